@@ -1,0 +1,53 @@
+"""What every solve returns: a value, a status whose text says what to do next, and statistics."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+
+class StatusCode(StrEnum):
+    """How a solve ended."""
+
+    OK = "ok"
+    OUT_OF_RANGE = "out_of_range"
+    NOT_CONVERGED = "not_converged"
+    NO_RING = "no_ring"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Status:
+    """How a solve ended and, when it did not succeed, what to do next."""
+
+    code: StatusCode = StatusCode.OK
+    text: str = "solved"
+
+    @property
+    def ok(self) -> bool:
+        """True when the value may be used without reservation."""
+        return self.code is StatusCode.OK
+
+
+@dataclass(frozen=True, kw_only=True)
+class Statistics:
+    """Counted work and residuals of a solve; wall time is kept apart because it does not reproduce."""
+
+    unknowns: int = 0
+    iterations: int = 0
+    relative_residual: float = 0.0
+    extra: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """Values with their uncertainty: arrays of one shape, SI, 95 % half-widths."""
+
+    value: FloatArray
+    uncertainty: FloatArray
+    status: Status = field(default_factory=Status)

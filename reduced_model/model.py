@@ -1,4 +1,4 @@
-"""What the closed loop needs of a balancer: its flow law, the moment of a pair of chambers, and its volumes."""
+"""What the closed loop needs of a balancer: its flow law, the moment of a pair of chambers, its volumes."""
 
 from __future__ import annotations
 

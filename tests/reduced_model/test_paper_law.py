@@ -1,0 +1,83 @@
+"""Eq. 19 behind the common interface."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from ringbalance.reduced_model import paper
+from ringbalance.reduced_model.flow_law import Regime
+from ringbalance.reduced_model.paper_law import paper_law, paper_model
+from ringbalance.scene.models import Scene
+
+
+def test_law_is_eq_19(paper_scene: Scene) -> None:
+    x = np.linspace(0, 0.5, 11)
+    flow = paper_law(paper_scene).evaluate(fill_ratio=x, gas_pressure=0.7e6)
+    expected = paper.velocity_paper(
+        disc=paper_scene.disc,
+        density=1000.0,
+        angular_velocity=paper_scene.rotor.speed,
+        drag_coefficient=50.0,
+        gas_pressure=0.7e6,
+        fill_ratio=x,
+    )
+    np.testing.assert_allclose(flow.velocity, expected, rtol=1e-14)
+    assert np.all(flow.regime == Regime.SIPHON)
+    # By hand at x = 0.25, where the levels agree: sqrt(2 * 700/51) m/s.
+    assert flow.velocity[5] == pytest.approx((2 * 700 / 51) ** 0.5, rel=1e-12)
+
+
+def test_law_is_blocked_below_stall_and_with_the_gas_off(paper_scene: Scene) -> None:
+    law = paper_law(paper_scene)
+    stall = float(
+        paper.stall_pressure(disc=paper_scene.disc, density=1e3, angular_velocity=paper_scene.rotor.speed)
+    )
+    flow = law.evaluate(
+        fill_ratio=[0.0, 0.0, 0.5], gas_pressure=[stall * (1 - 1e-9), stall * (1 + 1e-9), 0.0]
+    )
+    assert list(flow.regime) == [Regime.BLOCKED, Regime.SIPHON, Regime.BLOCKED]
+    assert flow.velocity[0] == flow.velocity[2] == 0.0
+    assert 0 < flow.velocity[1] < 1e-3
+
+
+def test_table_reproduces_the_law(paper_scene: Scene) -> None:
+    law = paper_law(paper_scene)
+    table = law.table()
+    squared = table["velocity_squared_per_pressure"] * (
+        0.9e6 + table["pressure_per_fill_difference"] * (0.3 - 0.1)
+    )
+    flow = law.evaluate(fill_ratio=0.3, opposite_fill_ratio=0.1, gas_pressure=0.9e6)
+    assert float(flow.velocity) == pytest.approx(float(squared[0]) ** 0.5, rel=1e-15)
+
+
+def test_scene_fixes_k_by_decree(paper_scene: Scene) -> None:
+    tube = dataclasses.replace(paper_scene.tube, drag_coefficient=20.0)
+    assert paper_law(dataclasses.replace(paper_scene, tube=tube)).drag_coefficient == 20.0
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"fill_ratio": 0.51, "gas_pressure": 1e5},
+        {"fill_ratio": -0.01, "gas_pressure": 1e5},
+        {"fill_ratio": np.nan, "gas_pressure": 1e5},
+        {"fill_ratio": 0.2, "opposite_fill_ratio": 0.6, "gas_pressure": 1e5},
+        {"fill_ratio": 0.2, "gas_pressure": np.nan},
+        {"fill_ratio": 0.2, "gas_pressure": -2e5},
+    ],
+)
+def test_law_refuses_what_cannot_be(paper_scene: Scene, arguments: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match=r"fill_ratio|gas_pressure"):
+        paper_law(paper_scene).evaluate(**arguments)
+
+
+def test_model_moves_72_mm_per_transferred_mass(paper_scene: Scene) -> None:
+    model = paper_model(paper_scene)
+    transferred = 0.1 * model.chamber_volume * model.density
+    moment = model.moment.pair_moment(fill_ratio=0.35, opposite_fill_ratio=0.15)
+    assert float(moment) == pytest.approx(72e-3 * transferred, rel=1e-14)
+    swapped = model.moment.pair_moment(fill_ratio=0.15, opposite_fill_ratio=0.35)
+    assert float(swapped) == -float(moment)

@@ -1,0 +1,50 @@
+# `make report` and `make test` are all that a newcomer needs; `make help` lists the rest.
+SHELL := /bin/sh
+VENV := .venv
+BENCH_VENV := .venv-bench
+PYTHON_IN_VENV := $(VENV)/bin/python
+SCENE ?= scenes/liquid_ring_paper.toml
+OUT ?= out
+WORKERS ?= 2
+# One thread per process: the tests run side by side, and sums then come out the same on every machine.
+export OPENBLAS_NUM_THREADS ?= 1
+export OMP_NUM_THREADS ?= 1
+export MKL_NUM_THREADS ?= 1
+
+.PHONY: help env report test test-heavy lint format bench lock clean
+
+help: ## list the targets
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1\t\2/p' Makefile | expand -t 18
+
+env: ## make .venv from requirements/lock.txt and see to off-screen OpenGL; nothing to do when up to date
+	@sh tools/make_env.sh $(VENV) requirements/lock.txt
+	@sh tools/make_opengl.sh "$(CURDIR)/$(PYTHON_IN_VENV)"
+
+report: env ## the report on SCENE (the paper's disc) into OUT (out/)
+	$(VENV)/bin/ringbalance report $(SCENE) --out $(OUT)
+
+test: lint ## lint, types and every test but the heavy ones
+	$(PYTHON_IN_VENV) -m pytest -n $(WORKERS)
+
+test-heavy: env ## the tests that take long
+	$(PYTHON_IN_VENV) -m pytest -n $(WORKERS) -m heavy
+
+lint: env ## ruff and mypy
+	$(VENV)/bin/ruff check .
+	$(VENV)/bin/ruff format --check .
+	$(VENV)/bin/mypy
+
+format: env ## let ruff write what `make lint` asks for
+	$(VENV)/bin/ruff check --fix .
+	$(VENV)/bin/ruff format .
+
+bench: ## timed comparisons, in an environment of their own with every extra (hundreds of MB)
+	@sh tools/make_env.sh $(BENCH_VENV) requirements/lock-all.txt
+	$(BENCH_VENV)/bin/python benchmarks/pressure_field.py
+
+lock: env ## write the lock files anew from pyproject.toml (a change of dependencies only)
+	sh tools/make_lock.sh $(VENV)/bin/uv
+
+clean: ## remove what the other targets made, the environments included
+	rm -rf $(VENV) $(BENCH_VENV) out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -not -path './.git/*' -prune -exec rm -rf {} +

@@ -1,0 +1,77 @@
+#!/bin/sh
+# Makes a virtual environment from a lock file, from nothing more than a python3 with or without venv.
+#   tools/make_env.sh VENV LOCK     e.g. tools/make_env.sh .venv requirements/lock.txt
+# Says and does nothing when the environment is up to date. Never reads standard input.
+set -eu
+cd "$(dirname "$0")/.."
+venv=$1
+lock=$2
+bootstrap=requirements/bootstrap.txt
+exec </dev/null
+
+. tools/debian_packages.sh
+
+in_range() {
+    "$1" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null
+}
+
+has_venv() {
+    "$1" -c 'import ensurepip, venv' 2>/dev/null
+}
+
+# Prints the first Python that will do; PYTHON=... on the make command line goes before all others.
+find_python() {
+    for candidate in ${PYTHON:-} python3 python3.13 python3.12 python3.11; do
+        if in_range "$candidate" && has_venv "$candidate"; then
+            printf '%s\n' "$candidate"
+            return
+        fi
+    done
+    return 1
+}
+
+# A bare Debian's python3 has neither pip nor venv.
+require_python() {
+    find_python && return
+    debian_packages "a Python with venv" python3 python3-venv >&2 || exit 1
+    find_python && return
+    echo "ringbalance needs Python 3.11, 3.12 or 3.13 with venv; found: $(python3 -V 2>&1 || true)." >&2
+    echo "Name one that this machine has, for example: make env PYTHON=/opt/python3.12/bin/python3" >&2
+    exit 1
+}
+
+fingerprint() {
+    pwd
+    cat tools/make_env.sh "$bootstrap" "$lock" | cksum
+}
+
+install_locked() {
+    # pip is asked when uv cannot: a mirror is often made known to pip alone.
+    "$venv/bin/uv" pip install --quiet --python "$venv/bin/python" --require-hashes -r "$lock" ||
+        {
+            echo "uv could not install the packages; trying pip with the same hashes ..."
+            "$venv/bin/python" -m pip install --quiet --require-hashes -r "$lock"
+        }
+}
+
+make_venv() {
+    python=$(require_python)
+    echo "making $venv with $("$python" -V) from $lock ..."
+    rm -f "$venv/.lock-stamp" "$venv/.project-stamp"
+    "$python" -m venv --clear "$venv"
+    "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --require-hashes -r "$bootstrap"
+    install_locked
+    fingerprint >"$venv/.lock-stamp"
+}
+
+install_project() {
+    "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+    cksum <pyproject.toml >"$venv/.project-stamp"
+}
+
+if ! "$venv/bin/python" -c '' 2>/dev/null || [ "$(fingerprint)" != "$(cat "$venv/.lock-stamp" 2>/dev/null)" ]; then
+    make_venv
+fi
+if [ "$(cksum <pyproject.toml)" != "$(cat "$venv/.project-stamp" 2>/dev/null)" ]; then
+    install_project
+fi

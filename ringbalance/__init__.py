@@ -1,3 +1,32 @@
-"""ringbalance: are the closed formulas of a liquid-ring balancer to be trusted, for your disc?"""
+"""ringbalance: are the closed formulas of a liquid-ring balancer to be trusted, for your disc?
+
+The names below are loaded when they are first used, so that `import ringbalance` costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ringbalance.scene import SceneError as SceneError
+    from ringbalance.scene import bundled_scene as bundled_scene
+    from ringbalance.scene import load_scene as load_scene
 
 __version__ = "0.1.0"
+
+_HOME = {
+    "SceneError": "ringbalance.scene",
+    "bundled_scene": "ringbalance.scene",
+    "load_scene": "ringbalance.scene",
+}
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOME})

@@ -1,0 +1,56 @@
+"""The repository as the architecture tests see it: its root, its rooms and the files that git knows."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+ROOM_ORDER = ("scene", "mesh", "physics", "reduced_model", "controller", "verification", "reports")
+
+
+@pytest.fixture(scope="session")
+def root() -> Path:
+    """Top folder of the repository."""
+    return ROOT
+
+
+@pytest.fixture(scope="session")
+def room_order() -> tuple[str, ...]:
+    """The rooms, first to last; a room imports only from those before it."""
+    return ROOM_ORDER
+
+
+@pytest.fixture(scope="session")
+def modules() -> Mapping[str, Path]:
+    """Dotted name to file, for every module of every room."""
+    found: dict[str, Path] = {}
+    for room in ROOM_ORDER:
+        for path in sorted((ROOT / room).rglob("*.py")):
+            parts = path.relative_to(ROOT).with_suffix("").parts
+            name = ".".join(("ringbalance", *(part for part in parts if part != "__init__")))
+            found[name] = path
+    return found
+
+
+@pytest.fixture(scope="session")
+def tracked_files() -> tuple[Path, ...]:
+    """Files that git tracks or would track; symbolic links are left out."""
+    command = [
+        "git",
+        "-c",
+        "safe.directory=*",
+        "ls-files",
+        "--cached",
+        "--others",
+        "--exclude-standard",
+        "-z",
+    ]
+    listing = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    if listing.returncode != 0:
+        pytest.skip(f"not a git checkout: {listing.stderr.strip()}")
+    paths = [ROOT / name for name in sorted(set(listing.stdout.split("\0"))) if name]
+    return tuple(path for path in paths if path.is_file() and not path.is_symlink())

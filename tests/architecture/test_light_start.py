@@ -1,0 +1,41 @@
+"""`--help` and `import ringbalance` load nothing heavy; threads are set before numpy could see them."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+HEAVY = (
+    "numpy",
+    "scipy",
+    "vtk",
+    "vtkmodules",
+    "pyvista",
+    "skfem",
+    "matplotlib",
+    "pydantic",
+    "fluids",
+    "meshio",
+)
+REPORT = "import json, sys; sys.stderr.write(json.dumps(sorted(sys.modules)))"
+
+
+def loaded(code: str) -> set[str]:
+    """Top-level names of the modules that a fresh interpreter has after running some code."""
+    command = [sys.executable, "-c", f"{code}\n{REPORT}"]
+    child = subprocess.run(command, capture_output=True, text=True, check=True)
+    return {name.split(".")[0] for name in json.loads(child.stderr)}
+
+
+def test_help_loads_nothing_heavy() -> None:
+    code = "from ringbalance.cli import main\nassert main(['--help']) == 0"
+    assert loaded(code) & set(HEAVY) == set()
+
+
+def test_import_loads_nothing_heavy() -> None:
+    assert loaded("import ringbalance\ndir(ringbalance)") & set(HEAVY) == set()
+
+
+def test_a_heavy_start_would_be_seen() -> None:
+    assert "numpy" in loaded("import ringbalance.mesh.geometry")

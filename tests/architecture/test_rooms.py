@@ -1,0 +1,145 @@
+"""One way through the house: a room imports only from rooms before it, absolutely, and at module level."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Mapping, Sequence
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+DYNAMIC = {"import_module", "__import__"}
+
+
+def imported_names(node: ast.AST) -> list[str]:
+    """Dotted names that an import statement may load, submodules included."""
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names]
+    if isinstance(node, ast.ImportFrom) and node.module:
+        return [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+    return []
+
+
+def _called_name(node: ast.Call) -> str:
+    return getattr(node.func, "id", "") or getattr(node.func, "attr", "")
+
+
+def _function_nodes(tree: ast.AST) -> Iterator[ast.AST]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            yield from ast.walk(node)
+
+
+def style_faults(source: str) -> list[str]:
+    """Imports that are relative, dynamic, or hidden in a function's body."""
+    tree = ast.parse(source)
+    faults = [
+        f"line {node.lineno}: relative import"
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and node.level
+    ]
+    faults += [
+        f"line {node.lineno}: import inside a function"
+        for node in _function_nodes(tree)
+        if isinstance(node, ast.Import | ast.ImportFrom)
+    ]
+    faults += [
+        f"line {node.lineno}: dynamic import"
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call) and _called_name(node) in DYNAMIC
+    ]
+    return faults
+
+
+def room_faults(source: str, *, room: str, room_order: Sequence[str]) -> list[str]:
+    """Imports from the face or from a later room."""
+    allowed = {*room_order[: room_order.index(room) + 1]}
+    faults = []
+    for node in ast.walk(ast.parse(source)):
+        for name in imported_names(node)[:1]:
+            top, _, rest = name.partition(".")
+            if top == "ringbalance" and rest.split(".")[0] not in allowed:
+                faults.append(f"line {getattr(node, 'lineno', 0)}: {room} imports {name}")
+    return faults
+
+
+def import_graph(sources: Mapping[str, str]) -> dict[str, set[str]]:
+    """Module to the modules of the project that it imports."""
+    return {
+        module: {
+            name for node in ast.walk(ast.parse(source)) for name in imported_names(node) if name in sources
+        }
+        - {module}
+        for module, source in sources.items()
+    }
+
+
+def cycle(sources: Mapping[str, str]) -> list[str]:
+    """One import cycle, or nothing."""
+    try:
+        TopologicalSorter(import_graph(sources)).prepare()
+    except CycleError as error:
+        return list(error.args[1])
+    return []
+
+
+def test_imports_are_absolute_and_at_module_level(modules: Mapping[str, Path]) -> None:
+    faults = {name: style_faults(path.read_text()) for name, path in modules.items()}
+    assert {name: found for name, found in faults.items() if found} == {}
+
+
+def test_no_room_imports_from_a_later_room(modules: Mapping[str, Path], room_order: tuple[str, ...]) -> None:
+    faults = [
+        f"{name}: {fault}"
+        for name, path in modules.items()
+        for fault in room_faults(path.read_text(), room=name.split(".")[1], room_order=room_order)
+    ]
+    assert faults == []
+
+
+def test_no_import_cycle(modules: Mapping[str, Path]) -> None:
+    assert cycle({name: path.read_text() for name, path in modules.items()}) == []
+
+
+@pytest.mark.parametrize(
+    ("source", "fault"),
+    [
+        ("from . import geometry", "relative"),
+        ("def f():\n    import numpy", "inside a function"),
+        ("class A:\n    def f(self):\n        from os import path", "inside a function"),
+        ("import importlib\nimportlib.import_module('ringbalance.reports')", "dynamic"),
+        ("__import__('numpy')", "dynamic"),
+    ],
+)
+def test_style_faults_are_seen(source: str, fault: str) -> None:
+    assert any(fault in found for found in style_faults(source))
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "import ringbalance.reports.cli",
+        "from ringbalance.controller import simulate",
+        "from ringbalance.controller.loop import simulate",
+        "from ringbalance import load_scene",
+        "if True:\n    from ringbalance.verification import run_case",
+    ],
+)
+def test_upward_imports_are_seen(source: str, room_order: tuple[str, ...]) -> None:
+    assert len(room_faults(source, room="mesh", room_order=room_order)) == 1
+
+
+def test_lawful_imports_are_let_through(room_order: tuple[str, ...]) -> None:
+    source = "import numpy\nfrom ringbalance.scene.models import Disc\nimport ringbalance.mesh.geometry"
+    assert room_faults(source, room="mesh", room_order=room_order) == []
+    assert style_faults(source) == []
+
+
+def test_a_cycle_is_seen() -> None:
+    sources = {
+        "ringbalance.mesh.a": "from ringbalance.mesh import b",
+        "ringbalance.mesh.b": "from ringbalance.mesh.c import f",
+        "ringbalance.mesh.c": "import ringbalance.mesh.a",
+    }
+    assert set(cycle(sources)) == set(sources)

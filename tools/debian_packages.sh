@@ -1,3 +1,4 @@
+# shellcheck shell=sh
 # Sourced by the set-up scripts.
 # debian_packages WHAT PACKAGE...: installs Debian packages as root, else prints the one line to run and fails.
 debian_packages() {

@@ -30,12 +30,14 @@ find_python() {
     return 1
 }
 
-# A bare Debian's python3 has neither pip nor venv.
+# A bare Debian's python3 has neither pip nor venv. What off-screen OpenGL lacks goes into the same one line.
 require_python() {
     find_python && return
-    debian_packages "a Python with venv" python3 python3-venv >&2 || exit 1
+    opengl=$(python3 tools/check_opengl.py 2>/dev/null) || true
+    # shellcheck disable=SC2086
+    debian_packages "a Python with venv" python3 python3-venv $opengl >&2 || exit 1
     find_python && return
-    echo "ringbalance needs Python 3.11, 3.12 or 3.13 with venv; found: $(python3 -V 2>&1 || true)." >&2
+    echo "ringbalance needs Python 3.11, 3.12 or 3.13 with venv; found: $(python3 -V 2>&1)." >&2
     echo "Name one that this machine has, for example: make env PYTHON=/opt/python3.12/bin/python3" >&2
     exit 1
 }

@@ -6,6 +6,7 @@ PYTHON_IN_VENV := $(VENV)/bin/python
 SCENE ?= scenes/liquid_ring_paper.toml
 OUT ?= out
 WORKERS ?= 2
+CODE := scene mesh physics reduced_model controller verification reports tools benchmarks
 # One thread per process: the tests run side by side, and sums then come out the same on every machine.
 export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
@@ -33,6 +34,7 @@ lint: env ## ruff and mypy
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
+	$(PYTHON_IN_VENV) tools/long_functions.py $(CODE)
 
 format: env ## let ruff write what `make lint` asks for
 	$(VENV)/bin/ruff check --fix .

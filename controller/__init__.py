@@ -1,0 +1,24 @@
+"""The closed loop: rotor, liquid-ring disc, control algorithms and the ways to carry an operation through."""
+
+from ringbalance.controller.algorithm import Command, Controller, Measurement, ValveCommand
+from ringbalance.controller.algorithms import controller_of
+from ringbalance.controller.document import simulation_document
+from ringbalance.controller.loop import simulate
+from ringbalance.controller.simulation import Injection, Outcome, Simulation
+from ringbalance.controller.target_vector import TargetVector
+from ringbalance.controller.trial import Trial
+
+__all__ = [
+    "Command",
+    "Controller",
+    "Injection",
+    "Measurement",
+    "Outcome",
+    "Simulation",
+    "TargetVector",
+    "Trial",
+    "ValveCommand",
+    "controller_of",
+    "simulate",
+    "simulation_document",
+]

@@ -1,0 +1,73 @@
+"""A finished run as the JSON document that scripts rely on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.controller.simulation import Injection, Sample, Simulation
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def simulation_document(simulation: Simulation) -> dict[str, Any]:
+    """Turn a run into plain numbers, lists and text, all in SI.
+
+    `time_s`, `amplitude_m`, `phase_rad` and each list of `fill_ratio` run together and hold the true state;
+    what the sensor showed is under `samples`, null where a sample was dropped or not a number.
+
+    Args:
+        simulation: the run.
+
+    Returns:
+        Document that `json.dumps(..., allow_nan=False)` accepts.
+    """
+    return {
+        "balancer": simulation.balancer,
+        "law": simulation.law,
+        "integrator": simulation.integrator,
+        "settled": simulation.settled,
+        "settling_time_s": simulation.settling_time,
+        "outcome": simulation.outcome.value,
+        "status": simulation.status,
+        "limit_m": simulation.limit,
+        "time_s": simulation.time.tolist(),
+        "amplitude_m": simulation.amplitude.tolist(),
+        "phase_rad": simulation.phase.tolist(),
+        "injections": [_injection(injection) for injection in simulation.injections],
+        "fill_ratio": {letter: fill.tolist() for letter, fill in simulation.fill_ratio.items()},
+        "overshoots": simulation.overshoots,
+        "misadjustments": simulation.misadjustments,
+        "noise_floor_m": simulation.noise_floor,
+        "samples": _samples(simulation.samples),
+    }
+
+
+def _injection(injection: Injection) -> dict[str, Any]:
+    operation = injection.operation
+    return {
+        "time_s": injection.time,
+        "chamber": injection.chamber,
+        "duration_s": operation.duration,
+        "regime": operation.regime_start.label,
+        "regime_end": operation.regime_end.label,
+        "event": operation.event.value,
+        "fill_before": operation.fill_before,
+        "fill_after": operation.fill_after,
+    }
+
+
+def _samples(samples: tuple[Sample, ...]) -> dict[str, Any]:
+    seen = [sample.measurement for sample in samples]
+    return {
+        "time_s": [sample.time for sample in samples],
+        "amplitude_m": [None if m is None else _number(m.amplitude) for m in seen],
+        "phase_rad": [None if m is None else _number(m.phase) for m in seen],
+        "resting": [sample.command.resting for sample in samples],
+    }
+
+
+def _number(value: float) -> float | None:
+    return value if np.isfinite(value) else None

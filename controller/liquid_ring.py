@@ -1,0 +1,225 @@
+"""The plant: the liquid-ring disc with its pairs of chambers, advanced through open valves and waiting."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.controller.transfer import Drive, Event, Integrator, Transfer
+from ringbalance.reduced_model.flow_law import Regime
+from ringbalance.reduced_model.model import BalancerModel
+from ringbalance.scene.models import Disc
+
+FloatArray = npt.NDArray[np.float64]
+
+NOTICEABLE: Final = 1e-12
+"""Change of a fill ratio that counts as movement."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PairState:
+    """Liquid of two opposite chambers: one fill is stored, the other follows from the total."""
+
+    fill: float
+    """x of the chamber on the positive side of the pair's axis (A, B, ...)."""
+    total: float
+    """Sum of the two fill ratios, constant."""
+    primed: bool = False
+    """Whether the connecting tube holds a continuous column."""
+    driven_first: bool = True
+    """Whether the last gas went into the chamber on the positive side."""
+
+    @property
+    def opposite_fill(self) -> float:
+        """x of the chamber on the negative side, total - x."""
+        return self.total - self.fill
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiscState:
+    """All pairs of the disc, in the order of their first chamber."""
+
+    pairs: tuple[PairState, ...]
+
+    def fills(self) -> tuple[float, ...]:
+        """Fill ratios of all chambers.
+
+        Returns:
+            x in the order of the letters, n numbers.
+        """
+        first = tuple(pair.fill for pair in self.pairs)
+        return first + tuple(pair.opposite_fill for pair in self.pairs)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Operation:
+    """What one open valve did."""
+
+    chamber: int
+    """Index of the driven chamber."""
+    duration: float
+    """s."""
+    fill_before: float
+    """x of the driven chamber when the valve opened."""
+    fill_after: float
+    """x of the driven chamber when the valve closed."""
+    regime_start: Regime
+    regime_end: Regime
+    event: Event
+
+    @property
+    def moved(self) -> bool:
+        """Whether any liquid passed."""
+        return abs(self.fill_after - self.fill_before) > NOTICEABLE
+
+
+@dataclass(frozen=True, kw_only=True)
+class Advance:
+    """The disc over one stretch of time."""
+
+    instants: FloatArray
+    """s from the start of the stretch, shape (m,), ascending, the last one its end."""
+    fill_ratio: FloatArray
+    """x of every chamber, shape (n, m)."""
+    state: DiscState
+    """At the end."""
+    operations: tuple[Operation, ...]
+    drift: float
+    """Largest change of a fill ratio while a pair's gas was off."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LiquidRing:
+    """The disc's flow law, moments and gas, with the integrator that carries it through time."""
+
+    model: BalancerModel
+    chambers: int
+    """n, even."""
+    gas_pressure: float
+    """Gauge, Pa, in a chamber while its valve is open."""
+    integrator: Integrator
+
+    def advance(
+        self, state: DiscState, *, gas_times: Mapping[int, float], duration: float, points: int
+    ) -> Advance:
+        """Let time pass with some valves open from its start, all pairs in parallel.
+
+        Args:
+            state: at the start.
+            gas_times: s for each driven chamber's index, at most `duration`; empty while waiting.
+            duration: s, above zero.
+            points: equally spaced instants to record beside the closing of each valve, at least 1.
+
+        Returns:
+            Advance.
+
+        Raises:
+            ValueError: gas into both chambers of a pair at once.
+        """
+        spaced = duration * np.arange(1, points + 1) / points
+        instants = np.unique(np.concatenate([spaced, np.fromiter(gas_times.values(), dtype=np.float64)]))
+        half = self.chambers // 2
+        paths = [
+            self._pair(pair, index, _open_valve(gas_times, index, index + half), instants)
+            for index, pair in enumerate(state.pairs)
+        ]
+        first = np.array([path.fill for path in paths])
+        totals = np.array([[pair.total] for pair in state.pairs])
+        return Advance(
+            instants=instants,
+            fill_ratio=np.concatenate([first, totals - first]),
+            state=DiscState(pairs=tuple(path.state for path in paths)),
+            operations=tuple(path.operation for path in paths if path.operation is not None),
+            drift=max(path.drift for path in paths),
+        )
+
+    def _pair(self, pair: PairState, index: int, valve: _Valve | None, instants: FloatArray) -> _Path:
+        """Gas on until the valve closes, then gas off to the end."""
+        if valve is None:
+            return self._gas_off(pair, instants)
+        on = instants[instants <= valve.duration]
+        first = valve.chamber == index
+        transfer = self.integrator(self._drive(pair, first=first, gas_pressure=self.gas_pressure), on)
+        after = _moved(pair, transfer, first=first)
+        off = self._gas_off(after, instants[on.size :] - valve.duration)
+        before = pair.fill if first else pair.opposite_fill
+        operation = Operation(
+            chamber=valve.chamber,
+            duration=valve.duration,
+            fill_before=before,
+            fill_after=float(transfer.fill[-1]),
+            regime_start=transfer.regime_start,
+            regime_end=transfer.regime_end,
+            event=transfer.event,
+        )
+        fill = np.concatenate([_first_fill(pair, transfer, first=first), off.fill])
+        return replace(off, fill=fill, operation=operation)
+
+    def _gas_off(self, pair: PairState, instants: FloatArray) -> _Path:
+        """A full tube lets the levels run back; one that does not hold its column empties at once."""
+        if instants.size == 0 or not pair.primed:
+            return _Path(state=pair, fill=np.full(instants.shape, pair.fill), operation=None, drift=0.0)
+        first = pair.driven_first
+        transfer = self.integrator(self._drive(pair, first=first, gas_pressure=0.0), instants)
+        after = _moved(pair, transfer, first=first)
+        fill = _first_fill(pair, transfer, first=first)
+        return _Path(state=after, fill=fill, operation=None, drift=abs(after.fill - pair.fill))
+
+    def _drive(self, pair: PairState, *, first: bool, gas_pressure: float) -> Drive:
+        return Drive(
+            law=self.model.flow,
+            fill=pair.fill if first else pair.opposite_fill,
+            total=pair.total,
+            exchange_rate=self.model.tube_area / self.model.chamber_volume,
+            gas_pressure=gas_pressure,
+            primed=pair.primed,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Valve:
+    chamber: int
+    duration: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Path:
+    """One pair over one stretch of time."""
+
+    state: PairState
+    fill: FloatArray
+    operation: Operation | None
+    drift: float
+
+
+def initial_state(*, disc: Disc) -> DiscState:
+    """All chambers at the scene's initial fill, no tube primed.
+
+    Args:
+        disc: the disc.
+
+    Returns:
+        DiscState.
+    """
+    pair = PairState(fill=disc.initial_fill, total=2 * disc.initial_fill)
+    return DiscState(pairs=(pair,) * (disc.chambers // 2))
+
+
+def _first_fill(pair: PairState, transfer: Transfer, *, first: bool) -> FloatArray:
+    return transfer.fill if first else np.asarray(pair.total - transfer.fill, dtype=np.float64)
+
+
+def _moved(pair: PairState, transfer: Transfer, *, first: bool) -> PairState:
+    fill = float(_first_fill(pair, transfer, first=first)[-1])
+    return replace(pair, fill=fill, primed=transfer.primed, driven_first=first)
+
+
+def _open_valve(gas_times: Mapping[int, float], first: int, opposite: int) -> _Valve | None:
+    asked = [_Valve(chamber=i, duration=gas_times[i]) for i in (first, opposite) if i in gas_times]
+    if len(asked) > 1:
+        raise ValueError(f"gas into chambers {first} and {opposite} of one pair at once")
+    return asked[0] if asked else None

@@ -1,0 +1,237 @@
+"""The closed loop: sample, command, gas open, gas closed, wait, sample again, until it settles or cannot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.controller.algorithm import Command, Controller, Measurement, usable
+from ringbalance.controller.algorithms import controller_of
+from ringbalance.controller.closed_form import closed_form, has_closed_form
+from ringbalance.controller.judgement import misadjustments, noise_floor, overshoots, rose, settling_time
+from ringbalance.controller.liquid_ring import Advance, DiscState, LiquidRing, initial_state
+from ringbalance.controller.outcome import Cause, Facts, outcome_of, status_text
+from ringbalance.controller.quadrature import quadrature
+from ringbalance.controller.rotor import chamber_letters, disc_unbalance, vibration
+from ringbalance.controller.sensor import Sensor, noisy_sensor
+from ringbalance.controller.simulation import Injection, Outcome, Sample, Simulation
+from ringbalance.controller.transfer import Integrator
+from ringbalance.reduced_model.model import BalancerModel
+from ringbalance.scene.models import Scene
+
+FloatArray = npt.NDArray[np.float64]
+Progress = Callable[[float, float], None]
+"""Called with the simulated time and the time limit, s."""
+
+GAS_POINTS: Final = 8
+"""Instants recorded within one command's gas time."""
+DRIFT_POINTS: Final = 4
+"""Instants recorded within a wait during which liquid may run back."""
+MAX_SAMPLES: Final = 100_000
+IDLE_OPERATIONS: Final = 3
+"""Commands in a row, beyond one for each chamber, that may move nothing before the run ends."""
+
+
+def simulate(
+    scene: Scene,
+    model: BalancerModel,
+    *,
+    controller: Controller[Any] | None = None,
+    integrator: Integrator | None = None,
+    sensor: Sensor | None = None,
+    progress: Progress | None = None,
+) -> Simulation:
+    """One closed-loop run of a scene under a balancer model.
+
+    Sample, step of the controller, gas into the commanded chambers (all pairs in parallel), gas off, wait of
+    one period, next sample; until nothing can change any more, the run cannot succeed, or the time is up.
+
+    Args:
+        scene: rotor, sensor, controller settings, gas pressure, seed and time limit.
+        model: flow law and moments of the balancer.
+        controller: the algorithm; default the one that the scene names.
+        integrator: how operations are carried through time; default the closed form when the law has one,
+            else the quadrature.
+        sensor: what the controller sees; default the scene's noise from the scene's seed.
+        progress: called once per sample; None for silence.
+
+    Returns:
+        Simulation; its status says how the run ended and what to do next.
+
+    Raises:
+        SceneError: an algorithm that this program does not have.
+
+    Source: section 5 and Fig. 5 of the liquid-ring paper.
+    """
+    chosen = integrator or (closed_form if has_closed_form(model.flow) else quadrature)
+    run = _Run(
+        scene=scene,
+        plant=LiquidRing(
+            model=model,
+            chambers=scene.disc.chambers,
+            gas_pressure=scene.gas.pressure,
+            integrator=chosen,
+        ),
+        controller=controller or controller_of(scene),
+        sensor=sensor or noisy_sensor(sensor=scene.sensor, seed=scene.run.seed),
+        exact=sensor is None and scene.sensor.amplitude_noise == scene.sensor.phase_noise == 0,
+        state=initial_state(disc=scene.disc),
+    )
+    cause = run.go(progress or _silent)
+    return _record(run, cause, integrator=getattr(chosen, "__name__", "custom"))
+
+
+def _silent(_: float, __: float) -> None:
+    """No progress wanted."""
+
+
+@dataclass(kw_only=True)
+class _Run:
+    """What changes during one run; lives inside one call of `simulate`."""
+
+    scene: Scene
+    plant: LiquidRing
+    controller: Controller[Any]
+    sensor: Sensor
+    exact: bool
+    state: DiscState
+    time: float = 0.0
+    times: list[FloatArray] = field(default_factory=list)
+    fills: list[FloatArray] = field(default_factory=list)
+    samples: list[Sample] = field(default_factory=list)
+    injections: list[Injection] = field(default_factory=list)
+    last_usable: Measurement | None = None
+    operated: bool = False
+    rises: int = 0
+    idle: int = 0
+    drift: float = 0.0
+
+    @property
+    def remaining(self) -> float:
+        return self.scene.run.time_limit - self.time
+
+    @property
+    def floor(self) -> float:
+        return noise_floor(
+            amplitude_noise=self.scene.sensor.amplitude_noise,
+            initial_amplitude=self.scene.rotor.initial_amplitude,
+        )
+
+    def go(self, progress: Progress) -> Cause:
+        """Cycle until there is a cause to stop."""
+        self._keep(np.zeros(1), np.array(self.state.fills())[:, None])
+        memory = self.controller.start()
+        for _ in range(MAX_SAMPLES):
+            progress(self.time, self.scene.run.time_limit)
+            measurement = self.sensor(self.time, self._vibration())
+            memory, command = self.controller.step(memory, measurement)
+            self.samples.append(Sample(time=self.time, measurement=measurement, command=command))
+            self._watch(measurement)
+            cause = self._cause(command)
+            if cause is not None:
+                return cause
+            self._gas(command)
+            self._wait()
+        return Cause.SAMPLES
+
+    def _vibration(self) -> complex:
+        moment = disc_unbalance(moment=self.plant.model.moment, fill_ratio=self.state.fills())
+        return complex(vibration(rotor=self.scene.rotor, moment=moment))
+
+    def _watch(self, measurement: Measurement | None) -> None:
+        """Count the rises in a row; a sample without a usable amplitude is passed over."""
+        if measurement is None or not usable(measurement, needs_phase=False):
+            return
+        if self.last_usable is not None and self.operated:
+            higher = rose(self.last_usable, measurement, floor=self.floor)
+            self.rises = self.rises + 1 if higher else 0
+        self.last_usable, self.operated = measurement, False
+
+    def _cause(self, command: Command) -> Cause | None:
+        if self.rises > self.controller.rises_tolerated:
+            return Cause.RISING
+        if self.idle >= IDLE_OPERATIONS + self.plant.chambers:
+            return Cause.IDLE
+        if command.resting and self.exact and not any(pair.primed for pair in self.state.pairs):
+            return Cause.AT_REST
+        return Cause.TIME if self.remaining <= 0 else None
+
+    def _gas(self, command: Command) -> None:
+        """All valves of a command open together; the stretch ends when the last one has closed."""
+        if not command.valves:
+            return
+        gas_times = {valve.chamber: min(valve.duration, self.remaining) for valve in command.valves}
+        advance = self.plant.advance(
+            self.state, gas_times=gas_times, duration=max(gas_times.values()), points=GAS_POINTS
+        )
+        letters = chamber_letters(self.plant.chambers)
+        self.injections += [
+            Injection(time=self.time, chamber=letters[operation.chamber], operation=operation)
+            for operation in advance.operations
+        ]
+        self.operated = True
+        self.idle = 0 if any(operation.moved for operation in advance.operations) else self.idle + 1
+        self._pass(advance)
+
+    def _wait(self) -> None:
+        duration = min(self.scene.controller.period, self.remaining)
+        if duration > 0:
+            points = DRIFT_POINTS if any(pair.primed for pair in self.state.pairs) else 1
+            self._pass(self.plant.advance(self.state, gas_times={}, duration=duration, points=points))
+
+    def _pass(self, advance: Advance) -> None:
+        self._keep(self.time + advance.instants, advance.fill_ratio)
+        self.state = advance.state
+        self.drift = max(self.drift, advance.drift)
+        self.time += float(advance.instants[-1])
+
+    def _keep(self, time: FloatArray, fill_ratio: FloatArray) -> None:
+        self.times.append(time)
+        self.fills.append(fill_ratio)
+
+
+def _record(run: _Run, cause: Cause, *, integrator: str) -> Simulation:
+    """Judge a finished run and freeze it."""
+    time, fills = np.concatenate(run.times), np.concatenate(run.fills, axis=1)
+    moment = disc_unbalance(moment=run.plant.model.moment, fill_ratio=fills)
+    seen = vibration(rotor=run.scene.rotor, moment=moment)
+    amplitude, limit = np.abs(seen), run.scene.controller.limit
+    facts = Facts(
+        scene=run.scene,
+        plant=run.plant,
+        state=run.state,
+        cause=cause,
+        time=run.time,
+        initial_amplitude=float(amplitude[0]),
+        final_amplitude=float(amplitude[-1]),
+        noise_floor=run.floor,
+        drift=run.drift,
+        overshoots=overshoots(run.samples, limit=limit),
+        samples=tuple(run.samples),
+        injections=tuple(run.injections),
+    )
+    outcome = outcome_of(facts)
+    settled = outcome is Outcome.SETTLED
+    return Simulation(
+        balancer="liquid_ring",
+        law=run.plant.model.name,
+        integrator=integrator,
+        outcome=outcome,
+        settled=settled,
+        settling_time=settling_time(time=time, amplitude=amplitude, limit=limit) if settled else None,
+        status=status_text(facts, outcome),
+        time=time,
+        amplitude=amplitude,
+        phase=np.angle(seen),
+        fill_ratio=dict(zip(chamber_letters(run.plant.chambers), fills, strict=True)),
+        injections=facts.injections,
+        samples=facts.samples,
+        overshoots=facts.overshoots,
+        misadjustments=misadjustments(run.samples, floor=run.floor),
+        noise_floor=run.floor,
+        limit=limit,
+    )

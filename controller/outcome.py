@@ -1,0 +1,246 @@
+"""How a run ended, found from its facts, and one text for each that says what to do next."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+from ringbalance.controller.judgement import NOISE_DEVIATIONS
+from ringbalance.controller.liquid_ring import NOTICEABLE, DiscState, LiquidRing
+from ringbalance.controller.reach import largest_pair_moment, starting_pressure, unreachable_moment
+from ringbalance.controller.rotor import influence, initial_vibration
+from ringbalance.controller.simulation import Injection, Outcome, Sample
+from ringbalance.controller.transfer import Event
+from ringbalance.scene.models import Scene
+
+MICROMETRE: Final = 1e-6
+GRAM_MILLIMETRE: Final = 1e-6
+
+
+class Cause(StrEnum):
+    """Why the loop stopped cycling."""
+
+    AT_REST = "at_rest"
+    """The controller rests, the sensor is exact and no liquid can move: nothing will change."""
+    TIME = "time"
+    IDLE = "idle"
+    """Several commands in a row moved no liquid."""
+    RISING = "rising"
+    """The amplitude rose after more operations in a row than the algorithm can explain."""
+    SAMPLES = "samples"
+    """The bound on the number of samples."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Facts:
+    """What a finished run knows about itself."""
+
+    scene: Scene
+    plant: LiquidRing
+    state: DiscState
+    """At the end."""
+    cause: Cause
+    time: float
+    """s, at the end."""
+    initial_amplitude: float
+    """m."""
+    final_amplitude: float
+    """m."""
+    noise_floor: float
+    """m."""
+    drift: float
+    """Largest change of a fill ratio while the gas was off."""
+    overshoots: int
+    samples: tuple[Sample, ...]
+    injections: tuple[Injection, ...]
+
+    @property
+    def wanted_moment(self) -> complex:
+        """Moment that would cancel the initial vibration, kg m."""
+        rotor = self.scene.rotor
+        k = influence(coefficient=rotor.influence_coefficient, lag_angle=rotor.lag_angle)
+        return -initial_vibration(rotor=rotor) / k
+
+    @property
+    def unreachable_amplitude(self) -> float:
+        """Vibration that remains with the liquid at its best, m."""
+        missing = unreachable_moment(plant=self.plant, state=self.state, wanted=self.wanted_moment)
+        return missing * self.scene.rotor.influence_coefficient
+
+    @property
+    def last_events(self) -> frozenset[Event]:
+        """What ended the flows of the last command."""
+        last = self.injections[-1].time if self.injections else None
+        return frozenset(i.operation.event for i in self.injections if i.time == last)
+
+
+def outcome_of(facts: Facts) -> Outcome:
+    """Classify how a run ended.
+
+    Args:
+        facts: of the run.
+
+    Returns:
+        Outcome; SETTLED only when the controller rests and the true amplitude is at or below the limit.
+    """
+    limit = facts.scene.controller.limit
+    if facts.samples[-1].command.resting and facts.final_amplitude <= limit:
+        return Outcome.SETTLED
+    higher = facts.final_amplitude > facts.initial_amplitude + facts.noise_floor
+    if facts.cause is Cause.RISING or (facts.cause is Cause.IDLE and higher):
+        return Outcome.DRIFTING if facts.drift > NOTICEABLE else Outcome.DIVERGING
+    if facts.unreachable_amplitude > limit:
+        return Outcome.CAPACITY_EXCEEDED
+    if facts.cause is Cause.IDLE:
+        return Outcome.STALLED if Event.BLOCKED in facts.last_events else Outcome.CHAMBER_EMPTY
+    return Outcome.TOO_MANY_SAMPLES if facts.cause is Cause.SAMPLES else _out_of_time(facts)
+
+
+def _out_of_time(facts: Facts) -> Outcome:
+    if facts.drift > NOTICEABLE:
+        return Outcome.DRIFTING
+    if NOISE_DEVIATIONS * facts.scene.sensor.amplitude_noise > facts.scene.controller.limit:
+        return Outcome.NOISE
+    last = facts.samples[-1].command
+    if not last.resting and not last.valves and last.reason.startswith("the gas time"):
+        return Outcome.GAS_TIME_TOO_SHORT
+    return Outcome.TIME_LIMIT
+
+
+def status_text(facts: Facts, outcome: Outcome) -> str:
+    """One or two sentences: how the run ended, with its numbers, and what to do next.
+
+    Args:
+        facts: of the run.
+        outcome: as classified.
+
+    Returns:
+        Text.
+    """
+    return _TEXTS[outcome](facts)
+
+
+def _um(length: float) -> str:
+    return f"{length / MICROMETRE:.4g} um"
+
+
+def _settled(facts: Facts) -> str:
+    return (
+        f"settled: {_um(facts.final_amplitude)} at {facts.time:.4g} s, not above the limit of "
+        f"{_um(facts.scene.controller.limit)}; nothing to do"
+    )
+
+
+def _not_settled(facts: Facts) -> str:
+    return (
+        f"not settled: {_um(facts.final_amplitude)} at {facts.time:.4g} s against the limit of "
+        f"{_um(facts.scene.controller.limit)}"
+    )
+
+
+def _time_limit(facts: Facts) -> str:
+    if facts.overshoots > 2:
+        cure = f"{facts.overshoots} overshoots: lower controller.proportional, or shorten the trial steps"
+    else:
+        cure = "raise controller.proportional or run.time_limit"
+    return f"{_not_settled(facts)}; time is up ({facts.scene.run.time_limit:.4g} s): {cure}"
+
+
+def _stalled(facts: Facts) -> str:
+    blocked = [i for i in facts.injections if i.operation.event is Event.BLOCKED]
+    last = blocked[-1]
+    total = facts.state.pairs[0].total
+    needed = starting_pressure(
+        law=facts.plant.model.flow,
+        fill=last.operation.fill_after,
+        opposite_fill=min(total - last.operation.fill_after, facts.plant.model.flow.max_fill_ratio),
+        above=facts.scene.gas.pressure,
+    )
+    threshold = "no pressure found starts it" if needed is None else f"it starts at {needed / 1e6:.4g} MPa"
+    return (
+        f"{_not_settled(facts)}; stalled: {facts.scene.gas.pressure / 1e6:.4g} MPa starts no flow out of "
+        f"chamber {last.chamber} at fill {last.operation.fill_after:.4g}, {threshold}: raise gas.pressure "
+        "above that, or lower rotor.speed"
+    )
+
+
+def _capacity(facts: Facts) -> str:
+    needed = abs(facts.wanted_moment) / GRAM_MILLIMETRE
+    pair = largest_pair_moment(plant=facts.plant, state=facts.state) / GRAM_MILLIMETRE
+    return (
+        f"{_not_settled(facts)}; capacity exceeded: the unbalance is {needed:.4g} g mm, one pair of chambers "
+        f"can form {pair:.4g} g mm along its axis, so at best {_um(facts.unreachable_amplitude)} remain: "
+        "balance the rotor first, use a denser liquid, or a larger or differently clocked disc"
+    )
+
+
+def _empty(facts: Facts) -> str:
+    letters = ", ".join(sorted({i.chamber for i in facts.injections if i.time == facts.injections[-1].time}))
+    return (
+        f"{_not_settled(facts)}; no liquid is left to drive out of chamber {letters} although the unbalance "
+        "is within the disc's capacity: check rotor.influence_coefficient, the lag angle that the controller "
+        "assumes, and the sense of rotation"
+    )
+
+
+def _diverging(facts: Facts) -> str:
+    if facts.overshoots >= 2:
+        cure = (
+            f"the residual turned round {facts.overshoots} times: lower controller.proportional; if it still "
+            "grows, check influence coefficient, lag angle and sense of rotation"
+        )
+    else:
+        cure = (
+            "check the influence coefficient, the lag angle that the controller assumes (more than 90 "
+            "degrees off drives the liquid the wrong way) and the sense of rotation"
+        )
+    return (
+        f"diverging, stopped at {facts.time:.4g} s: the amplitude rose from "
+        f"{_um(facts.initial_amplitude)} to {_um(facts.final_amplitude)}: {cure}"
+    )
+
+
+def _drifting(facts: Facts) -> str:
+    return (
+        f"{_not_settled(facts)}; the full tube lets liquid run back while the gas is off (up to "
+        f"{facts.drift:.3g} in fill between samples): raise rotor.speed or the hump so that the column "
+        "breaks, or vent the tube"
+    )
+
+
+def _too_short(facts: Facts) -> str:
+    return (
+        f"{_not_settled(facts)}; the commanded gas times have fallen below the valves' minimum of "
+        f"{facts.scene.controller.minimum_gas_time * 1e3:.4g} ms: raise controller.proportional, lower "
+        "controller.minimum_gas_time or raise controller.limit"
+    )
+
+
+def _noise(facts: Facts) -> str:
+    return (
+        f"{_not_settled(facts)}; the limit lies below {NOISE_DEVIATIONS:g} standard deviations of the sensor "
+        f"({_um(facts.scene.sensor.amplitude_noise)}): raise controller.limit or average the sensor"
+    )
+
+
+def _too_many(facts: Facts) -> str:
+    return (
+        f"{_not_settled(facts)}; stopped after {len(facts.samples)} samples: raise controller.period or "
+        "lower run.time_limit"
+    )
+
+
+_TEXTS: Final[Mapping[Outcome, Callable[[Facts], str]]] = {
+    Outcome.SETTLED: _settled,
+    Outcome.TIME_LIMIT: _time_limit,
+    Outcome.STALLED: _stalled,
+    Outcome.CAPACITY_EXCEEDED: _capacity,
+    Outcome.CHAMBER_EMPTY: _empty,
+    Outcome.DIVERGING: _diverging,
+    Outcome.DRIFTING: _drifting,
+    Outcome.GAS_TIME_TOO_SHORT: _too_short,
+    Outcome.NOISE: _noise,
+    Outcome.TOO_MANY_SAMPLES: _too_many,
+}

@@ -1,0 +1,122 @@
+"""A finished run as a person reads it in a terminal."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+from rich.console import Console, Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from ringbalance.controller.simulation import Injection, Simulation
+from ringbalance.controller.transfer import Event
+
+FloatArray = npt.NDArray[np.float64]
+
+BARS: Final = "▁▂▃▄▅▆▇█"
+SPARK_WIDTH: Final = 60
+MOST_INJECTIONS: Final = 40
+DECADES: Final = 3.0
+"""Depth of the sparkline below the largest amplitude."""
+
+
+def show(simulation: Simulation, *, console: Console) -> None:
+    """Print a run: summary, amplitude over time, injections.
+
+    Args:
+        simulation: the run.
+        console: where to.
+    """
+    console.print(Group(*_parts(simulation)))
+
+
+def sparkline(values: FloatArray) -> str:
+    """Draw values as a line of bars, logarithmic over three decades below the largest.
+
+    Args:
+        values: shape (m,), at least zero.
+
+    Returns:
+        m characters; all of the lowest bar when every value is zero.
+    """
+    top = float(np.max(values, initial=0.0))
+    if top == 0:
+        return BARS[0] * values.size
+    depth = np.log10(np.maximum(values / top, 10.0**-DECADES)) / DECADES + 1
+    return "".join(BARS[round(share * (len(BARS) - 1))] for share in depth)
+
+
+def _parts(simulation: Simulation) -> Iterable[RenderableType]:
+    colour = "green" if simulation.settled else "yellow"
+    yield Text(simulation.status, style=f"bold {colour}")
+    yield _summary(simulation)
+    yield _amplitude(simulation)
+    if simulation.injections:
+        yield _injections(simulation.injections)
+
+
+def _summary(simulation: Simulation) -> Table:
+    table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
+    table.add_column(style="dim")
+    table.add_column()
+    when = "-" if simulation.settling_time is None else f"{simulation.settling_time:.3f} s"
+    last = {letter: fill[-1] for letter, fill in simulation.fill_ratio.items()}
+    for name, value in (
+        ("flow law", f"{simulation.law} ({simulation.integrator.replace('_', ' ')})"),
+        ("settling time", when),
+        ("amplitude", f"{_um(simulation.amplitude[0])} -> {_um(simulation.amplitude[-1])}"),
+        ("limit", _um(simulation.limit)),
+        ("gas time", f"{_gas_time(simulation):.3f} s in {len(simulation.injections)} injections"),
+        ("overshoots", str(simulation.overshoots)),
+        ("misadjustments", str(simulation.misadjustments)),
+        ("fill ratios", "  ".join(f"{letter} {fill:.4f}" for letter, fill in last.items())),
+    ):
+        table.add_row(name, value)
+    return table
+
+
+def _gas_time(simulation: Simulation) -> float:
+    return math.fsum(injection.operation.duration for injection in simulation.injections)
+
+
+def _amplitude(simulation: Simulation) -> Text:
+    """Amplitude at equal steps of time, by straight lines between the recorded instants."""
+    end = float(simulation.time[-1])
+    at = np.linspace(0.0, end, SPARK_WIDTH)
+    line = sparkline(np.interp(at, simulation.time, simulation.amplitude))
+    return Text.assemble(("amplitude (log) ", "dim"), line, (f"  0 to {end:.3g} s", "dim"))
+
+
+def _injections(injections: tuple[Injection, ...]) -> Table:
+    table = Table(title="injections", title_justify="left")
+    for name in ("time, s", "chamber", "gas, s", "fill before", "fill after"):
+        table.add_column(name, justify="center" if name == "chamber" else "right")
+    table.add_column("regime")
+    for injection in injections[:MOST_INJECTIONS]:
+        operation = injection.operation
+        table.add_row(
+            f"{injection.time:.3f}",
+            injection.chamber,
+            f"{operation.duration:.4f}",
+            f"{operation.fill_before:.5f}",
+            f"{operation.fill_after:.5f}",
+            _regime(injection),
+        )
+    if len(injections) > MOST_INJECTIONS:
+        table.caption = f"and {len(injections) - MOST_INJECTIONS} more: see --json"
+    return table
+
+
+def _regime(injection: Injection) -> str:
+    operation = injection.operation
+    names = dict.fromkeys((operation.regime_start.label, operation.regime_end.label))
+    event = "" if operation.event in {Event.NONE, Event.BLOCKED} else f" ({operation.event.value})"
+    return " to ".join(names) + event
+
+
+def _um(length: float) -> str:
+    return f"{length * 1e6:.4g} um"

@@ -1,0 +1,89 @@
+"""The record of one closed-loop run, and how a run can end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.controller.algorithm import Command, Measurement
+from ringbalance.controller.liquid_ring import Operation
+
+FloatArray = npt.NDArray[np.float64]
+
+
+class Outcome(StrEnum):
+    """How a run ended."""
+
+    SETTLED = "settled"
+    TIME_LIMIT = "time_limit"
+    STALLED = "stalled"
+    CAPACITY_EXCEEDED = "capacity_exceeded"
+    CHAMBER_EMPTY = "chamber_empty"
+    DIVERGING = "diverging"
+    DRIFTING = "drifting"
+    GAS_TIME_TOO_SHORT = "gas_time_too_short"
+    NOISE = "noise"
+    TOO_MANY_SAMPLES = "too_many_samples"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sample:
+    """One look at the vibration and what the controller made of it."""
+
+    time: float
+    """s."""
+    measurement: Measurement | None
+    """What the sensor gave; None for a dropped sample."""
+    command: Command
+
+
+@dataclass(frozen=True, kw_only=True)
+class Injection:
+    """One opening of one valve."""
+
+    time: float
+    """s, at which the valve opens."""
+    chamber: str
+    """Letter of the driven chamber."""
+    operation: Operation
+
+
+@dataclass(frozen=True, kw_only=True)
+class Simulation:
+    """One closed-loop run."""
+
+    balancer: str
+    """ "liquid_ring"."""
+    law: str
+    """Name of the model, such as "paper" or "calibrated"."""
+    integrator: str
+    """How operations were carried through time."""
+    outcome: Outcome
+    settled: bool
+    """Whether the amplitude ends at or below the limit, seen so by the controller."""
+    settling_time: float | None
+    """s, from which on the amplitude stays at or below the limit; None when not settled."""
+    status: str
+    """How the run ended and what to do next."""
+    time: FloatArray
+    """s, shape (m,): samples, and instants within operations and waits."""
+    amplitude: FloatArray
+    """True vibration, m zero-to-peak, shape (m,)."""
+    phase: FloatArray
+    """Of the true vibration, rad within (-pi, pi], shape (m,)."""
+    fill_ratio: Mapping[str, FloatArray]
+    """x of each chamber by letter, shape (m,) each."""
+    injections: tuple[Injection, ...]
+    samples: tuple[Sample, ...]
+    overshoots: int
+    """Times that the residual turned by more than 90 degrees between samples while above the limit."""
+    misadjustments: int
+    """Operations after which the measured amplitude was higher by more than the noise floor."""
+    noise_floor: float
+    """m."""
+    limit: float
+    """m."""

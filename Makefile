@@ -42,6 +42,7 @@ format: env ## let ruff write what `make lint` asks for
 
 bench: ## timed comparisons, in an environment of their own with every extra (hundreds of MB)
 	@sh tools/make_env.sh $(BENCH_VENV) requirements/lock-all.txt
+	@sh tools/make_ngsolve.sh "$(CURDIR)/$(BENCH_VENV)/bin/python"
 	$(BENCH_VENV)/bin/python benchmarks/pressure_field.py
 
 lock: env ## write the lock files anew from pyproject.toml (a change of dependencies only)

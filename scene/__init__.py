@@ -1,0 +1,24 @@
+"""Scene files: from TOML with units to frozen, validated, SI-only records, or every fault at once."""
+
+from ringbalance.scene.describe import Row, scene_fault, scene_table
+from ringbalance.scene.faults import Fault, SceneError
+from ringbalance.scene.files import write_whole
+from ringbalance.scene.liquids import KnownLiquid, known_liquids, liquid_at
+from ringbalance.scene.loader import bundled_scene, load_scene, scene_from
+from ringbalance.scene.models import Scene
+
+__all__ = [
+    "Fault",
+    "KnownLiquid",
+    "Row",
+    "Scene",
+    "SceneError",
+    "bundled_scene",
+    "known_liquids",
+    "liquid_at",
+    "load_scene",
+    "scene_fault",
+    "scene_from",
+    "scene_table",
+    "write_whole",
+]

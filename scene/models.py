@@ -230,3 +230,5 @@ class Scene:
     """File name without its folder; for messages and the evidence."""
     sha256: str
     """Of the scene file's bytes."""
+    defaulted: tuple[str, ...] = ()
+    """Paths such as "rotor.lag_angle" whose value is a default, because the file does not give it."""

@@ -1,0 +1,142 @@
+"""What is wrong with a scene file: one sentence per fault, all faults of a file together."""
+
+from __future__ import annotations
+
+import difflib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+MISSING = "missing"
+_LONGEST_VALUE = 60
+_LONGEST_LIST = 10
+_DEEPEST = 4
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fault:
+    """One fault of a scene file, with all that is needed to put it right."""
+
+    file: str
+    """The scene file, as it was named."""
+    table: str
+    """Table in the file, such as "disc"; empty for the top level and for the file itself."""
+    key: str
+    """Key in the table; empty when the whole table or file is at fault."""
+    value: str
+    """What stands there, as TOML has it; "missing" when nothing does; empty when it does not apply."""
+    problem: str
+    """What is wrong."""
+    allowed: str
+    """What would be accepted; empty when the problem says it all."""
+
+    def __str__(self) -> str:
+        """The fault on one line: file: [table] key = value: what is wrong; allowed: ..."""
+        end = f"; allowed: {self.allowed}" if self.allowed else ""
+        return f"{self.file}: {self._place()}{self.problem}{end}"
+
+    def _place(self) -> str:
+        parts = [f"[{self.table}]" if self.table else "", self.key]
+        place = " ".join(part for part in parts if part)
+        if not place:
+            return ""
+        shown = f" is {MISSING}" if self.value == MISSING else f" = {self.value}" if self.value else ""
+        return f"{place}{shown}: "
+
+
+class SceneError(Exception):
+    """A scene that cannot be used; `faults` holds everything that is wrong with it.
+
+    Args:
+        faults: one or more faults; their lines together are the message.
+    """
+
+    def __init__(self, faults: Iterable[Fault]) -> None:
+        self.faults: tuple[Fault, ...] = tuple(faults)
+        super().__init__("\n".join(str(fault) for fault in self.faults))
+
+    def __reduce__(self) -> tuple[type[SceneError], tuple[tuple[Fault, ...]]]:
+        """Rebuild from the faults, so that the error survives the way back from a worker process."""
+        return type(self), (self.faults,)
+
+
+def closest(word: str, known: Iterable[str]) -> str:
+    """Find the known word that was probably meant.
+
+    Args:
+        word: what was written.
+        known: the words that exist.
+
+    Returns:
+        One of them, or an empty string when nothing is close.
+    """
+    folded = {name.casefold(): name for name in known}
+    close = difflib.get_close_matches(word.casefold()[:_LONGEST_VALUE], list(folded), n=1, cutoff=0.6)
+    return folded[close[0]] if close else ""
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """Suggest the known word that was probably meant.
+
+    Args:
+        word: what was written.
+        known: the words that exist.
+
+    Returns:
+        ' (did you mean "x"?)' or an empty string when nothing is close.
+    """
+    found = closest(word, known)
+    return f' (did you mean "{found}"?)' if found else ""
+
+
+def toml_text(value: object) -> str:
+    """Write a value as it would stand in a TOML file, shortened to fit a line.
+
+    Args:
+        value: anything a TOML file can hold.
+
+    Returns:
+        One line of printable text.
+    """
+    text = _toml_text(value, depth=0)
+    return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 4] + " ..."
+
+
+def _toml_text(value: object, *, depth: int) -> str:
+    if isinstance(value, str):
+        return _quoted(value[: 2 * _LONGEST_VALUE])
+    if isinstance(value, Mapping | Sequence):
+        return _nested(value, depth=depth + 1)
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int) and abs(value) >= 10**30:
+        return f"a whole number of {value.bit_length()} bits"
+    return str(value)
+
+
+def _nested(value: Mapping[Any, Any] | Sequence[Any], *, depth: int) -> str:
+    if depth > _DEEPEST:
+        return "..."
+    if isinstance(value, Mapping):
+        few = list(value.items())[:_LONGEST_LIST]
+        pairs = (f"{toml_key(str(key))} = {_toml_text(item, depth=depth)}" for key, item in few)
+        return "{ " + ", ".join(pairs) + " }"
+    return "[" + ", ".join(_toml_text(item, depth=depth) for item in value[:_LONGEST_LIST]) + "]"
+
+
+def toml_key(key: str) -> str:
+    """Write a key as it would stand in a TOML file: bare where it can be, else quoted.
+
+    Args:
+        key: any key.
+
+    Returns:
+        One line of printable text.
+    """
+    bare = key.isascii() and key.replace("_", "a").replace("-", "a").isalnum()
+    return key if bare and len(key) <= _LONGEST_VALUE else _quoted(key[:_LONGEST_VALUE])
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=not text.isprintable())

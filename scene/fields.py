@@ -1,0 +1,325 @@
+"""What a key of a scene file can take: readers that turn a TOML value into SI or say what is allowed.
+
+A reader is put into the annotation of a schema field, where pydantic calls it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from ringbalance.scene.dimensions import DIMENSIONS
+from ringbalance.scene.faults import did_you_mean
+from ringbalance.scene.units import FieldError, parse_quantity, unit_names
+
+_LARGEST_NUMBER = 1e9
+_LONGEST_NAME = 200
+_LARGEST_SEED = 2**63 - 1
+LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reader:
+    """How the values of one key are read."""
+
+    read: Callable[[object], Any]
+    """TOML value to SI; raises FieldError."""
+    allowed: str
+    """What is accepted, for messages."""
+    kind: str
+    """What is written there, for the reference of the scene file."""
+
+    def __get_pydantic_core_schema__(self, _source: object, _handler: object) -> CoreSchema:
+        """Let pydantic call `read`, and keep the fault's two halves apart in its error."""
+        return core_schema.no_info_plain_validator_function(self._validate)
+
+    def _validate(self, value: object) -> Any:
+        try:
+            return self.read(value)
+        except FieldError as error:
+            context = {"problem": error.problem, "allowed": error.allowed}
+            raise PydanticCustomError("scene_field", "{problem}", context) from error
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bounds:
+    """The interval that a value must lie in, as numbers and as people write it."""
+
+    above: float | None = None
+    """Exclusive."""
+    at_least: float | None = None
+    at_most: float | None = None
+    below: float | None = None
+    """Exclusive."""
+
+    def holds(self, value: float) -> bool:
+        """Tell whether a value lies inside.
+
+        Args:
+            value: in the same unit as the bounds.
+
+        Returns:
+            True inside.
+        """
+        return (
+            (self.above is None or value > self.above)
+            and (self.at_least is None or value >= self.at_least)
+            and (self.at_most is None or value <= self.at_most)
+            and (self.below is None or value < self.below)
+        )
+
+    def __str__(self) -> str:
+        """Such as "above 0 and at most 1"."""
+        named = {
+            "above": self.above,
+            "at least": self.at_least,
+            "at most": self.at_most,
+            "below": self.below,
+        }
+        return " and ".join(f"{words} {bound:g}" for words, bound in named.items() if bound is not None)
+
+
+def quantity(dimension: str, bounds: Bounds | None = None) -> Reader:
+    """Read a number with a unit.
+
+    Args:
+        dimension: a key of `DIMENSIONS`.
+        bounds: in SI; None for any sign.
+
+    Returns:
+        A reader of text such as "44.5 mm"; its values are SI.
+    """
+    kind = DIMENSIONS[dimension]
+    limits = bounds or Bounds()
+    interval = f" {limits}" if bounds else ""
+    allowed = f'{kind.name}{interval}, such as "{kind.example}", in {unit_names(dimension)}'
+
+    def read(value: object) -> float:
+        number = parse_quantity(value, dimension)
+        if not limits.holds(number):
+            raise FieldError(f"it must be {limits}", allowed)
+        if limits.above == 0 and number < kind.smallest:
+            si_unit = next(iter(kind.units))
+            raise FieldError(f"it must be at least {kind.smallest:g} {si_unit} to mean anything", allowed)
+        return number
+
+    return Reader(read=read, allowed=allowed, kind=f"{kind.name}: {unit_names(dimension)}")
+
+
+def angle_of_turn() -> Reader:
+    """Read a phase or lag; beyond a full turn either way it is wrapped to within half a turn.
+
+    Returns:
+        A reader of text such as "17 deg"; its values are rad.
+    """
+
+    allowed = f'an angle such as "{DIMENSIONS["angle"].example}", in {unit_names("angle")}'
+
+    def read(value: object) -> float:
+        angle = parse_quantity(value, "angle")
+        # 360 deg is the full turn itself, however it was rounded.
+        return angle if abs(angle) <= 2 * math.pi * (1 + 1e-12) else math.remainder(angle, 2 * math.pi)
+
+    return Reader(read=read, allowed=allowed, kind=f"an angle: {unit_names('angle')}")
+
+
+def share(bounds: Bounds) -> Reader:
+    """Read a share of one: a bare number or a percentage.
+
+    Args:
+        bounds: dimensionless.
+
+    Returns:
+        A reader of 0.01 and of "1 %".
+    """
+    allowed = f'a share {bounds}, such as {_example(bounds):g} or "{100 * _example(bounds):g} %"'
+
+    def read(value: object) -> float:
+        number = parse_quantity(value, "share") if isinstance(value, str) else _number(value, allowed)
+        if not bounds.holds(number):
+            raise FieldError(f"it must be {bounds}", allowed)
+        return number
+
+    return Reader(read=read, allowed=allowed, kind="a bare number or %")
+
+
+def _example(bounds: Bounds) -> float:
+    return 0.01 if (bounds.at_most or bounds.below or 1.0) < 0.5 else 0.5
+
+
+def number(bounds: Bounds) -> Reader:
+    """Read a number that has no unit.
+
+    Args:
+        bounds: dimensionless.
+
+    Returns:
+        A reader of bare numbers.
+    """
+    allowed = f"a bare number {bounds}"
+
+    def read(value: object) -> float:
+        plain = _number(value, allowed)
+        if not bounds.holds(plain):
+            raise FieldError(f"it must be {bounds}", allowed)
+        return plain
+
+    return Reader(read=read, allowed=allowed, kind="a bare number")
+
+
+def _number(value: object, allowed: str) -> float:
+    if isinstance(value, str):
+        raise FieldError("it is text, where a bare number stands", allowed)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise FieldError("it is not a number", allowed)
+    if isinstance(value, float) and not math.isfinite(value):
+        raise FieldError("it is not a finite number", allowed)
+    if abs(value) > _LARGEST_NUMBER:
+        raise FieldError(f"its magnitude is above {_LARGEST_NUMBER:g}", allowed)
+    return float(value)
+
+
+def _whole(value: object, allowed: str) -> int:
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise FieldError("it is not a whole number", allowed)
+    return value
+
+
+def chamber_count() -> Reader:
+    """Read the number of chambers: even, and no more than there are letters for.
+
+    Returns:
+        A reader of whole numbers.
+    """
+    allowed = f"an even whole number from 2 to {len(LETTERS)}"
+
+    def read(value: object) -> int:
+        count = _whole(value, allowed)
+        if count % 2:
+            raise FieldError("it must be even: each chamber needs its opposite", allowed)
+        if not 2 <= count <= len(LETTERS):
+            raise FieldError(f"it must lie from 2 to {len(LETTERS)}", allowed)
+        return count
+
+    return Reader(read=read, allowed=allowed, kind="an even whole number")
+
+
+def seed_number() -> Reader:
+    """Read the seed of the random numbers.
+
+    Returns:
+        A reader of whole numbers from 0 to 2^63 - 1.
+    """
+    allowed = "a whole number from 0 to 2^63 - 1"
+
+    def read(value: object) -> int:
+        count = _whole(value, allowed)
+        if not 0 <= count <= _LARGEST_SEED:
+            raise FieldError("it must lie from 0 to 2^63 - 1", allowed)
+        return count
+
+    return Reader(read=read, allowed=allowed, kind="a whole number")
+
+
+def choice(*options: str) -> Reader:
+    """Read one of a few words.
+
+    Args:
+        options: the words.
+
+    Returns:
+        A reader of text.
+    """
+    allowed = " or ".join(f'"{option}"' for option in options)
+
+    def read(value: object) -> str:
+        if not isinstance(value, str):
+            raise FieldError("it is not text", allowed)
+        if value not in options:
+            raise FieldError(f"it is not one of the known words{did_you_mean(value, options)}", allowed)
+        return value
+
+    return Reader(read=read, allowed=allowed, kind=allowed)
+
+
+def text() -> Reader:
+    """Read a name.
+
+    Returns:
+        A reader of text on one line.
+    """
+    allowed = f"text on one line, up to {_LONGEST_NAME} characters"
+
+    def read(value: object) -> str:
+        if not isinstance(value, str):
+            raise FieldError("it is not text", allowed)
+        if not value.strip() or not value.isprintable() or len(value) > _LONGEST_NAME:
+            raise FieldError("it is empty, too long or not printable", allowed)
+        return value
+
+    return Reader(read=read, allowed=allowed, kind="text")
+
+
+def chamber_letters() -> Reader:
+    """Read the order in which chambers are tried.
+
+    Returns:
+        A reader of lists of different capital letters.
+    """
+    allowed = 'a list of chamber letters, each once, such as ["A", "C", "B", "D"]'
+
+    def read(value: object) -> tuple[str, ...]:
+        if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
+            raise FieldError("it is not a list of letters", allowed)
+        letters: Iterable[str] = value
+        if any(len(letter) != 1 or letter not in LETTERS for letter in letters):
+            raise FieldError("a chamber is named by one capital letter", allowed)
+        if len(set(letters)) != len(value):
+            raise FieldError("a chamber stands in it more than once", allowed)
+        return tuple(letters)
+
+    return Reader(read=read, allowed=allowed, kind="a list of letters")
+
+
+def half_width(dimension: str | None) -> Reader:
+    """Read the 95 % half-width of a quantity: a percentage of it, or in its own unit.
+
+    Args:
+        dimension: a key of `DIMENSIONS`, or None for a quantity without unit.
+
+    Returns:
+        A reader whose values are (half-width, whether it is relative); SI when it is not.
+    """
+    allowed = _half_width_allowed(dimension)
+
+    def read(value: object) -> tuple[float, bool]:
+        relative = isinstance(value, str) and value.rstrip().endswith("%")
+        if dimension is None and not relative:
+            width = _number(value, allowed)
+        else:
+            width = _absolute(value, "share" if relative or dimension is None else dimension, allowed)
+        if width < 0 or (relative and width >= 1):
+            raise FieldError("a half-width must be at least 0 and below 100 %", allowed)
+        return width, relative
+
+    return Reader(read=read, allowed=allowed, kind=f"a half-width: {allowed}")
+
+
+def _absolute(value: object, dimension: str, allowed: str) -> float:
+    try:
+        return parse_quantity(value, dimension)
+    except FieldError as error:
+        raise FieldError(error.problem, allowed) from error
+
+
+def _half_width_allowed(dimension: str | None) -> str:
+    own = "a bare number"
+    if dimension is not None:
+        own = f"{DIMENSIONS[dimension].name} in {unit_names(dimension)}"
+    return f'a percentage of the quantity such as "5 %", or {own}'

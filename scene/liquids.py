@@ -1,0 +1,223 @@
+"""Known liquids by name and temperature, with their uncertainties; a temperature without data is refused."""
+
+from __future__ import annotations
+
+import bisect
+import csv
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from types import MappingProxyType
+
+from ringbalance.scene.faults import did_you_mean
+from ringbalance.scene.models import Liquid
+from ringbalance.scene.units import FieldError
+from ringbalance.scene.water import COLDEST, HOTTEST, water_properties
+
+_ZERO_CELSIUS = 273.15
+_SAME_TEMPERATURE = 0.01
+_WATER = "water"
+_ALIASES: Mapping[str, tuple[str, tuple[str, ...]]] = MappingProxyType(
+    {
+        "water": ("water", ()),
+        "gallium": ("gallium", ("liquid gallium", "Ga")),
+        "silicone KF-96L-5cs": ("silicone oil 5 cSt", ("silicone 5 cSt", "KF-96L-5cs")),
+        "silicone 10 cSt": ("silicone oil 10 cSt", ()),
+        "silicone 50 cSt": ("silicone oil 50 cSt", ()),
+        "silicone 100 cSt": ("silicone oil 100 cSt", ()),
+        "silicone 350 cSt": ("silicone oil 350 cSt", ()),
+        "Krytox GPL 101": ("perfluorinated oil GPL 101", ("GPL 101",)),
+        "Krytox GPL 102": ("perfluorinated oil GPL 102", ("GPL 102",)),
+    }
+)
+"""Name in the data file: name here, further names; the data file's own name is understood too."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Row:
+    temperature: float
+    density: float
+    viscosity: float
+    vapour_pressure: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class KnownLiquid:
+    """A liquid whose properties are held here."""
+
+    name: str
+    aliases: tuple[str, ...]
+    """Other names that are understood; case, spaces and dashes do not matter in any."""
+    temperatures: tuple[float, ...]
+    """K, rising: one for which there are data, or several between which they are interpolated."""
+    density_uncertainty: float
+    """95 % half-width, relative."""
+    viscosity_uncertainty: float
+    """95 % half-width, relative."""
+    source: str
+
+    @property
+    def held(self) -> str:
+        """The temperatures for which there are data, in words."""
+        first, last = (f"{t - _ZERO_CELSIUS:.4g} degC" for t in (self.temperatures[0], self.temperatures[-1]))
+        return first if len(self.temperatures) == 1 else f"{first} to {last}"
+
+    def holds(self, temperature: float) -> bool:
+        """Tell whether there are data for a temperature.
+
+        Args:
+            temperature: K.
+
+        Returns:
+            True within the data, give or take 0.01 K.
+        """
+        low, high = self.temperatures[0], self.temperatures[-1]
+        return low - _SAME_TEMPERATURE <= temperature <= high + _SAME_TEMPERATURE
+
+
+def known_liquids() -> tuple[KnownLiquid, ...]:
+    """List the liquids that a scene can name.
+
+    Returns:
+        The liquids in the order of the data file.
+    """
+    return tuple(liquid for liquid, _ in _library().values())
+
+
+def find_liquid(*, name: str) -> KnownLiquid | None:
+    """Look a liquid up by any of its names.
+
+    Args:
+        name: such as "Silicone oil 100 cSt".
+
+    Returns:
+        The liquid; None when no liquid has that name.
+    """
+    plain = _plain(name)
+    return next((liquid for liquid in known_liquids() if plain in map(_plain, _names(liquid))), None)
+
+
+def unknown_liquid(*, name: str) -> FieldError:
+    """Say that a liquid is not known, and which ones are.
+
+    Args:
+        name: what was written.
+
+    Returns:
+        The error, to be raised or reported.
+    """
+    names = [each for liquid in known_liquids() for each in _names(liquid)]
+    held = ", ".join(f'"{liquid.name}"' for liquid in known_liquids())
+    return FieldError(
+        f"no liquid of that name is known{did_you_mean(name, names)}",
+        f"{held}; or any name with density and kinematic_viscosity given outright",
+    )
+
+
+def liquid_at(*, name: str, temperature: float) -> Liquid:
+    """Properties of a known liquid at a temperature.
+
+    Between two temperatures of the data the density is linear in T and the logarithm of the kinematic
+    viscosity is linear in 1/T; the vapour pressure is linear in T.  Water is calculated.
+
+    Args:
+        name: any of the liquid's names.
+        temperature: K.
+
+    Returns:
+        The liquid with its uncertainties.
+
+    Raises:
+        FieldError: an unknown name, or a temperature outside the data.
+
+    Source: the rows of `data/fluid_properties.csv`, each with its own; water, `water_properties`.
+    """
+    liquid = find_liquid(name=name)
+    if liquid is None:
+        raise unknown_liquid(name=name)
+    if not liquid.holds(temperature):
+        shown = f"{temperature - _ZERO_CELSIUS:.6g} degC"
+        raise FieldError(f"there are no data for {liquid.name} at {shown}", f"{liquid.name} at {liquid.held}")
+    density, viscosity, vapour_pressure = _properties(liquid, temperature)
+    return Liquid(
+        name=liquid.name,
+        temperature=temperature,
+        density=density,
+        kinematic_viscosity=viscosity,
+        vapour_pressure=vapour_pressure,
+        density_uncertainty=liquid.density_uncertainty,
+        viscosity_uncertainty=liquid.viscosity_uncertainty,
+        source=liquid.source,
+    )
+
+
+def _properties(liquid: KnownLiquid, temperature: float) -> tuple[float, float, float]:
+    low, high = liquid.temperatures[0], liquid.temperatures[-1]
+    inside = min(max(temperature, low), high)
+    if liquid.name == _WATER:
+        return water_properties(temperature=inside)
+    return _interpolated(_library()[liquid.name][1], inside)
+
+
+def _interpolated(rows: tuple[_Row, ...], temperature: float) -> tuple[float, float, float]:
+    index = bisect.bisect_left([row.temperature for row in rows], temperature)
+    upper = rows[index]
+    if upper.temperature == temperature:
+        return upper.density, upper.viscosity, upper.vapour_pressure
+    lower = rows[index - 1]
+    share = (temperature - lower.temperature) / (upper.temperature - lower.temperature)
+    # Linear in 1/T rather than in T: the same share, weighted with the upper temperature over T.
+    inverse_share = share * upper.temperature / temperature
+    log_ratio = math.log(upper.viscosity / lower.viscosity)
+    return (
+        lower.density + share * (upper.density - lower.density),
+        lower.viscosity * math.exp(inverse_share * log_ratio),
+        lower.vapour_pressure + share * (upper.vapour_pressure - lower.vapour_pressure),
+    )
+
+
+def _names(liquid: KnownLiquid) -> tuple[str, ...]:
+    return (liquid.name, *liquid.aliases)
+
+
+def _plain(name: str) -> str:
+    return "".join(character for character in name.casefold() if character.isalnum())
+
+
+@cache
+def _library() -> Mapping[str, tuple[KnownLiquid, tuple[_Row, ...]]]:
+    data = resources.files("ringbalance.scene") / "data" / "fluid_properties.csv"
+    lines = data.read_text(encoding="utf-8").splitlines()
+    table = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    entries = (
+        _entry(key, [line for line in table if line["fluid"] == key])
+        for key in dict.fromkeys(line["fluid"] for line in table)
+    )
+    return MappingProxyType({liquid.name: (liquid, rows) for liquid, rows in entries})
+
+
+def _entry(key: str, lines: Iterable[Mapping[str, str]]) -> tuple[KnownLiquid, tuple[_Row, ...]]:
+    ordered = sorted(lines, key=lambda line: float(line["T_C"]))
+    rows = tuple(_row(line) for line in ordered)
+    name, aliases = _ALIASES[key]
+    source = f"{ordered[0]['source']} ({ordered[0]['status']})"
+    liquid = KnownLiquid(
+        name=name,
+        aliases=aliases if key == name else (*aliases, key),
+        temperatures=(COLDEST, HOTTEST) if name == _WATER else tuple(row.temperature for row in rows),
+        density_uncertainty=max(float(line["u95_rho_percent"]) for line in ordered) / 100,
+        viscosity_uncertainty=max(float(line["u95_nu_percent"]) for line in ordered) / 100,
+        source=source,
+    )
+    return liquid, rows
+
+
+def _row(line: Mapping[str, str]) -> _Row:
+    return _Row(
+        temperature=float(line["T_C"]) + _ZERO_CELSIUS,
+        density=float(line["rho_kg_m3"]),
+        viscosity=float(line["nu_m2_s"]),
+        vapour_pressure=float(line["vapour_pressure_Pa"]),
+    )

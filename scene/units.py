@@ -1,0 +1,178 @@
+"""Quantities as people write them, read into SI and written back: no guessing, one rounding.
+
+The written decimal times the unit's exact factor is rounded once, so "44.5 mm" and "4.45 cm" are the same
+double.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from fractions import Fraction
+from types import MappingProxyType
+
+from ringbalance.scene.dimensions import DIMENSIONS, Dimension, Unit
+from ringbalance.scene.faults import did_you_mean, toml_text
+
+_LONGEST_TEXT = 60
+_NUMBER = re.compile(
+    r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)(?![0-9.,])\s*(.*?)\s*", re.DOTALL
+)
+_NOT_FINITE = re.compile(r"\s*[+-]?(nan|inf)", re.IGNORECASE)
+_DECIMAL_COMMA = re.compile(r"\s*[+-]?[0-9]+,[0-9]")
+_DYNAMIC_VISCOSITIES = ("Pa*s", "mPa*s", "cP", "P")
+_SPELLINGS = MappingProxyType(
+    {
+        "℃": "degC",
+        "°C": "degC",
+        "°F": "degF",
+        "°": "deg",
+        "µ": "u",
+        "μ": "u",
+        "²": "^2",
+        "³": "^3",
+        "·": "*",
+        "⋅": "*",
+        "×": "*",
+        "−": "-",
+    }
+)
+
+
+class FieldError(ValueError):
+    """A value that a key cannot take.
+
+    Args:
+        problem: what is wrong with it.
+        allowed: what would be accepted.
+    """
+
+    def __init__(self, problem: str, allowed: str) -> None:
+        self.problem = problem
+        self.allowed = allowed
+        super().__init__(f"{problem}; allowed: {allowed}")
+
+
+def unit_names(dimension: str) -> str:
+    """List the units of a dimension, as a message shows them.
+
+    Args:
+        dimension: a key of `DIMENSIONS`.
+
+    Returns:
+        The names with commas between.
+    """
+    return ", ".join(DIMENSIONS[dimension].units)
+
+
+def parse_quantity(text: object, dimension: str) -> float:
+    """Read a quantity such as "44.5 mm" into SI.
+
+    SI value = (number + offset) factor, rounded once; angles and speeds times pi after that.
+
+    Args:
+        text: a number and a unit; the space between may be left out.
+        dimension: a key of `DIMENSIONS`.
+
+    Returns:
+        The value in SI, finite.
+
+    Raises:
+        FieldError: not such a quantity; the error says what is wrong and which units exist.
+
+    Range: magnitudes up to `Dimension.largest`; a temperature above absolute zero.
+    """
+    kind = DIMENSIONS[dimension]
+    number, unit_text = _split(text, kind)
+    unit = kind.units.get(_canonical(unit_text))
+    if unit is None:
+        raise FieldError(_wrong_unit(unit_text, kind), _allowed(kind))
+    value = _in_si(number, unit, kind)
+    if kind is DIMENSIONS["temperature"] and value <= 0:
+        raise FieldError("it lies at or below absolute zero", "a temperature above 0 K (-273.15 degC)")
+    return value
+
+
+def format_quantity(value: float, dimension: str, unit: str, *, digits: int = 6) -> str:
+    """Write an SI value in a unit, for people.
+
+    Args:
+        value: SI.
+        dimension: a key of `DIMENSIONS`.
+        unit: one of its units.
+        digits: significant digits.
+
+    Returns:
+        Such as "44.5 mm".
+    """
+    entry = DIMENSIONS[dimension].units[unit]
+    number = value / float(entry.factor) / (math.pi if entry.pi else 1.0) - float(entry.offset)
+    return f"{number:.{digits}g} {unit}"
+
+
+def _split(text: object, kind: Dimension) -> tuple[str, str]:
+    if isinstance(text, bool) or not isinstance(text, int | float | str):
+        raise FieldError("it is not text with a number and a unit", _allowed(kind))
+    if not isinstance(text, str):
+        raise FieldError("a bare number has no unit", _allowed(kind))
+    if len(text) > _LONGEST_TEXT:
+        raise FieldError(f"it is longer than {_LONGEST_TEXT} characters", _allowed(kind))
+    spelled = _respelled(text)
+    match = _NUMBER.fullmatch(spelled)
+    if match is None:
+        raise FieldError(_not_a_number(spelled), _allowed(kind))
+    return match[1], match[2]
+
+
+def _not_a_number(text: str) -> str:
+    if _NOT_FINITE.match(text):
+        return "it is not a finite number"
+    if _DECIMAL_COMMA.match(text):
+        return "it has a decimal comma; write a point"
+    return "it is not a number followed by a unit"
+
+
+def _respelled(text: str) -> str:
+    for spelling, standard in _SPELLINGS.items():
+        text = text.replace(spelling, standard)
+    return text
+
+
+def _canonical(unit: str) -> str:
+    """Spaces around operators go, a space between factors is a product, and m2 means m^2."""
+    tight = re.sub(r"\s*([*/()^])\s*", r"\1", unit)
+    product = re.sub(r"\s+", "*", tight)
+    return re.sub(r"(?<=m)(?=[23](?![0-9]))", "^", product)
+
+
+def _in_si(number: str, unit: Unit, kind: Dimension) -> float:
+    # The double is looked at first: an exponent of a thousand million must not reach the exact arithmetic.
+    rough = float(number)
+    scale = float(unit.factor) * (math.pi if unit.pi else 1.0)
+    if not abs(rough) * scale <= 10 * kind.largest:
+        raise FieldError(_too_large(kind), _allowed(kind))
+    exact = Fraction(number) if rough != 0 else Fraction(0)
+    value = float((exact + unit.offset) * unit.factor) * (math.pi if unit.pi else 1.0)
+    if abs(value) > kind.largest:
+        raise FieldError(_too_large(kind), _allowed(kind))
+    return value
+
+
+def _too_large(kind: Dimension) -> str:
+    return f"its magnitude is above {kind.largest:g} {next(iter(kind.units))}, more than any balancer has"
+
+
+def _allowed(kind: Dimension) -> str:
+    return f'{kind.name} such as "{kind.example}", in {", ".join(kind.units)}'
+
+
+def _wrong_unit(unit_text: str, kind: Dimension) -> str:
+    unit = _canonical(unit_text)
+    if not unit:
+        return "the unit is missing"
+    if unit in _DYNAMIC_VISCOSITIES and kind is DIMENSIONS["kinematic_viscosity"]:
+        return f'"{unit}" is a unit of dynamic viscosity; divide by the density'
+    for other in DIMENSIONS.values():
+        if unit in other.units:
+            return f'"{unit}" is a unit of {other.noun}, not of {kind.noun}'
+    return f"{toml_text(unit)} is not a unit of {kind.noun}{did_you_mean(unit, kind.units)}"

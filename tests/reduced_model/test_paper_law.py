@@ -13,13 +13,13 @@ from ringbalance.reduced_model.paper_law import paper_law, paper_model
 from ringbalance.scene.models import Scene
 
 
-def test_law_is_eq_19(paper_scene: Scene) -> None:
+def test_law_is_eq_19(table_1_scene: Scene) -> None:
     x = np.linspace(0, 0.5, 11)
-    flow = paper_law(paper_scene).evaluate(fill_ratio=x, gas_pressure=0.7e6)
+    flow = paper_law(table_1_scene).evaluate(fill_ratio=x, gas_pressure=0.7e6)
     expected = paper.velocity_paper(
-        disc=paper_scene.disc,
+        disc=table_1_scene.disc,
         density=1000.0,
-        angular_velocity=paper_scene.rotor.speed,
+        angular_velocity=table_1_scene.rotor.speed,
         drag_coefficient=50.0,
         gas_pressure=0.7e6,
         fill_ratio=x,
@@ -30,10 +30,10 @@ def test_law_is_eq_19(paper_scene: Scene) -> None:
     assert flow.velocity[5] == pytest.approx((2 * 700 / 51) ** 0.5, rel=1e-12)
 
 
-def test_law_is_blocked_below_stall_and_with_the_gas_off(paper_scene: Scene) -> None:
-    law = paper_law(paper_scene)
+def test_law_is_blocked_below_stall_and_with_the_gas_off(table_1_scene: Scene) -> None:
+    law = paper_law(table_1_scene)
     stall = float(
-        paper.stall_pressure(disc=paper_scene.disc, density=1e3, angular_velocity=paper_scene.rotor.speed)
+        paper.stall_pressure(disc=table_1_scene.disc, density=1e3, angular_velocity=table_1_scene.rotor.speed)
     )
     flow = law.evaluate(
         fill_ratio=[0.0, 0.0, 0.5], gas_pressure=[stall * (1 - 1e-9), stall * (1 + 1e-9), 0.0]
@@ -43,8 +43,8 @@ def test_law_is_blocked_below_stall_and_with_the_gas_off(paper_scene: Scene) -> 
     assert 0 < flow.velocity[1] < 1e-3
 
 
-def test_table_reproduces_the_law(paper_scene: Scene) -> None:
-    law = paper_law(paper_scene)
+def test_table_reproduces_the_law(table_1_scene: Scene) -> None:
+    law = paper_law(table_1_scene)
     table = law.table()
     squared = table["velocity_squared_per_pressure"] * (
         0.9e6 + table["pressure_per_fill_difference"] * (0.3 - 0.1)
@@ -53,9 +53,9 @@ def test_table_reproduces_the_law(paper_scene: Scene) -> None:
     assert float(flow.velocity) == pytest.approx(float(squared[0]) ** 0.5, rel=1e-15)
 
 
-def test_scene_fixes_k_by_decree(paper_scene: Scene) -> None:
-    tube = dataclasses.replace(paper_scene.tube, drag_coefficient=20.0)
-    assert paper_law(dataclasses.replace(paper_scene, tube=tube)).drag_coefficient == 20.0
+def test_scene_fixes_k_by_decree(table_1_scene: Scene) -> None:
+    tube = dataclasses.replace(table_1_scene.tube, drag_coefficient=20.0)
+    assert paper_law(dataclasses.replace(table_1_scene, tube=tube)).drag_coefficient == 20.0
 
 
 @pytest.mark.parametrize(
@@ -69,13 +69,13 @@ def test_scene_fixes_k_by_decree(paper_scene: Scene) -> None:
         {"fill_ratio": 0.2, "gas_pressure": -2e5},
     ],
 )
-def test_law_refuses_what_cannot_be(paper_scene: Scene, arguments: dict[str, float]) -> None:
+def test_law_refuses_what_cannot_be(table_1_scene: Scene, arguments: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=r"fill_ratio|gas_pressure"):
-        paper_law(paper_scene).evaluate(**arguments)
+        paper_law(table_1_scene).evaluate(**arguments)
 
 
-def test_model_moves_72_mm_per_transferred_mass(paper_scene: Scene) -> None:
-    model = paper_model(paper_scene)
+def test_model_moves_72_mm_per_transferred_mass(table_1_scene: Scene) -> None:
+    model = paper_model(table_1_scene)
     transferred = 0.1 * model.chamber_volume * model.density
     moment = model.moment.pair_moment(fill_ratio=0.35, opposite_fill_ratio=0.15)
     assert float(moment) == pytest.approx(72e-3 * transferred, rel=1e-14)

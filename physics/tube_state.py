@@ -1,0 +1,139 @@
+"""The terms of k at given velocities, without their uncertainty."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.physics.tube_bends import bend_loss, straight_length
+from ringbalance.physics.tube_ends import entrance_loss, exit_loss, kinetic_factor
+from ringbalance.physics.tube_friction import friction_factor
+from ringbalance.physics.tube_numbers import reynolds_number, rotation_reynolds_number
+from ringbalance.physics.tube_rotation import (
+    STRAIGHT_CRITICAL_REYNOLDS,
+    critical_reynolds,
+    rotating_friction_ratio,
+    turbulent_friction_ratio,
+)
+from ringbalance.scene.models import Liquid, Tube
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TubeState:
+    """Numbers and terms of the tube's loss; arrays of one shape."""
+
+    reynolds: FloatArray
+    """Re."""
+    rotation_reynolds: float
+    """R_Om."""
+    critical_ratio: float
+    """Critical Re over the straight tube's."""
+    straight_friction: FloatArray
+    """f without rotation."""
+    rotating_friction: FloatArray
+    """f with rotation."""
+    bends: tuple[FloatArray, ...]
+    """K of each bend, in order along the path."""
+    kinetic_factor: FloatArray
+    """alpha."""
+    terms: Mapping[str, FloatArray]
+    """What k is the sum of."""
+
+    @property
+    def k(self) -> FloatArray:
+        """Sum of the terms."""
+        return np.asarray(sum(self.terms.values()), dtype=np.float64)
+
+
+def tube_state(*, tube: Tube, liquid: Liquid, angular_velocity: float, velocity: npt.ArrayLike) -> TubeState:
+    """Evaluate every term of k.
+
+    Args:
+        tube: the tube.
+        liquid: the liquid.
+        angular_velocity: omega, rad/s.
+        velocity: u, m/s, any shape, positive.
+
+    Returns:
+        TubeState, arrays of the shape of `velocity`.
+
+    Raises:
+        ValueError: arcs longer than the tube.
+
+    Source: the sources of the terms stand with them.
+    """
+    nu = liquid.kinematic_viscosity
+    re = reynolds_number(velocity=velocity, bore=tube.bore, kinematic_viscosity=nu)
+    rotation = rotation_reynolds_number(
+        angular_velocity=angular_velocity, bore=tube.bore, kinematic_viscosity=nu
+    )
+    critical = float(critical_reynolds(rotation_reynolds=rotation) / STRAIGHT_CRITICAL_REYNOLDS)
+    rough = tube.roughness / tube.bore
+    straight = friction_factor(reynolds=re, relative_roughness=rough)
+    turning = friction_factor(
+        reynolds=re,
+        relative_roughness=rough,
+        laminar_ratio=rotating_friction_ratio(reynolds=re, rotation_reynolds=rotation).value,
+        turbulent_ratio=turbulent_friction_ratio(reynolds=re, rotation_reynolds=rotation).value,
+        critical_ratio=critical,
+    )
+    bends = tuple(bend_loss(bend=b, bore=tube.bore, friction_factor=straight) for b in tube.bends)
+    return TubeState(
+        reynolds=re,
+        rotation_reynolds=rotation,
+        critical_ratio=critical,
+        straight_friction=straight,
+        rotating_friction=turning,
+        bends=bends,
+        kinetic_factor=kinetic_factor(reynolds=re, critical_ratio=critical),
+        terms=_terms(tube, re, critical, straight, turning, bends),
+    )
+
+
+def _terms(
+    tube: Tube,
+    re: FloatArray,
+    critical: float,
+    straight: FloatArray,
+    turning: FloatArray,
+    bends: tuple[FloatArray, ...],
+) -> dict[str, FloatArray]:
+    if tube.drag_coefficient is not None:
+        return {"decree": np.full(re.shape, tube.drag_coefficient)}
+    # The arcs turn too: rotation acts on the whole length, friction without it on the straights alone.
+    return {
+        "entrance": entrance_loss(tube=tube, reynolds=re, critical_ratio=critical)[0],
+        "friction": straight_length(tube=tube) / tube.bore * straight,
+        "rotation": tube.length / tube.bore * (turning - straight),
+        "bends": np.asarray(sum(bends, start=np.zeros(re.shape)), dtype=np.float64),
+        "exit": exit_loss(tube=tube, reynolds=re, critical_ratio=critical)[0],
+        "extra": np.full(re.shape, tube.extra_loss),
+    }
+
+
+def upstream_loss(*, tube: Tube, state: TubeState) -> FloatArray:
+    """The part of k between the driven chamber and the hump.
+
+    Entrance, the share `hump_position` of friction, rotation and extra loss, and the bends that lie before
+    the hump when all are spread evenly along the path; of a k fixed by decree the share `hump_position`.
+
+    Args:
+        tube: the tube.
+        state: its terms.
+
+    Returns:
+        k_up, the shape of the state's arrays.
+
+    Source: energy balance from the chamber to the hump; the scene does not say where the bends lie.
+    """
+    share = tube.hump_position
+    if "decree" in state.terms:
+        return np.asarray(share * state.terms["decree"], dtype=np.float64)
+    along = share * (state.terms["friction"] + state.terms["rotation"] + state.terms["extra"])
+    before = [k for i, k in enumerate(state.bends) if (i + 0.5) / len(state.bends) < share]
+    return np.asarray(state.terms["entrance"] + along + sum(before), dtype=np.float64)

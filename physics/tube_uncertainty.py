@@ -1,0 +1,147 @@
+"""What the uncertainty of k is made of: each correlation's spread, and each uncertain input's effect."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.physics.tube_bends import bend_spread, straight_length
+from ringbalance.physics.tube_ends import entrance_loss, exit_loss
+from ringbalance.physics.tube_friction import friction_factor, friction_uncertainty, turbulent_share
+from ringbalance.physics.tube_rotation import rotating_friction_ratio, turbulent_friction_ratio
+from ringbalance.physics.tube_state import TubeState, tube_state
+from ringbalance.scene.models import InputUncertainty, Liquid, Tube
+
+FloatArray = npt.NDArray[np.float64]
+
+ASSUMED_ROUGHNESS_SPREAD: Final = 0.5
+"""Relative 95 % half-width of a roughness for which the scene states none."""
+ENTRY_SPREAD: Final = 0.3
+"""Relative 95 % half-width of the rotation term over the first sqrt(R_Om) diameters, where the secondary flow
+still develops; assigned."""
+TUBE_INPUTS: Final = ("bore", "length", "roughness", "extra_loss", "drag_coefficient")
+
+
+def uncertainty_parts(
+    *,
+    tube: Tube,
+    liquid: Liquid,
+    angular_velocity: float,
+    velocity: FloatArray,
+    state: TubeState,
+    inputs: tuple[InputUncertainty, ...],
+) -> Mapping[str, FloatArray]:
+    """95 % half-widths of k, one per cause; independent, so they combine by the root of the sum of squares.
+
+    Args:
+        tube: the tube.
+        liquid: the liquid; its own viscosity uncertainty is used unless `inputs` has one.
+        angular_velocity: omega, rad/s.
+        velocity: u, m/s, any shape.
+        state: the terms of k at these velocities.
+        inputs: 95 % half-widths of scene quantities.
+
+    Returns:
+        Half-width of k by cause, each the shape of `velocity`; parts that vanish everywhere are kept.
+
+    Source: ASME V&V 20-2009, input uncertainty by sensitivity; model spreads stand with the correlations.
+    """
+    model = {} if tube.drag_coefficient is not None else _model_parts(tube, state)
+    return model | _input_parts(tube, liquid, angular_velocity, velocity, state, inputs)
+
+
+def _model_parts(tube: Tube, state: TubeState) -> dict[str, FloatArray]:
+    re, rough, ratio = state.reynolds, tube.roughness / tube.bore, state.critical_ratio
+    straight = straight_length(tube=tube) / tube.bore
+    lam = rotating_friction_ratio(reynolds=re, rotation_reynolds=state.rotation_reynolds)
+    tur = turbulent_friction_ratio(reynolds=re, rotation_reynolds=state.rotation_reynolds)
+    friction = friction_uncertainty(
+        reynolds=re,
+        relative_roughness=rough,
+        laminar_ratio=lam.value,
+        turbulent_ratio=tur.value,
+        critical_ratio=ratio,
+    )
+    higher = friction_factor(
+        reynolds=re,
+        relative_roughness=rough,
+        laminar_ratio=lam.value + lam.uncertainty,
+        turbulent_ratio=tur.value + tur.uncertainty,
+        critical_ratio=ratio,
+    )
+    ends = (end(tube=tube, reynolds=re, critical_ratio=ratio)[1] for end in (entrance_loss, exit_loss))
+    laminar = 1 - turbulent_share(reynolds=re, critical_ratio=ratio)
+    entry = min(1.0, state.rotation_reynolds**0.5 * tube.bore / tube.length)
+    return {
+        "friction correlation": straight * friction,
+        "rotation model": tube.length / tube.bore * (higher - state.rotating_friction),
+        "rotation entry": ENTRY_SPREAD * entry * laminar * np.abs(state.terms["rotation"]),
+        "ends": np.sqrt(sum(e**2 for e in ends)),
+        "bends": bend_spread(reynolds=re, critical_ratio=ratio) * state.terms["bends"],
+    }
+
+
+def _input_parts(
+    tube: Tube,
+    liquid: Liquid,
+    angular_velocity: float,
+    velocity: FloatArray,
+    state: TubeState,
+    inputs: tuple[InputUncertainty, ...],
+) -> dict[str, FloatArray]:
+    stated = {i.quantity: i for i in inputs}
+
+    def effect(quantity: str, half_width: float) -> FloatArray:
+        sides = (
+            _shifted(tube, liquid, angular_velocity, quantity, sign * half_width) for sign in (-1.0, 1.0)
+        )
+        changes = (
+            tube_state(tube=t, liquid=q, angular_velocity=w, velocity=velocity).k - state.k
+            for t, q, w in sides
+        )
+        return np.asarray(np.max(np.abs(np.array(list(changes))), axis=0), dtype=np.float64)
+
+    widths = _half_widths(tube, liquid, angular_velocity, stated)
+    return {f"input: {name}": effect(name, width) for name, width in widths.items()}
+
+
+def _half_widths(
+    tube: Tube, liquid: Liquid, angular_velocity: float, stated: Mapping[str, InputUncertainty]
+) -> dict[str, float]:
+    """Absolute half-widths of the inputs that k knows, from the scene or, failing that, assumed."""
+    nominal = {name: getattr(tube, name) for name in TUBE_INPUTS}
+    nominal |= {"kinematic_viscosity": liquid.kinematic_viscosity, "speed": angular_velocity}
+    assumed = {
+        "kinematic_viscosity": liquid.viscosity_uncertainty * liquid.kinematic_viscosity,
+        "roughness": ASSUMED_ROUGHNESS_SPREAD * tube.roughness,
+    }
+    given = {
+        name: i.half_width * (abs(nominal[name]) if i.relative else 1.0)
+        for name, i in stated.items()
+        if nominal.get(name) is not None
+    }
+    return {name: width for name, width in (assumed | given).items() if width > 0}
+
+
+def _shifted(
+    tube: Tube, liquid: Liquid, angular_velocity: float, quantity: str, change: float
+) -> tuple[Tube, Liquid, float]:
+    if quantity == "speed":
+        return tube, liquid, angular_velocity + change
+    if quantity == "kinematic_viscosity":
+        # Never to zero or below: an interval that wide says "unknown", and a tenth already shows it.
+        value = max(liquid.kinematic_viscosity + change, 0.1 * liquid.kinematic_viscosity)
+        return tube, replace(liquid, kinematic_viscosity=value), angular_velocity
+    value = getattr(tube, quantity) + change
+    floor = {
+        "bore": 0.1 * tube.bore,
+        "length": sum(b.angle * b.radius for b in tube.bends) or 0.1 * tube.length,
+        "roughness": 0.0,
+        "extra_loss": 0.0,
+        "drag_coefficient": 0.0,
+    }[quantity]
+    return replace(tube, **{quantity: max(value, floor)}), liquid, angular_velocity

@@ -1,0 +1,190 @@
+"""k(u): the "+1" held, smooth across the transition, one velocity per head, honest about its ranges."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from fluids.fittings import bend_rounded, entrance_sharp
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ringbalance.physics.tube_loss import TubeLoss, tube_loss
+from ringbalance.physics.tube_numbers import reynolds_number, rotation_reynolds_number
+from ringbalance.scene.models import Bend, InputUncertainty, Liquid, Tube
+
+WATER = Liquid(
+    name="custom",
+    temperature=None,
+    density=1000.0,
+    kinematic_viscosity=1e-6,
+    vapour_pressure=2339.0,
+    density_uncertainty=0.001,
+    viscosity_uncertainty=0.02,
+    source="test",
+)
+TUBE = Tube(
+    bore=1.5e-3,
+    port_radius=44.5e-3,
+    hump_radius=31.5e-3,
+    hump_position=0.5,
+    hump_gas="vented",
+    length=120e-3,
+    roughness=1.5e-6,
+    entrance="sharp",
+    entrance_radius=0.0,
+    bends=(Bend(angle=math.pi / 2, radius=3e-3), Bend(angle=math.pi / 2, radius=3e-3)),
+    extra_loss=0.0,
+    drag_coefficient=None,
+)
+OMEGA = 1047.2
+VELOCITIES = np.geomspace(0.1, 20, 1200)
+
+
+def loss(
+    tube: Tube = TUBE, nu: float = 1e-6, omega: float = OMEGA, velocity: object = VELOCITIES
+) -> TubeLoss:
+    liquid = dataclasses.replace(WATER, kinematic_viscosity=nu)
+    return tube_loss(tube=tube, liquid=liquid, angular_velocity=omega, velocity=velocity)  # type: ignore[arg-type]
+
+
+tubes = st.builds(
+    dataclasses.replace,
+    st.just(TUBE),
+    bore=st.floats(0.8e-3, 4e-3),
+    length=st.floats(30e-3, 1.0),
+    roughness=st.floats(0, 40e-6),
+    entrance=st.sampled_from(["sharp", "rounded", "projecting"]),
+    entrance_radius=st.floats(0, 2e-3),
+    extra_loss=st.floats(0, 5),
+    hump_position=st.floats(0.05, 0.95),
+)
+viscosities = st.floats(-7, -3.4).map(lambda e: 10.0**e)
+speeds = st.sampled_from([0.0, 5.0, 100.0, 1047.2, 6000.0])
+
+
+def test_numbers() -> None:
+    assert float(reynolds_number(velocity=-2.0, bore=1e-3, kinematic_viscosity=1e-6)) == pytest.approx(2000)
+    assert rotation_reynolds_number(
+        angular_velocity=-100.0, bore=2e-3, kinematic_viscosity=1e-6
+    ) == pytest.approx(400)
+
+
+def test_terms_add_up_and_the_turbulent_exit_is_not_counted_twice() -> None:
+    found = loss(omega=0.0, velocity=np.array([20.0]), nu=1e-7)
+    np.testing.assert_allclose(sum(found.terms.values()), found.k.value, rtol=1e-14)
+    assert float(found.terms["exit"][0]) < 1e-3
+    assert float(found.terms["entrance"][0]) == pytest.approx(entrance_sharp(), abs=1e-3)
+
+
+def test_both_laminar_ends_together_cost_about_2_3_with_the_plus_one() -> None:
+    found = loss(dataclasses.replace(TUBE, bends=()), omega=0.0, velocity=1000 * 1e-6 / 1.5e-3)
+    ends = float(found.terms["entrance"] + found.terms["exit"])
+    assert ends == pytest.approx(1.3, abs=0.05)
+    assert float(found.kinetic_factor) == pytest.approx(2, abs=0.05)
+
+
+def test_head_of_a_long_laminar_tube_is_hagen_poiseuille() -> None:
+    tube = dataclasses.replace(TUBE, bends=(), length=10.0)
+    u, nu = 0.2, 1e-5
+    found = loss(tube, nu=nu, omega=0.0, velocity=u)
+    head = float(found.k.value + 1) * u**2 / 2
+    assert head == pytest.approx(32 * nu * u * 10.0 / tube.bore**2, rel=1e-3)
+
+
+def test_arc_friction_is_counted_once() -> None:
+    tube = dataclasses.replace(TUBE, bends=(Bend(angle=math.pi, radius=20e-3),), length=math.pi * 20e-3)
+    found = loss(tube, omega=0.0)
+    np.testing.assert_allclose(found.terms["friction"], 0.0, atol=1e-12)
+    f = 64 / float(found.reynolds[0])
+    expected = bend_rounded(Di=tube.bore, angle=180.0, rc=20e-3, fd=f)
+    assert float(found.terms["bends"][0]) == pytest.approx(expected, rel=1e-9)
+
+
+@given(tube=tubes, nu=viscosities, omega=speeds)
+def test_k_is_smooth_and_the_head_has_one_velocity(tube: Tube, nu: float, omega: float) -> None:
+    found = loss(tube, nu=nu, omega=omega)
+    k, u = found.k.value, found.velocity
+    assert np.all(np.isfinite(k))
+    step = np.log(u[1] / u[0])
+    slope = np.diff(np.log(k + 1)) / step
+    assert np.all(slope > -2)  # so (k + 1) u^2 grows
+    assert np.max(np.abs(slope)) < 4
+    # A jump, however small, would show as a slope that grows without bound on a finer grid.
+    at = np.argmax(np.abs(np.diff(slope)))
+    fine = loss(tube, nu=nu, omega=omega, velocity=np.geomspace(u[at], u[at + 2], 400))
+    fine_slope = np.diff(np.log(fine.k.value + 1)) / np.log(fine.velocity[1] / fine.velocity[0])
+    assert np.max(np.abs(fine_slope)) < 1.05 * np.max(np.abs(slope)) + 0.05
+
+
+@given(tube=tubes, nu=viscosities, omega=speeds)
+def test_uncertainty_is_finite_positive_and_made_of_its_parts(tube: Tube, nu: float, omega: float) -> None:
+    found = loss(tube, nu=nu, omega=omega, velocity=np.geomspace(1e-6, 1e4, 60))
+    assert np.all(np.isfinite(found.k.uncertainty) & (found.k.uncertainty > 0))
+    combined = np.sqrt(sum(p**2 for p in found.uncertainty_parts.values()))
+    np.testing.assert_allclose(found.k.uncertainty, combined, rtol=1e-12)
+    assert not found.in_range[0]
+    assert not found.in_range[-1]
+    assert np.all(found.upstream_k <= found.k.value + 1e-9)
+    assert np.all(found.upstream_k >= 0)
+
+
+def test_rotation_costs_far_more_than_friction_in_the_papers_tube_when_slow() -> None:
+    found = loss(velocity=np.array([0.5, 15.0]))
+    assert found.terms["rotation"][0] > 3 * found.terms["friction"][0]
+    assert found.terms["rotation"][1] < 0.5 * found.terms["friction"][1]
+    assert list(found.flow_state) == ["laminar", "turbulent"]
+
+
+def test_ranges_are_told_in_words() -> None:
+    found = loss(velocity=np.array([0.5, 15.0]))
+    assert list(found.in_range) == [False, True]
+    assert any(text.startswith("bends") and where[0] for text, where in found.range_notes.items())
+    assert not found.k.status.ok
+    assert "in_range" in found.k.status.text
+
+
+def test_decree_fixes_k_at_every_velocity() -> None:
+    found = loss(dataclasses.replace(TUBE, drag_coefficient=50.0))
+    assert np.all(found.k.value == 50.0)
+    assert set(found.terms) == {"decree"}
+    assert np.all(found.upstream_k == 25.0)
+    assert np.all(found.k.uncertainty == 0.0)
+    assert np.all(found.in_range)
+
+
+def test_input_uncertainty_is_the_change_of_k() -> None:
+    tube = dataclasses.replace(TUBE, bends=(), length=10.0)
+    inputs = (InputUncertainty(quantity="bore", half_width=0.02, relative=True),)
+    found = tube_loss(
+        tube=tube,
+        liquid=dataclasses.replace(WATER, kinematic_viscosity=1e-4),
+        angular_velocity=0.0,
+        velocity=1.0,
+        inputs=inputs,
+    )
+    # Laminar: k is L/d * 64 nu/(u d), so 2 % of the bore is 4 % of k.
+    assert float(found.uncertainty_parts["input: bore"] / found.k.value) == pytest.approx(0.04, abs=2e-3)
+    assert float(found.uncertainty_parts["input: kinematic_viscosity"] / found.k.value) == pytest.approx(
+        0.02, abs=1e-3
+    )
+
+
+def test_upstream_loss_knows_where_the_hump_lies() -> None:
+    near, far = (loss(dataclasses.replace(TUBE, hump_position=s)) for s in (0.1, 0.9))
+    between = far.upstream_k - near.upstream_k
+    along = 0.8 * (near.terms["friction"] + near.terms["rotation"]) + near.terms["bends"]
+    np.testing.assert_allclose(between, along, rtol=1e-12)
+
+
+@pytest.mark.parametrize("velocity", [0.0, -1.0, np.nan, np.inf])
+def test_velocity_must_be_positive_and_finite(velocity: float) -> None:
+    with pytest.raises(ValueError, match="velocity"):
+        loss(velocity=velocity)
+
+
+def test_arcs_longer_than_the_tube_are_refused() -> None:
+    with pytest.raises(ValueError, match="arcs"):
+        loss(dataclasses.replace(TUBE, length=5e-3))

@@ -57,7 +57,7 @@ def _ratios(above: Mapping[str, Unit], below: Mapping[str, Unit]) -> dict[str, U
     }
 
 
-_VIBRATION = _units({"m": 1, "mm": "1e-3", "um": "1e-6", "nm": "1e-9"})
+_VIBRATION = _units({"m": 1, "mm": "1e-3", "um": "1e-6"})
 _UNBALANCE = _units({"(kg*m)": 1, "(kg*mm)": "1e-3", "(g*m)": "1e-3", "(g*cm)": "1e-5", "(g*mm)": "1e-6"})
 
 DIMENSIONS: Mapping[str, Dimension] = MappingProxyType(

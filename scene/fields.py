@@ -30,7 +30,7 @@ class Reader:
     """TOML value to SI; raises FieldError."""
     allowed: str
     """What is accepted, for messages."""
-    kind: str
+    summary: str
     """What is written there, for the reference of the scene file."""
 
     def __get_pydantic_core_schema__(self, _source: object, _handler: object) -> CoreSchema:
@@ -95,7 +95,7 @@ def quantity(dimension: str, bounds: Bounds | None = None) -> Reader:
     """
     kind = DIMENSIONS[dimension]
     limits = bounds or Bounds()
-    interval = f" {limits}" if bounds else ""
+    interval = f" {limits}".replace(" at least", " of at least") if bounds else ""
     allowed = f'{kind.name}{interval}, such as "{kind.example}", in {unit_names(dimension)}'
 
     def read(value: object) -> float:
@@ -107,7 +107,7 @@ def quantity(dimension: str, bounds: Bounds | None = None) -> Reader:
             raise FieldError(f"it must be at least {kind.smallest:g} {si_unit} to mean anything", allowed)
         return number
 
-    return Reader(read=read, allowed=allowed, kind=f"{kind.name}: {unit_names(dimension)}")
+    return Reader(read=read, allowed=allowed, summary=f"{kind.name}{interval}")
 
 
 def angle_of_turn() -> Reader:
@@ -124,7 +124,7 @@ def angle_of_turn() -> Reader:
         # 360 deg is the full turn itself, however it was rounded.
         return angle if abs(angle) <= 2 * math.pi * (1 + 1e-12) else math.remainder(angle, 2 * math.pi)
 
-    return Reader(read=read, allowed=allowed, kind=f"an angle: {unit_names('angle')}")
+    return Reader(read=read, allowed=allowed, summary="an angle")
 
 
 def share(bounds: Bounds) -> Reader:
@@ -144,7 +144,7 @@ def share(bounds: Bounds) -> Reader:
             raise FieldError(f"it must be {bounds}", allowed)
         return number
 
-    return Reader(read=read, allowed=allowed, kind="a bare number or %")
+    return Reader(read=read, allowed=allowed, summary=f"a share {bounds}, bare or in %")
 
 
 def _example(bounds: Bounds) -> float:
@@ -160,7 +160,7 @@ def number(bounds: Bounds) -> Reader:
     Returns:
         A reader of bare numbers.
     """
-    allowed = f"a bare number {bounds}"
+    allowed = f"a bare number {bounds}".replace("number at", "number of at")
 
     def read(value: object) -> float:
         plain = _number(value, allowed)
@@ -168,7 +168,7 @@ def number(bounds: Bounds) -> Reader:
             raise FieldError(f"it must be {bounds}", allowed)
         return plain
 
-    return Reader(read=read, allowed=allowed, kind="a bare number")
+    return Reader(read=read, allowed=allowed, summary=allowed)
 
 
 def _number(value: object, allowed: str) -> float:
@@ -207,7 +207,7 @@ def chamber_count() -> Reader:
             raise FieldError(f"it must lie from 2 to {len(LETTERS)}", allowed)
         return count
 
-    return Reader(read=read, allowed=allowed, kind="an even whole number")
+    return Reader(read=read, allowed=allowed, summary=allowed)
 
 
 def seed_number() -> Reader:
@@ -224,7 +224,7 @@ def seed_number() -> Reader:
             raise FieldError("it must lie from 0 to 2^63 - 1", allowed)
         return count
 
-    return Reader(read=read, allowed=allowed, kind="a whole number")
+    return Reader(read=read, allowed=allowed, summary=allowed)
 
 
 def choice(*options: str) -> Reader:
@@ -245,7 +245,7 @@ def choice(*options: str) -> Reader:
             raise FieldError(f"it is not one of the known words{did_you_mean(value, options)}", allowed)
         return value
 
-    return Reader(read=read, allowed=allowed, kind=allowed)
+    return Reader(read=read, allowed=allowed, summary=allowed)
 
 
 def text() -> Reader:
@@ -263,7 +263,7 @@ def text() -> Reader:
             raise FieldError("it is empty, too long or not printable", allowed)
         return value
 
-    return Reader(read=read, allowed=allowed, kind="text")
+    return Reader(read=read, allowed=allowed, summary=allowed)
 
 
 def chamber_letters() -> Reader:
@@ -284,7 +284,7 @@ def chamber_letters() -> Reader:
             raise FieldError("a chamber stands in it more than once", allowed)
         return tuple(letters)
 
-    return Reader(read=read, allowed=allowed, kind="a list of letters")
+    return Reader(read=read, allowed=allowed, summary=allowed)
 
 
 def half_width(dimension: str | None) -> Reader:
@@ -308,7 +308,8 @@ def half_width(dimension: str | None) -> Reader:
             raise FieldError("a half-width must be at least 0 and below 100 %", allowed)
         return width, relative
 
-    return Reader(read=read, allowed=allowed, kind=f"a half-width: {allowed}")
+    own = DIMENSIONS[dimension].name if dimension else "a bare number"
+    return Reader(read=read, allowed=allowed, summary=f"a percentage, or {own}")
 
 
 def _absolute(value: object, dimension: str, allowed: str) -> float:

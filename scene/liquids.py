@@ -202,7 +202,7 @@ def _entry(key: str, lines: Iterable[Mapping[str, str]]) -> tuple[KnownLiquid, t
     ordered = sorted(lines, key=lambda line: float(line["T_C"]))
     rows = tuple(_row(line) for line in ordered)
     name, aliases = _ALIASES[key]
-    source = f"{ordered[0]['source']} ({ordered[0]['status']})"
+    source = f"{ordered[0]['source']}; {ordered[0]['status']}"
     liquid = KnownLiquid(
         name=name,
         aliases=aliases if key == name else (*aliases, key),

@@ -47,7 +47,10 @@ class Controller(Protocol[StateT]):
 
     @property
     def rises_tolerated(self) -> int:
-        """Operations in a row after which the amplitude may have risen without the loop diverging."""
+        """Operations in a row after which the amplitude may have risen without the loop diverging.
+
+        As many rises that end above the first sample, or one more, end a run.
+        """
         ...
 
     def start(self) -> StateT:

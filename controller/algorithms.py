@@ -8,7 +8,8 @@ from ringbalance.controller.algorithm import Controller
 from ringbalance.controller.rotor import chamber_letters
 from ringbalance.controller.target_vector import TargetVector
 from ringbalance.controller.trial import Trial
-from ringbalance.scene.faults import Fault, SceneError
+from ringbalance.scene.describe import scene_fault
+from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 
 
@@ -29,18 +30,14 @@ def controller_of(scene: Scene) -> Controller[Any]:
         return target_vector_of(scene)
     if kind == "trial":
         return trial_of(scene)
-    raise SceneError(
-        [
-            Fault(
-                file=scene.source,
-                table="controller",
-                key="kind",
-                value=f'"{kind}"',
-                problem="this version simulates no such algorithm",
-                allowed='"target_vector", "trial"',
-            )
-        ]
+    fault = scene_fault(
+        scene=scene,
+        table="controller",
+        key="kind",
+        problem="this version does not simulate this algorithm",
+        allowed='"target_vector", "trial"',
     )
+    raise SceneError([fault])
 
 
 def target_vector_of(scene: Scene) -> TargetVector:

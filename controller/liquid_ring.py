@@ -127,13 +127,14 @@ class LiquidRing:
             self._pair(pair, index, _open_valve(gas_times, index, index + half), instants)
             for index, pair in enumerate(state.pairs)
         ]
+        operations = [path.operation for path in paths if path.operation is not None]
         first = np.array([path.fill for path in paths])
         totals = np.array([[pair.total] for pair in state.pairs])
         return Advance(
             instants=instants,
             fill_ratio=np.concatenate([first, totals - first]),
             state=DiscState(pairs=tuple(path.state for path in paths)),
-            operations=tuple(path.operation for path in paths if path.operation is not None),
+            operations=tuple(sorted(operations, key=lambda operation: operation.chamber)),
             drift=max(path.drift for path in paths),
         )
 

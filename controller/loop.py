@@ -152,13 +152,20 @@ class _Run:
         self.last_usable, self.operated = measurement, False
 
     def _cause(self, command: Command) -> Cause | None:
-        if self.rises > self.controller.rises_tolerated:
+        if self._diverges():
             return Cause.RISING
         if self.idle >= IDLE_OPERATIONS + self.plant.chambers:
             return Cause.IDLE
         if command.resting and self.exact and not any(pair.primed for pair in self.state.pairs):
             return Cause.AT_REST
         return Cause.TIME if self.remaining <= 0 else None
+
+    def _diverges(self) -> bool:
+        """More rises in a row than tolerated, or as many and higher than at the start."""
+        spare = self.controller.rises_tolerated - self.rises
+        first, last = self.samples[0].measurement, self.last_usable
+        higher = first is not None and last is not None and rose(first, last, floor=self.floor)
+        return spare < 0 or (spare == 0 and higher)
 
     def _gas(self, command: Command) -> None:
         """All valves of a command open together; the stretch ends when the last one has closed."""
@@ -184,10 +191,13 @@ class _Run:
             self._pass(self.plant.advance(self.state, gas_times={}, duration=duration, points=points))
 
     def _pass(self, advance: Advance) -> None:
-        self._keep(self.time + advance.instants, advance.fill_ratio)
+        time = self.time + advance.instants
+        # A valve may open for less than the clock resolves: the record keeps one entry for one time.
+        later = np.diff(time, prepend=self.time) > 0
+        self._keep(time[later], advance.fill_ratio[:, later])
         self.state = advance.state
         self.drift = max(self.drift, advance.drift)
-        self.time += float(advance.instants[-1])
+        self.time = float(time[-1])
 
     def _keep(self, time: FloatArray, fill_ratio: FloatArray) -> None:
         self.times.append(time)

@@ -17,6 +17,8 @@ from ringbalance.scene.models import Scene
 
 MICROMETRE: Final = 1e-6
 GRAM_MILLIMETRE: Final = 1e-6
+NEARLY_EMPTY: Final = 1e-6
+"""Fill ratio at which a chamber's last liquid is looked at."""
 
 
 class Cause(StrEnum):
@@ -149,20 +151,20 @@ def _time_limit(facts: Facts) -> str:
 
 
 def _stalled(facts: Facts) -> str:
-    blocked = [i for i in facts.injections if i.operation.event is Event.BLOCKED]
-    last = blocked[-1]
-    total = facts.state.pairs[0].total
-    needed = starting_pressure(
-        law=facts.plant.model.flow,
-        fill=last.operation.fill_after,
-        opposite_fill=min(total - last.operation.fill_after, facts.plant.model.flow.max_fill_ratio),
-        above=facts.scene.gas.pressure,
-    )
-    threshold = "no pressure found starts it" if needed is None else f"it starts at {needed / 1e6:.4g} MPa"
+    last = next(i for i in reversed(facts.injections) if i.operation.event is Event.BLOCKED)
+    fill, law = last.operation.fill_after, facts.plant.model.flow
+    total, pressure = facts.state.pairs[0].total, facts.scene.gas.pressure
+    lowest = max(0.0, total - law.max_fill_ratio)
+
+    def needed(at: float, *, primed: bool) -> str:
+        other = min(total - at, law.max_fill_ratio)
+        found = starting_pressure(law=law, fill=at, opposite_fill=other, primed=primed, above=pressure)
+        return "no pressure found does" if found is None else f"{found / 1e6:.4g} MPa"
+
     return (
-        f"{_not_settled(facts)}; stalled: {facts.scene.gas.pressure / 1e6:.4g} MPa starts no flow out of "
-        f"chamber {last.chamber} at fill {last.operation.fill_after:.4g}, {threshold}: raise gas.pressure "
-        "above that, or lower rotor.speed"
+        f"{_not_settled(facts)}; stalled: {pressure / 1e6:.4g} MPa drives no liquid out of chamber "
+        f"{last.chamber} at fill {fill:.4g} (to start there: {needed(fill, primed=False)}; to empty it: "
+        f"{needed(lowest + NEARLY_EMPTY, primed=True)}): raise gas.pressure, or lower rotor.speed"
     )
 
 

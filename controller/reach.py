@@ -60,23 +60,30 @@ def unreachable_moment(*, plant: LiquidRing, state: DiscState, wanted: complex) 
     return float(np.min(np.abs(offset - along * edges)))
 
 
-def starting_pressure(*, law: FlowLaw, fill: float, opposite_fill: float, above: float) -> float | None:
-    """Smallest gas pressure at which liquid leaves a chamber whose tube is not primed.
+def starting_pressure(
+    *, law: FlowLaw, fill: float, opposite_fill: float, primed: bool, above: float
+) -> float | None:
+    """Smallest gas pressure at which liquid leaves a chamber.
 
     Args:
         law: the flow law.
         fill: x of the driven chamber.
         opposite_fill: x of the opposite chamber.
-        above: a gauge pressure, Pa, above zero, that does not start the flow.
+        primed: whether the tube holds a continuous column beforehand.
+        above: a gauge pressure, Pa, above zero, where the search begins.
 
     Returns:
         Gauge pressure, Pa, to 12 digits; None when no pressure found does.
     """
 
     def flows(pressure: float) -> bool:
-        flow = law.evaluate(fill_ratio=fill, opposite_fill_ratio=opposite_fill, gas_pressure=pressure)
+        flow = law.evaluate(
+            fill_ratio=fill, opposite_fill_ratio=opposite_fill, gas_pressure=pressure, primed=primed
+        )
         return bool(flow.velocity > 0)
 
+    if flows(above):
+        return above
     low, high = above, 2 * above
     for _ in range(MAX_DOUBLINGS):
         if flows(high):

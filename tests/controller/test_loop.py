@@ -1,0 +1,336 @@
+"""The closed loop: against a few lines by hand, its limit cases, and what each ending says."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ringbalance.controller.adaptive_ode import adaptive_ode
+from ringbalance.controller.algorithm import Measurement
+from ringbalance.controller.algorithms import controller_of
+from ringbalance.controller.document import simulation_document
+from ringbalance.controller.liquid_ring import LiquidRing, initial_state
+from ringbalance.controller.loop import simulate
+from ringbalance.controller.quadrature import quadrature
+from ringbalance.controller.simulation import Outcome, Simulation
+from ringbalance.reduced_model.model import BalancerModel
+from ringbalance.scene.faults import SceneError
+from ringbalance.scene.models import Scene
+
+
+def with_controller(scene: Scene, **changes: Any) -> Scene:
+    return replace(scene, controller=replace(scene.controller, **changes))
+
+
+def with_rotor(scene: Scene, **changes: Any) -> Scene:
+    return replace(scene, rotor=replace(scene.rotor, **changes))
+
+
+def with_gas(scene: Scene, pressure: float) -> Scene:
+    return replace(scene, gas=replace(scene.gas, pressure=pressure))
+
+
+def with_noise(scene: Scene, *, seed: int = 0) -> Scene:
+    noisy = replace(scene.sensor, amplitude_noise=0.01e-6, phase_noise=math.radians(0.5))
+    return replace(scene, sensor=noisy, run=replace(scene.run, seed=seed))
+
+
+def document(simulation: Simulation) -> str:
+    return json.dumps(simulation_document(simulation), allow_nan=False)
+
+
+def test_proportional_control_along_one_axis_by_hand(scene: Scene, model: BalancerModel) -> None:
+    # Unbalance exactly at chamber A: every operation drives A, the amplitude is 10 um less what has moved.
+    along = with_rotor(
+        with_controller(scene, integral_time=None, derivative_time=0.0), initial_phase=-math.radians(17)
+    )
+    run = simulate(along, model)
+    area = math.pi / 4 * 1.5e-3**2
+    volume = (math.pi / 4 * (44.5e-3**2 - 20.5e-3**2) - 2 * 2.777e-3 * 24e-3) * 62e-3
+    omega2 = (10000 * 2 * math.pi / 60) ** 2
+    x, time, amplitude, expected = 0.25, 0.0, 10e-6, []
+    while amplitude > 0.05e-6:
+        gas = 0.08e6 * amplitude
+        head = 0.7e6 + 1000 * omega2 * volume / (62e-3 * math.pi / 2) * (2 * x - 0.5)
+        u = math.sqrt(2 / (1000 * 51) * head)
+        after = x - area / volume * (u * gas - omega2 * area / (51 * 62e-3 * math.pi / 2) * gas**2)
+        expected.append((time, gas, x, after))
+        x, time = after, time + gas + 0.5
+        amplitude = 10e-6 - 0.0108 * 72e-3 * 1000 * volume * (0.25 - x)
+    found = [
+        (i.time, i.operation.duration, i.operation.fill_before, i.operation.fill_after)
+        for i in run.injections
+    ]
+    assert {i.chamber for i in run.injections} == {"A"}
+    assert np.array(found) == pytest.approx(np.array(expected), rel=1e-9)
+    assert run.settled
+    assert run.amplitude[-1] == pytest.approx(amplitude, rel=1e-6)
+
+
+def test_the_record_is_consistent(scene: Scene, model: BalancerModel) -> None:
+    run = simulate(scene, model)
+    assert np.all(np.diff(run.time) > 0)
+    assert run.amplitude[0] == pytest.approx(10e-6)
+    assert run.phase[0] == pytest.approx(math.pi / 2)
+    assert run.settling_time is not None
+    after = run.time >= run.settling_time
+    assert np.all(run.amplitude[after] <= run.limit)
+    assert run.amplitude[np.flatnonzero(after)[0] - 1] > run.limit
+    for injection in run.injections:
+        start = int(np.flatnonzero(run.time == injection.time)[0])
+        stop = int(np.argmin(np.abs(run.time - injection.time - injection.operation.duration)))
+        fills = run.fill_ratio[injection.chamber]
+        assert fills[start] == injection.operation.fill_before
+        assert fills[stop] == pytest.approx(injection.operation.fill_after, abs=1e-15)
+
+
+def test_both_valves_open_together_and_the_wait_follows_the_longer_one(
+    scene: Scene, model: BalancerModel
+) -> None:
+    run = simulate(scene, model)
+    first = [i for i in run.injections if i.time == 0.0]
+    assert [i.chamber for i in first] == ["B", "C"]
+    # The unbalance lies at 90 + 17 degrees; Kc e = 0.8 s.
+    assert first[0].operation.duration == pytest.approx(0.8 * math.cos(math.radians(17)))
+    assert first[1].operation.duration == pytest.approx(0.8 * math.sin(math.radians(17)))
+    assert run.samples[1].time == pytest.approx(first[0].operation.duration + 0.5)
+
+
+def test_the_integrators_agree_over_a_whole_run(scene: Scene, model: BalancerModel) -> None:
+    exact = simulate(scene, model)
+    assert exact.integrator == "closed_form"
+    for integrator, tolerance in ((quadrature, 1e-10), (adaptive_ode(), 1e-7)):
+        other = simulate(scene, model, integrator=integrator)
+        assert other.time == pytest.approx(exact.time, abs=tolerance * 100)
+        for letter, fill in exact.fill_ratio.items():
+            assert other.fill_ratio[letter] == pytest.approx(fill, abs=tolerance)
+
+
+@pytest.mark.parametrize("chambers", [2, 6, 8])
+def test_other_numbers_of_chambers_settle(scene: Scene, model: BalancerModel, chambers: int) -> None:
+    disc = replace(scene.disc, chambers=chambers)
+    phase = -math.radians(17) if chambers == 2 else 1.0
+    run = simulate(with_rotor(replace(scene, disc=disc), initial_phase=phase), model)
+    assert run.settled, run.status
+    assert list(run.fill_ratio) == list("ABCDEFGH"[:chambers])
+
+
+def test_nothing_is_done_without_vibration(scene: Scene, model: BalancerModel) -> None:
+    run = simulate(with_rotor(scene, initial_amplitude=0.0), model)
+    assert (run.outcome, run.settling_time, run.injections) == (Outcome.SETTLED, 0.0, ())
+    assert np.all(run.amplitude == 0)
+
+
+def test_an_unbalance_beyond_the_capacity_is_said_so(scene: Scene, model: BalancerModel) -> None:
+    run = simulate(with_rotor(scene, initial_amplitude=30e-6, initial_phase=math.radians(73)), model)
+    assert run.outcome is Outcome.CAPACITY_EXCEEDED
+    # 30 um at chamber B against 72 mm * 1000 kg/m^3 * V * 0.25 of one pair.
+    assert "2778 g mm" in run.status
+    assert "1219 g mm" in run.status
+    assert run.amplitude[-1] == pytest.approx(30e-6 - 0.0108 * 1218.6e-6, rel=1e-3)
+    assert run.time[-1] < scene.run.time_limit
+
+
+def test_too_little_pressure_stalls_and_names_what_is_needed(scene: Scene, model: BalancerModel) -> None:
+    run = simulate(with_gas(scene, 0.2e6), model)
+    assert run.outcome is Outcome.STALLED
+    assert "0.381" in run.status
+    assert not run.settled
+    assert run.time[-1] < scene.run.time_limit
+
+
+def test_a_wrong_lag_angle_is_found_out_and_stopped(scene: Scene, model: BalancerModel) -> None:
+    run = simulate(with_controller(scene, assumed_lag_angle=math.radians(197)), model)
+    assert run.outcome is Outcome.DIVERGING
+    assert "lag angle" in run.status
+    assert len(run.samples) <= 4
+    assert run.misadjustments >= 2
+
+
+def test_a_wrong_sense_of_rotation_is_found_out(scene: Scene, model: BalancerModel) -> None:
+    mirrored = controller_of(scene)
+
+    class Mirrored:
+        rises_tolerated = mirrored.rises_tolerated
+        start = staticmethod(mirrored.start)
+
+        @staticmethod
+        def step(state: Any, measurement: Measurement | None) -> Any:
+            assert measurement is not None
+            return mirrored.step(state, replace(measurement, phase=-measurement.phase))
+
+    run = simulate(with_rotor(scene, initial_phase=math.radians(70)), model, controller=Mirrored())
+    assert run.outcome is Outcome.DIVERGING
+    assert "sense of rotation" in run.status
+
+
+def test_far_too_high_a_gain_is_told_by_its_overshoots(scene: Scene, model: BalancerModel) -> None:
+    run = simulate(with_controller(scene, proportional=0.5e6), model)
+    assert not run.settled
+    assert run.overshoots > 2
+    assert "proportional" in run.status
+
+
+def test_commands_below_the_valves_minimum_are_told(scene: Scene, model: BalancerModel) -> None:
+    run = simulate(with_controller(scene, minimum_gas_time=0.05, integral_time=None), model)
+    assert run.outcome is Outcome.GAS_TIME_TOO_SHORT
+    assert "50 ms" in run.status
+    assert all(i.operation.duration >= 0.05 for i in run.injections)
+
+
+def test_a_limit_below_the_noise_is_told(scene: Scene, model: BalancerModel) -> None:
+    loud = replace(scene, sensor=replace(scene.sensor, amplitude_noise=1e-6))
+    run = simulate(loud, model)
+    assert run.outcome is Outcome.NOISE
+    assert "standard deviations" in run.status
+
+
+def test_the_time_limit_ends_a_run_in_mid_operation(scene: Scene, model: BalancerModel) -> None:
+    short = replace(scene, run=replace(scene.run, time_limit=0.3))
+    run = simulate(short, model)
+    assert run.outcome is Outcome.TIME_LIMIT
+    assert run.time[-1] == pytest.approx(0.3)
+    assert max(i.operation.duration for i in run.injections) == pytest.approx(0.3)
+
+
+def test_a_tiny_period_does_not_run_for_ever(
+    scene: Scene, model: BalancerModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("ringbalance.controller.loop.MAX_SAMPLES", 50)
+    tiny = with_controller(scene, period=1e-9, minimum_gas_time=10.0, maximum_gas_time=20.0)
+    run = simulate(tiny, model)
+    assert run.outcome is Outcome.TOO_MANY_SAMPLES
+    assert "controller.period" in run.status
+    assert len(run.samples) == 50
+
+
+def test_noise_is_reproducible_by_seed(scene: Scene, model: BalancerModel) -> None:
+    runs = [document(simulate(with_noise(scene, seed=seed), model)) for seed in (7, 7, 8)]
+    assert runs[0] == runs[1]
+    assert runs[0] != runs[2]
+
+
+def test_noise_has_the_deviations_asked_for(scene: Scene, model: BalancerModel) -> None:
+    loud = replace(scene.sensor, amplitude_noise=0.2e-6, phase_noise=0.05)
+    still = with_controller(
+        with_rotor(replace(scene, sensor=loud)), minimum_gas_time=1e3, maximum_gas_time=2e3
+    )
+    seen = [s.measurement for s in simulate(still, model).samples]
+    amplitudes = np.array([m.amplitude for m in seen if m is not None])
+    phases = np.array([m.phase for m in seen if m is not None])
+    assert len(seen) > 200
+    assert amplitudes.mean() == pytest.approx(10e-6, abs=0.06e-6)
+    assert amplitudes.std() == pytest.approx(0.2e-6, rel=0.2)
+    assert phases.std() == pytest.approx(0.05, rel=0.2)
+
+
+def test_a_faulty_sensor_delays_but_does_not_mislead(scene: Scene, model: BalancerModel) -> None:
+    count = 0
+
+    def faulty(time: float, vibration: complex) -> Measurement | None:
+        nonlocal count
+        count += 1
+        if count % 3 == 1:
+            return None
+        amplitude = math.nan if count % 3 == 2 and count < 6 else abs(vibration)
+        return Measurement(time=time, amplitude=amplitude, phase=float(np.angle(vibration)) + 4 * math.pi)
+
+    short = replace(scene, run=replace(scene.run, time_limit=20.0))
+    run = simulate(short, model, sensor=faulty)
+    assert run.amplitude[-1] <= run.limit
+    assert run.misadjustments == 0
+    samples = simulation_document(run)["samples"]
+    assert samples["amplitude_m"][:2] == [None, None]
+    document(run)
+
+
+def test_progress_runs_to_the_end(scene: Scene, model: BalancerModel) -> None:
+    seen: list[tuple[float, float]] = []
+    run = simulate(scene, model, progress=lambda time, limit: seen.append((time, limit)))
+    assert [time for time, _ in seen] == [sample.time for sample in run.samples]
+    assert {limit for _, limit in seen} == {120.0}
+
+
+def test_an_algorithm_that_is_not_there_is_a_fault_of_the_scene(scene: Scene, model: BalancerModel) -> None:
+    with pytest.raises(SceneError, match=r"test\.toml: \[controller\] kind"):
+        simulate(with_controller(scene, kind="law_based"), model)
+
+
+def test_the_document_is_what_scripts_rely_on(scene: Scene, model: BalancerModel) -> None:
+    found = json.loads(document(simulate(scene, model)))
+    promised = {
+        "balancer",
+        "settled",
+        "settling_time_s",
+        "status",
+        "time_s",
+        "amplitude_m",
+        "phase_rad",
+        "injections",
+        "fill_ratio",
+        "overshoots",
+        "misadjustments",
+    }
+    assert promised <= set(found)
+    assert found["balancer"] == "liquid_ring"
+    injection = {"time_s", "chamber", "duration_s", "regime", "fill_before", "fill_after"}
+    assert injection <= set(found["injections"][0])
+    assert found["injections"][0]["regime"] == "siphon"
+    lengths = {len(found[key]) for key in ("time_s", "amplitude_m", "phase_rad")}
+    assert lengths == {len(fill) for fill in found["fill_ratio"].values()}
+
+
+# --- liquid that runs back through a full tube ---
+
+
+@pytest.fixture
+def siphoning(model: BalancerModel, laws: Mapping[str, Any]) -> BalancerModel:
+    """A balancer whose column holds with the gas off: levels run back by u = 20 (x_A - x_C) m/s."""
+    return replace(model, name="levelling", flow=laws["levelling"])
+
+
+def test_self_siphoning_loses_the_correction_and_is_told(scene: Scene, siphoning: BalancerModel) -> None:
+    run = simulate(scene, siphoning)
+    assert run.outcome is Outcome.DRIFTING
+    assert "run back" in run.status
+    assert run.integrator == "quadrature"
+
+
+def test_levels_run_back_by_the_law_while_waiting(siphoning: BalancerModel, scene: Scene) -> None:
+    plant = LiquidRing(model=siphoning, chambers=4, gas_pressure=1e5, integrator=quadrature)
+    state = initial_state(disc=scene.disc)
+    driven = plant.advance(state, gas_times={2: 0.4}, duration=0.4, points=3)
+    assert driven.state.pairs[0].primed
+    assert not driven.state.pairs[1].primed
+    waited = plant.advance(driven.state, gas_times={}, duration=0.7, points=2)
+    rate = 2 * 20 * siphoning.tube_area / siphoning.chamber_volume
+    lost = (driven.state.pairs[0].fill - 0.25) * math.exp(-rate * 0.7)
+    assert waited.state.pairs[0].fill == pytest.approx(0.25 + lost, abs=1e-11)
+    assert waited.state.pairs[1] == driven.state.pairs[1]
+    assert waited.drift == pytest.approx(driven.state.pairs[0].fill - 0.25 - lost, abs=1e-11)
+
+
+def test_a_pair_whose_valve_closes_first_runs_back_during_the_other(
+    siphoning: BalancerModel, scene: Scene
+) -> None:
+    plant = LiquidRing(model=siphoning, chambers=4, gas_pressure=1e5, integrator=quadrature)
+    both = plant.advance(initial_state(disc=scene.disc), gas_times={0: 0.2, 1: 0.9}, duration=0.9, points=3)
+    assert sorted(both.instants) == pytest.approx([0.2, 0.3, 0.6, 0.9])
+    first = {o.chamber: o for o in both.operations}[0]
+    rate = 2 * 20 * siphoning.tube_area / siphoning.chamber_volume
+    assert both.fill_ratio[0, 0] == first.fill_after
+    assert both.fill_ratio[0, -1] - 0.25 == pytest.approx(
+        (first.fill_after - 0.25) * math.exp(-rate * 0.7), abs=1e-11
+    )
+
+
+def test_gas_into_both_chambers_of_a_pair_is_refused(scene: Scene, model: BalancerModel) -> None:
+    plant = LiquidRing(model=model, chambers=4, gas_pressure=1e5, integrator=quadrature)
+    with pytest.raises(ValueError, match="one pair"):
+        plant.advance(initial_state(disc=scene.disc), gas_times={1: 0.2, 3: 0.2}, duration=0.2, points=1)

@@ -1,0 +1,145 @@
+"""Whatever the scene: liquid is conserved, fills stay in range, nothing is NaN, and every run ends."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ringbalance.controller.adaptive_ode import adaptive_ode
+from ringbalance.controller.closed_form import closed_form
+from ringbalance.controller.document import simulation_document
+from ringbalance.controller.loop import simulate
+from ringbalance.controller.quadrature import quadrature
+from ringbalance.controller.transfer import Drive
+from ringbalance.reduced_model.model import BalancerModel
+from ringbalance.reduced_model.paper_law import paper_model
+from ringbalance.scene.models import Scene
+
+DriveBy = Callable[..., Drive]
+
+
+@st.composite
+def scenes(draw: st.DrawFn, base: Scene) -> Scene:
+    """Random changes of everything that the loop reads."""
+    number = st.floats
+    maximum = draw(number(0.1, 0.9))
+    return replace(
+        base,
+        disc=replace(
+            base.disc,
+            chambers=draw(st.sampled_from([2, 4, 6, 8])),
+            max_fill_ratio=maximum,
+            initial_fill=maximum * draw(number(0.05, 0.95)),
+        ),
+        tube=replace(base.tube, bore=draw(number(0.3e-3, 6e-3)), drag_coefficient=draw(number(0.0, 500.0))),
+        gas=replace(base.gas, pressure=draw(number(0.0, 3e6))),
+        rotor=replace(
+            base.rotor,
+            speed=draw(number(50.0, 2000.0)),
+            influence_coefficient=draw(number(1e-4, 1.0)),
+            lag_angle=draw(number(-4.0, 4.0)),
+            initial_amplitude=draw(number(0.0, 1e-4)),
+            initial_phase=draw(number(-7.0, 7.0)),
+        ),
+        sensor=replace(
+            base.sensor,
+            amplitude_noise=draw(st.sampled_from([0.0, 1e-8, 1e-6])),
+            phase_noise=draw(number(0.0, 0.5)),
+        ),
+        controller=replace(
+            base.controller,
+            kind=draw(st.sampled_from(["target_vector", "trial"])),
+            period=draw(number(0.01, 2.0)),
+            proportional=draw(number(1e2, 1e7)),
+            integral_time=draw(st.none() | number(0.1, 1e3)),
+            derivative_time=draw(number(0.0, 1.0)),
+            minimum_gas_time=draw(number(0.0, 0.01)),
+            maximum_gas_time=draw(number(0.02, 10.0)),
+            sequence=("A", "B"),
+        ),
+        run=replace(base.run, time_limit=draw(number(0.1, 5.0)), seed=draw(st.integers(0, 99))),
+    )
+
+
+def check(scene: Scene, model: BalancerModel) -> None:
+    run = simulate(scene, model)
+    fills = np.array(list(run.fill_ratio.values()))
+    half = scene.disc.chambers // 2
+    assert fills[:half] + fills[half:] == pytest.approx(2 * scene.disc.initial_fill, abs=1e-12)
+    assert np.all((fills >= 0) & (fills <= scene.disc.max_fill_ratio))
+    assert np.all(np.isfinite(run.amplitude) & np.isfinite(run.phase))
+    assert np.all(np.diff(run.time) > 0)
+    assert run.time[-1] <= scene.run.time_limit * (1 + 1e-12)
+    assert run.status
+    assert run.settled == (run.settling_time is not None)
+    json.dumps(simulation_document(run), allow_nan=False)
+
+
+@given(data=st.data())
+@settings(max_examples=40)
+def test_any_run_under_the_papers_law(data: st.DataObject, scene: Scene) -> None:
+    drawn = data.draw(scenes(scene))
+    check(drawn, paper_model(drawn))
+
+
+@given(
+    data=st.data(),
+    name=st.sampled_from(["constant", "two_regimes", "levelling", "square_root", "proportional"]),
+)
+@settings(max_examples=25)
+def test_any_run_under_other_laws(
+    data: st.DataObject, name: str, scene: Scene, model: BalancerModel, laws: Mapping[str, Any]
+) -> None:
+    drawn = data.draw(scenes(scene))
+    law = replace(laws[name], max_fill_ratio=drawn.disc.max_fill_ratio)
+    check(drawn, replace(model, name=name, flow=law))
+
+
+@given(
+    fill=st.floats(0.0, 0.5),
+    pressure=st.floats(0.0, 2e6),
+    duration=st.floats(1e-6, 30.0),
+)
+@settings(max_examples=60)
+def test_quadrature_and_closed_form_agree(
+    drive: Drive, fill: float, pressure: float, duration: float
+) -> None:
+    asked = replace(drive, fill=fill, gas_pressure=pressure)
+    t = np.linspace(0.0, duration, 4)
+    exact, found = closed_form(asked, t), quadrature(asked, t)
+    assert found.fill == pytest.approx(exact.fill, abs=1e-9)
+    assert found.event is exact.event or exact.event_time == pytest.approx(duration, rel=1e-5)
+
+
+@given(
+    name=st.sampled_from(["constant", "two_regimes", "levelling", "proportional"]),
+    fill=st.floats(0.0, 0.5),
+    pressure=st.floats(0.0, 1e5),
+    primed=st.booleans(),
+    duration=st.floats(1e-3, 10.0),
+)
+@settings(max_examples=40)
+def test_quadrature_and_adaptive_ode_agree(
+    drive_by: DriveBy, name: str, fill: float, pressure: float, primed: bool, duration: float
+) -> None:
+    asked = drive_by(name, fill=fill, gas_pressure=pressure, primed=primed)
+    t = np.linspace(0.0, duration, 4)
+    assert quadrature(asked, t).fill == pytest.approx(adaptive_ode()(asked, t).fill, abs=1e-5)
+
+
+@given(fill=st.floats(0.0, 0.5), split=st.floats(0.01, 0.99))
+def test_two_stretches_are_one(drive: Drive, fill: float, split: float) -> None:
+    for integrator in (closed_form, quadrature):
+        whole = integrator(replace(drive, fill=fill), np.array([1.0])).fill[-1]
+        first = integrator(replace(drive, fill=fill), np.array([split])).fill[-1]
+        second = integrator(replace(drive, fill=float(first), primed=True), np.array([1.0 - split])).fill[-1]
+        assert second == pytest.approx(whole, abs=1e-11)
+        assert not math.isnan(second)

@@ -1,0 +1,206 @@
+"""The target-vector step: pure, PID by hand, limits, and what it does with a bad sample."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ringbalance.controller.algorithm import Command, Measurement
+from ringbalance.controller.rotor import chamber_directions
+from ringbalance.controller.target_vector import TargetVector, TargetVectorState, components
+
+PID = TargetVector(
+    chambers=4,
+    lag_angle=0.3,
+    limit=1e-7,
+    proportional=1e5,
+    integral_time=20.0,
+    derivative_time=0.5,
+    minimum_gas_time=1e-3,
+    maximum_gas_time=5.0,
+)
+
+
+def sample(time: float, amplitude: float, phase: float = 0.2) -> Measurement:
+    return Measurement(time=time, amplitude=amplitude, phase=phase)
+
+
+def gas(command: Command) -> dict[int, float]:
+    return {valve.chamber: valve.duration for valve in command.valves}
+
+
+def vector_time(command: Command) -> float:
+    """Length of the commanded vector for four chambers."""
+    return math.hypot(*gas(command).values())
+
+
+@given(
+    n=st.sampled_from([4, 6, 8, 10]),
+    angle=st.floats(-20, 20),
+    length=st.floats(0, 10),
+)
+def test_components_add_up_to_the_vector(n: int, angle: float, length: float) -> None:
+    shares = components(chambers=n, angle=angle, length=length)
+    directions = chamber_directions(n)
+    total = sum(share * directions[chamber] for chamber, share in shares)
+    assert total == pytest.approx(
+        length * complex(math.cos(angle), math.sin(angle)), abs=1e-13 * max(length, 1)
+    )
+    assert all(0 <= share <= length * (1 + 1e-12) for _, share in shares)
+    first, second = (chamber for chamber, _ in shares)
+    assert (second - first) % n == 1
+
+
+@pytest.mark.parametrize(
+    ("degrees", "first", "second"), [(30, 0, 1), (120, 1, 2), (210, 2, 3), (300, 3, 0), (-60, 3, 0)]
+)
+def test_four_chambers_take_cosine_and_sine(degrees: float, first: int, second: int) -> None:
+    shares = dict(components(chambers=4, angle=math.radians(degrees), length=2.0))
+    assert shares[first] == pytest.approx(2 * math.cos(math.radians(30)))
+    assert shares[second] == pytest.approx(2 * math.sin(math.radians(30)))
+
+
+@pytest.mark.parametrize(("degrees", "chamber"), [(60, 0), (120, 1), (-120, 1)])
+def test_two_chambers_take_the_component_along_their_axis(degrees: float, chamber: int) -> None:
+    assert components(chambers=2, angle=math.radians(degrees), length=2.0) == (
+        (chamber, pytest.approx(1.0, rel=1e-12)),
+    )
+
+
+def test_gas_goes_to_the_chambers_near_the_unbalance() -> None:
+    # Phase 0.2 and lag 0.3: the unbalance lies at 0.5 rad, between A and B.
+    _, command = PID.step(PID.start(), sample(0.0, 4e-6))
+    assert gas(command) == pytest.approx({0: 0.4 * math.cos(0.5), 1: 0.4 * math.sin(0.5)})
+    assert not command.resting
+
+
+def test_pid_by_hand_with_the_actual_interval() -> None:
+    state, first = PID.step(PID.start(), sample(1.0, 4e-6))
+    assert vector_time(first) == pytest.approx(0.4)
+    state, second = PID.step(state, sample(2.5, 3e-6))
+    area = (4e-6 + 3e-6) / 2 * 1.5
+    assert vector_time(second) == pytest.approx(1e5 * (3e-6 + area / 20 + 0.5 * (3e-6 - 4e-6) / 1.5))
+    state, third = PID.step(state, sample(2.9, 2.5e-6))
+    area += (3e-6 + 2.5e-6) / 2 * 0.4
+    assert vector_time(third) == pytest.approx(1e5 * (2.5e-6 + area / 20 + 0.5 * (2.5e-6 - 3e-6) / 0.4))
+    assert state.integral == pytest.approx(area)
+
+
+def test_without_an_integral_time_there_is_no_integral_part() -> None:
+    pd = replace(PID, integral_time=None, derivative_time=0.0)
+    state, _ = pd.step(pd.start(), sample(0.0, 4e-6))
+    _, command = pd.step(state, sample(100.0, 4e-6))
+    assert vector_time(command) == pytest.approx(0.4)
+
+
+def test_the_integral_stands_still_while_the_output_is_cut() -> None:
+    state, _ = PID.step(PID.start(), sample(0.0, 4e-6))
+    held, command = PID.step(state, sample(1.0, 1e-3))
+    assert held.integral == state.integral == 0.0
+    assert vector_time(command) == pytest.approx(5.0)
+
+
+def test_a_long_command_is_cut_along_its_direction() -> None:
+    _, command = PID.step(PID.start(), sample(0.0, 1e-3))
+    assert gas(command) == pytest.approx({0: 5 * math.cos(0.5), 1: 5 * math.sin(0.5)})
+
+
+def test_a_short_share_is_not_executed() -> None:
+    # 0.4 s at 0.002 rad: the share of B is 0.8 ms, below the valves' 1 ms.
+    _, command = PID.step(PID.start(), sample(0.0, 4e-6, phase=-0.298))
+    assert gas(command) == pytest.approx({0: 0.4}, rel=1e-5)
+    _, none = replace(PID, minimum_gas_time=1.0).step(PID.start(), sample(0.0, 4e-6))
+    assert none.valves == ()
+    assert none.reason
+    assert not none.resting
+
+
+def test_the_integral_is_dropped_when_the_residual_has_turned_round() -> None:
+    for mode, expected in (("reset", 0.0), ("accumulate", (4e-6 + 1e-6) / 2)):
+        pid = replace(PID, on_reversal=mode)
+        state, _ = pid.step(pid.start(), sample(0.0, 4e-6))
+        state, _ = pid.step(state, sample(1.0, 1e-6, phase=0.2 + math.pi))
+        assert state.integral == pytest.approx(expected)
+
+
+def test_a_falling_amplitude_never_asks_for_negative_gas() -> None:
+    eager = replace(PID, derivative_time=50.0)
+    state, _ = eager.step(eager.start(), sample(0.0, 4e-6))
+    _, command = eager.step(state, sample(1.0, 1e-6))
+    assert command.valves == ()
+
+
+@pytest.mark.parametrize("amplitude", [0.0, 0.5e-7, 1e-7])
+def test_it_rests_at_and_below_the_limit_and_forgets(amplitude: float) -> None:
+    state, _ = PID.step(PID.start(), sample(0.0, 4e-6))
+    state, _ = PID.step(state, sample(1.0, 3e-6))
+    state, command = PID.step(state, sample(2.0, amplitude))
+    assert command == Command(resting=True)
+    assert state == TargetVectorState()
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        None,
+        sample(2.0, math.nan),
+        sample(2.0, 3e-6, phase=math.nan),
+        sample(2.0, math.inf),
+        sample(math.nan, 3e-6),
+    ],
+)
+def test_a_bad_sample_holds_everything(bad: Measurement | None) -> None:
+    state, _ = PID.step(PID.start(), sample(1.0, 4e-6))
+    held, command = PID.step(state, bad)
+    assert held is state
+    assert command.valves == ()
+    assert not command.resting
+    _, after = PID.step(held, sample(3.0, 3e-6))
+    _, expected = PID.step(state, sample(3.0, 3e-6))
+    assert after == expected
+    area = (4e-6 + 3e-6) / 2 * 2.0
+    assert vector_time(after) == pytest.approx(1e5 * (3e-6 + area / 20 + 0.5 * -1e-6 / 2.0))
+
+
+@pytest.mark.parametrize("turns", [-2, 1, 5])
+def test_a_jump_of_the_phase_by_whole_turns_changes_nothing(turns: int) -> None:
+    state, _ = PID.step(PID.start(), sample(0.0, 4e-6))
+    plain = PID.step(state, sample(1.0, 3e-6))[1]
+    jumped = PID.step(state, sample(1.0, 3e-6, phase=0.2 + 2 * math.pi * turns))[1]
+    assert gas(jumped) == pytest.approx(gas(plain), rel=1e-12)
+
+
+def test_two_samples_at_one_time_do_not_divide_by_zero() -> None:
+    state, _ = PID.step(PID.start(), sample(1.0, 4e-6))
+    _, command = PID.step(state, sample(1.0, 3e-6))
+    assert vector_time(command) == pytest.approx(0.3)
+
+
+@given(
+    amplitudes=st.lists(st.floats(0, 1e-3), min_size=1, max_size=8),
+    phases=st.lists(st.floats(-50, 50), min_size=8, max_size=8),
+)
+def test_the_step_is_pure_and_within_limits(amplitudes: list[float], phases: list[float]) -> None:
+    state = PID.start()
+    for index, (amplitude, phase) in enumerate(zip(amplitudes, phases, strict=False)):
+        measurement = sample(float(index), amplitude, phase)
+        kept = replace(state)
+        once, twice = PID.step(state, measurement), PID.step(state, measurement)
+        assert once == twice
+        assert state == kept
+        state, command = once
+        assert all(1e-3 <= valve.duration <= 5.0 for valve in command.valves)
+        assert len({valve.chamber % 2 for valve in command.valves}) == len(command.valves)
+        assert math.isfinite(state.integral)
+        assert state.integral >= 0
+
+
+def test_settings_cannot_be_changed_in_place() -> None:
+    with pytest.raises(AttributeError):
+        PID.limit = 1.0  # type: ignore[misc]
+    assert np.isfinite(PID.limit)

@@ -22,27 +22,22 @@ def section(docstring: str, name: str) -> str:
 
 
 def documented_arguments(docstring: str) -> list[str]:
-    """Names in the `Args:` section, in order."""
-    return ENTRY.findall(section(docstring, "Args"))
+    """Names in the `Args:` section, in order, without those that nothing reads."""
+    return [name for name in ENTRY.findall(section(docstring, "Args")) if name[0] != "_"]
 
 
 def arguments(function: Function) -> list[str]:
-    """Names in the signature, in order, without self and cls."""
+    """Names in the signature, in order, without self, cls and those that nothing reads."""
     spec = function.args
     named = [*spec.posonlyargs, *spec.args]
     named += [spec.vararg] if spec.vararg else []
     named += spec.kwonlyargs
     named += [spec.kwarg] if spec.kwarg else []
-    return [argument.arg for argument in named if argument.arg not in {"self", "cls"}]
-
-
-def _decorators(function: Function) -> set[str]:
-    return {ast.unparse(decorator).split("(")[0].split(".")[-1] for decorator in function.decorator_list}
+    return [name for argument in named if (name := argument.arg) not in {"self", "cls"} and name[0] != "_"]
 
 
 def _gives_something(function: Function) -> bool:
-    nothing = function.returns is None or ast.unparse(function.returns) in {"None", "NoReturn"}
-    return not nothing and not _decorators(function) & {"property", "cached_property"}
+    return function.returns is not None and ast.unparse(function.returns) not in {"None", "NoReturn"}
 
 
 def faults(function: Function) -> list[str]:
@@ -53,7 +48,11 @@ def faults(function: Function) -> list[str]:
     found = []
     if documented_arguments(docstring) != arguments(function):
         found.append(f"Args: name {documented_arguments(docstring)}, the signature {arguments(function)}")
-    if _gives_something(function) and not (section(docstring, "Returns") or section(docstring, "Yields")):
+    if (
+        arguments(function)
+        and _gives_something(function)
+        and not (section(docstring, "Returns") or section(docstring, "Yields"))
+    ):
         found.append("no Returns:")
     return found
 

@@ -83,7 +83,8 @@ def test_every_data_file_is_packaged(project: Mapping[str, Any], root: Path) -> 
     for package in settings["packages"]:
         if package != "ringbalance":
             folder = root.joinpath(*package.split(".")[1:])
-            assert missing_data(folder, settings["package-data"].get(package, [])) == [], package
+            patterns = settings["package-data"].get(package, []) + settings["package-data"].get("*", [])
+            assert missing_data(folder, patterns) == [], package
 
 
 def test_a_forgotten_data_file_is_seen(tmp_path: Path) -> None:

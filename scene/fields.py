@@ -127,16 +127,17 @@ def angle_of_turn() -> Reader:
     return Reader(read=read, allowed=allowed, summary="an angle")
 
 
-def share(bounds: Bounds) -> Reader:
+def share(bounds: Bounds, *, example: float) -> Reader:
     """Read a share of one: a bare number or a percentage.
 
     Args:
         bounds: dimensionless.
+        example: a value that one might write.
 
     Returns:
         A reader of 0.01 and of "1 %".
     """
-    allowed = f'a share {bounds}, such as {_example(bounds):g} or "{100 * _example(bounds):g} %"'
+    allowed = f'a share {bounds}, such as {example:g} or "{100 * example:g} %"'
 
     def read(value: object) -> float:
         number = parse_quantity(value, "share") if isinstance(value, str) else _number(value, allowed)
@@ -145,10 +146,6 @@ def share(bounds: Bounds) -> Reader:
         return number
 
     return Reader(read=read, allowed=allowed, summary=f"a share {bounds}, bare or in %")
-
-
-def _example(bounds: Bounds) -> float:
-    return 0.01 if (bounds.at_most or bounds.below or 1.0) < 0.5 else 0.5
 
 
 def number(bounds: Bounds) -> Reader:

@@ -127,7 +127,17 @@ def read_document(document: Mapping[str, Any], *, file: str) -> tuple[Reading, t
         if value is not None and not {path, path.split(".")[0]} & broken
     }
     reading = Reading(file=file, document=document, values=values, broken=broken)
-    return reading, tuple(_fault(detail, file) for detail in details)
+    return reading, tuple(_fault(detail, file) for detail in _told(details))
+
+
+def _told(details: list[ErrorDetails]) -> list[ErrorDetails]:
+    """All but the missing keys that a misspelt one was meant for."""
+    meant = {_meant(detail["loc"], False) for detail in details if detail["type"] == "extra_forbidden"}
+    return [
+        detail
+        for detail in details
+        if detail["type"] != "missing" or ".".join(map(str, detail["loc"])) not in meant
+    ]
 
 
 def _paths(details: list[ErrorDetails], document: Mapping[str, Any]) -> Iterator[str]:

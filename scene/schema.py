@@ -114,10 +114,10 @@ class DiscTable(_Table):
         "0 mm",
         "strip that a plate takes on each side of a chamber, so half of the plate between two chambers",
     )
-    max_fill_ratio: Annotated[float | None, share(Bounds(above=0, at_most=1))] = _standard(
+    max_fill_ratio: Annotated[float | None, share(Bounds(above=0, at_most=1), example=0.5)] = _standard(
         0.5, "liquid of a pair of opposite chambers, as a share of the volume of one chamber"
     )
-    initial_fill: Annotated[float | None, share(Bounds(above=0, at_most=1))] = _derived(
+    initial_fill: Annotated[float | None, share(Bounds(above=0, at_most=1), example=0.5)] = _derived(
         "half of max_fill_ratio, the only value allowed", "fill ratio of every chamber at the start"
     )
 
@@ -161,7 +161,7 @@ class TubeTable(_Table):
         "the straight tube of the paper's Eq. 18: always a full siphon",
         "smallest radius on the path from port to port",
     )
-    hump_position: Annotated[float | None, share(Bounds(above=0, below=1))] = _standard(
+    hump_position: Annotated[float | None, share(Bounds(above=0, below=1), example=0.5)] = _standard(
         0.5, "share of the path, from the driven chamber, at which the hump lies"
     )
     hump_gas: Annotated[str | None, choice("vented", "trapped")] = _standard(
@@ -202,7 +202,7 @@ class GasTable(_Table):
     conductance: Annotated[float | None, quantity("conductance", _POSITIVE)] = _unused(
         "the chamber fills at once", "sonic conductance C (ISO 6358) of valve and line; needs critical_ratio"
     )
-    critical_ratio: Annotated[float | None, share(Bounds(above=0, below=1))] = _unused(
+    critical_ratio: Annotated[float | None, share(Bounds(above=0, below=1), example=0.3)] = _unused(
         "the chamber fills at once",
         "critical pressure ratio b (ISO 6358) of valve and line; needs conductance",
     )
@@ -296,7 +296,7 @@ class RunTable(_Table):
 class AccuracyTable(_Table):
     """[accuracy]."""
 
-    tolerance: Annotated[float | None, share(Bounds(above=0, below=1))] = _standard(
+    tolerance: Annotated[float | None, share(Bounds(above=0, below=1), example=0.01)] = _standard(
         "1 %", "relative bound on discretisation and left-out terms, against the top model"
     )
 

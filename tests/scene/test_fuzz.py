@@ -1,0 +1,174 @@
+"""Whatever stands in a file, loading it ends in a sound scene or in a SceneError, never in anything else."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from ringbalance.scene import Scene, SceneError, bundled_scene, scene_from
+from ringbalance.scene.dimensions import DIMENSIONS
+from ringbalance.scene.reading import TABLES
+from ringbalance.scene.schema import SceneTables
+
+PATHS = [
+    (table, key)
+    for table in TABLES
+    for key in (*SceneTables.model_fields[table].annotation.model_fields, "colour")  # type: ignore[union-attr]
+]
+UNITS = sorted({unit for kind in DIMENSIONS.values() for unit in kind.units})
+NUMBERS = st.one_of(
+    st.floats(allow_nan=True, allow_infinity=True).map(str),
+    st.floats(1e-3, 1e3).map(str),
+    st.sampled_from(["0", "-1", "1e300", "-1e300", "1e999999", "1e-999999", "nan", "inf", "9" * 50]),
+)
+QUANTITIES = st.tuples(NUMBERS, st.sampled_from(UNITS)).map(" ".join)
+LEAVES = st.one_of(
+    QUANTITIES,
+    st.text(max_size=20),
+    st.booleans(),
+    st.integers(-(2**70), 2**70),
+    st.integers(-3, 30),
+    st.floats(),
+    st.floats(0, 1),
+)
+JUNK = st.recursive(
+    LEAVES,
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner, max_size=3),
+    max_leaves=4,
+)
+FUZZ = settings(
+    max_examples=400,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+
+
+def _loaded(content: bytes) -> Scene | None:
+    try:
+        return scene_from(content=content, file="my_disc.toml")
+    except SceneError as error:
+        lines = str(error).splitlines()
+        if not error.faults or len(lines) != len(error.faults) or not all(map(str.isprintable, lines)):
+            raise AssertionError("a fault is not one printable line") from error
+    return None
+
+
+def _numbers(record: object) -> Iterator[float]:
+    if isinstance(record, float):
+        yield record
+    if isinstance(record, tuple):
+        for item in record:
+            yield from _numbers(item)
+    if is_dataclass(record):
+        for field in fields(record):
+            yield from _numbers(getattr(record, field.name))
+
+
+def _assert_sound(scene: Scene) -> None:
+    disc, tube = scene.disc, scene.tube
+    assert all(map(math.isfinite, _numbers(scene)))
+    assert 0 < disc.inner_radius < disc.outer_radius
+    assert math.asin(disc.plate_thickness / disc.inner_radius) < disc.central_angle / 2
+    assert disc.chambers % 2 == 0
+    assert disc.chambers * disc.central_angle <= 2 * math.pi * 1.0001
+    assert 2 * disc.initial_fill == disc.max_fill_ratio or math.isclose(
+        2 * disc.initial_fill, disc.max_fill_ratio
+    )
+    assert disc.inner_radius < tube.port_radius <= disc.outer_radius
+    assert tube.hump_radius is None or 0 < tube.hump_radius < tube.port_radius
+    assert all(tube.bore <= 2.001 * bend.radius for bend in tube.bends)
+    assert scene.liquid.density > 0
+    assert scene.liquid.kinematic_viscosity > 0
+    assert 0 <= scene.liquid.vapour_pressure < scene.gas.ambient_pressure
+    assert scene.gas.pressure >= 0
+    assert scene.rotor.speed > 0
+    assert scene.controller.minimum_gas_time < scene.controller.maximum_gas_time
+    assert 0 < scene.tolerance < 1
+
+
+@given(changes=st.lists(st.tuples(st.sampled_from(PATHS), JUNK), min_size=1, max_size=3))
+@FUZZ
+def test_junk_in_place_of_values(
+    changes: list[tuple[tuple[str, str], Any]],
+    newcomer_document: dict[str, Any],
+    as_toml: Callable[[Mapping[str, Any]], str],
+) -> None:
+    document = {table: dict(content) for table, content in newcomer_document.items()}
+    for (table, key), value in changes:
+        document.setdefault(table, {})[key] = value
+    scene = _loaded(as_toml(document).encode())
+    if scene is not None:
+        _assert_sound(scene)
+
+
+@given(
+    outer=st.floats(1, 500),
+    inner=st.floats(1, 500),
+    angle=st.floats(1, 200),
+    chambers=st.sampled_from([2, 4, 6, 8]),
+    plate=st.floats(0, 50),
+    hump=st.floats(1, 500),
+    length=st.floats(1, 3000),
+    bore=st.floats(0.5, 20),
+)
+@FUZZ
+def test_plausible_discs(
+    outer: float,
+    inner: float,
+    angle: float,
+    chambers: int,
+    plate: float,
+    hump: float,
+    length: float,
+    bore: float,
+    newcomer_document: dict[str, Any],
+    as_toml: Callable[[Mapping[str, Any]], str],
+) -> None:
+    """Plausible numbers reach the cross-checks; a disc that passes them is sound."""
+    disc = {
+        "outer_radius": f"{outer} mm",
+        "inner_radius": f"{inner} mm",
+        "axial_width": "30 mm",
+        "central_angle": f"{angle} deg",
+        "plate_thickness": f"{plate} mm",
+        "chambers": chambers,
+    }
+    tube = {"bore": f"{bore} mm", "hump_radius": f"{hump} mm", "length": f"{length} mm"}
+    scene = _loaded(as_toml({**newcomer_document, "disc": disc, "tube": tube}).encode())
+    if scene is not None:
+        _assert_sound(scene)
+
+
+@given(table=st.sampled_from((*TABLES, "name", "balancer", "colour")), value=JUNK)
+@FUZZ
+def test_junk_in_place_of_tables(
+    table: str,
+    value: Any,
+    newcomer_document: dict[str, Any],
+    as_toml: Callable[[Mapping[str, Any]], str],
+) -> None:
+    scene = _loaded(as_toml({**newcomer_document, table: value}).encode())
+    if scene is not None:
+        _assert_sound(scene)
+
+
+@given(at=st.integers(0, 10**6), deleted=st.integers(0, 40), inserted=st.binary(max_size=10))
+@FUZZ
+def test_torn_files(at: int, deleted: int, inserted: bytes) -> None:
+    whole = bundled_scene("liquid_ring_paper").read_bytes()
+    place = at % len(whole)
+    scene = _loaded(whole[:place] + inserted + whole[place + deleted :])
+    if scene is not None:
+        _assert_sound(scene)
+
+
+@given(st.one_of(st.binary(max_size=60), st.text(max_size=60).map(str.encode)))
+@FUZZ
+def test_any_bytes(content: bytes) -> None:
+    assert _loaded(content) is None

@@ -1,0 +1,308 @@
+"""Files that cannot be read, defaults, and what a loaded scene says."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import math
+import pickle
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import FrozenInstanceError, fields
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ringbalance.scene import Fault, Scene, SceneError, bundled_scene, load_scene, scene_fault, scene_table
+from ringbalance.scene.defaults import even_number_of_chambers, trial_sequence
+from ringbalance.scene.uncertain import UNCERTAIN, nominal_value, with_value
+
+Load = Callable[[Mapping[str, Any]], Scene]
+BUNDLED = ("liquid_ring_paper", "silicone_oil_100cst", "perfluorinated_oil", "six_chamber")
+
+
+def _message(path: Path) -> str:
+    with pytest.raises(SceneError) as caught:
+        load_scene(path)
+    message = str(caught.value)
+    assert len(message.splitlines()) == 1
+    return message
+
+
+def test_no_such_file(tmp_path: Path) -> None:
+    assert _message(tmp_path / "none.toml") == f"{tmp_path / 'none.toml'}: there is no such file"
+
+
+def test_folder(tmp_path: Path) -> None:
+    assert "this is a folder" in _message(tmp_path)
+
+
+def test_unreadable(tmp_path: Path) -> None:
+    assert "cannot be read" in _message(tmp_path / ("x" * 300))
+    assert "cannot be read" in _message(tmp_path / "a\0b")
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"name = \n", "line 1"),
+        (b"[disc]\n\nbore = 3 mm\n", "line 3"),
+        (b'name = "a"\nname = "b"\n', "line 2"),
+        (b"a = " + b"[" * 20000, "nested too deeply"),
+        (b"seed = " + b"9" * 5000, "this is not TOML"),
+        (b'# ok\nname = "\xff"\n', "line 2 is not UTF-8"),
+        ('name = "x"'.encode("utf-16"), "not UTF-8"),
+        (b"#" * (2**20 + 1), "larger than any scene"),
+    ],
+)
+def test_not_a_scene_file(content: bytes, words: str, tmp_path: Path) -> None:
+    path = tmp_path / "my_disc.toml"
+    path.write_bytes(content)
+    assert words in _message(path)
+
+
+def test_empty_file_lacks_every_needed_table(tmp_path: Path) -> None:
+    path = tmp_path / "empty.toml"
+    path.touch()
+    with pytest.raises(SceneError) as caught:
+        load_scene(path)
+    assert [fault.table for fault in caught.value.faults] == ["disc", "liquid", "tube", "gas", "rotor"]
+
+
+def test_byte_order_mark_and_windows_lines(tmp_path: Path) -> None:
+    content = bundled_scene("liquid_ring_paper").read_text(encoding="utf-8")
+    path = tmp_path / "windows.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + content.replace("\n", "\r\n").encode())
+    assert load_scene(path).disc == load_scene(bundled_scene("liquid_ring_paper")).disc
+
+
+def test_error_survives_pickling() -> None:
+    fault = Fault(file="a", table="b", key="c", value="d", problem="e", allowed="f")
+    copied = pickle.loads(pickle.dumps(SceneError([fault])))
+    assert copied.faults == (fault,)
+    assert str(copied) == "a: [b] c = d: e; allowed: f"
+
+
+@pytest.mark.parametrize("name", BUNDLED)
+def test_bundled_scenes(name: str) -> None:
+    """Each loads, is named by its file's bytes, and its gas primes the tube down to an empty chamber."""
+    path = bundled_scene(name)
+    scene = load_scene(path)
+    assert scene.source == f"{name}.toml"
+    assert scene.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+    assert scene == load_scene(str(path))
+    hump = scene.tube.hump_radius
+    assert hump is not None
+    head = scene.rotor.speed**2 * (scene.tube.port_radius**2 - hump**2) / 2
+    assert scene.gas.pressure > scene.liquid.density * head
+    # The ring stands against gravity many times over.
+    assert scene.rotor.speed**2 * scene.disc.inner_radius > 100 * scene.environment.gravity
+
+
+def test_every_scene_file_is_tested() -> None:
+    assert sorted(BUNDLED) == sorted(path.stem for path in bundled_scene(BUNDLED[0]).parent.glob("*.toml"))
+
+
+def test_bundled_scene_by_file_name_and_unknown() -> None:
+    assert bundled_scene("six_chamber.toml") == bundled_scene("six_chamber")
+    with pytest.raises(SceneError, match=r"did you mean \"six_chamber\".*liquid_ring_paper"):
+        bundled_scene("six_chambers")
+
+
+def test_paper_scene_has_the_papers_values() -> None:
+    """Table 1, Eqs. 4 to 6 and section 6 of the liquid-ring paper."""
+    scene = load_scene(bundled_scene("liquid_ring_paper"))
+    disc = scene.disc
+    assert (disc.outer_radius, disc.inner_radius, disc.axial_width) == (0.0445, 0.0205, 0.062)
+    assert disc.central_angle == pytest.approx(math.pi / 2, rel=1e-15)
+    assert (disc.chambers, disc.max_fill_ratio, disc.initial_fill) == (4, 0.5, 0.25)
+    area = disc.central_angle / 2 * (disc.outer_radius**2 - disc.inner_radius**2)
+    area -= 2 * disc.plate_thickness * (disc.outer_radius - disc.inner_radius)
+    assert area * disc.axial_width == pytest.approx(67.7e-6, abs=0.05e-6)
+    assert scene.liquid.density == 1000.0
+    assert scene.rotor.speed == pytest.approx(10000 * math.pi / 30, rel=1e-15)
+    assert scene.gas.pressure == 7e5
+    controller = scene.controller
+    assert (controller.proportional, controller.integral_time, controller.derivative_time) == (
+        8e4,
+        48.0,
+        0.06,
+    )
+    assert (controller.limit, controller.fine_below) == (5e-8, 8e-7)
+    assert controller.sequence == ("A", "C", "B", "D")
+
+
+def test_newcomers_scene(newcomer_document: dict[str, Any], load: Load) -> None:
+    """Disc, liquid, tube, gas and speed are enough; the rest is default and marked as such."""
+    scene = load(newcomer_document)
+    assert scene.name == "my_disc"
+    assert (scene.disc.chambers, scene.disc.plate_thickness) == (6, 0.0)
+    assert (scene.disc.max_fill_ratio, scene.disc.initial_fill) == (0.5, 0.25)
+    assert scene.tube.port_radius == scene.disc.outer_radius
+    assert (scene.tube.hump_radius, scene.tube.bends, scene.tube.entrance) == (None, (), "sharp")
+    assert (scene.environment.shaft, scene.environment.gravity) == ("horizontal", 9.80665)
+    assert (scene.gas.ambient_pressure, scene.gas.conductance) == (101325.0, None)
+    assert scene.controller.sequence == ("A", "D", "B", "E", "C", "F")
+    assert scene.controller.assumed_lag_angle == scene.rotor.lag_angle
+    assert scene.tolerance == 0.01
+    assert {"rotor.influence_coefficient", "disc.chambers", "tube.port_radius"} <= set(scene.defaulted)
+    assert not {"disc.outer_radius", "rotor.speed", "liquid.density"} & set(scene.defaulted)
+
+
+def test_defaults_follow_what_is_given(newcomer_document: dict[str, Any], load: Load) -> None:
+    newcomer_document["rotor"] |= {"influence_coefficient": "0.02 um/(g*mm)", "lag_angle": "377 deg"}
+    newcomer_document["disc"] |= {"max_fill_ratio": 0.3}
+    scene = load(newcomer_document)
+    assert scene.controller.assumed_influence_coefficient == 0.02
+    assert scene.rotor.lag_angle == pytest.approx(math.radians(17), rel=1e-14)
+    assert scene.controller.assumed_lag_angle == scene.rotor.lag_angle
+    assert scene.disc.initial_fill == 0.15
+
+
+def test_outright_properties_win(newcomer_document: dict[str, Any], load: Load) -> None:
+    newcomer_document["liquid"] = {"name": "water", "temperature": "20 degC", "density": "1 g/ml"}
+    liquid = load(newcomer_document).liquid
+    assert (liquid.density, liquid.density_uncertainty) == (1000.0, 0.0)
+    assert liquid.kinematic_viscosity == pytest.approx(1.0034e-6, rel=1e-5)
+    assert liquid.viscosity_uncertainty == 0.01
+    assert liquid.vapour_pressure == pytest.approx(2339.3, rel=1e-4)
+    assert "density given outright" in liquid.source
+
+
+@pytest.mark.parametrize(
+    "extra", [{}, {"name": "glycol mix"}, {"name": "water"}, {"temperature": "-20 degC"}]
+)
+def test_custom_liquid(extra: dict[str, str], newcomer_document: dict[str, Any], load: Load) -> None:
+    given = {"density": "1100 kg/m^3", "kinematic_viscosity": "5 cSt"}
+    newcomer_document["liquid"] = given | extra
+    liquid = load(newcomer_document).liquid
+    assert (liquid.density, liquid.kinematic_viscosity, liquid.vapour_pressure) == (1100.0, 5e-6, 0.0)
+    assert (liquid.density_uncertainty, liquid.viscosity_uncertainty) == (0.0, 0.0)
+    assert liquid.name == extra.get("name", "custom")
+    assert "vapour pressure not given, taken as 0 Pa" in liquid.source
+
+
+def test_outright_everything_needs_no_data(newcomer_document: dict[str, Any], load: Load) -> None:
+    given = {"density": "6 g/ml", "kinematic_viscosity": "1 cSt", "vapour_pressure": "1 Pa"}
+    newcomer_document["liquid"] = given | {"name": "gallium", "temperature": "400 degC"}
+    liquid = load(newcomer_document).liquid
+    assert (liquid.density, liquid.vapour_pressure, liquid.temperature) == (6000.0, 1.0, 673.15)
+
+
+def test_only_temperature_is_the_default(newcomer_document: dict[str, Any], load: Load) -> None:
+    newcomer_document["liquid"] = {"name": "silicone oil 100 cSt"}
+    assert load(newcomer_document).liquid.temperature == 298.15
+
+
+def test_uncertainty_of_a_liquid(newcomer_document: dict[str, Any], load: Load) -> None:
+    newcomer_document["uncertainty"] = {
+        "density": "10 kg/m^3",
+        "kinematic_viscosity": "7 %",
+        "bore": "0.02 mm",
+    }
+    scene = load(newcomer_document)
+    assert scene.liquid.density_uncertainty == pytest.approx(10 / scene.liquid.density, rel=1e-15)
+    assert scene.liquid.viscosity_uncertainty == 0.07
+    spreads = {each.quantity: (each.half_width, each.relative) for each in scene.uncertainty}
+    assert spreads == {"density": (10.0, False), "kinematic_viscosity": (0.07, True), "bore": (2e-5, False)}
+
+
+def test_decreed_drag_needs_no_length(newcomer_document: dict[str, Any], load: Load) -> None:
+    newcomer_document["tube"] = {"bore": "2 mm", "drag_coefficient": 50}
+    assert load(newcomer_document).tube.length == pytest.approx(0.12, rel=1e-15)
+    newcomer_document["tube"]["hump_radius"] = "45 mm"
+    longer = 2 * math.sqrt(60**2 - 45**2) + 45 * (math.pi - 2 * math.acos(0.75))
+    assert load(newcomer_document).tube.length == pytest.approx(1e-3 * longer, rel=1e-14)
+
+
+def test_rounded_entrance(newcomer_document: dict[str, Any], load: Load) -> None:
+    newcomer_document["tube"] |= {"entrance": "rounded", "entrance_radius": "0.5 mm"}
+    assert load(newcomer_document).tube.entrance_radius == 5e-4
+
+
+def test_right_angle_in_radians(newcomer_document: dict[str, Any], load: Load) -> None:
+    newcomer_document["disc"]["central_angle"] = "1.5708 rad"
+    assert load(newcomer_document).disc.chambers == 4
+
+
+@pytest.mark.parametrize(
+    ("degrees", "chambers"),
+    [(180, 2), (90, 4), (60, 6), (36, 10), (120, None), (72, None), (100, None), (89, None)],
+)
+def test_even_number_of_chambers(degrees: float, chambers: int | None) -> None:
+    assert even_number_of_chambers(math.radians(degrees)) == chambers
+
+
+@pytest.mark.parametrize("chambers", [2, 4, 6, 26])
+def test_trial_sequence_alternates_opposites(chambers: int) -> None:
+    sequence = trial_sequence(chambers)
+    assert sorted(sequence) == [chr(ord("A") + i) for i in range(chambers)]
+    assert all(
+        ord(second) - ord(first) == chambers // 2
+        for first, second in zip(sequence[::2], sequence[1::2], strict=True)
+    )
+
+
+def test_scene_is_frozen() -> None:
+    scene = load_scene(bundled_scene("liquid_ring_paper"))
+    with pytest.raises(FrozenInstanceError):
+        scene.disc.outer_radius = 1.0  # type: ignore[misc]
+    assert copy.deepcopy(scene) == scene
+
+
+def test_table_of_a_scene(newcomer_document: dict[str, Any], load: Load) -> None:
+    newcomer_document["uncertainty"] = {"bore": "0.02 mm", "lag_angle": "3 deg", "speed": "1 %"}
+    rows = {(row.group, row.quantity): row for row in scene_table(load(newcomer_document))}
+    assert rows["Disc", "outer radius R2"].value == "60 mm"
+    assert rows["Rotor", "speed"].value == "6000 rpm"
+    assert rows["Rotor", "speed"].note == "give or take 1 % (95 %)"
+    assert rows["Rotor", "lag angle"].note == "default; give or take 3 deg (95 %)"
+    assert rows["Connecting tube", "bore d"].note == "give or take 0.02 mm (95 %)"
+    assert rows["Connecting tube", "hump radius"].value == "none: always a full siphon"
+    assert rows["Liquid", "temperature"].value == "25 degC"
+    assert rows["Run", "tolerance"].value == "1 %"
+
+
+def test_table_has_every_value() -> None:
+    """No number of a scene is left out of its description."""
+    scene = load_scene(bundled_scene("liquid_ring_paper"))
+    lines = len(scene_table(scene))
+    tables = ("disc", "liquid", "tube", "gas", "environment", "rotor", "sensor", "controller", "run")
+    shown_elsewhere = {"density_uncertainty", "viscosity_uncertainty", "source", "entrance_radius"}
+    trial_only = {"sequence", "first_trial", "long_step", "short_step", "fine_below"}
+    not_asked_for = {"critical_ratio", "dead_volume", "valve_lag"}
+    names = [field.name for table in tables for field in fields(getattr(scene, table))]
+    assert lines == len([n for n in names if n not in shown_elsewhere | trial_only | not_asked_for]) + 1
+
+
+def test_fault_of_a_loaded_scene() -> None:
+    scene = load_scene(bundled_scene("liquid_ring_paper"))
+    fault = scene_fault(scene=scene, table="rotor", key="speed", problem="too slow", allowed="above 300 rpm")
+    assert (
+        str(fault) == 'liquid_ring_paper.toml: [rotor] speed = "10000 rpm": too slow; allowed: above 300 rpm'
+    )
+
+
+def test_one_quantity_changed() -> None:
+    scene = load_scene(bundled_scene("liquid_ring_paper"))
+    for quantity in UNCERTAIN:
+        changed = with_value(scene=scene, quantity=quantity, value=0.125)
+        assert nominal_value(scene=changed, quantity=quantity) == 0.125
+        assert changed != scene
+        back = getattr(getattr(scene, UNCERTAIN[quantity].table), quantity)
+        assert with_value(scene=changed, quantity=quantity, value=back) == scene
+    with pytest.raises(ValueError, match="'colour' is none of"):
+        nominal_value(scene=scene, quantity="colour")
+
+
+def test_comments_give_every_origin() -> None:
+    """In the paper's scene each value of the machine says whether it is given, inferred or assumed."""
+    text = bundled_scene("liquid_ring_paper").read_text(encoding="utf-8")
+    machine = text[text.index("[disc]") : text.index("[run]")]
+    values = [line for line in machine.splitlines() if "=" in line and line[0] not in "# "]
+    assert len(values) > 35
+    assert [
+        line for line in values if not any(word in line for word in ("given", "inferred", "assumed"))
+    ] == []
+    assert tomllib.loads(text)["disc"]["plate_thickness"] == "2.777 mm"

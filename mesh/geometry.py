@@ -55,6 +55,30 @@ def liquid_area(*, disc: Disc, surface_radius: npt.ArrayLike) -> FloatArray:
     return np.asarray(outer - _area_primitive(disc, a), dtype=np.float64)
 
 
+def liquid_first_moment(*, disc: Disc, surface_radius: npt.ArrayLike) -> FloatArray:
+    """First moment of the cross-section about the shaft, between a concentric surface and the outer wall.
+
+    int x dA = [2 sin(theta/2)/3 (r^2 - t^2)^(3/2) - cos(theta/2) t r^2] from a to R2; times rho B it is the
+    moment U of a chamber, without finite elements.
+
+    Args:
+        disc: the disc.
+        surface_radius: a, m, any shape, within [R1, R2].
+
+    Returns:
+        First moment, m^3, the shape of `surface_radius`.
+
+    Source: integral of 2 r^2 sin(alpha(r)); with t = 0 and times rho B it is Eq. 7 of the liquid-ring paper.
+    """
+    a, outer, t = np.asarray(surface_radius, dtype=np.float64), disc.outer_radius, disc.plate_thickness
+    inner_face, outer_face = np.sqrt(a**2 - t**2), np.sqrt(outer**2 - t**2)
+    # Differences of powers by their factors, or a film of a micrometre would cancel.
+    squares = (outer - a) * (outer + a)
+    cubes = squares * (inner_face**2 + inner_face * outer_face + outer_face**2) / (inner_face + outer_face)
+    half = disc.central_angle / 2
+    return np.asarray(2 * np.sin(half) / 3 * cubes - np.cos(half) * t * squares, dtype=np.float64)
+
+
 def chamber_volume(*, disc: Disc) -> float:
     """Volume of one chamber between its plates, V = B A(R1).
 

@@ -1,0 +1,88 @@
+"""Meshes with their boundary names, and fields on them, to and from VTU files."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import meshio
+import numpy as np
+import numpy.typing as npt
+from skfem import Mesh
+from skfem.io.meshio import to_meshio
+
+from ringbalance.scene.files import write_whole
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class StoredMesh:
+    """What a VTU file holds."""
+
+    mesh: Mesh
+    """Coordinates in metres, boundaries by name."""
+    fields: Mapping[str, FloatArray]
+    """Nodal fields by name."""
+
+
+def write_vtu(
+    path: Path,
+    *,
+    mesh: Mesh,
+    length_scale: float = 1.0,
+    fields: Mapping[str, npt.ArrayLike] | None = None,
+) -> Path:
+    """Write a mesh in metres with its boundary names and nodal fields, whole or not at all.
+
+    Args:
+        path: of the file, ending in .vtu.
+        mesh: coordinates in units of `length_scale`.
+        length_scale: m.
+        fields: nodal values by name, shape (nodes,) each, in SI units.
+
+    Returns:
+        The path.
+
+    Raises:
+        ValueError: another ending, or a field that is not one finite value per node.
+        OSError: the file cannot be written.
+
+    Source: VTK XML through meshio; scikit-fem stores each boundary as cell data "skfem:b:<name>".
+    """
+    if path.suffix != ".vtu":
+        raise ValueError(f"the name of a VTU file must end in .vtu, not {path.suffix!r}")
+    nodal = {name: np.asarray(value, dtype=np.float64) for name, value in (fields or {}).items()}
+    for name, value in nodal.items():
+        if value.shape != (mesh.doflocs.shape[1],) or not np.all(np.isfinite(value)):
+            raise ValueError(f"field {name!r} must hold one finite value per node")
+    with tempfile.TemporaryDirectory() as folder:
+        draft = Path(folder) / path.name
+        stored = to_meshio(mesh.scaled(length_scale), nodal)
+        # VTK has no points in the plane; meshio would say so on the console.
+        stored.points = np.pad(stored.points, ((0, 0), (0, 3 - stored.points.shape[1])))
+        meshio.write(draft, stored)
+        return write_whole(path, draft.read_bytes())
+
+
+def read_vtu(path: Path) -> StoredMesh:
+    """Read a mesh and its nodal fields back from a file that `write_vtu` wrote.
+
+    Args:
+        path: of the file.
+
+    Returns:
+        The mesh, in metres, with its boundary names, and the fields.
+
+    Raises:
+        OSError: the file cannot be read.
+        ValueError: it names no boundary, so it is not one of ours.
+    """
+    out: list[object] = ["point_data"]
+    mesh = Mesh.load(path, out=out)
+    if not mesh.boundaries:
+        raise ValueError(f"{path} holds no named boundaries")
+    data = out[0] if isinstance(out[0], dict) else {}
+    return StoredMesh(mesh=mesh, fields={name: np.asarray(v, dtype=np.float64) for name, v in data.items()})

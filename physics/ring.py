@@ -1,0 +1,339 @@
+"""What the liquid ring in one chamber does to its disc: volume, wall pressure, moment and wall forces.
+
+Every number comes from finite elements on three meshes or more and carries the half-width that the grid
+convergence of exactly this number gives it.  With gravity across the shaft each number is the mean over a
+turn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.mesh.chamber import default_cells
+from ringbalance.mesh.geometry import chamber_volume, half_angle, surface_radius
+from ringbalance.physics.grid_convergence import GridConvergence, gci
+from ringbalance.physics.pressure import RotatingLiquid
+from ringbalance.physics.results import Estimate, Statistics, Status, StatusCode
+from ringbalance.physics.ring_samples import (
+    COLUMNS,
+    SCALARS,
+    WALLS,
+    WIDTH,
+    Sample,
+    Turn,
+    empty_sample,
+    turn_mean,
+)
+from ringbalance.scene.models import Disc, Shaft
+
+FloatArray = npt.NDArray[np.float64]
+
+FORMAL_ORDER = 4.0
+"""Of every integral on quadratic geometry: twice the order of the elements, and that of an arc's drawing."""
+
+_EPSILON = float(np.finfo(np.float64).eps)
+_AVERAGING = 1e-10
+"""Left-over harmonics in the mean over a turn, relative; decides the number of samples."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RingQuantities:
+    """Totals of the liquid in one chamber along an array of fill ratios, SI; arrays start with that axis.
+
+    Axes: x outward through the middle of the chamber, y with the rotation, z along the shaft.
+    """
+
+    fill_ratio: FloatArray
+    """x, shape (n,)."""
+    surface_radius: FloatArray
+    """Radius of the concentric free surface that holds the same volume, m, shape (n,)."""
+    liquid_volume: Estimate
+    """m^3, shape (n,)."""
+    wall_pressure: Estimate
+    """Mean over the outer wall, of the liquid alone (gas counted as zero), Pa, shape (n,)."""
+    moment: Estimate
+    """U = rho times the integral of x over the liquid, kg m, shape (n,)."""
+    moment_per_volume: Estimate
+    """dU/dV' as liquid is added, kg/m^2, shape (n,)."""
+    wall_force: Mapping[str, Estimate]
+    """Force of the liquid on each wall, N, shape (n, 3)."""
+    resultant_force: Estimate
+    """Sum over the walls, N, shape (n, 3)."""
+    wall_torque: Mapping[str, Estimate]
+    """Torque of the liquid on each wall about the shaft, with the rotation, N m, shape (n,)."""
+    resultant_torque: Estimate
+    """Sum over the walls, N m, shape (n,)."""
+    ripple: Mapping[str, FloatArray]
+    """First harmonic over a turn of "wall_pressure" (Pa) and "moment" (kg m), zero-to-peak, shape (n,)."""
+    convergence: Mapping[str, tuple[GridConvergence, ...]]
+    """Judgement on each scalar quantity by its name, one per fill ratio."""
+    mesh_values: Mapping[str, FloatArray]
+    """Each scalar quantity on every mesh, finest first, shape (meshes, n)."""
+    cells: tuple[tuple[int, ...], ...]
+    """Cells of the meshes, finest first."""
+    closed: npt.NDArray[np.bool_]
+    """Whether gravity leaves a closed ring, shape (n,); where not, values are those without gravity."""
+    status: Status
+    statistics: Statistics
+
+    @property
+    def observed_order(self) -> Mapping[str, FloatArray]:
+        """Observed order of each scalar quantity, shape (n,); zero where round-off hides it."""
+        return {
+            name: np.array([record.observed_order for record in records])
+            for name, records in self.convergence.items()
+        }
+
+
+def ring_quantities(
+    *,
+    disc: Disc,
+    density: float,
+    angular_velocity: float,
+    fill_ratio: npt.ArrayLike,
+    gravity: float = 0.0,
+    shaft: Shaft = "horizontal",
+    dimension: int | None = None,
+    cells: Sequence[tuple[int, ...]] | None = None,
+    turn_samples: int | None = None,
+    source_factor: float = 1.0,
+    wall_factor: float = 1.0,
+) -> RingQuantities:
+    """Finite-element totals of one chamber's liquid over fill ratios, with uncertainties from grid
+    convergence.
+
+    laplace(p) = 2 rho omega^2, n.grad p = rho (omega^2 r e_r + g).n on walls, p = 0 on the free surface; then
+    volume, mean p on the outer wall, U = int rho x, dU/dV' = rho int x/|n.grad p| / int 1/|n.grad p|, int p
+    n.
+
+    Args:
+        disc: the disc.
+        density: rho, kg/m^3.
+        angular_velocity: omega, rad/s, not zero.
+        fill_ratio: x, any shape, flattened to (n,), within [0, 1]; an empty chamber is exact.
+        gravity: g, m/s^2; zero leaves it out.
+        shaft: "horizontal" turns gravity across the chamber, "vertical" points it along -z.
+        dimension: 2 or 3; default 2, or 3 for a vertical shaft with gravity, which 2 cannot describe.
+        cells: meshes, finest first, each with half the cells of the one before; default `default_cells` and
+            two coarser ones.
+        turn_samples: even number of angles of gravity over a turn; default enough for a mean within 1e-10.
+        source_factor: multiplies the source term; anything but 1 is a deliberate fault.
+        wall_factor: multiplies the walls' condition; anything but 1 is a deliberate fault.
+
+    Returns:
+        The totals.  Where gravity leaves no closed ring, status is NO_RING, `closed` is False and the values
+        are those without gravity, their half-widths widened by all that gravity could do to the liquid there.
+
+    Raises:
+        ValueError: fill ratios outside [0, 1]; density, speed or number of samples that make no sense; two
+            dimensions for gravity along the shaft; fewer than three meshes.
+
+    Source: Eqs. 3 to 12 of the liquid-ring paper, with exact plates; Celik et al. (2008),
+    doi:10.1115/1.2960953.
+    """
+    fills = np.atleast_1d(np.asarray(fill_ratio, dtype=np.float64)).ravel()
+    _check(fills, density, angular_velocity, gravity)
+    axial = gravity > 0 and shaft == "vertical"
+    meshes = _meshes(disc, cells, dimension or (3 if axial else 2))
+    if axial and len(meshes[0]) == 2:
+        raise ValueError("gravity along the shaft needs dimension 3")
+    liquid = RotatingLiquid(
+        density=density,
+        angular_velocity=angular_velocity,
+        source_factor=source_factor,
+        wall_factor=wall_factor,
+    )
+    turn = Turn(gravity=gravity, shaft=shaft, samples=_turn_samples(disc, liquid, gravity, turn_samples))
+    samples = [_on_meshes(disc, liquid, float(x), meshes, turn) for x in fills]
+    return _collect(disc, liquid, fills, meshes, samples, gravity)
+
+
+def _check(fills: FloatArray, density: float, omega: float, gravity: float) -> None:
+    if fills.size == 0 or not np.all((fills >= 0) & (fills <= 1)):
+        raise ValueError("fill_ratio must lie within [0, 1], and there must be at least one")
+    if not (density > 0 and np.isfinite(density) and np.isfinite(omega) and omega != 0):
+        raise ValueError("density must be positive and angular_velocity not zero, both finite")
+    if not (gravity >= 0 and np.isfinite(gravity)):
+        raise ValueError("gravity must be zero or positive")
+
+
+def _meshes(
+    disc: Disc, cells: Sequence[tuple[int, ...]] | None, dimension: int
+) -> tuple[tuple[int, ...], ...]:
+    finest = default_cells(disc=disc, dimension=dimension)
+    meshes = tuple(cells) if cells else tuple(tuple(n // k for n in finest) for k in (1, 2, 4))
+    if len(meshes) < 3 or any(len(c) != len(meshes[0]) for c in meshes):
+        raise ValueError("cells must list at least three meshes of one dimension, finest first")
+    return meshes
+
+
+def _turn_samples(disc: Disc, liquid: RotatingLiquid, gravity: float, wanted: int | None) -> int:
+    if wanted is not None:
+        if wanted < 2 or wanted % 2:
+            raise ValueError("turn_samples must be even and at least two")
+        return wanted
+    tilt = gravity / (liquid.angular_velocity**2 * disc.inner_radius)
+    if tilt == 0:
+        return 2
+    harmonics = np.log(_AVERAGING) / np.log(min(tilt, 0.3))
+    return 2 * max(2, int(np.ceil(harmonics / 2)))
+
+
+def _on_meshes(
+    disc: Disc, liquid: RotatingLiquid, x: float, meshes: tuple[tuple[int, ...], ...], turn: Turn
+) -> tuple[Sample, ...]:
+    """Samples on every mesh, finest first, each starting from the surfaces of the coarser one."""
+    if x == 0:
+        half = float(half_angle(disc=disc, radius=disc.outer_radius))
+        drop = liquid.density * disc.outer_radius * np.sin(half) / half
+        return (empty_sample(moment_per_volume=drop),) * len(meshes)
+    found: list[Sample] = []
+    for k, cells in reversed(list(enumerate(meshes))):
+        halves = found and all(n == 2 * m for n, m in zip(cells, meshes[k + 1], strict=True))
+        coarser = found[-1] if halves else None
+        sample = turn_mean(disc=disc, liquid=liquid, fill_ratio=x, cells=cells, turn=turn, coarser=coarser)
+        found.append(sample)
+    return tuple(reversed(found))
+
+
+def _collect(
+    disc: Disc,
+    liquid: RotatingLiquid,
+    fills: FloatArray,
+    meshes: tuple[tuple[int, ...], ...],
+    samples: Sequence[tuple[Sample, ...]],
+    gravity: float,
+) -> RingQuantities:
+    failed = [next((s.status for s in levels if not s.status.ok), Status()) for levels in samples]
+    closed = np.array([status.ok for status in failed])
+    plain = Turn(gravity=0.0, shaft="horizontal", samples=2)
+    kept = [
+        levels if ok else _on_meshes(disc, liquid, float(x), meshes, plain)
+        for levels, ok, x in zip(samples, closed, fills, strict=True)
+    ]
+    values = np.array([[sample.values for sample in levels] for levels in kept])
+    records = _judge(disc, liquid, fills, meshes, values)
+    widths = np.array([[record.uncertainty for record in row] for row in records])
+    # An empty chamber is exact, but where its first drop goes is not once gravity pulls on it.
+    widths[fills == 0] = 0.0
+    displaced = _displaced(disc, liquid, fills, gravity)
+    widths = widths + np.where(closed[:, None], 0.0, displaced)
+    widths[fills == 0, 3] = displaced[fills == 0, 3]
+    status = _status(fills, failed)
+    parts = {
+        name: Estimate(value=_part(values[:, 0], name), uncertainty=_part(widths, name), status=status)
+        for name in COLUMNS
+    }
+    return _quantities(disc, fills, meshes, kept, values, records, parts, closed, status)
+
+
+def _part(table: FloatArray, name: str) -> FloatArray:
+    columns = table[:, COLUMNS[name]]
+    return np.array(columns if columns.shape[1] > 1 else columns[:, 0])
+
+
+def _quantities(
+    disc: Disc,
+    fills: FloatArray,
+    meshes: tuple[tuple[int, ...], ...],
+    kept: Sequence[tuple[Sample, ...]],
+    values: FloatArray,
+    records: list[list[GridConvergence]],
+    parts: Mapping[str, Estimate],
+    closed: npt.NDArray[np.bool_],
+    status: Status,
+) -> RingQuantities:
+    finest = [levels[0] for levels in kept]
+    ripple = np.array([sample.ripple for sample in finest])
+    return RingQuantities(
+        fill_ratio=fills,
+        surface_radius=surface_radius(disc=disc, fill_ratio=fills),
+        liquid_volume=parts["liquid_volume"],
+        wall_pressure=parts["wall_pressure"],
+        moment=parts["moment"],
+        moment_per_volume=parts["moment_per_volume"],
+        wall_force={name: parts[f"force {name}"] for name in WALLS},
+        resultant_force=parts["force resultant"],
+        wall_torque={name: parts[f"torque {name}"] for name in WALLS},
+        resultant_torque=parts["torque resultant"],
+        ripple={"wall_pressure": ripple[:, 0], "moment": ripple[:, 1]},
+        convergence={name: tuple(row[k] for row in records) for k, name in enumerate(SCALARS)},
+        mesh_values={name: values[:, :, k].T.copy() for k, name in enumerate(SCALARS)},
+        cells=meshes,
+        closed=closed,
+        status=status,
+        statistics=Statistics(
+            unknowns=max(sample.unknowns for sample in finest),
+            relative_residual=max(sample.residual for levels in kept for sample in levels),
+            extra={"surface_flux_mismatch": max(sample.flux_mismatch for sample in finest)},
+        ),
+    )
+
+
+def _judge(
+    disc: Disc,
+    liquid: RotatingLiquid,
+    fills: FloatArray,
+    meshes: tuple[tuple[int, ...], ...],
+    values: FloatArray,
+) -> list[list[GridConvergence]]:
+    sizes = [float(np.prod(cells)) ** (-1 / len(cells)) for cells in meshes]
+    bounds = [_noise(disc, liquid, float(x), meshes[0]) for x in fills]
+    return [
+        [
+            gci(values=levels[:, k], sizes=sizes, formal_order=FORMAL_ORDER, round_off=float(bound[k]))
+            for k in range(WIDTH)
+        ]
+        for levels, bound in zip(values, bounds, strict=True)
+    ]
+
+
+def _scales(disc: Disc, liquid: RotatingLiquid, x: float) -> FloatArray:
+    """Natural size of every column, for what is zero by symmetry."""
+    a, outer = float(surface_radius(disc=disc, fill_ratio=x)), disc.outer_radius
+    volume = x * chamber_volume(disc=disc)
+    pressure = liquid.density * liquid.angular_velocity**2 * (outer - a) * (outer + a) / 2
+    force = pressure * disc.central_angle * outer * (disc.axial_width + outer)
+    scales = np.full(WIDTH, force * outer)
+    scales[4:22] = force
+    scales[:4] = volume, pressure, liquid.density * volume * outer, liquid.density * outer
+    return scales
+
+
+def _noise(disc: Disc, liquid: RotatingLiquid, x: float, cells: tuple[int, ...]) -> FloatArray:
+    """Bound of the rounding in every column on the finest mesh."""
+    if x == 0:
+        return np.zeros(WIDTH)
+    a = float(surface_radius(disc=disc, fill_ratio=x))
+    depth, arc = disc.outer_radius - a, 2 * a * float(half_angle(disc=disc, radius=a))
+    # Coordinates of a thin film cancel; a cell that is narrow for the liquid's depth makes the matrix stiff.
+    stiffness = max(2 * cells[0], 2 * cells[1] * depth / arc) ** 2
+    return _EPSILON * (4 * disc.outer_radius / depth + 0.2 * stiffness) * _scales(disc, liquid, x)
+
+
+def _displaced(disc: Disc, liquid: RotatingLiquid, fills: FloatArray, gravity: float) -> FloatArray:
+    """All that gravity could do where it leaves no closed ring, shape (n, columns)."""
+    if gravity == 0:
+        return np.zeros((fills.size, WIDTH))
+    a = surface_radius(disc=disc, fill_ratio=fills)
+    reach = disc.outer_radius - a * np.cos(half_angle(disc=disc, radius=a))  # of the liquid's mean x
+    excess = 2 * liquid.density * gravity * disc.outer_radius
+    force = excess * disc.central_angle * disc.outer_radius * (disc.axial_width + disc.outer_radius)
+    widths = np.full((fills.size, WIDTH), force * disc.outer_radius)
+    widths[:, 4:22] = force
+    widths[:, 0], widths[:, 1] = 0.0, excess
+    widths[:, 2] = liquid.density * fills * chamber_volume(disc=disc) * reach
+    widths[:, 3] = liquid.density * reach
+    return widths
+
+
+def _status(fills: FloatArray, failed: Sequence[Status]) -> Status:
+    for x, status in zip(fills, failed, strict=True):
+        if not status.ok:
+            remedy = "; values there are without gravity" if status.code is StatusCode.NO_RING else ""
+            return Status(code=status.code, text=f"at a fill ratio of {x:.4g}: {status.text}{remedy}")
+    return Status()

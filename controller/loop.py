@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from ringbalance.controller.algorithm import Command, Controller, Measurement, usable
 from ringbalance.controller.algorithms import controller_of
+from ringbalance.controller.checks import check_ring
 from ringbalance.controller.closed_form import closed_form, has_closed_form
 from ringbalance.controller.judgement import misadjustments, noise_floor, overshoots, rose, settling_time
 from ringbalance.controller.liquid_ring import Advance, DiscState, LiquidRing, initial_state
@@ -63,10 +64,11 @@ def simulate(
         Simulation; its status says how the run ended and what to do next.
 
     Raises:
-        SceneError: an algorithm that this program does not have.
+        SceneError: an algorithm that this program does not have, or a rotor too slow to form a ring.
 
     Source: section 5 and Fig. 5 of the liquid-ring paper.
     """
+    check_ring(scene)
     chosen = integrator or (closed_form if has_closed_form(model.flow) else quadrature)
     run = _Run(
         scene=scene,
@@ -218,6 +220,7 @@ def _record(run: _Run, cause: Cause, *, integrator: str) -> Simulation:
         time=run.time,
         initial_amplitude=float(amplitude[0]),
         final_amplitude=float(amplitude[-1]),
+        settling_time=settling_time(time=time, amplitude=amplitude, limit=limit),
         noise_floor=run.floor,
         drift=run.drift,
         overshoots=overshoots(run.samples, limit=limit),
@@ -232,7 +235,7 @@ def _record(run: _Run, cause: Cause, *, integrator: str) -> Simulation:
         integrator=integrator,
         outcome=outcome,
         settled=settled,
-        settling_time=settling_time(time=time, amplitude=amplitude, limit=limit) if settled else None,
+        settling_time=facts.settling_time if settled else None,
         status=status_text(facts, outcome),
         time=time,
         amplitude=amplitude,

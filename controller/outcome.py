@@ -50,6 +50,8 @@ class Facts:
     """m."""
     final_amplitude: float
     """m."""
+    settling_time: float | None
+    """s, from which on the amplitude was not above the limit; None when it ends above."""
     noise_floor: float
     """m."""
     drift: float
@@ -88,7 +90,7 @@ def outcome_of(facts: Facts) -> Outcome:
         Outcome; SETTLED only when the controller rests and the true amplitude is at or below the limit.
     """
     limit = facts.scene.controller.limit
-    if facts.samples[-1].command.resting and facts.final_amplitude <= limit:
+    if facts.samples[-1].command.resting and facts.settling_time is not None:
         return Outcome.SETTLED
     higher = facts.final_amplitude > facts.initial_amplitude + facts.noise_floor
     if facts.cause is Cause.RISING or (facts.cause is Cause.IDLE and higher):
@@ -130,8 +132,8 @@ def _um(length: float) -> str:
 
 def _settled(facts: Facts) -> str:
     return (
-        f"settled: {_um(facts.final_amplitude)} at {facts.time:.4g} s, not above the limit of "
-        f"{_um(facts.scene.controller.limit)}; nothing to do"
+        f"settled: not above the limit of {_um(facts.scene.controller.limit)} from "
+        f"{facts.settling_time:.4g} s on, {_um(facts.final_amplitude)} at the end; nothing to do"
     )
 
 

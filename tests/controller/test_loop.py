@@ -262,6 +262,19 @@ def test_an_algorithm_that_is_not_there_is_a_fault_of_the_scene(scene: Scene, mo
         simulate(with_controller(scene, kind="law_based"), model)
 
 
+def test_a_rotor_too_slow_for_a_ring_is_a_fault_of_the_scene(scene: Scene, model: BalancerModel) -> None:
+    # sqrt(g/a) at a = 34.9 mm: 16.76 rad/s, 160 rpm.
+    for speed, slow in ((16.7, True), (16.9, False)):
+        turning = replace(scene, rotor=replace(scene.rotor, speed=speed))
+        if slow:
+            with pytest.raises(SceneError, match=r"\[rotor\] speed.*160"):
+                simulate(turning, model)
+        else:
+            assert simulate(turning, model).status
+    upright = replace(scene, environment=replace(scene.environment, shaft="vertical"))
+    assert simulate(replace(upright, rotor=replace(scene.rotor, speed=5.0)), model).status
+
+
 def test_the_document_is_what_scripts_rely_on(scene: Scene, model: BalancerModel) -> None:
     found = json.loads(document(simulate(scene, model)))
     promised = {

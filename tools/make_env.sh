@@ -19,9 +19,9 @@ has_venv() {
     "$1" -c 'import ensurepip, venv' 2>/dev/null
 }
 
-# Prints the first Python that will do; PYTHON=... on the make command line goes before all others.
+# Prints the first Python that will do; with PYTHON=... on the make command line it is that one or none.
 find_python() {
-    for candidate in ${PYTHON:-} python3 python3.13 python3.12 python3.11; do
+    for candidate in ${PYTHON:-python3 python3.13 python3.12 python3.11}; do
         if in_range "$candidate" && has_venv "$candidate"; then
             printf '%s\n' "$candidate"
             return
@@ -30,16 +30,25 @@ find_python() {
     return 1
 }
 
+refuse() {
+    echo "ringbalance needs Python 3.11, 3.12 or 3.13 with venv; $1 is: $("$1" -V 2>&1)." >&2
+    echo "Name one that this machine has, for example: make env PYTHON=/opt/python3.12/bin/python3" >&2
+    exit 1
+}
+
 # A bare Debian's python3 has neither pip nor venv. What off-screen OpenGL lacks goes into the same one line.
 require_python() {
     find_python && return
+    [ -z "${PYTHON:-}" ] || refuse "$PYTHON"
     opengl=$(python3 tools/check_opengl.py 2>/dev/null) || true
     # shellcheck disable=SC2086
     debian_packages "a Python with venv" python3 python3-venv $opengl >&2 || exit 1
-    find_python && return
-    echo "ringbalance needs Python 3.11, 3.12 or 3.13 with venv; found: $(python3 -V 2>&1)." >&2
-    echo "Name one that this machine has, for example: make env PYTHON=/opt/python3.12/bin/python3" >&2
-    exit 1
+    find_python || refuse python3
+}
+
+# Is there an environment that runs, with the Python that was asked for?
+venv_runs() {
+    found=$("$venv/bin/python" -V 2>/dev/null) && [ "$found" = "$("${PYTHON:-$venv/bin/python}" -V 2>&1)" ]
 }
 
 fingerprint() {
@@ -71,7 +80,7 @@ install_project() {
     cksum <pyproject.toml >"$venv/.project-stamp"
 }
 
-if ! "$venv/bin/python" -c '' 2>/dev/null || [ "$(fingerprint)" != "$(cat "$venv/.lock-stamp" 2>/dev/null)" ]; then
+if ! venv_runs || [ "$(fingerprint)" != "$(cat "$venv/.lock-stamp" 2>/dev/null)" ]; then
     make_venv
 fi
 if [ "$(cksum <pyproject.toml)" != "$(cat "$venv/.project-stamp" 2>/dev/null)" ]; then

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,7 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         "misadjustments": simulation.misadjustments,
         "noise_floor_m": simulation.noise_floor,
         "samples": _samples(simulation.samples),
+        "models_used": [asdict(term) for term in simulation.terms],
     }
 
 

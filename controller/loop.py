@@ -20,6 +20,7 @@ from ringbalance.controller.quadrature import quadrature
 from ringbalance.controller.rotor import chamber_letters, disc_unbalance, vibration
 from ringbalance.controller.sensor import Sensor, noisy_sensor
 from ringbalance.controller.simulation import Injection, Outcome, Sample, Simulation
+from ringbalance.controller.terms import terms
 from ringbalance.controller.transfer import Integrator
 from ringbalance.reduced_model.model import BalancerModel
 from ringbalance.scene.models import Scene
@@ -247,4 +248,10 @@ def _record(run: _Run, cause: Cause, *, integrator: str) -> Simulation:
         misadjustments=misadjustments(run.samples, floor=run.floor),
         noise_floor=run.floor,
         limit=limit,
+        terms=terms(
+            scene=run.scene,
+            model=run.plant.model,
+            integrator=integrator,
+            gas_times=[injection.operation.duration for injection in run.injections],
+        ),
     )

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from ringbalance.controller.algorithm import Command, Measurement
 from ringbalance.controller.liquid_ring import Operation
+from ringbalance.controller.terms import Term
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -87,3 +88,5 @@ class Simulation:
     """m."""
     limit: float
     """m."""
+    terms: tuple[Term, ...]
+    """Physical terms modelled and left out."""

@@ -84,8 +84,9 @@ def _gas_time(simulation: Simulation) -> float:
 
 
 def _amplitude(simulation: Simulation) -> Text:
-    """Amplitude at equal steps of time, by straight lines between the recorded instants."""
-    end = float(simulation.time[-1])
+    """Amplitude at equal steps of time, by straight lines, until shortly after the last valve has closed."""
+    closed = [i.time + i.operation.duration for i in simulation.injections]
+    end = min(float(simulation.time[-1]), 1.2 * max(closed, default=math.inf))
     at = np.linspace(0.0, end, SPARK_WIDTH)
     line = sparkline(np.interp(at, simulation.time, simulation.amplitude))
     return Text.assemble(("amplitude (log) ", "dim"), line, (f"  0 to {end:.3g} s", "dim"))

@@ -1,0 +1,47 @@
+"""What a person sees: status, summary, a line of bars, the injections."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from ringbalance.controller.loop import simulate
+from ringbalance.controller.show import show, sparkline
+from ringbalance.reduced_model.model import BalancerModel
+from ringbalance.scene.models import Scene
+
+
+def printed(scene: Scene, model: BalancerModel) -> str:
+    stream = io.StringIO()
+    show(simulate(scene, model), console=Console(file=stream, width=110))
+    return stream.getvalue()
+
+
+def test_a_run_in_words_and_tables(scene: Scene, model: BalancerModel) -> None:
+    text = printed(scene, model)
+    assert "settled" in text
+    assert "siphon" in text
+    assert "paper (closed form)" in text
+    # Fill of chamber B before and after its first operation, by the closed form of Eqs. 19 and 20.
+    assert "0.25000" in text
+    assert "█" in text
+
+
+def test_a_run_without_injections_and_one_with_too_many(scene: Scene, model: BalancerModel) -> None:
+    quiet = replace(scene, rotor=replace(scene.rotor, initial_amplitude=0.0))
+    assert "injections" not in printed(quiet, model).replace("in 0 injections", "")
+    trial = replace(scene, controller=replace(scene.controller, kind="trial"))
+    assert "more: see --json" in printed(trial, model)
+
+
+@pytest.mark.parametrize(
+    ("values", "bars"),
+    [([1.0, 1e-3, 1e-9], "█▁▁"), ([0.0, 0.0], "▁▁"), ([1.0, 10**-1.5], "█▄"), ([], "")],
+)
+def test_bars_are_logarithmic_over_three_decades(values: list[float], bars: str) -> None:
+    found = sparkline(np.array(values))
+    assert found == bars or (bars == "█▄" and found in {"█▄", "█▅"})

@@ -17,6 +17,8 @@ from ringbalance.scene.models import Scene
 
 MICROMETRE: Final = 1e-6
 GRAM_MILLIMETRE: Final = 1e-6
+CONFIRMING_SAMPLES: Final = 5
+"""Samples over which the amplitude must have stayed when something could still change it."""
 NEARLY_EMPTY: Final = 1e-6
 """Fill ratio at which a chamber's last liquid is looked at."""
 
@@ -74,6 +76,13 @@ class Facts:
         return missing * self.scene.rotor.influence_coefficient
 
     @property
+    def confirmed_from(self) -> float:
+        """Latest settling time that counts as staying, s."""
+        if self.cause is Cause.AT_REST:
+            return self.time
+        return self.samples[-min(CONFIRMING_SAMPLES, len(self.samples))].time
+
+    @property
     def last_events(self) -> frozenset[Event]:
         """What ended the flows of the last command."""
         last = self.injections[-1].time if self.injections else None
@@ -87,10 +96,11 @@ def outcome_of(facts: Facts) -> Outcome:
         facts: of the run.
 
     Returns:
-        Outcome; SETTLED only when the controller rests and the true amplitude is at or below the limit.
+        Outcome; SETTLED only when the true amplitude ends at or below the limit and stays there: because
+        nothing can change any more, or over at least the last five samples (over all, if there are fewer).
     """
     limit = facts.scene.controller.limit
-    if facts.samples[-1].command.resting and facts.settling_time is not None:
+    if facts.settling_time is not None and facts.settling_time <= facts.confirmed_from:
         return Outcome.SETTLED
     higher = facts.final_amplitude > facts.initial_amplitude + facts.noise_floor
     if facts.cause is Cause.RISING or (facts.cause is Cause.IDLE and higher):
@@ -161,7 +171,7 @@ def _stalled(facts: Facts) -> str:
     def needed(at: float, *, primed: bool) -> str:
         other = min(total - at, law.max_fill_ratio)
         found = starting_pressure(law=law, fill=at, opposite_fill=other, primed=primed, above=pressure)
-        return "no pressure found does" if found is None else f"{found / 1e6:.4g} MPa"
+        return "no pressure: its liquid has left the port" if found is None else f"{found / 1e6:.4g} MPa"
 
     return (
         f"{_not_settled(facts)}; stalled: {pressure / 1e6:.4g} MPa drives no liquid out of chamber "

@@ -65,7 +65,7 @@ class Simulation:
     """How operations were carried through time."""
     outcome: Outcome
     settled: bool
-    """Whether the amplitude ends at or below the limit, seen so by the controller."""
+    """Whether the amplitude ends at or below the limit and stays there."""
     settling_time: float | None
     """s, from which on the amplitude stays at or below the limit; None when not settled."""
     status: str

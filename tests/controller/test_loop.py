@@ -250,6 +250,18 @@ def test_a_faulty_sensor_delays_but_does_not_mislead(scene: Scene, model: Balanc
     document(run)
 
 
+def test_dipping_below_the_limit_at_the_end_is_not_settling(scene: Scene, model: BalancerModel) -> None:
+    settled = simulate(with_noise(scene), model)
+    assert settled.settled
+    assert settled.settling_time is not None
+    # The same run, cut short two periods after it has come below the limit: too few samples to say so.
+    end = settled.settling_time + 1.2
+    cut = simulate(replace(with_noise(scene), run=replace(scene.run, time_limit=end)), model)
+    assert cut.amplitude[-1] <= cut.limit
+    assert cut.outcome is Outcome.TIME_LIMIT
+    assert not cut.settled
+
+
 def test_progress_runs_to_the_end(scene: Scene, model: BalancerModel) -> None:
     seen: list[tuple[float, float]] = []
     run = simulate(scene, model, progress=lambda time, limit: seen.append((time, limit)))

@@ -19,6 +19,7 @@ from ringbalance.physics.least_squares_order import Fit, best_fit
 FloatArray = npt.NDArray[np.float64]
 
 _LOWEST_ORDER = 0.5
+_HIGHEST_ORDER = 50.0
 _EPSILON = float(np.finfo(np.float64).eps)
 
 
@@ -98,7 +99,7 @@ def gci(
     phi, h = np.asarray(values, dtype=np.float64), np.asarray(sizes, dtype=np.float64)
     _check(phi, h, formal_order)
     noise = max(round_off, 8 * _EPSILON * float(np.abs(phi).max()))
-    if abs(phi[1] - phi[0]) <= noise:
+    if _is_noise(phi, h, formal_order, noise):
         return _at_round_off(phi, noise)
     if phi.size > 3:
         return _from_fit(phi, best_fit(phi, h, formal_order=formal_order), formal_order, noise, safety)
@@ -114,11 +115,18 @@ def _check(phi: FloatArray, h: FloatArray, formal_order: float) -> None:
         raise ValueError("sizes must be positive and grow from the finest mesh to the coarsest")
 
 
+def _is_noise(phi: FloatArray, h: FloatArray, formal_order: float, noise: float) -> bool:
+    """Whether the last change is rounding, and no accident of errors that cross zero on the finest meshes."""
+    first, second = np.abs(np.diff(phi[:3]))
+    foretold = second / ((h[2] / h[1]) ** formal_order - 1) / (h[1] / h[0]) ** formal_order
+    return bool(first <= noise and foretold <= 10 * noise)
+
+
 def celik_order(*, first_change: float, second_change: float, r21: float, r32: float) -> float:
     """Observed order from two changes, by fixed-point iteration; negative when the changes grow.
 
     Args:
-        first_change: e21 = phi2 - phi1, finest mesh 1; not zero.
+        first_change: e21 = phi2 - phi1, finest mesh 1; zero counts as the highest order.
         second_change: e32 = phi3 - phi2; not zero.
         r21: h2/h1, above 1.
         r32: h3/h2, above 1.
@@ -128,18 +136,20 @@ def celik_order(*, first_change: float, second_change: float, r21: float, r32: f
 
     Source: Celik et al. (2008), Eqs. 5a to 5c, doi:10.1115/1.2960953.
     """
+    if first_change == 0:
+        return _HIGHEST_ORDER
     ratio = second_change / first_change
     s, logarithm = np.sign(ratio), np.log(abs(ratio))
     p = float(logarithm / np.log(r21))
     if abs(r21 - r32) <= 1e-12 * r21:
-        return float(np.clip(p, -50, 50))
+        return float(np.clip(p, -_HIGHEST_ORDER, _HIGHEST_ORDER))
     for _ in range(200):
-        size = float(np.clip(abs(p), 1e-6, 50))
+        size = float(np.clip(abs(p), 1e-6, _HIGHEST_ORDER))
         update = float((logarithm + np.log((r21**size - s) / (r32**size - s))) / np.log(r21))
         if abs(update - p) <= 1e-12 * max(1.0, abs(p)):
             break
         p = update
-    return float(np.clip(p, -50, 50))
+    return float(np.clip(p, -_HIGHEST_ORDER, _HIGHEST_ORDER))
 
 
 def _from_three(

@@ -34,6 +34,8 @@ FloatArray = npt.NDArray[np.float64]
 _MAX_STEPS = 40
 _STEP_TOLERANCE = 1e-9
 """Largest last move of a node, in mean depths."""
+_ROUNDING = 1e-5
+"""Below this a move that no longer shrinks is rounding, in mean depths: in a film depths are differences."""
 _SAFE_SHARE = 0.9
 """Share of the way to a wall that a node may go in one step."""
 _NEAREST = 1e-3
@@ -49,6 +51,8 @@ class FoundSurface:
     steps: int
     last_move: float
     """Largest move of a node in the last step, in mean depths."""
+    rounding: float
+    """Of the surface's place, in mean depths; zero when the search ended on its tolerance."""
     volume_error: float
     """Relative."""
 
@@ -90,6 +94,7 @@ def solve_with_gravity(
         **solution.statistics.extra,
         "surface_flux_mismatch": surface_flux_mismatch(solution=solution, liquid=liquid),
         "surface_last_move": found.last_move,
+        "surface_rounding": found.rounding,
         "volume_error": found.volume_error,
     }
     statistics = replace(solution.statistics, iterations=found.steps, extra=extra)
@@ -142,7 +147,9 @@ def find_surface(
     if no_ring is None:
         return _search(disc, liquid, fill_ratio, cells, concentric if start is None else start)
     chamber = chamber_mesh(disc=disc, surface_radius=concentric, cells=cells)
-    return FoundSurface(chamber=chamber, status=no_ring, steps=0, last_move=0.0, volume_error=0.0)
+    return FoundSurface(
+        chamber=chamber, status=no_ring, steps=0, last_move=0.0, rounding=0.0, volume_error=0.0
+    )
 
 
 def _search(
@@ -155,18 +162,29 @@ def _search(
     target = _target(disc, fill_ratio, len(cells))
     first = chamber = chamber_mesh(disc=disc, surface_radius=start, cells=cells)
     depth = disc.outer_radius - float(np.mean(first.surface_radius))
-    move, steps, status = np.inf, 0, Status()
-    while steps < _MAX_STEPS and move > _STEP_TOLERANCE and status.ok:
+    move, before, steps, status = np.inf, np.inf, 0, Status()
+    while steps < _MAX_STEPS and status.ok and not _settled(move, before):
         wanted = _wanted_move(chamber, liquid, target)
         radius = chamber.surface_radius + wanted * _damping(disc, chamber.surface_radius, wanted)
         chamber = chamber_mesh(disc=disc, surface_radius=radius, cells=cells)
-        move, steps = float(np.abs(wanted).max()) / depth, steps + 1
+        move, before, steps = float(np.abs(wanted).max()) / depth, move, steps + 1
         status = _near_walls(disc, radius, depth)
     if status.ok:
-        status = _end_of_search(disc, chamber.surface_radius, move)
+        status = _end_of_search(disc, chamber.surface_radius, move, _settled(move, before))
     chamber = _hold_volume(disc, chamber, target) if status.ok else first
     error = _measure(chamber) / target - 1 if status.ok else 0.0
-    return FoundSurface(chamber=chamber, status=status, steps=steps, last_move=move, volume_error=error)
+    return FoundSurface(
+        chamber=chamber,
+        status=status,
+        steps=steps,
+        last_move=move,
+        rounding=move if move > _STEP_TOLERANCE else 0.0,
+        volume_error=error,
+    )
+
+
+def _settled(move: float, before: float) -> bool:
+    return move <= _STEP_TOLERANCE or before / 4 <= move <= _ROUNDING
 
 
 def refined_surface(radius: FloatArray) -> FloatArray:
@@ -292,8 +310,8 @@ def _near_walls(disc: Disc, radius: FloatArray, depth: float) -> Status:
     return Status()
 
 
-def _end_of_search(disc: Disc, radius: FloatArray, move: float) -> Status:
-    if move > _STEP_TOLERANCE:
+def _end_of_search(disc: Disc, radius: FloatArray, move: float, settled: bool) -> Status:
+    if not settled:
         return Status(
             code=StatusCode.NOT_CONVERGED,
             text=f"the free surface still moves by {move:.1e} of its depth; "

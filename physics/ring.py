@@ -216,7 +216,8 @@ def _collect(
         for levels, ok, x in zip(samples, closed, fills, strict=True)
     ]
     values = np.array([[sample.values for sample in levels] for levels in kept])
-    records = _judge(disc, liquid, fills, meshes, values)
+    rounding = [max(sample.rounding for sample in levels) for levels in kept]
+    records = _judge(disc, liquid, fills, meshes, values, rounding)
     widths = np.array([[record.uncertainty for record in row] for row in records])
     # An empty chamber is exact, but where its first drop goes is not once gravity pulls on it.
     widths[fills == 0] = 0.0
@@ -280,9 +281,12 @@ def _judge(
     fills: FloatArray,
     meshes: tuple[tuple[int, ...], ...],
     values: FloatArray,
+    rounding: Sequence[float],
 ) -> list[list[GridConvergence]]:
     sizes = [float(np.prod(cells)) ** (-1 / len(cells)) for cells in meshes]
-    bounds = [_noise(disc, liquid, float(x), meshes[0]) for x in fills]
+    bounds = [
+        _noise(disc, liquid, float(x), meshes[0], moved) for x, moved in zip(fills, rounding, strict=True)
+    ]
     return [
         [
             gci(values=levels[:, k], sizes=sizes, formal_order=FORMAL_ORDER, round_off=float(bound[k]))
@@ -304,7 +308,9 @@ def _scales(disc: Disc, liquid: RotatingLiquid, x: float) -> FloatArray:
     return scales
 
 
-def _noise(disc: Disc, liquid: RotatingLiquid, x: float, cells: tuple[int, ...]) -> FloatArray:
+def _noise(
+    disc: Disc, liquid: RotatingLiquid, x: float, cells: tuple[int, ...], rounding: float
+) -> FloatArray:
     """Bound of the rounding in every column on the finest mesh."""
     if x == 0:
         return np.zeros(WIDTH)
@@ -312,7 +318,8 @@ def _noise(disc: Disc, liquid: RotatingLiquid, x: float, cells: tuple[int, ...])
     depth, arc = disc.outer_radius - a, 2 * a * float(half_angle(disc=disc, radius=a))
     # Coordinates of a thin film cancel; a cell that is narrow for the liquid's depth makes the matrix stiff.
     stiffness = max(2 * cells[0], 2 * cells[1] * depth / arc) ** 2
-    return _EPSILON * (4 * disc.outer_radius / depth + 0.2 * stiffness) * _scales(disc, liquid, x)
+    relative = _EPSILON * (4 * disc.outer_radius / depth + 0.2 * stiffness) + rounding
+    return relative * _scales(disc, liquid, x)
 
 
 def _displaced(disc: Disc, liquid: RotatingLiquid, fills: FloatArray, gravity: float) -> FloatArray:

@@ -61,6 +61,8 @@ class Sample:
     """Largest relative residual of the linear systems."""
     flux_mismatch: float
     """Largest mismatch of flux and force on a found surface, relative."""
+    rounding: float
+    """Largest rounding of a found surface's place, in mean depths."""
 
 
 def turn_mean(
@@ -109,6 +111,7 @@ def turn_mean(
         unknowns=solutions[0].statistics.unknowns,
         residual=max(s.statistics.relative_residual for s in solutions),
         flux_mismatch=max(s.statistics.extra.get("surface_flux_mismatch", 0.0) for s in solutions),
+        rounding=max(s.statistics.extra.get("surface_rounding", 0.0) for s in solutions),
     )
 
 
@@ -196,4 +199,5 @@ def _failed(status: Status) -> Sample:
         unknowns=0,
         residual=0.0,
         flux_mismatch=0.0,
+        rounding=0.0,
     )

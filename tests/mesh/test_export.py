@@ -1,0 +1,57 @@
+"""VTU files: boundary names, places and fields survive, and VTK sees right-handed cells."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista
+
+from ringbalance.mesh.chamber import chamber_mesh
+from ringbalance.mesh.export import read_vtu, write_vtu
+from ringbalance.mesh.geometry import liquid_area
+from ringbalance.scene.models import Disc
+
+
+@pytest.mark.parametrize("cells", [(3, 6), (3, 6, 2)])
+def test_round_trip(
+    disc: Disc, tmp_path: Path, cells: tuple[int, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    chamber = chamber_mesh(disc=disc, surface_radius=35e-3, cells=cells)
+    field = np.arange(chamber.mesh.doflocs.shape[1]) * 0.1
+    path = write_vtu(
+        tmp_path / "a" / "ring.vtu",
+        mesh=chamber.mesh,
+        length_scale=chamber.length_scale,
+        fields={"pressure": field},
+    )
+    stored = read_vtu(path)
+    np.testing.assert_array_equal(stored.mesh.doflocs, chamber.mesh.doflocs * chamber.length_scale)
+    np.testing.assert_array_equal(stored.mesh.t, chamber.mesh.t)
+    np.testing.assert_array_equal(stored.fields["pressure"], field)
+    assert set(stored.mesh.boundaries) == set(chamber.mesh.boundaries)
+    for name, facets in chamber.mesh.boundaries.items():
+        np.testing.assert_array_equal(np.sort(stored.mesh.boundaries[name]), np.sort(facets))
+    assert capsys.readouterr() == ("", "")
+
+
+def test_vtk_measures_the_liquid_and_not_its_mirror_image(disc: Disc, tmp_path: Path) -> None:
+    area = float(liquid_area(disc=disc, surface_radius=35e-3))
+    for cells, size in (((8, 24), area), ((8, 24, 2), area * disc.axial_width)):
+        chamber = chamber_mesh(disc=disc, surface_radius=35e-3, cells=cells)
+        path = write_vtu(tmp_path / "ring.vtu", mesh=chamber.mesh, length_scale=chamber.length_scale)
+        grid = pyvista.read(path)
+        measured = grid.area if len(cells) == 2 else grid.volume
+        # VTK measures quadratic cells by their linear parts.
+        assert measured == pytest.approx(size, rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "field"), [("ring.vtk", [0.0] * 15), ("ring.vtu", [0.0]), ("ring.vtu", [np.nan] * 15)]
+)
+def test_what_cannot_be_stored_is_refused(disc: Disc, tmp_path: Path, name: str, field: list[float]) -> None:
+    chamber = chamber_mesh(disc=disc, surface_radius=35e-3, cells=(1, 2))
+    with pytest.raises(ValueError, match=r"vtu|finite value per node"):
+        write_vtu(tmp_path / name, mesh=chamber.mesh, fields={"pressure": field})
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,201 @@
+"""The pressure solver: exact where it must be, equal to independent routes, honest when it fails."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import skfem
+from scipy.sparse import diags_array, random_array
+from skfem.helpers import dot, grad
+
+from ringbalance.mesh.chamber import ChamberMesh, Geometry, chamber_mesh
+from ringbalance.physics import pressure_linear
+from ringbalance.physics.pressure import PressureProblem, RotatingLiquid, places, solve_pressure
+from ringbalance.physics.pressure_assembly import (
+    at_cells,
+    facet_load,
+    facet_mass,
+    facet_points,
+    stiffness,
+    volume_load,
+    volume_points,
+)
+from ringbalance.physics.pressure_linear import solve_linear
+from ringbalance.physics.results import StatusCode
+from ringbalance.scene.models import Disc, Scene
+
+FloatArray = npt.NDArray[np.float64]
+
+WATER = RotatingLiquid(density=1000.0, angular_velocity=1047.2)
+
+
+@pytest.fixture(scope="module")
+def disc(paper_scene: Scene) -> Disc:
+    return paper_scene.disc
+
+
+def wavy(angle: FloatArray, axial: FloatArray) -> FloatArray:
+    return np.asarray(34e-3 + 2e-3 * np.cos(3 * angle + 0.5) + 0.03 * axial)
+
+
+def polynomial(dimension: int, degree: int) -> PressureProblem:
+    """All monomials of one degree at once, scaled to a disc of 44.5 mm."""
+    unit = 44.5e-3
+    rows = [np.array([1.0, -0.7, 0.4])[:dimension], np.array([0.3, 0.9, -0.5])[:dimension]]
+
+    def factors(x: FloatArray) -> list[FloatArray]:
+        return [np.tensordot(row, x, axes=1) / unit + 0.2 for row in rows[:degree]]
+
+    def value(x: FloatArray) -> FloatArray:
+        return np.asarray(1e5 * np.prod(np.stack(factors(x)), axis=0))
+
+    def gradient(x: FloatArray) -> FloatArray:
+        parts = factors(x)
+        others = [np.ones_like(parts[0])] if degree == 1 else [parts[1], parts[0]]
+        terms = [np.multiply.outer(row, other) for row, other in zip(rows, others, strict=False)]
+        return np.asarray(1e5 / unit * sum(terms))
+
+    laplacian = 0.0 if degree == 1 else 2e5 / unit**2 * float(rows[0] @ rows[1])
+    return PressureProblem(
+        source=lambda x: np.full(x.shape[1:], laplacian),
+        wall_flux=lambda x, n: np.asarray(np.sum(gradient(x) * n, axis=0)),
+        surface_pressure=value,
+    )
+
+
+@pytest.mark.parametrize("cells", [(2, 5), (2, 5, 2)])
+@pytest.mark.parametrize(("geometry", "degree"), [("quadratic", 1), ("straight", 2)])
+def test_polynomials_of_the_space_are_exact(
+    disc: Disc, cells: tuple[int, ...], geometry: Geometry, degree: int
+) -> None:
+    """Curved cells hold all linear functions of place, straight ones all quadratic ones."""
+    problem = polynomial(len(cells), degree)
+    chamber = chamber_mesh(disc=disc, surface_radius=wavy, cells=cells, geometry=geometry)
+    solution = solve_pressure(chamber=chamber, problem=problem)
+    exact = problem.surface_pressure(places(chamber))
+    np.testing.assert_allclose(solution.pressure, exact, atol=1e-11 * np.abs(exact).max())
+
+
+def test_the_flux_through_the_surface_is_exact_for_a_linear_pressure(disc: Disc) -> None:
+    sector = replace(disc, plate_thickness=0.0)
+    chamber = chamber_mesh(disc=sector, surface_radius=35e-3, cells=(3, 6), geometry="straight")
+    solution = solve_pressure(chamber=chamber, problem=polynomial(2, 1))
+    facets = facet_points(chamber.mesh, "free_surface")
+    flux = polynomial(2, 1).wall_flux(facets.points * chamber.length_scale, facets.normals)
+    nodal = np.zeros(solution.pressure.size)
+    nodal[chamber.grid[0]] = solution.surface_gradient
+    total = np.sum(facets.weights * flux)
+    found = facet_load(facets, np.ones_like(facets.weights), unknowns=nodal.size) @ nodal
+    assert found == pytest.approx(total, rel=1e-11)
+
+
+@pytest.mark.parametrize("cells", [(2, 5), (2, 5, 2)])
+def test_assembly_agrees_with_scikit_fems_forms(disc: Disc, cells: tuple[int, ...]) -> None:
+    mesh = chamber_mesh(disc=disc, surface_radius=wavy, cells=cells).mesh
+    unknowns = mesh.doflocs.shape[1]
+    basis = skfem.Basis(mesh, mesh.elem(), intorder=5)
+    laplace = skfem.BilinearForm(lambda u, v, _: dot(grad(u), grad(v)))
+    difference = stiffness(mesh) - laplace.assemble(basis)
+    assert abs(difference).max() < 1e-12 * abs(laplace.assemble(basis)).max()
+    volume = volume_points(mesh)
+    load = skfem.LinearForm(lambda v, w: np.exp(w.x[0]) * v).assemble(basis)
+    mine = volume_load(volume, np.exp(volume.points[0]), unknowns=unknowns)
+    np.testing.assert_allclose(mine, load, atol=1e-14)
+    for name in mesh.boundaries:
+        facets = facet_points(mesh, name)
+        other = skfem.FacetBasis(mesh, mesh.elem(), facets=name, intorder=5)
+        flux = skfem.LinearForm(lambda v, w: (w.n[0] - 2 * w.n[1]) * w.x[1] * v).assemble(other)
+        density = (facets.normals[0] - 2 * facets.normals[1]) * facets.points[1]
+        np.testing.assert_allclose(facet_load(facets, density, unknowns=unknowns), flux, atol=1e-11)
+        mass = skfem.BilinearForm(lambda u, v, _: u * v).assemble(other)
+        assert abs(facet_mass(facets, unknowns=unknowns) - mass).max() < 1e-11
+
+
+def test_normals_point_out_of_the_liquid(disc: Disc) -> None:
+    mesh = chamber_mesh(disc=disc, surface_radius=35e-3, cells=(2, 6, 2)).mesh
+    total = np.zeros(3)
+    volume = 0.0
+    for name in mesh.boundaries:
+        facets = facet_points(mesh, name)
+        total += np.sum(facets.weights * facets.normals, axis=(1, 2))
+        volume += float(np.sum(facets.weights * np.sum(facets.points * facets.normals, axis=0))) / 3
+    np.testing.assert_allclose(total, 0, atol=1e-13)
+    assert volume == pytest.approx(float(volume_points(mesh).weights.sum()), rel=1e-12)
+
+
+@pytest.mark.parametrize("depth", [1e-6, 1e-3, 24e-3])
+@pytest.mark.parametrize("cells", [(8, 24), (8, 24, 4)])
+def test_pressure_of_a_ring_of_any_depth(disc: Disc, depth: float, cells: tuple[int, ...]) -> None:
+    """Within 1e-6 of rho omega^2 (r^2 - a^2)/2 at the outer wall, on the default mesh."""
+    a = disc.outer_radius - depth
+    chamber = chamber_mesh(disc=disc, surface_radius=a, cells=cells)
+    solution = solve_pressure(chamber=chamber, problem=WATER.problem())
+    wall = 0.5 * 1000.0 * 1047.2**2 * (disc.outer_radius - a) * (disc.outer_radius + a)
+    np.testing.assert_allclose(solution.pressure[chamber.grid[-1]], wall, rtol=1e-6)
+    np.testing.assert_allclose(-solution.surface_gradient, 1000.0 * 1047.2**2 * a, rtol=1e-5)
+    assert solution.status.ok
+    assert solution.statistics.relative_residual < 1e-11
+
+
+def test_gas_pressure_adds_to_every_point(disc: Disc) -> None:
+    chamber = chamber_mesh(disc=disc, surface_radius=35e-3, cells=(2, 6))
+    plain = solve_pressure(chamber=chamber, problem=WATER.problem())
+    driven = solve_pressure(chamber=chamber, problem=replace(WATER, gas_pressure=7e5).problem())
+    np.testing.assert_allclose(driven.pressure - plain.pressure, 7e5, rtol=1e-9)
+
+
+def test_two_and_three_dimensions_agree_in_every_section(disc: Disc) -> None:
+    flat = chamber_mesh(disc=disc, surface_radius=30e-3, cells=(3, 9))
+    deep = chamber_mesh(disc=disc, surface_radius=30e-3, cells=(3, 9, 2))
+    section = solve_pressure(chamber=flat, problem=WATER.problem()).pressure[flat.grid]
+    whole = solve_pressure(chamber=deep, problem=WATER.problem()).pressure[deep.grid]
+    for k in range(whole.shape[-1]):
+        np.testing.assert_allclose(whole[..., k], section, atol=1e-10 * section.max())
+
+
+def chamber_and_load(disc: Disc) -> ChamberMesh:
+    return chamber_mesh(disc=disc, surface_radius=30e-3, cells=(4, 12, 2))
+
+
+def test_multigrid_agrees_with_factorisation_bit_for_bit_from_run_to_run(disc: Disc) -> None:
+    chamber = chamber_and_load(disc)
+    direct = solve_pressure(chamber=chamber, problem=WATER.problem())
+    runs = [solve_pressure(chamber=chamber, problem=WATER.problem(), direct_limit=0) for _ in range(2)]
+    assert runs[0].status.ok
+    assert runs[0].statistics.iterations > 0
+    assert runs[0].statistics.relative_residual < 1e-10
+    np.testing.assert_allclose(runs[0].pressure, direct.pressure, atol=1e-9 * direct.pressure.max())
+    np.testing.assert_array_equal(runs[0].pressure, runs[1].pressure)
+
+
+def test_a_solve_that_does_not_converge_says_so(disc: Disc, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pressure_linear, "_MAX_ITERATIONS", 2)
+    solution = solve_pressure(chamber=chamber_and_load(disc), problem=WATER.problem(), direct_limit=0)
+    assert solution.status.code is StatusCode.NOT_CONVERGED
+    assert "residual" in solution.status.text
+    assert np.all(np.isfinite(solution.pressure))
+
+
+def test_linear_solver_reports_the_true_residual() -> None:
+    rng = np.random.default_rng(3)
+    sparse = random_array((300, 300), density=0.02, rng=rng)
+    matrix = (sparse + sparse.T + diags_array(np.full(300, 10.0))).tocsr()
+    right = rng.standard_normal(300)
+    found = solve_linear(matrix, right, dimension=2)
+    residual = np.linalg.norm(matrix @ found.values - right) / np.linalg.norm(right)
+    assert found.statistics.relative_residual == pytest.approx(residual, rel=1e-12)
+    assert found.statistics.unknowns == 300
+    assert solve_linear(matrix, np.zeros(300), dimension=2).status.ok
+
+
+@pytest.mark.parametrize("factor", ["source_factor", "wall_factor"])
+def test_a_deliberate_fault_changes_the_pressure(disc: Disc, factor: str) -> None:
+    chamber = chamber_mesh(disc=disc, surface_radius=30e-3, cells=(2, 6))
+    sound = solve_pressure(chamber=chamber, problem=WATER.problem())
+    faulty = solve_pressure(chamber=chamber, problem=replace(WATER, **{factor: 1.01}).problem())
+    volume = volume_points(chamber.mesh)
+    difference = at_cells(volume, faulty.pressure - sound.pressure)
+    assert np.abs(difference).max() > 1e-3 * sound.pressure.max()

@@ -11,7 +11,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from cyclopts import App, CycloptsError, UnknownCommandError
+from cyclopts import App, CycloptsError, Parameter, UnknownCommandError
 
 import ringbalance
 
@@ -49,6 +49,7 @@ def build_app() -> App:
             "still written); 2 bad input; 130 interrupted."
         ),
         version=ringbalance.__version__,
+        default_parameter=Parameter(negative=()),
         result_action="return_value",
         suppress_keyboard_interrupt=False,
     )

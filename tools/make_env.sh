@@ -58,7 +58,8 @@ fingerprint() {
 
 install_locked() {
     # pip is asked when uv cannot: a mirror is often made known to pip alone.
-    "$venv/bin/uv" pip install --quiet --python "$venv/bin/python" --require-hashes -r "$lock" ||
+    "$venv/bin/uv" pip install --quiet --compile-bytecode --python "$venv/bin/python" \
+        --require-hashes -r "$lock" ||
         {
             echo "uv could not install the packages; trying pip with the same hashes ..."
             "$venv/bin/python" -m pip install --quiet --require-hashes -r "$lock"

@@ -219,8 +219,8 @@ def _diverging(facts: Facts) -> str:
 def _drifting(facts: Facts) -> str:
     return (
         f"{_not_settled(facts)}; the full tube lets liquid run back while the gas is off (up to "
-        f"{facts.drift:.3g} in fill between samples): raise rotor.speed or the hump so that the column "
-        "breaks, or vent the tube"
+        f"{facts.drift:.3g} in fill between samples): raise rotor.speed or lower tube.hump_radius so "
+        "that the column breaks, or vent the tube"
     )
 
 

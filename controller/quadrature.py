@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.closed_form import boundary_event
+from ringbalance.controller.gauss_panel import ABSCISSA, WEIGHT, Panel, nodes, three_panels
 from ringbalance.controller.transfer import (
     Drive,
     Event,
@@ -19,8 +20,6 @@ from ringbalance.controller.transfer import (
 )
 from ringbalance.reduced_model.flow_law import Regime
 
-NODES: Final = 12
-"""Gauss-Legendre points of a panel."""
 FILL_TOLERANCE: Final = 1e-12
 """Error in fill ratio allowed to one panel, and distance to a stall that counts as there."""
 SCAN: Final = 33
@@ -28,9 +27,6 @@ SCAN: Final = 33
 MAX_WINDOWS: Final = 64
 MAX_PANELS: Final = 512
 MAX_NEWTON: Final = 40
-
-_ABSCISSA, _WEIGHT = np.polynomial.legendre.leggauss(NODES)
-_ABSCISSA, _WEIGHT = (1 + _ABSCISSA) / 2, _WEIGHT / 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,54 +157,45 @@ class _Journey:
 
     def _follow(self, stretch: _Stretch) -> None:
         """Adaptive panels along one stretch, taking the instants that fall into each."""
-        panels = [(1.0, 0.0)]
+        waiting = [(1.0, 0.0)]
         for _ in range(MAX_PANELS):
-            if not panels or self.remaining <= 0:
+            if not waiting or self.remaining <= 0:
                 return
-            top, bottom = panels.pop()
-            whole, halves, rate = self._panel(stretch, top, bottom)
-            left = abs(stretch.start - stretch.end) * top**2
-            if abs(whole - sum(halves)) * rate <= FILL_TOLERANCE or left <= FILL_TOLERANCE:
-                middle = (top + bottom) / 2
-                self._take(stretch, top, middle, halves[0])
-                self._take(stretch, middle, bottom, halves[1])
+            top, bottom = waiting.pop()
+            ends = three_panels(top, bottom)
+            pace, rate = self.work.pace(stretch, nodes(ends))
+            whole, upper, lower = (
+                Panel(top=a, bottom=b, integrand=row) for (a, b), row in zip(ends, pace, strict=True)
+            )
+            error = abs(whole.integral - upper.integral - lower.integral) * float(rate.max())
+            if min(error, abs(stretch.start - stretch.end) * top**2) <= FILL_TOLERANCE:
+                self._take(stretch, upper)
+                self._take(stretch, lower)
             else:
-                panels += [((top + bottom) / 2, bottom), (top, (top + bottom) / 2)]
+                waiting += [ends[2], ends[1]]
         self._end(Event.UNFINISHED, self.position)
 
-    def _panel(
-        self, stretch: _Stretch, top: float, bottom: float
-    ) -> tuple[float, tuple[float, float], float]:
-        """Time over a panel by one rule and by two, and the largest |dx/dt| met."""
-        width = top - bottom
-        z = bottom + width * np.stack([_ABSCISSA, (1 + _ABSCISSA) / 2, _ABSCISSA / 2])
-        pace, rate = self.work.pace(stretch, z)
-        whole, upper, lower = pace @ _WEIGHT * width * np.array([1.0, 0.5, 0.5])
-        return float(whole), (float(upper), float(lower)), float(rate.max())
-
-    def _take(self, stretch: _Stretch, top: float, bottom: float, duration: float) -> None:
+    def _take(self, stretch: _Stretch, panel: Panel) -> None:
         """Fills at the instants within one accepted panel, then the clock moves on."""
+        duration = panel.integral
         inside = (self.instants >= self.time) & (self.instants < self.time + duration)
         if np.any(inside):
-            z = self._invert(stretch, top, bottom, self.instants[inside] - self.time, duration)
+            z = self._invert(stretch, panel, self.instants[inside] - self.time)
             self.fill[inside] = stretch.fill(z)
         self.time += duration
-        later = self.instants >= self.time
-        self.fill[later] = stretch.fill(np.asarray(bottom))
-        self.position = float(stretch.fill(np.asarray(bottom)))
+        self.position = float(stretch.fill(np.asarray(panel.bottom)))
+        self.fill[self.instants >= self.time] = self.position
 
-    def _invert(
-        self, stretch: _Stretch, top: float, bottom: float, wanted: FloatArray, duration: float
-    ) -> FloatArray:
+    def _invert(self, stretch: _Stretch, panel: Panel, wanted: FloatArray) -> FloatArray:
         """Solve integral from z to top of pace = wanted, by Newton steps held within a shrinking bracket."""
-        low, high = np.full(wanted.shape, bottom), np.full(wanted.shape, top)
-        z = top - (top - bottom) * wanted / duration
+        low, high = np.full(wanted.shape, panel.bottom), np.full(wanted.shape, panel.top)
+        z = panel.reached(wanted)
         for _ in range(MAX_NEWTON):
-            width = top - z
-            nodes = np.concatenate([z[:, None] + width[:, None] * _ABSCISSA, z[:, None]], axis=1)
-            pace, rate = self.work.pace(stretch, nodes)
-            excess = pace[:, :-1] @ _WEIGHT * width - wanted
-            found = np.abs(excess) * rate[:, -1] <= FILL_TOLERANCE / 100
+            width = panel.top - z
+            at = np.concatenate([z[:, None] + width[:, None] * ABSCISSA, z[:, None]], axis=1)
+            pace, rate = self.work.pace(stretch, at)
+            excess = pace[:, :-1] @ WEIGHT * width - wanted
+            found = np.abs(excess) * rate[:, -1] <= FILL_TOLERANCE / 10
             if np.all(found | (high - low <= 4 * np.finfo(np.float64).eps)):
                 break
             low, high = np.where(excess > 0, z, low), np.where(excess > 0, high, z)

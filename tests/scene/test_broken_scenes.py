@@ -110,7 +110,9 @@ SINGLE: dict[str, Broken] = {
             ),
         ),
     ),
-    "hump outside the disc": _one("tube.hump_radius", "50 mm", "hump lies outside the port", "44.5 mm"),
+    "hump outside the disc": _one(
+        "tube.hump_radius", "50 mm", "outer wall too", "at most outer_radius (44.5 mm)"
+    ),
     "hump on the axis": _one("tube.hump_radius", "0 mm", "above 0", "a length above 0"),
     "hump at the end": _one("tube.hump_position", 1, "below 1", "above 0 and below 1"),
     "bore too wide for the bends": _one(
@@ -308,6 +310,10 @@ SEVERAL: dict[str, Broken] = {
             Expected("disc", "inner_radius", '"45 mm"', "smaller than outer_radius", "below 44.5 mm"),
             Expected("disc", "plate_thickness", '"35 mm"', "close the chamber", "31.8198 mm"),
         ),
+    ),
+    "a spread needs no value that is missing anyway": Broken(
+        {"tube.length": REMOVED, "uncertainty": {"length": "1 mm"}},
+        (Expected("tube", "length", "missing", "k cannot be calculated", "a length above 0"),),
     ),
     "all tables missing": Broken(
         dict.fromkeys(("disc", "liquid", "tube", "gas", "rotor"), REMOVED),

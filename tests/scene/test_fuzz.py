@@ -42,7 +42,7 @@ JUNK = st.recursive(
     max_leaves=4,
 )
 FUZZ = settings(
-    max_examples=400,
+    max_examples=250,
     deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
@@ -108,21 +108,21 @@ def test_junk_in_place_of_values(
 
 
 @given(
-    outer=st.floats(1, 500),
-    inner=st.floats(1, 500),
-    angle=st.floats(1, 200),
+    outer=st.floats(5, 500),
+    inner=st.floats(0.1, 1.1),
     chambers=st.sampled_from([2, 4, 6, 8]),
-    plate=st.floats(0, 50),
-    hump=st.floats(1, 500),
-    length=st.floats(1, 3000),
-    bore=st.floats(0.5, 20),
+    angle=st.floats(0.3, 1.05),
+    plate=st.floats(0, 0.6),
+    hump=st.floats(0.1, 1.1),
+    length=st.floats(1, 6),
+    bore=st.floats(0.01, 0.5),
 )
 @FUZZ
 def test_plausible_discs(
     outer: float,
     inner: float,
-    angle: float,
     chambers: int,
+    angle: float,
     plate: float,
     hump: float,
     length: float,
@@ -130,17 +130,49 @@ def test_plausible_discs(
     newcomer_document: dict[str, Any],
     as_toml: Callable[[Mapping[str, Any]], str],
 ) -> None:
-    """Plausible numbers reach the cross-checks; a disc that passes them is sound."""
+    """Shares of the outer radius and of the pitch, some beyond what fits; a disc that passes is sound."""
     disc = {
         "outer_radius": f"{outer} mm",
-        "inner_radius": f"{inner} mm",
+        "inner_radius": f"{inner * outer} mm",
         "axial_width": "30 mm",
-        "central_angle": f"{angle} deg",
-        "plate_thickness": f"{plate} mm",
+        "central_angle": f"{angle * 360 / chambers} deg",
+        "plate_thickness": f"{plate * inner * outer} mm",
         "chambers": chambers,
     }
-    tube = {"bore": f"{bore} mm", "hump_radius": f"{hump} mm", "length": f"{length} mm"}
+    tube = {
+        "bore": f"{bore * outer} mm",
+        "hump_radius": f"{hump * outer} mm",
+        "length": f"{length * outer} mm",
+        "bends": [{"angle": "90 deg", "radius": f"{outer / 6} mm"}],
+    }
     scene = _loaded(as_toml({**newcomer_document, "disc": disc, "tube": tube}).encode())
+    if scene is not None:
+        _assert_sound(scene)
+
+
+@given(changes=st.lists(st.tuples(st.integers(0, 999), st.floats(0, 3)), min_size=1, max_size=3))
+@FUZZ
+def test_scaled_values(
+    changes: list[tuple[int, float]],
+    paper_document: dict[str, Any],
+    as_toml: Callable[[Mapping[str, Any]], str],
+) -> None:
+    """Quantities of the paper's scene, some of them scaled: many pass, and those that do are sound."""
+    document = {
+        key: dict(value) if isinstance(value, dict) else value for key, value in paper_document.items()
+    }
+    paths = [
+        (table, key)
+        for table, content in document.items()
+        if isinstance(content, dict)
+        for key, value in content.items()
+        if isinstance(value, str) and value[0].isdigit()
+    ]
+    for index, factor in changes:
+        table, key = paths[index % len(paths)]
+        number, unit = document[table][key].split(" ", 1)
+        document[table][key] = f"{float(number) * factor} {unit}"
+    scene = _loaded(as_toml(document).encode())
     if scene is not None:
         _assert_sound(scene)
 

@@ -36,7 +36,7 @@ def test_hump_on_the_way_in_and_out() -> None:
 @given(**SHAPES)
 @PROPERTY
 def test_taut_string_is_a_path(hump: float, separation: float) -> None:
-    """Where the chord is blocked, tangent, arc and tangent laid out in small steps are as long as the bound."""
+    """Where the chord is blocked, tangent, arc and tangent in small steps are as long as the bound."""
     assume(math.cos(separation / 2) < hump)
     tangent = math.acos(hump)
     arc = [tangent + (separation - 2 * tangent) * i / 2000 for i in range(2001)]

@@ -33,7 +33,9 @@ from ringbalance.scene.models import Disc, Shaft
 FloatArray = npt.NDArray[np.float64]
 
 FORMAL_ORDER = 4.0
-"""Of every integral on quadratic geometry: twice the order of the elements, and that of an arc's drawing."""
+"""Of integrals on quadratic geometry: twice the order of the elements, and that of an arc's drawing."""
+PLATE_ORDER = 3.0
+"""Of what a plate alone feels: its edge on the free surface, where the conditions change, costs one order."""
 
 _EPSILON = float(np.finfo(np.float64).eps)
 _AVERAGING = 1e-10
@@ -284,12 +286,16 @@ def _judge(
     rounding: Sequence[float],
 ) -> list[list[GridConvergence]]:
     sizes = [float(np.prod(cells)) ** (-1 / len(cells)) for cells in meshes]
+    orders = np.full(WIDTH, FORMAL_ORDER)
+    for name, columns in COLUMNS.items():
+        if "plate" in name:
+            orders[columns] = PLATE_ORDER
     bounds = [
         _noise(disc, liquid, float(x), meshes[0], moved) for x, moved in zip(fills, rounding, strict=True)
     ]
     return [
         [
-            gci(values=levels[:, k], sizes=sizes, formal_order=FORMAL_ORDER, round_off=float(bound[k]))
+            gci(values=levels[:, k], sizes=sizes, formal_order=float(orders[k]), round_off=float(bound[k]))
             for k in range(WIDTH)
         ]
         for levels, bound in zip(values, bounds, strict=True)

@@ -237,7 +237,7 @@ class RotorTable(_Table):
 
     speed: Annotated[float | None, quantity("speed", _POSITIVE)] = _needed("speed of the rotor")
     influence_coefficient: Influence = _standard(
-        "0.0108 um/(g*mm)",
+        "0.0104 um/(g*mm)",
         "zero-to-peak vibration per unbalance; the default is inferred for the paper's rotor",
     )
     lag_angle: Turn = _standard(
@@ -279,8 +279,8 @@ class ControllerTable(_Table):
         "each chamber followed by its opposite: A, C, B, D for four", "trial algorithm: order of the chambers"
     )
     first_trial: PositiveTime = _standard("50 ms", "trial algorithm: gas time of a chamber's first trial")
-    long_step: PositiveTime = _standard("200 ms", "trial algorithm: gas time while the amplitude is large")
-    short_step: PositiveTime = _standard("10 ms", "trial algorithm: gas time below fine_below")
+    long_step: PositiveTime = _standard("100 ms", "trial algorithm: gas time while the amplitude is large")
+    short_step: PositiveTime = _standard("5 ms", "trial algorithm: gas time below fine_below")
     fine_below: PositiveLength = _standard(
         "0.8 um", "trial algorithm: amplitude below which short steps are used"
     )

@@ -200,7 +200,7 @@ SINGLE: dict[str, Broken] = {
     ),
     "trial steps crossed": Broken(
         {"controller.kind": "trial", "controller.short_step": "300 ms"},
-        (Expected("controller", "short_step", '"300 ms"', "longer than long_step", "at most 0.2 s"),),
+        (Expected("controller", "short_step", '"300 ms"', "longer than long_step", "at most 0.1 s"),),
     ),
     "spread of something unknown": _one("uncertainty.colour", "5 %", "unknown key", "lag_angle"),
     "spread of something absent": _one(
@@ -336,13 +336,13 @@ SEVERAL: dict[str, Broken] = {
         ),
     ),
     "three steps of the trial algorithm": Broken(
-        {"controller.kind": "trial", "controller.maximum_gas_time": "5 ms"},
+        {"controller.kind": "trial", "controller.maximum_gas_time": "3 ms"},
         tuple(
-            Expected("controller", key, value, "never executed", "maximum_gas_time (0.005 s)")
+            Expected("controller", key, value, "never executed", "maximum_gas_time (0.003 s)")
             for key, value in {
                 "first_trial": '"50 ms"',
-                "long_step": '"200 ms"',
-                "short_step": '"10 ms"',
+                "long_step": '"100 ms"',
+                "short_step": '"5 ms"',
             }.items()
         ),
     ),

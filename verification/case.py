@@ -1,0 +1,175 @@
+"""A case's text and criteria, `case.toml`, as a validated record: the claim stands before the result."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, model_validator
+
+from ringbalance.verification.text import placeholders
+from ringbalance.verification.verdicts import VOCABULARY, Kind, Metric, Verdict
+
+Text = Annotated[str, StringConstraints(min_length=3, strip_whitespace=True)]
+Identifier = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*$")]
+Basis = Literal["total", "per unit depth", "pointwise", "ratio", "count", "time"]
+ReferenceKind = Literal[
+    "printed number",
+    "printed formula",
+    "closed form",
+    "manufactured solution",
+    "published data",
+    "conservation law",
+    "independent calculation",
+    "definition",
+]
+NEEDS_REFERENCE: tuple[Metric, ...] = ("validation", "within_uncertainty", "relative", "absolute")
+
+
+class CaseError(ValueError):
+    """A case.toml that is not what a case must be."""
+
+
+class _Record(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class ReferenceText(_Record):
+    """Where the reference comes from and how far it is to be trusted."""
+
+    kind: ReferenceKind
+    source: Text
+    uncertainty: Text
+    doubts: tuple[Text, ...] = ()
+
+
+class Quantity(_Record):
+    """One judged number: its limit and the limit's reason stand before the result."""
+
+    name: Identifier
+    title: Text
+    unit: str = Field(min_length=1)
+    basis: Basis
+    metric: Metric
+    limit: float
+    why: Text
+    correction: str = ""
+    """Named correction after which a claim's number is reproduced."""
+
+
+class Mutation(_Record):
+    """A defect that must change the verdict: built into the computation by name, or a changed scene."""
+
+    id: Identifier
+    what: Text
+    expect: Verdict
+    scene: Mapping[str, float | None] = Field(default_factory=dict)
+    """Overrides of scene quantities in SI, such as "disc.plate_thickness" = 0.0."""
+    cost: Literal["light", "heavy"] = "light"
+
+
+class CaseDefinition(_Record):
+    """All of a case that is not computed."""
+
+    id: Identifier
+    number: int | None = None
+    """Of the claim, 1 to 20."""
+    kind: Kind
+    title: Text
+    claim: Text
+    """One sentence: what is claimed, or required of the program."""
+    protects: Text
+    assumes: tuple[Text, ...]
+    does_not_cover: tuple[Text, ...]
+    explanation: Text
+    """What was found and why, with placeholders for its numbers."""
+    consequence: Mapping[str, Text]
+    """One sentence for a designer, by verdict, or "default"."""
+    equations: tuple[Text, ...]
+    reference: ReferenceText
+    judged_on: Literal["scene", "paper"] = "scene"
+    """Whether the scene at hand is judged, or always the paper's own disc."""
+    headline: bool = False
+    cost: Literal["light", "heavy"] = "light"
+    quantity: tuple[Quantity, ...] = Field(min_length=1)
+    must_fail: tuple[Mutation, ...] = Field(min_length=1)
+
+    @property
+    def prose(self) -> tuple[str, ...]:
+        """Texts that may hold placeholders."""
+        return (self.explanation, *self.consequence.values(), *self.reference.doubts)
+
+    def consequence_of(self, verdict: Verdict) -> str:
+        """The sentence for a designer that goes with a verdict.
+
+        Args:
+            verdict: of the case.
+
+        Returns:
+            The sentence, placeholders still in it.
+        """
+        return self.consequence.get(verdict.value, self.consequence.get("default", ""))
+
+    @model_validator(mode="after")
+    def _hold_together(self) -> Self:
+        if (self.number is None) == (self.kind == "claim"):
+            raise ValueError("a claim has a number, and nothing else has one")
+        _unique("quantity", [quantity.name for quantity in self.quantity])
+        _unique("must_fail", [mutation.id for mutation in self.must_fail])
+        for quantity in self.quantity:
+            self._check_quantity(quantity)
+        for mutation in self.must_fail:
+            self._check_mutation(mutation)
+        self._check_consequence()
+        for text in self.prose:
+            placeholders(text)
+        return self
+
+    def _check_quantity(self, quantity: Quantity) -> None:
+        if (quantity.metric == "validation") and self.kind != "claim":
+            raise ValueError(f'{quantity.name}: metric "validation" is for claims; use "within_uncertainty"')
+        if quantity.metric in NEEDS_REFERENCE and quantity.limit <= 0:
+            raise ValueError(f"{quantity.name}: limit must be positive")
+
+    def _check_mutation(self, mutation: Mutation) -> None:
+        if mutation.expect not in VOCABULARY[self.kind] or mutation.expect is Verdict.NOT_RUN:
+            raise ValueError(f'{mutation.id}: a {self.kind} case cannot come out "{mutation.expect}"')
+        if self.kind != "claim" and mutation.expect is not Verdict.FAILED:
+            raise ValueError(f'{mutation.id}: a mutation of a {self.kind} case must come out "failed"')
+
+    def _check_consequence(self) -> None:
+        known = [verdict.value for verdict in VOCABULARY[self.kind]]
+        strange = [key for key in self.consequence if key not in (*known, "default")]
+        if strange:
+            raise ValueError(f'consequence: "{strange[0]}" is no verdict of a {self.kind} case')
+        missing = [word for word in known if word != "not run" and word not in self.consequence]
+        if missing and "default" not in self.consequence:
+            raise ValueError(f'consequence: nothing for "{missing[0]}", and no default')
+
+
+def _unique(what: str, names: list[str]) -> None:
+    if len(set(names)) != len(names):
+        raise ValueError(f"{what}: a name stands twice in {names}")
+
+
+def parse_case(text: str, *, source: str) -> CaseDefinition:
+    """Read a case.toml.
+
+    Args:
+        text: of the file.
+        source: name of the file, for messages.
+
+    Returns:
+        CaseDefinition.
+
+    Raises:
+        CaseError: text that is not TOML, or not a case; all faults at once.
+    """
+    try:
+        return CaseDefinition.model_validate(tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        raise CaseError(f"{source}: {error}") from error
+    except ValidationError as error:
+        faults = [f"{'.'.join(map(str, fault['loc'])) or 'case'}: {fault['msg']}" for fault in error.errors()]
+        raise CaseError("\n".join(f"{source}: {fault}" for fault in faults)) from error

@@ -1,0 +1,1 @@
+"""Eqs. 2 to 4 of the liquid-ring paper."""

@@ -1,0 +1,1 @@
+"""Eq. 7 of the liquid-ring paper."""

@@ -1,0 +1,81 @@
+"""Moment of one half-full chamber by finite elements, and the arithmetic of Eq. 7."""
+
+# ruff: noqa: ARG001 - every case answers to one interface
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from ringbalance.reduced_model.paper import max_liquid_volume_paper, moment_paper, surface_radius_paper
+from ringbalance.scene.models import Disc, Scene
+from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
+from ringbalance.verification.paper_numbers import CHAMBER_MOMENT, DENSITY, RING_RADIUS, at_paper_density
+from ringbalance.verification.rings import found_of, mesh_table, moment_spread, ring_of
+
+_FILLS: Final = (0.1, 0.2, 0.3, 0.4, 0.5)
+
+
+def reference(scene: Scene) -> Mapping[str, Reference]:
+    """The printed moment, for the liquid and for the arithmetic.
+
+    Args:
+        scene: not used.
+
+    Returns:
+        References.
+    """
+    return {"moment": CHAMBER_MOMENT.reference, "arithmetic": CHAMBER_MOMENT.reference}
+
+
+def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Moment by finite elements, and by Eq. 7 with and without the paper's rounding.
+
+    Args:
+        scene: the paper's disc.
+        level: not used.
+        defect: "plates_left_out".
+
+    Returns:
+        Evidence.
+    """
+    given = at_paper_density(scene)
+    ring = ring_of(given, _FILLS)
+    by_elements = found_of(ring, "moment", -1, input_=moment_spread(given, _FILLS[-1]))
+    unrounded, rounded = (_eq_7(given.disc, radius) for radius in (_radius(given.disc), RING_RADIUS.value))
+    arithmetic = Found(value=unrounded, corrected=rounded)
+    moment = arithmetic if defect == "plates_left_out" else by_elements
+    return Evidence(
+        found={"moment": moment, "arithmetic": arithmetic},
+        numbers={
+            "rounding_step": abs(unrounded - rounded),
+            "shortfall": 1 - moment.value / CHAMBER_MOMENT.value,
+        },
+        series=(_figure(given, ring.moment.value, ring.moment.uncertainty),),
+        convergence=(mesh_table(ring, "moment", "kg m", len(_FILLS) - 1),),
+        status=ring.status,
+    )
+
+
+def _radius(disc: Disc) -> float:
+    return float(surface_radius_paper(disc=disc, liquid_volume=max_liquid_volume_paper(disc=disc)))
+
+
+def _eq_7(disc: Disc, radius: float) -> float:
+    return float(moment_paper(disc=disc, density=DENSITY, surface_radius=radius))
+
+
+def _figure(scene: Scene, moment: np.ndarray, uncertainty: np.ndarray) -> Series:
+    x = np.array(_FILLS)
+    liquid = 2 * x * max_liquid_volume_paper(disc=scene.disc)
+    radius = surface_radius_paper(disc=scene.disc, liquid_volume=liquid)
+    by_eq_7 = moment_paper(disc=scene.disc, density=DENSITY, surface_radius=radius)
+    return Series(
+        name="moment of one chamber",
+        x=Axis(name="fill ratio", unit="1", values=x),
+        y=(
+            Curve(name="finite elements", unit="kg m", values=moment, uncertainty=uncertainty),
+            Curve(name="Eq. 7", unit="kg m", values=by_eq_7, style="paper"),
+        ),
+    )

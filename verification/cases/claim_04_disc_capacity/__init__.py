@@ -1,0 +1,1 @@
+"""Eq. 8 of the liquid-ring paper."""

@@ -1,0 +1,1 @@
+"""Eq. 12 of the liquid-ring paper."""

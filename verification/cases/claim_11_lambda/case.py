@@ -1,0 +1,110 @@
+"""lambda at the centre and over the range by finite elements."""
+
+# ruff: noqa: ARG001 - every case answers to one interface
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from ringbalance.mesh.geometry import chamber_volume
+from ringbalance.physics.ring import RingQuantities
+from ringbalance.reduced_model.paper import PAPER_LAMBDA
+from ringbalance.scene.models import Scene
+from ringbalance.verification.comparison import from_half_width, from_rounding
+from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
+from ringbalance.verification.exact_chamber import central_lambda
+from ringbalance.verification.paper_numbers import LAMBDA_TOLERANCE, plate_uncertainty, with_plate
+from ringbalance.verification.rings import found_of, mesh_table, ring_of, scaled
+from ringbalance.verification.sensitivity import input_uncertainty
+
+_SHARES: Final = tuple(np.linspace(0.0, 1.0, 11).tolist())
+"""Of the largest fill; the middle one is the centre."""
+_CENTRE: Final = 5
+_LAST_DIGIT: Final = 1e-3
+
+
+def reference(scene: Scene) -> Mapping[str, Reference]:
+    """72 mm with its stated error range and its rounding.
+
+    Args:
+        scene: not used.
+
+    Returns:
+        References.
+    """
+    stated = from_half_width(LAMBDA_TOLERANCE * PAPER_LAMBDA)
+    spread = math.hypot(stated, from_rounding(_LAST_DIGIT))
+    return {"central": Reference(value=PAPER_LAMBDA, uncertainty=spread)}
+
+
+def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """lambda from the moments of both chambers, and from the slope of the moment at the centre.
+
+    Args:
+        scene: the paper's disc.
+        level: not used.
+        defect: none is known here; the scene carries it.
+
+    Returns:
+        Evidence.
+    """
+    fills = tuple(share * scene.disc.max_fill_ratio for share in _SHARES)
+    ring = ring_of(scene, fills)
+    per_density = 2 / scene.liquid.density
+    central = scaled(found_of(ring, "moment_per_volume", _CENTRE, input_=_spread(scene)), per_density)
+    curve = _over_range(scene, ring, central.value)
+    return Evidence(
+        found={
+            "central": central,
+            "variation": Found(value=float(np.ptp(curve)) / central.value),
+        },
+        numbers={"bare": central_lambda(disc=with_plate(scene.disc, 0.0))},
+        series=(_figure(np.array(fills), curve),),
+        convergence=(mesh_table(ring, "moment_per_volume", "kg/m^2", _CENTRE),),
+        status=ring.status,
+    )
+
+
+def _spread(scene: Scene) -> float:
+    """Of dU/dV', from the plate thickness."""
+    scale = scene.liquid.density / 2
+    return scale * input_uncertainty(
+        [
+            (
+                lambda t: central_lambda(disc=with_plate(scene.disc, t)),
+                scene.disc.plate_thickness,
+                plate_uncertainty(scene),
+            )
+        ]
+    )
+
+
+def _over_range(scene: Scene, ring: RingQuantities, central: float) -> np.ndarray:
+    moment = ring.moment.value
+    away = ring.fill_ratio - scene.disc.max_fill_ratio / 2
+    away[_CENTRE] = 1.0
+    transferred = scene.liquid.density * chamber_volume(disc=scene.disc) * away
+    curve = (moment - moment[::-1]) / transferred
+    curve[_CENTRE] = central
+    return np.asarray(curve)
+
+
+def _figure(fills: np.ndarray, curve: np.ndarray) -> Series:
+    claimed = np.full(fills.shape, PAPER_LAMBDA)
+    return Series(
+        name="moment of a pair per transferred mass",
+        x=Axis(name="fill ratio of one chamber", unit="1", values=fills),
+        y=(
+            Curve(name="finite elements", unit="m", values=curve),
+            Curve(
+                name="72 mm within 0.7 %",
+                unit="m",
+                values=claimed,
+                style="paper",
+                uncertainty=LAMBDA_TOLERANCE * claimed,
+            ),
+        ),
+    )

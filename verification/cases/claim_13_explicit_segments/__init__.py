@@ -1,0 +1,1 @@
+"""Eq. 20 of the liquid-ring paper."""

@@ -1,0 +1,170 @@
+"""Explicit segments against the closed form over one long operation."""
+
+# ruff: noqa: ARG001 - every case answers to one interface
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ringbalance.controller.closed_form import closed_form
+from ringbalance.controller.explicit_segments import explicit_segments
+from ringbalance.controller.transfer import Drive
+from ringbalance.reduced_model.paper_law import PaperLaw, paper_law
+from ringbalance.scene.models import Scene
+from ringbalance.verification.comparison import from_half_width
+from ringbalance.verification.evidence import (
+    Axis,
+    Convergence,
+    Curve,
+    Evidence,
+    Found,
+    Level,
+    NotRunError,
+    Reference,
+    Series,
+)
+from ringbalance.verification.orders import extrapolate, order_study
+
+_COUNTS = (4, 8, 16, 32, 64, 128, 256, 512)
+_SHARE = 0.9
+"""Of the time until the chamber is empty or the flow stalls; at a stall itself no scheme has its order."""
+_SHORT = 0.1
+"""Share of the long operation that a controller's usual command lasts."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Operation:
+    """One chamber from full towards empty under the scene's gas pressure."""
+
+    drive: Drive
+    duration: float
+    """s."""
+
+    def moved(self, fill: float) -> float:
+        """Fill ratio given away."""
+        return self.drive.fill - fill
+
+    def exact(self) -> float:
+        """Moved fill ratio by the closed form."""
+        return self.moved(float(closed_form(self.drive, np.array([self.duration])).fill[-1]))
+
+    def stepped(self, count: int) -> float:
+        """Moved fill ratio by explicit segments."""
+        transfer = explicit_segments(count)(self.drive, np.array([self.duration]))
+        return self.moved(float(transfer.fill[-1]))
+
+    def frozen(self) -> float:
+        """Moved fill ratio with the first velocity kept."""
+        velocity = float(self.drive.flow(self.drive.fill).velocity)
+        return velocity * self.drive.exchange_rate * self.duration
+
+    def error(self, count: int) -> float:
+        """Relative error of the moved fill."""
+        return abs(self.stepped(count) / self.exact() - 1)
+
+
+def reference(scene: Scene) -> Mapping[str, Reference]:
+    """The closed form.
+
+    Args:
+        scene: the scene.
+
+    Returns:
+        References.
+    """
+    return {"moved_fill": Reference(value=_long_operation(scene).exact())}
+
+
+def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Moved fill over a sequence of segment counts.
+
+    Args:
+        scene: the scene; Eq. 19 is its law here.
+        level: not used.
+        defect: "frozen_velocity".
+
+    Returns:
+        Evidence.
+    """
+    operation = _long_operation(scene)
+    frozen = defect == "frozen_velocity"
+    exact = operation.exact()
+    moved = [operation.frozen() if frozen else operation.stepped(count) for count in _COUNTS]
+    error = [abs(value / exact - 1) for value in moved]
+    study = order_study(size=[1 / count for count in _COUNTS], error=error)
+    limit = extrapolate(coarse=moved[-2], fine=moved[-1], ratio=2, order=1)
+    # One half of the last correction bounds what the extrapolation has left.
+    spread = from_half_width(abs(limit - moved[-1]) / 2)
+    brief = _Operation(drive=operation.drive, duration=_SHORT * operation.duration)
+    return Evidence(
+        found={
+            "moved_fill": Found(value=limit, numerical=spread),
+            "order": Found(value=study.settled_order),
+            "finest_error": Found(value=study.finest_error),
+        },
+        numbers={
+            "duration": operation.duration,
+            "moved": exact,
+            "single": operation.error(1),
+            "segments_percent": _segments_for(operation, 1e-2),
+            "segments_per_mille": _segments_for(operation, 1e-3),
+            "short": brief.duration,
+            "short_segments": _segments_for(brief, 1e-3),
+        },
+        series=(_figure(error),),
+        convergence=(
+            Convergence(
+                quantity="moved fill ratio, relative",
+                unit="1",
+                formal_order=1.0,
+                size=[_COUNTS[0] / count for count in _COUNTS],
+                error=error,
+                observed_order=study.order,
+            ),
+        ),
+    )
+
+
+def _long_operation(scene: Scene) -> _Operation:
+    law = paper_law(scene)
+    drive = _drive(law, scene)
+    end = closed_form(drive, np.array([1e6])).event_time
+    if not end:
+        raise NotRunError("the gas pressure of this scene does not start the flow by Eq. 19: raise it")
+    return _Operation(drive=drive, duration=_SHARE * end)
+
+
+def _drive(law: PaperLaw, scene: Scene) -> Drive:
+    return Drive(
+        law=law,
+        fill=law.max_fill_ratio,
+        total=law.max_fill_ratio,
+        exchange_rate=law.tube_area / law.chamber_volume,
+        gas_pressure=scene.gas.pressure,
+        primed=False,
+    )
+
+
+def _segments_for(operation: _Operation, tolerance: float) -> float:
+    """Smallest number of segments within a tolerance: first guessed from the error of many, then counted."""
+    exact, many = operation.exact(), _COUNTS[-1]
+    count = max(1, int(np.ceil(many * operation.error(many) / tolerance)))
+    while abs(operation.stepped(count) / exact - 1) > tolerance:
+        count += 1
+    return float(count)
+
+
+def _figure(error: list[float]) -> Series:
+    counts = np.array(_COUNTS, dtype=np.float64)
+    first_order = error[0] * counts[0] / counts
+    return Series(
+        name="error of the moved fill against the number of segments",
+        x=Axis(name="segments", unit="1", values=counts),
+        y=(
+            Curve(name="Eq. 20", unit="1", values=np.array(error), style="paper"),
+            Curve(name="first order", unit="1", values=first_order, style="reference"),
+        ),
+        log=True,
+    )

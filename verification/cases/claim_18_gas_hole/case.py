@@ -1,0 +1,180 @@
+"""The largest fill that leaves a point of the chamber dry at every angle, at rest and at every speed."""
+
+# ruff: noqa: ARG001 - every case answers to one interface
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import minimize_scalar
+
+from ringbalance.mesh.geometry import half_angle, surface_radius
+from ringbalance.scene.models import Disc, Scene
+from ringbalance.verification.comparison import from_half_width
+from ringbalance.verification.evidence import (
+    Axis,
+    Curve,
+    Evidence,
+    Found,
+    Level,
+    NotRunError,
+    Reference,
+    Series,
+)
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+_GRIDS = ((30, 45), (60, 90))
+"""Radial and angular cells, coarse and fine."""
+_ANGLES = np.linspace(0.0, np.pi, 181)
+"""Of the shaft; the chamber is symmetric about its centre line."""
+_DOWNWARD = _ANGLES[:1]
+_OFFSETS = np.array([0.02, 0.1, 0.3, 0.6, 1.0, 2.0, 5.0, 20.0])
+"""g/omega^2 in units of R2: from a centred ring to almost a plane."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Cells:
+    """The chamber cut into small cells."""
+
+    place: ComplexArray
+    """Their middles, m, centre line along the real axis."""
+    share: FloatArray
+    """Of the chamber's area."""
+    width: FloatArray
+    """Distance over which the surface passes a cell, m."""
+
+
+def reference(scene: Scene) -> Mapping[str, Reference]:
+    """None: the margins are judged against zero.
+
+    Args:
+        scene: not used.
+
+    Returns:
+        Nothing.
+    """
+    return {}
+
+
+def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Safe fills at rest, at full speed and between.
+
+    Args:
+        scene: the scene, its shaft horizontal.
+        level: not used.
+        defect: "upright_only".
+
+    Returns:
+        Evidence.
+
+    Raises:
+        NotRunError: the shaft is vertical, or there is no gravity.
+    """
+    if scene.environment.shaft != "horizontal" or scene.environment.gravity == 0:
+        raise NotRunError("the claim is about a horizontal shaft under gravity")
+    disc = scene.disc
+    angles = _DOWNWARD if defect == "upright_only" else _ANGLES
+    coarse, fine = (_cells(disc, *grid) for grid in _GRIDS)
+    best = _safest_radius(disc, fine, angles)
+    offset = scene.environment.gravity / scene.rotor.speed**2
+
+    def margin(cells: _Cells, state: str) -> float:
+        fills = {
+            "stopped": lambda: _safe_at_rest(cells, best, angles),
+            "running": lambda: _safe_turning(cells, best, np.array([offset]), angles),
+            "any_speed": lambda: min(
+                _safe_at_rest(cells, best, angles),
+                _safe_turning(cells, best, _OFFSETS * disc.outer_radius, angles),
+            ),
+        }
+        return float(fills[state]()) - disc.max_fill_ratio
+
+    def found(state: str) -> Found:
+        value = margin(fine, state)
+        return Found(value=value, numerical=from_half_width(abs(value - margin(coarse, state))))
+
+    margins = {state: found(state) for state in ("running", "stopped", "any_speed")}
+    turning = _safe_turning(fine, best, _OFFSETS * disc.outer_radius, angles)
+    ring = float(surface_radius(disc=disc, fill_ratio=disc.max_fill_ratio))
+    return Evidence(
+        found={f"margin_{state}": margin_ for state, margin_ in margins.items()},
+        numbers={
+            "best_radius": best,
+            "max_fill": disc.max_fill_ratio,
+            "safe_running": margins["running"].value + disc.max_fill_ratio,
+            "safe_stopped": margins["stopped"].value + disc.max_fill_ratio,
+            "ring_radius": ring,
+            "safe_at_ring": _safe_at_rest(fine, ring, angles),
+            "between_margin": turning - margins["stopped"].value - disc.max_fill_ratio,
+        },
+        series=(_figure(disc, fine, offset),),
+    )
+
+
+def _cells(disc: Disc, radial: int, angular: int) -> _Cells:
+    depth = disc.outer_radius - disc.inner_radius
+    radius = disc.inner_radius + depth * (np.arange(radial) + 0.5) / radial
+    alpha = half_angle(disc=disc, radius=radius)
+    angle = np.outer(alpha, 2 * (np.arange(angular) + 0.5) / angular - 1)
+    area = np.broadcast_to((radius * 2 * alpha * depth / (radial * angular))[:, None], angle.shape).ravel()
+    place = (radius[:, None] * np.exp(1j * angle)).ravel()
+    return _Cells(place=place, share=area / area.sum(), width=np.sqrt(area))
+
+
+def _liquid_share(cells: _Cells, height: FloatArray) -> FloatArray:
+    """Share of the chamber below a level; height = distance of each cell beyond it, shape (states, cells)."""
+    inside = np.clip(0.5 + height / cells.width, 0.0, 1.0)
+    return np.asarray(inside @ cells.share, dtype=np.float64)
+
+
+def _safe_at_rest(cells: _Cells, radius: float, angles: FloatArray) -> float:
+    """Smallest share below the level through a point of the centre line, over directions of gravity."""
+    down = np.exp(1j * angles)[:, None]
+    return float(_liquid_share(cells, np.real((cells.place - radius) * np.conj(down))).min())
+
+
+def _safe_turning(cells: _Cells, radius: float, offsets: FloatArray, angles: FloatArray) -> float:
+    """The same with the surface a circle about -g/omega^2."""
+    shares = []
+    for offset in offsets:
+        centre = -offset * np.exp(1j * angles)[:, None]
+        shares.append(_liquid_share(cells, np.abs(cells.place - centre) - np.abs(radius - centre)).min())
+    return float(min(shares))
+
+
+def _safest_radius(disc: Disc, cells: _Cells, angles: FloatArray) -> float:
+    inner, outer = disc.inner_radius, disc.outer_radius
+    scan = np.linspace(inner, outer, 25)
+    best = scan[int(np.argmax([_safe_at_rest(cells, r, angles) for r in scan]))]
+    step = scan[1] - scan[0]
+    result = minimize_scalar(
+        lambda r: -_safe_at_rest(cells, r, angles),
+        bounds=(max(inner, best - step), min(outer, best + step)),
+        method="bounded",
+        options={"xatol": 1e-4 * (outer - inner)},
+    )
+    return float(result.x)
+
+
+def _figure(disc: Disc, cells: _Cells, offset: float) -> Series:
+    radius = np.linspace(disc.inner_radius, disc.outer_radius, 61)
+    rest = np.array([_safe_at_rest(cells, r, _ANGLES[::4]) for r in radius])
+    running = np.array([_safe_turning(cells, r, np.array([offset]), _ANGLES[::30]) for r in radius])
+    return Series(
+        name="largest fill that leaves the gas hole dry",
+        x=Axis(name="radius of the hole on the centre line", unit="m", values=radius),
+        y=(
+            Curve(name="running", unit="1", values=running),
+            Curve(name="stopped, worst angle", unit="1", values=rest),
+            Curve(
+                name="largest fill",
+                unit="1",
+                values=np.full(radius.shape, disc.max_fill_ratio),
+                style="paper",
+            ),
+        ),
+    )

@@ -1,0 +1,1 @@
+"""The conclusion of the liquid-ring paper on changing the balancing liquid."""

@@ -1,0 +1,1 @@
+"""Eqs. 9 to 11 of the liquid-ring paper."""

@@ -1,0 +1,92 @@
+"""The integral of Eq. 11 against finite elements, and against the force balance of the whole liquid."""
+
+# ruff: noqa: ARG001 - every case answers to one interface
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+
+import numpy as np
+
+from ringbalance.mesh.geometry import surface_radius
+from ringbalance.physics.ring import RingQuantities
+from ringbalance.scene.models import Scene
+from ringbalance.verification.comparison import from_half_width
+from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
+from ringbalance.verification.exact_chamber import exact_moment, exact_wall_pressure
+from ringbalance.verification.rings import found_of, mesh_table, ring_of
+
+
+def reference(scene: Scene) -> Mapping[str, Reference]:
+    """The integral of Eq. 11, and a balance of one.
+
+    Args:
+        scene: the scene.
+
+    Returns:
+        References.
+    """
+    pressure = _integrated(scene, np.array([scene.disc.max_fill_ratio]))
+    return {"wall_pressure": Reference(value=float(pressure[0])), "force_balance": Reference(value=1.0)}
+
+
+def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Wall pressure and net force by finite elements.
+
+    Args:
+        scene: the scene.
+        level: not used.
+        defect: "whole_ring".
+
+    Returns:
+        Evidence.
+    """
+    fills = tuple((np.array([0.2, 0.4, 0.6, 0.8, 1.0]) * scene.disc.max_fill_ratio).tolist())
+    ring = ring_of(scene, fills)
+    pressure = found_of(ring, "wall_pressure", -1)
+    if defect == "whole_ring":
+        pressure = dataclasses.replace(pressure, value=_whole_ring(scene))
+    return Evidence(
+        found={"wall_pressure": pressure, "force_balance": _balance(scene, ring)},
+        numbers={"whole_ring": 1 - _whole_ring(scene) / float(_integrated(scene, np.array([fills[-1]]))[0])},
+        series=(_figure(scene, ring),),
+        convergence=(mesh_table(ring, "wall_pressure", "Pa", len(fills) - 1),),
+        status=ring.status,
+    )
+
+
+def _integrated(scene: Scene, fill: np.ndarray) -> np.ndarray:
+    return exact_wall_pressure(
+        disc=scene.disc,
+        density=scene.liquid.density,
+        angular_velocity=scene.rotor.speed,
+        fill_ratio=fill,
+    )
+
+
+def _whole_ring(scene: Scene) -> float:
+    """Centrifugal force of a ring of unit angle over its outer face, integral of rho omega^2 r^2 dr / R2."""
+    outer = scene.disc.outer_radius
+    inner = float(surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio))
+    return scene.liquid.density * scene.rotor.speed**2 * (outer**3 - inner**3) / (3 * outer)
+
+
+def _balance(scene: Scene, ring: RingQuantities) -> Found:
+    """Net force of the liquid on all walls along the centre line, over omega^2 U from the closed form."""
+    moment = exact_moment(disc=scene.disc, density=scene.liquid.density, fill_ratio=scene.disc.max_fill_ratio)
+    centrifugal = scene.rotor.speed**2 * float(moment)
+    force = float(ring.resultant_force.value[-1, 0])
+    spread = from_half_width(float(ring.resultant_force.uncertainty[-1, 0]))
+    return Found(value=force / centrifugal, numerical=spread / centrifugal)
+
+
+def _figure(scene: Scene, ring: RingQuantities) -> Series:
+    integrated = _integrated(scene, ring.fill_ratio)
+    return Series(
+        name="pressure on the outer wall",
+        x=Axis(name="fill ratio", unit="1", values=ring.fill_ratio),
+        y=(
+            Curve(name="finite elements", unit="Pa", values=ring.wall_pressure.value),
+            Curve(name="Eq. 11 integrated", unit="Pa", values=integrated, style="paper"),
+        ),
+    )

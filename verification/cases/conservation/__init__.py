@@ -1,0 +1,1 @@
+"""Balances of flux, force, torque, weight and volume."""

@@ -1,0 +1,128 @@
+"""Balances on meshes with a free surface found under gravity."""
+
+# ruff: noqa: ARG001 - every case answers to one interface
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.mesh.chamber import default_cells
+from ringbalance.mesh.geometry import chamber_volume
+from ringbalance.physics.pressure import FREE_SURFACE, PressureSolution, RotatingLiquid
+from ringbalance.physics.pressure_assembly import at_facets, facet_points, volume_points
+from ringbalance.physics.pressure_integrals import liquid_integrals, section_integrals
+from ringbalance.physics.pressure_surface import solve_with_gravity
+from ringbalance.scene.models import Scene
+from ringbalance.verification.evidence import Evidence, Found, Level, Reference
+from ringbalance.verification.gravity_study import tilted_liquid
+from ringbalance.verification.rings import ring_of
+
+FloatArray = npt.NDArray[np.float64]
+
+_FILL_SHARE: Final = 0.8
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Balance:
+    """Relative residuals of one two-dimensional solution."""
+
+    force: float
+    torque: float
+    flux: float
+    volume: float
+
+
+def reference(scene: Scene) -> Mapping[str, Reference]:
+    """None: residuals are judged against limits.
+
+    Args:
+        scene: not used.
+
+    Returns:
+        Nothing.
+    """
+    return {}
+
+
+def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Residuals of all balances.
+
+    Args:
+        scene: the scene; its disc and density are used.
+        level: not used.
+        defect: "wall_condition_off_by_a_percent" or "plate_force_dropped".
+
+    Returns:
+        Evidence.
+    """
+    fill = _FILL_SHARE * scene.disc.max_fill_ratio
+    radial, angular = default_cells(disc=scene.disc)
+    balances = [_section_balance(scene, fill, (radial // k, angular // k), defect) for k in (4, 2, 1)]
+    drawn = float(ring_of(scene, (fill,)).liquid_volume.value[0])
+    found = {
+        "flux_balance": max(balance.flux for balance in balances),
+        "force_balance": max(balance.force for balance in balances),
+        "torque_balance": max(balance.torque for balance in balances),
+        "weight_balance": _weight_balance(scene, fill, (radial // 2, angular // 2, 4)),
+        "volume_found": max(balance.volume for balance in balances),
+        "volume_drawn": abs(drawn / (fill * chamber_volume(disc=scene.disc)) - 1),
+    }
+    return Evidence(found={name: Found(value=value) for name, value in found.items()})
+
+
+def _section_balance(scene: Scene, fill: float, cells: tuple[int, ...], defect: str | None) -> _Balance:
+    true = tilted_liquid(disc=scene.disc, density=scene.liquid.density, fill_ratio=fill, shaft="horizontal")
+    used = replace(true, wall_factor=1.01) if defect == "wall_condition_off_by_a_percent" else true
+    solution = _solved(scene, used, fill, cells)
+    loads = section_integrals(solution=solution, density=true.density)
+    forces = dict(loads.force_per_depth)
+    if defect == "plate_force_dropped":
+        forces["plate_left"] = np.zeros(2)
+    gravity = np.array(true.gravity)
+    body = true.angular_velocity**2 * loads.first_moment_per_depth + true.density * loads.area * gravity
+    moment = loads.first_moment_per_depth
+    turning = moment[0] * gravity[1] - moment[1] * gravity[0]
+    size = float(np.linalg.norm(body))
+    torque = sum(loads.torque_per_depth.values()) - turning
+    return _Balance(
+        force=float(np.linalg.norm(sum(forces.values()) - body)) / size,
+        torque=abs(float(torque)) / (size * scene.disc.outer_radius),
+        flux=_flux_residual(solution, true),
+        volume=abs(solution.statistics.extra["volume_error"]),
+    )
+
+
+def _solved(scene: Scene, liquid: RotatingLiquid, fill: float, cells: tuple[int, ...]) -> PressureSolution:
+    solution = solve_with_gravity(disc=scene.disc, liquid=liquid, fill_ratio=fill, cells=cells)
+    if not solution.status.ok:
+        raise ValueError(solution.status.text)
+    return solution
+
+
+def _flux_residual(solution: PressureSolution, liquid: RotatingLiquid) -> float:
+    """Flux out through the surface plus flux through the walls, less the source, relative to the source."""
+    unit, mesh = solution.chamber.length_scale, solution.chamber.mesh
+    problem = liquid.problem()
+    volume = volume_points(mesh)
+    source = unit * float(np.sum(volume.weights * problem.source(unit * volume.points)))
+    gradient = np.zeros(solution.pressure.size)
+    gradient[solution.chamber.grid[0]] = solution.surface_gradient
+    surface = facet_points(mesh, FREE_SURFACE)
+    total = float(np.sum(surface.weights * at_facets(surface, gradient)))
+    for name in mesh.boundaries:
+        if name != FREE_SURFACE:
+            wall = facet_points(mesh, name)
+            total += float(np.sum(wall.weights * problem.wall_flux(unit * wall.points, wall.normals)))
+    return abs(total / source - 1)
+
+
+def _weight_balance(scene: Scene, fill: float, cells: tuple[int, ...]) -> float:
+    liquid = tilted_liquid(disc=scene.disc, density=scene.liquid.density, fill_ratio=fill, shaft="vertical")
+    loads = liquid_integrals(solution=_solved(scene, liquid, fill, cells), density=liquid.density)
+    weight = liquid.density * loads.volume * liquid.gravity[2]
+    axial: FloatArray = np.array([force[2] for force in loads.force.values()])
+    return abs(float(axial.sum()) / weight - 1)

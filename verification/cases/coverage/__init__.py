@@ -1,0 +1,1 @@
+"""How often half-widths hold, over random discs."""

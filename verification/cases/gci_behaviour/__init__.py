@@ -1,0 +1,1 @@
+"""Grid convergence on sequences whose limit is known."""

@@ -1,0 +1,1 @@
+"""The worked examples of Celik et al. (2008)."""

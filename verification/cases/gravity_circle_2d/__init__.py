@@ -1,0 +1,1 @@
+"""Gravity across the shaft: the free surface is part of a circle."""

@@ -1,0 +1,50 @@
+"""Free surface and pressure with gravity across the shaft, two-dimensional."""
+
+# ruff: noqa: ARG001 - every case answers to one interface
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+from ringbalance.mesh.chamber import default_cells
+from ringbalance.scene.models import Scene
+from ringbalance.verification.evidence import Evidence, Level, Reference
+from ringbalance.verification.gravity_study import gravity_evidence, gravity_study
+
+_FILL_SHARE: Final = 0.8
+_LEVELS: Final = {"light": (1, 2, 4, 8), "heavy": (1, 2, 4, 8, 16)}
+
+
+def reference(scene: Scene) -> Mapping[str, Reference]:
+    """None: orders and errors are judged against limits.
+
+    Args:
+        scene: not used.
+
+    Returns:
+        Nothing.
+    """
+    return {}
+
+
+def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Errors of surface and pressure over levels.
+
+    Args:
+        scene: the scene; its disc and density are used, its speed is not.
+        level: "heavy" adds a finer level.
+        defect: a fault of the liquid's right-hand sides.
+
+    Returns:
+        Evidence.
+    """
+    angular = default_cells(disc=scene.disc)[1] // 4
+    study = gravity_study(
+        disc=scene.disc,
+        density=scene.liquid.density,
+        fill_ratio=_FILL_SHARE * scene.disc.max_fill_ratio,
+        cells=[(2 * n, angular * n) for n in _LEVELS[level]],
+        shaft="horizontal",
+        defect=defect,
+    )
+    return gravity_evidence(study)

@@ -1,0 +1,1 @@
+"""Gravity along the shaft: the free surface is a paraboloid."""

@@ -1,0 +1,82 @@
+"""Wall pressure, moment, volume and lambda by three routes."""
+
+# ruff: noqa: ARG001 - every case answers to one interface
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ringbalance.mesh.geometry import chamber_volume
+from ringbalance.physics.ring import RingQuantities, ring_quantities
+from ringbalance.scene.models import Scene
+from ringbalance.verification.evidence import Evidence, Level, Reference
+from ringbalance.verification.exact_chamber import central_lambda, exact_moment, exact_wall_pressure
+from ringbalance.verification.paper_numbers import with_plate
+from ringbalance.verification.rings import found_of, mesh_table, scaled
+
+_SCALARS = {"wall_pressure": "Pa", "moment": "kg m", "liquid_volume": "m^3"}
+
+
+def reference(scene: Scene) -> Mapping[str, Reference]:
+    """The closed forms.
+
+    Args:
+        scene: the scene.
+
+    Returns:
+        References.
+    """
+    disc, full = scene.disc, scene.disc.max_fill_ratio
+    pressure = exact_wall_pressure(
+        disc=disc,
+        density=scene.liquid.density,
+        angular_velocity=scene.rotor.speed,
+        fill_ratio=full,
+    )
+    values = {
+        "wall_pressure": float(pressure),
+        "moment": float(exact_moment(disc=disc, density=scene.liquid.density, fill_ratio=full)),
+        "volume": full * chamber_volume(disc=disc),
+    }
+    exact = {f"{name}_{d}d": Reference(value=value) for name, value in values.items() for d in (2, 3)}
+    return exact | {"lambda_2d": Reference(value=central_lambda(disc=disc))}
+
+
+def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Finite elements in two and three dimensions.
+
+    Args:
+        scene: the scene.
+        level: not used.
+        defect: "plates_left_out" or "source_off".
+
+    Returns:
+        Evidence.
+    """
+    flat, solid = (_ring(scene, dimension, defect) for dimension in (2, 3))
+    found = {
+        f"{name.removeprefix('liquid_')}_{d}d": found_of(ring, name, 0)
+        for d, ring in ((2, flat), (3, solid))
+        for name in _SCALARS
+    }
+    centre = _ring(scene, 2, defect, share=0.5)
+    found["lambda_2d"] = scaled(found_of(centre, "moment_per_volume", 0), 2 / scene.liquid.density)
+    moment = found["moment_2d"]
+    exact = reference(scene)["moment_2d"].value
+    return Evidence(
+        found=found,
+        numbers={"moment_share": abs(moment.value - exact) / (2 * moment.numerical)},
+        convergence=tuple(mesh_table(flat, name, unit, 0) for name, unit in _SCALARS.items()),
+        status=flat.status,
+    )
+
+
+def _ring(scene: Scene, dimension: int, defect: str | None, share: float = 1.0) -> RingQuantities:
+    disc = with_plate(scene.disc, 0.0) if defect == "plates_left_out" else scene.disc
+    return ring_quantities(
+        disc=disc,
+        density=scene.liquid.density,
+        angular_velocity=scene.rotor.speed,
+        fill_ratio=share * scene.disc.max_fill_ratio,
+        dimension=dimension,
+        source_factor=1.00001 if defect == "source_off" else 1.0,
+    )

@@ -1,0 +1,1 @@
+"""The integrators of an operation against the closed form and against each other."""

@@ -1,0 +1,182 @@
+"""Quadrature, explicit segments and an adaptive integrator on one operation."""
+
+# ruff: noqa: ARG001 - every case answers to one interface
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.controller.adaptive_ode import adaptive_ode
+from ringbalance.controller.closed_form import closed_form
+from ringbalance.controller.explicit_segments import explicit_segments
+from ringbalance.controller.quadrature import quadrature
+from ringbalance.controller.transfer import Drive
+from ringbalance.reduced_model.flow_law import Flow
+from ringbalance.reduced_model.paper import stall_pressure
+from ringbalance.reduced_model.paper_law import PaperLaw, paper_law
+from ringbalance.scene.models import Scene
+from ringbalance.verification.evidence import Convergence, Evidence, Found, Level, Reference
+from ringbalance.verification.orders import OrderStudy, order_study
+
+FloatArray = npt.NDArray[np.float64]
+
+_COUNTS: Final = (8, 16, 32, 64, 128, 256)
+_INSTANTS: Final = 200
+_ABOVE_STALL: Final = 1.8
+_BELOW_STALL: Final = 0.6
+"""Gas pressures in units of the one that empties a chamber."""
+_SHARE: Final = 0.9
+_KINK: Final = 0.6
+"""Fill, in units of the largest, below which the kinked law slows down."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _KinkedLaw:
+    """The paper's law, slower in proportion to the fill once that is below a kink; continuous, not smooth."""
+
+    base: PaperLaw
+
+    @property
+    def name(self) -> str:
+        return "kinked"
+
+    @property
+    def max_fill_ratio(self) -> float:
+        return self.base.max_fill_ratio
+
+    def evaluate(
+        self,
+        *,
+        fill_ratio: npt.ArrayLike,
+        opposite_fill_ratio: npt.ArrayLike | None = None,
+        gas_pressure: npt.ArrayLike,
+        primed: npt.ArrayLike = False,
+    ) -> Flow:
+        flow = self.base.evaluate(
+            fill_ratio=fill_ratio,
+            opposite_fill_ratio=opposite_fill_ratio,
+            gas_pressure=gas_pressure,
+            primed=primed,
+        )
+        kink = _KINK * self.max_fill_ratio
+        slowing = np.minimum(1.0, 0.5 + 0.5 * np.asarray(fill_ratio) / kink)
+        return replace(flow, velocity=flow.velocity * slowing)
+
+    def table(self) -> Mapping[str, FloatArray]:
+        return self.base.table()
+
+
+def reference(scene: Scene) -> Mapping[str, Reference]:
+    """None: errors against the closed form are judged against limits.
+
+    Args:
+        scene: not used.
+
+    Returns:
+        Nothing.
+    """
+    return {}
+
+
+def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Errors of every integrator.
+
+    Args:
+        scene: the scene; its own gas pressure is not used.
+        level: not used.
+        defect: "exchange_rate_off" or "frozen_velocity".
+
+    Returns:
+        Evidence.
+    """
+    law = paper_law(scene)
+    empties = float(
+        stall_pressure(disc=scene.disc, density=scene.liquid.density, angular_velocity=scene.rotor.speed)
+    )
+    long = _drive(law, _ABOVE_STALL * empties)
+    spoiled = 1.001 if defect == "exchange_rate_off" else 1.0
+    duration = _SHARE * _end(long)
+    study = _explicit(long, duration, frozen=defect == "frozen_velocity")
+    found = {
+        "quadrature_error": _quadrature_error(long, duration, spoiled),
+        "stall_error": _stall_error(_drive(law, _BELOW_STALL * empties), spoiled),
+        "moved_error": _moved_error(long, duration),
+        "explicit_order": study.settled_order,
+        "kinked_difference": _kinked_difference(law, long, duration),
+    }
+    return Evidence(
+        found={name: Found(value=value) for name, value in found.items()},
+        convergence=(
+            Convergence(
+                quantity="fill by explicit segments, relative error",
+                unit="1",
+                formal_order=1.0,
+                size=study.size,
+                error=study.error,
+                observed_order=study.order,
+            ),
+        ),
+    )
+
+
+def _drive(law: PaperLaw, pressure: float) -> Drive:
+    return Drive(
+        law=law,
+        fill=law.max_fill_ratio,
+        total=law.max_fill_ratio,
+        exchange_rate=law.tube_area / law.chamber_volume,
+        gas_pressure=pressure,
+        primed=False,
+    )
+
+
+def _end(drive: Drive) -> float:
+    """Time at which the flow ends by itself, s."""
+    end = closed_form(drive, np.array([1e9])).event_time
+    return math.nan if end is None else end
+
+
+def _quadrature_error(drive: Drive, duration: float, spoiled: float) -> float:
+    t = np.linspace(0, duration, _INSTANTS + 1)[1:]
+    used = replace(drive, exchange_rate=drive.exchange_rate * spoiled)
+    return float(np.max(np.abs(quadrature(used, t).fill - closed_form(drive, t).fill)))
+
+
+def _stall_error(drive: Drive, spoiled: float) -> float:
+    exact = _end(drive)
+    used = replace(drive, exchange_rate=drive.exchange_rate * spoiled)
+    found = quadrature(used, np.array([2 * exact])).event_time
+    return 1.0 if found is None else abs(found / exact - 1)
+
+
+def _moved_error(drive: Drive, duration: float) -> float:
+    """S times the integral of u along the quadrature's own path, by Gauss's rule in time."""
+    abscissa, weight = np.polynomial.legendre.leggauss(20)
+    t = duration * (1 + abscissa) / 2
+    path = quadrature(drive, np.append(t, duration))
+    velocity = drive.flow(path.fill[:-1]).velocity
+    passed = drive.exchange_rate * duration / 2 * float(weight @ velocity)
+    return abs(passed / (drive.fill - float(path.fill[-1])) - 1)
+
+
+def _explicit(drive: Drive, duration: float, *, frozen: bool) -> OrderStudy:
+    t = np.array([duration])
+    exact = float(closed_form(drive, t).fill[-1])
+    moved = drive.fill - exact
+    fills = [float(explicit_segments(count)(drive, t).fill[-1]) for count in _COUNTS]
+    if frozen:
+        u0 = float(drive.flow(drive.fill).velocity)
+        fills = [drive.fill - u0 * drive.exchange_rate * duration] * len(_COUNTS)
+    error = [abs(fill - exact) / moved for fill in fills]
+    return order_study(size=[_COUNTS[0] / count for count in _COUNTS], error=error)
+
+
+def _kinked_difference(law: PaperLaw, drive: Drive, duration: float) -> float:
+    kinked = replace(drive, law=_KinkedLaw(base=law))
+    t = np.linspace(0, duration, 21)[1:]
+    return float(np.max(np.abs(quadrature(kinked, t).fill - adaptive_ode(tolerance=1e-11)(kinked, t).fill)))

@@ -1,0 +1,1 @@
+"""The pressure problem in 2 dimensions against a manufactured solution."""

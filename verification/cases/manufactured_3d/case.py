@@ -1,0 +1,42 @@
+"""Three-dimensional manufactured study, quadratic and straight geometry."""
+
+# ruff: noqa: ARG001 - every case answers to one interface
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ringbalance.mesh.chamber import default_cells
+from ringbalance.scene.models import Disc, Scene
+from ringbalance.verification.evidence import Evidence, Level, Reference
+from ringbalance.verification.manufactured_evidence import manufactured_evidence
+
+
+def reference(scene: Scene) -> Mapping[str, Reference]:
+    """None: orders and errors are judged against limits.
+
+    Args:
+        scene: not used.
+
+    Returns:
+        Nothing.
+    """
+    return {}
+
+
+def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Errors over four levels, five at level heavy.
+
+    Args:
+        scene: the scene; its disc gives the shape.
+        level: "heavy" adds a finer level.
+        defect: a fault of the right-hand sides.
+
+    Returns:
+        Evidence.
+    """
+    return manufactured_evidence(disc=scene.disc, cells=_cells(scene.disc, level), defect=defect)
+
+
+def _cells(disc: Disc, level: Level) -> list[tuple[int, ...]]:
+    angular = default_cells(disc=disc)[1] // 8
+    return [(n, angular * n, n) for n in ((1, 2, 4, 8) if level == "light" else (1, 2, 4, 8, 16))]

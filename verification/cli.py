@@ -1,0 +1,186 @@
+"""`ringbalance verify`: the cases on the command line, as a table or as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from json import dumps
+from pathlib import Path
+from typing import Final
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+from rich.table import Table
+from rich.text import Text
+
+from ringbalance.scene import load_scene
+from ringbalance.verification.case import CaseDefinition
+from ringbalance.verification.catalogue import UnknownCaseError, load_case, load_cases
+from ringbalance.verification.document import results_document
+from ringbalance.verification.evidence import Level
+from ringbalance.verification.result import CaseResult, QuantityResult
+from ringbalance.verification.runner import paper_scene, run_cases
+from ringbalance.verification.verdicts import Verdict
+
+DONE: Final = 0
+FAILED: Final = 1
+BAD_INPUT: Final = 2
+_STYLES: Final = {
+    Verdict.PASSED: "green",
+    Verdict.CONFIRMED: "green",
+    Verdict.CORRECTED: "yellow",
+    Verdict.INCONCLUSIVE: "yellow",
+    Verdict.REFUTED: "magenta",
+    Verdict.FAILED: "bold red",
+    Verdict.NOT_RUN: "dim",
+}
+
+
+def verify(
+    *cases: str,
+    scene: Path | None = None,
+    list_: bool = False,
+    mutations: bool = False,
+    level: Level = "light",
+    json: bool = False,
+    workers: int = 1,
+) -> int:
+    """Run verification cases and judge the paper's claims.
+
+    Args:
+        cases: ids of the cases; none for all.
+        scene: scene file; default the liquid-ring paper's disc.
+        list_: name the cases and run none.
+        mutations: also build in each case's defects, which must change its verdict.
+        level: "heavy" runs the cases that take long too.
+        json: print one JSON document instead of a table.
+        workers: processes to spread the cases over.
+
+    Returns:
+        Exit code: 0; 1 when a code-verification case failed, or a mutation was not caught; 2 for an unknown
+        case.
+
+    Raises:
+        SceneError: the scene file is not a scene.
+    """
+    progress = Console(stderr=True)
+    try:
+        definitions = [load_case(case) for case in cases] if cases else list(load_cases())
+    except UnknownCaseError as error:
+        progress.print(f"ringbalance: {error}", markup=False, highlight=False, soft_wrap=True)
+        return BAD_INPUT
+    if list_:
+        _print_list(definitions, json=json)
+        return DONE
+    given = paper_scene() if scene is None else load_scene(scene)
+    with _bar(progress) as bar:
+        task = bar.add_task("cases", total=len(definitions))
+        results = run_cases(
+            [definition.id for definition in definitions],
+            scene=given,
+            level=level,
+            mutations=mutations,
+            workers=workers,
+            progress=lambda result: bar.update(task, advance=1, description=result.definition.id),
+        )
+    if json:
+        print(dumps(results_document(results), allow_nan=False))
+    else:
+        _print_results(results, mutations=mutations)
+    return exit_code(results)
+
+
+def exit_code(results: Sequence[CaseResult]) -> int:
+    """Exit code of a run: a refuted claim is a result, a failed code verification is a fault.
+
+    Args:
+        results: of the cases.
+
+    Returns:
+        1 when a code-verification case failed or a mutation was not caught, else 0.
+    """
+    failed = any(
+        result.broken or (result.definition.kind == "code_verification" and result.verdict is Verdict.FAILED)
+        for result in results
+    )
+    return FAILED if failed else DONE
+
+
+def _bar(console: Console) -> Progress:
+    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("{task.description}"))
+    return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+
+
+def _print_list(definitions: Sequence[CaseDefinition], *, json: bool) -> None:
+    if json:
+        listed = [
+            {
+                "id": d.id,
+                "kind": d.kind,
+                "number": d.number,
+                "title": d.title,
+                "cost": d.cost,
+                "claim": d.claim,
+                "mutations": [mutation.id for mutation in d.must_fail],
+            }
+            for d in definitions
+        ]
+        print(dumps(listed, allow_nan=False))
+        return
+    table = Table("case", "kind", "cost", "what is claimed or required")
+    for d in definitions:
+        table.add_row(d.id, d.kind.replace("_", " ") + _numbered(d), d.cost, d.claim)
+    Console().print(table)
+
+
+def _numbered(definition: CaseDefinition) -> str:
+    return "" if definition.number is None else f" {definition.number}"
+
+
+def _print_results(results: Sequence[CaseResult], *, mutations: bool) -> None:
+    console = Console()
+    table = Table("case", "quantity", "found", "reference or limit", "95 % ±", "verdict")
+    for result in results:
+        name = f"{result.definition.id}\n[dim]{result.definition.kind.replace('_', ' ')}[/]"
+        table.add_row(name, result.definition.title, "", "", "", _styled(result), end_section=False)
+        for quantity in result.quantities:
+            table.add_row("", *_quantity_row(quantity))
+        table.add_section()
+    console.print(table)
+    for result in results:
+        _print_remarks(console, result, mutations=mutations)
+
+
+def _styled(result: CaseResult) -> Text:
+    if result.broken:
+        return Text(f"{result.verdict}, BROKEN", style="bold red")
+    return Text(result.verdict, style=_STYLES[result.verdict])
+
+
+def _quantity_row(result: QuantityResult) -> tuple[str | Text, ...]:
+    quantity, found, comparison = result.quantity, result.found, result.comparison
+    verdict = Text(result.verdict, style=_STYLES[result.verdict])
+    title = f"{quantity.title} [{quantity.unit}]" if quantity.unit != "1" else quantity.title
+    if found is None or comparison is None:
+        return Text(title), "", "", "", verdict
+    against = {"at_most": f"≤ {quantity.limit:.4g}", "at_least": f"≥ {quantity.limit:.4g}"}
+    reference = "" if result.reference is None else f"{result.reference.value:.6g}"
+    return (
+        Text(title),
+        f"{found.value:.6g}",
+        against.get(quantity.metric, reference),
+        f"{comparison.half_width:.2g}",
+        verdict,
+    )
+
+
+def _print_remarks(console: Console, result: CaseResult, *, mutations: bool) -> None:
+    definition = result.definition
+    if definition.kind == "claim" and result.evidence is not None:
+        sentence = result.filled(definition.consequence_of(result.verdict))
+        console.print(Text.assemble((f"{definition.title}: ", "bold"), (f"{result.verdict}. "), sentence))
+    if result.evidence is None:
+        console.print(Text.assemble((f"{definition.title}: ", "bold"), f"{result.verdict}. ", result.status))
+    for mutation in result.mutations if mutations else ():
+        word = "caught" if mutation.caught else "NOT CAUGHT: the case is broken"
+        style = "green" if mutation.caught else "bold red"
+        console.print(Text(f"  {definition.id}: {mutation.what}: {mutation.verdict}, {word}", style=style))

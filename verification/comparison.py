@@ -1,0 +1,96 @@
+"""The comparison of a found number with a reference: error against validation uncertainty (ASME V&V 20).
+
+E = S - D is compared with u_val = sqrt(u_num^2 + u_input^2 + u_D^2).  All u are standard uncertainties; the
+half-width 2 u_val covers 95 %.  An error inside it cannot be told from none; one outside it can.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+COVERAGE_FACTOR = 2.0
+"""Half-widths at 95 % per standard uncertainty."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """A found number against a reference."""
+
+    error: float
+    """E = S - D."""
+    validation_uncertainty: float
+    """u_val, standard."""
+
+    @property
+    def half_width(self) -> float:
+        """2 u_val, the 95 % half-width that |E| is compared with."""
+        return COVERAGE_FACTOR * self.validation_uncertainty
+
+    @property
+    def consistent(self) -> bool:
+        """Whether |E| <= 2 u_val: the comparison sees no difference."""
+        return abs(self.error) <= self.half_width
+
+
+def compare(
+    *,
+    found: float,
+    reference: float,
+    numerical: float = 0.0,
+    input_: float = 0.0,
+    reference_uncertainty: float = 0.0,
+) -> Comparison:
+    """Compare a found number with a reference.
+
+    E = S - D, u_val = sqrt(u_num^2 + u_input^2 + u_D^2)
+
+    Args:
+        found: S.
+        reference: D, in the unit of S.
+        numerical: u_num, standard, in the unit of S.
+        input_: u_input, standard, in the unit of S.
+        reference_uncertainty: u_D, standard, in the unit of S.
+
+    Returns:
+        Comparison.  A few units in the last place of the larger number are added to the half-width, for
+        round-off.
+
+    Raises:
+        ValueError: a number that is not finite, or a negative uncertainty.
+
+    Source: ASME V&V 20-2009, sections 1 and 6; independent uncertainties.
+    """
+    parts = (numerical, input_, reference_uncertainty)
+    if not all(math.isfinite(value) for value in (found, reference, *parts)) or min(parts) < 0:
+        raise ValueError("a comparison needs finite numbers and uncertainties that are not negative")
+    round_off = 4 * math.ulp(max(abs(found), abs(reference)))
+    return Comparison(error=found - reference, validation_uncertainty=math.hypot(*parts, round_off))
+
+
+def from_half_width(half_width: float) -> float:
+    """Standard uncertainty from a 95 % half-width.
+
+    Args:
+        half_width: of the 95 % interval.
+
+    Returns:
+        half_width / 2.
+    """
+    return half_width / COVERAGE_FACTOR
+
+
+def from_rounding(last_digit: float) -> float:
+    """Standard uncertainty of a printed number: all within half a unit of its last digit is equally likely.
+
+    u = last_digit / (2 sqrt(3))
+
+    Args:
+        last_digit: value of one unit of the last digit printed, in the number's unit.
+
+    Returns:
+        Standard uncertainty; its 95 % half-width, 0.58 of the last digit, covers the whole rounding interval.
+
+    Source: rectangular distribution, GUM (JCGM 100:2008), 4.3.7.
+    """
+    return last_digit / (2 * math.sqrt(3))

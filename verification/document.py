@@ -1,0 +1,208 @@
+"""Results of cases as plain JSON-able records, and heavy results kept from an earlier run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.verification.comparison import COVERAGE_FACTOR
+from ringbalance.verification.evidence import Axis, Convergence, Curve, Evidence, Series, Table
+from ringbalance.verification.result import CaseResult, MutationResult, QuantityResult
+from ringbalance.verification.verdicts import Verdict
+
+Document = dict[str, Any]
+
+
+def case_document(result: CaseResult) -> Document:
+    """One case's result as a JSON-able record; SI units, or the unit named beside the number.
+
+    Args:
+        result: of the case.
+
+    Returns:
+        id, kind, verdict, quantities (name, unit, value, reference, error, uncertainty, limit, verdict and
+        more) and all that a report shows of the case.
+    """
+    definition = result.definition
+    return {
+        "id": definition.id,
+        "kind": definition.kind,
+        "verdict": result.verdict.value,
+        "quantities": [_quantity(quantity) for quantity in result.quantities],
+        "number": definition.number,
+        "title": definition.title,
+        "claim": definition.claim,
+        "protects": definition.protects,
+        "assumes": list(definition.assumes),
+        "does_not_cover": list(definition.does_not_cover),
+        "explanation": result.filled(definition.explanation),
+        "consequence": _consequence(result),
+        "equations": list(definition.equations),
+        "reference": {
+            "kind": definition.reference.kind,
+            "source": definition.reference.source,
+            "uncertainty": definition.reference.uncertainty,
+        },
+        "doubts": [text for doubt in definition.reference.doubts if (text := result.filled(doubt))],
+        "headline": definition.headline,
+        "cost": definition.cost,
+        "level": result.level,
+        "status": result.status,
+        "scene": result.scene_name,
+        "scene_sha256": result.scene_sha256,
+        "judged_on": definition.judged_on,
+        "time_s": result.time_s,
+        "mutations": [_mutation(mutation) for mutation in result.mutations],
+        "declared_mutations": [
+            {"id": mutation.id, "what": mutation.what, "expect": mutation.expect.value, "cost": mutation.cost}
+            for mutation in definition.must_fail
+        ],
+        "broken": result.broken,
+        **_evidence(result.evidence),
+    }
+
+
+def _consequence(result: CaseResult) -> str:
+    if result.verdict is Verdict.NOT_RUN:
+        return ""
+    return result.filled(result.definition.consequence_of(result.verdict))
+
+
+def _quantity(result: QuantityResult) -> Document:
+    quantity, found, reference, comparison = (
+        result.quantity,
+        result.found,
+        result.reference,
+        result.comparison,
+    )
+    return {
+        "name": quantity.name,
+        "title": quantity.title,
+        "unit": quantity.unit,
+        "basis": quantity.basis,
+        "value": None if found is None else found.value,
+        "reference": None if reference is None else reference.value,
+        "error": None if reference is None or found is None else found.value - reference.value,
+        "uncertainty": None if comparison is None else comparison.half_width,
+        "value_uncertainty": (
+            None if found is None else COVERAGE_FACTOR * float(np.hypot(found.numerical, found.input))
+        ),
+        "numerical_uncertainty": None if found is None else COVERAGE_FACTOR * found.numerical,
+        "input_uncertainty": None if found is None else COVERAGE_FACTOR * found.input,
+        "reference_uncertainty": None if reference is None else COVERAGE_FACTOR * reference.uncertainty,
+        "corrected": None if found is None else found.corrected,
+        "correction": quantity.correction,
+        "metric": quantity.metric,
+        "limit": quantity.limit,
+        "why": quantity.why,
+        "verdict": result.verdict.value,
+    }
+
+
+def _mutation(mutation: MutationResult) -> Document:
+    return {
+        "id": mutation.id,
+        "must_fail": mutation.what,
+        "expect": mutation.expect.value,
+        "verdict": mutation.verdict.value,
+        "failed": mutation.caught,
+        "status": mutation.status,
+    }
+
+
+def _evidence(evidence: Evidence | None) -> Document:
+    if evidence is None:
+        return {"numbers": {}, "series": [], "convergence": [], "tables": []}
+    return {
+        "numbers": {name: float(value) for name, value in evidence.numbers.items()},
+        "series": [_series(series) for series in evidence.series],
+        "convergence": [_convergence(study) for study in evidence.convergence],
+        "tables": [_table(table) for table in evidence.tables],
+    }
+
+
+def _series(series: Series) -> Document:
+    return {
+        "name": series.name,
+        "x": _axis(series.x),
+        "y": [_curve(curve) for curve in series.y],
+        "log": series.log,
+    }
+
+
+def _axis(axis: Axis) -> Document:
+    return {"name": axis.name, "unit": axis.unit, "values": _numbers(axis.values)}
+
+
+def _curve(curve: Curve) -> Document:
+    shown: Document = {
+        "name": curve.name,
+        "unit": curve.unit,
+        "values": _numbers(curve.values),
+        "style": curve.style,
+    }
+    return shown if curve.uncertainty is None else shown | {"uncertainty": _numbers(curve.uncertainty)}
+
+
+def _convergence(study: Convergence) -> Document:
+    return {
+        "quantity": study.quantity,
+        "unit": study.unit,
+        "formal_order": study.formal_order,
+        "observed_order": _numbers(study.observed_order),
+        "h": _numbers(study.size),
+        "error": None if study.error is None else _numbers(study.error),
+        "value": None if study.value is None else _numbers(study.value),
+        "gci": study.gci,
+        "geometry": study.geometry,
+        "note": study.note,
+    }
+
+
+def _table(table: Table) -> Document:
+    columns = {
+        name: [value if isinstance(value, str) else float(value) for value in values]
+        for name, values in table.columns.items()
+    }
+    return {"name": table.name, "columns": columns, "units": dict(table.units)}
+
+
+def _numbers(values: npt.ArrayLike) -> list[float | None]:
+    """A curve may have gaps: a value that is not finite there is none."""
+    return [float(v) if np.isfinite(v) else None for v in np.asarray(values, dtype=np.float64).ravel()]
+
+
+def results_document(results: Iterable[CaseResult]) -> list[Document]:
+    """Results of several cases as JSON-able records.
+
+    Args:
+        results: of the cases.
+
+    Returns:
+        One record per case, in order.
+    """
+    return [case_document(result) for result in results]
+
+
+def merge_saved(document: Sequence[Document], saved: Sequence[Mapping[str, Any]]) -> list[Document]:
+    """Put earlier results of heavy cases where this run has none.
+
+    Args:
+        document: of this run.
+        saved: records of an earlier run, each with the `date` that it was stamped with.
+
+    Returns:
+        The records, a heavy case that was not run replaced by the earlier result on the same scene, if any.
+    """
+    earlier = {(case["id"], case["scene_sha256"]): dict(case) for case in saved}
+    return [_merged(case, earlier.get((case["id"], case["scene_sha256"]))) for case in document]
+
+
+def _merged(case: Document, earlier: Document | None) -> Document:
+    keep = case["cost"] == "heavy" and case["verdict"] == Verdict.NOT_RUN.value
+    if not keep or earlier is None or earlier["verdict"] == Verdict.NOT_RUN.value:
+        return case
+    return earlier | {"status": f"kept from an earlier run of {earlier.get('date', 'an unknown date')}"}

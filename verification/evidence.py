@@ -1,0 +1,162 @@
+"""What a case hands to the framework: numbers with uncertainties, curves, tables; no verdict, no plot."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.physics.results import Status
+from ringbalance.scene.models import Scene
+
+FloatArray = npt.NDArray[np.float64]
+Level = Literal["light", "heavy"]
+CurveStyle = Literal["paper", "found", "reference"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reference:
+    """The number that a judged quantity is held against; SI, in the unit that the case's text names."""
+
+    value: float
+    uncertainty: float = 0.0
+    """u_D, standard uncertainty."""
+
+    def __post_init__(self) -> None:
+        _finite(self.value, self.uncertainty)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Found:
+    """A number that a case found; SI, in the unit that the case's text names."""
+
+    value: float
+    numerical: float = 0.0
+    """u_num, standard uncertainty of the calculation."""
+    input: float = 0.0
+    """u_input, standard uncertainty from what the calculation was given."""
+    corrected: float | None = None
+    """The number once the correction that the case's text names is made; None where there is none."""
+    conclusive: bool = True
+    """False when the sequence behind the number is not asymptotic, or a solve did not succeed."""
+
+    def __post_init__(self) -> None:
+        _finite(self.value, self.numerical, self.input, 0.0 if self.corrected is None else self.corrected)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Axis:
+    """Values along one direction of a figure."""
+
+    name: str
+    unit: str
+    values: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class Curve:
+    """One line of a figure, of the length of its x axis."""
+
+    name: str
+    unit: str
+    values: FloatArray
+    style: CurveStyle = "found"
+    uncertainty: FloatArray | None = None
+    """95 % half-width."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Series:
+    """One figure of a case."""
+
+    name: str
+    x: Axis
+    y: Sequence[Curve]
+    log: bool = False
+    """Both axes logarithmic."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Convergence:
+    """Errors, or values, of one quantity over a sequence of levels, coarse to fine."""
+
+    quantity: str
+    unit: str
+    formal_order: float
+    size: Sequence[float]
+    """h, relative to the coarsest, coarse to fine."""
+    error: Sequence[float] | None = None
+    """Against an exact value."""
+    value: Sequence[float] | None = None
+    """Where there is no exact value."""
+    observed_order: Sequence[float] = ()
+    """Of each pair of levels, or of each triplet where there is no exact value."""
+    gci: float | None = None
+    """95 % half-width of the finest value, relative to it."""
+    geometry: str = ""
+    """ "quadratic" or "straight" where it matters."""
+    note: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """A table of a case: columns of equal length, each with its unit."""
+
+    name: str
+    columns: Mapping[str, Sequence[float | str]]
+    units: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evidence:
+    """All that one computation of a case found."""
+
+    found: Mapping[str, Found]
+    """By the names of the case's quantities."""
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    """Further numbers, SI, for the placeholders of the case's text."""
+    series: Sequence[Series] = ()
+    convergence: Sequence[Convergence] = ()
+    tables: Sequence[Table] = ()
+    status: Status = field(default_factory=Status)
+
+
+class CaseCode(Protocol):
+    """The two functions of a case's `case.py`."""
+
+    def reference(self, scene: Scene) -> Mapping[str, Reference]:
+        """What the judged quantities are held against.
+
+        Args:
+            scene: the scene that the case is judged on.
+
+        Returns:
+            References by the names of the case's quantities; one that is not named has none.
+        """
+        ...
+
+    def compute(self, scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+        """What the program finds.
+
+        Args:
+            scene: the scene that the case is judged on.
+            level: how much work may be done.
+            defect: name of a mutation to build in on purpose; None for none.
+
+        Returns:
+            Evidence.
+        """
+        ...
+
+
+class NotRunError(Exception):
+    """Raised by a case that cannot be run on this scene, or not yet; its text says why."""
+
+
+def _finite(*values: float) -> None:
+    if not all(math.isfinite(value) for value in values):
+        raise ValueError(f"evidence must be finite, not {values}")

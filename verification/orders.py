@@ -1,0 +1,79 @@
+"""Order studies: observed order of each pair of levels, judged together with the finest error."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+ROUND_OFF = 1e-13
+"""Relative errors below this say nothing about the order."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OrderStudy:
+    """Errors over a sequence of levels with the order that each pair of neighbours shows."""
+
+    size: tuple[float, ...]
+    """h, coarse to fine."""
+    error: tuple[float, ...]
+    """Magnitudes, of one scale for all levels."""
+    order: tuple[float, ...]
+    """Of each pair; shorter than the levels by one."""
+
+    @property
+    def finest_error(self) -> float:
+        """Error on the finest level."""
+        return self.error[-1]
+
+    @property
+    def settled_order(self) -> float:
+        """The lowest order among the two finest pairs: earlier ones are not yet asymptotic."""
+        return min(self.order[-2:])
+
+
+def order_study(*, size: Sequence[float], error: Sequence[float]) -> OrderStudy:
+    """Observed orders p = ln(e_i / e_(i+1)) / ln(h_i / h_(i+1)).
+
+    Args:
+        size: h, coarse to fine, strictly falling; at least two.
+        error: magnitudes, relative, one per level.
+
+    Returns:
+        OrderStudy.
+
+    Raises:
+        ValueError: lengths that differ, sizes that do not fall, errors that are negative or not finite, or at
+            round-off, where no order can be seen.
+    """
+    h, e = np.asarray(size, dtype=np.float64), np.asarray(error, dtype=np.float64)
+    if h.shape != e.shape or h.size < 2:
+        raise ValueError("an order study needs at least two levels, with one error each")
+    if not (np.all(np.isfinite(h)) and np.all(h > 0) and np.all(np.diff(h) < 0)):
+        raise ValueError("sizes must be positive and fall from level to level")
+    if not (np.all(np.isfinite(e)) and np.all(e > ROUND_OFF)):
+        raise ValueError("errors must be finite and above round-off for an order to be seen")
+    order = np.log(e[:-1] / e[1:]) / np.log(h[:-1] / h[1:])
+    return OrderStudy(size=tuple(h.tolist()), error=tuple(e.tolist()), order=tuple(order.tolist()))
+
+
+def extrapolate(*, coarse: float, fine: float, ratio: float, order: float) -> float:
+    """Richardson extrapolation, S = f + (f - c)/(ratio^order - 1).
+
+    Args:
+        coarse: c, value on the coarser level.
+        fine: f, value on the finer level.
+        ratio: h_coarse / h_fine, above one.
+        order: formal order, positive.
+
+    Returns:
+        Extrapolated value.
+
+    Raises:
+        ValueError: a ratio that is not above one, or an order that is not positive.
+    """
+    if not (ratio > 1 and order > 0):
+        raise ValueError("the ratio must be above one and the order positive")
+    return fine + (fine - coarse) / (math.pow(ratio, order) - 1)

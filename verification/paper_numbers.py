@@ -1,0 +1,110 @@
+"""The numbers that the liquid-ring paper prints, each with the value of one unit of its last digit.
+
+Pan, Wu, Gao and Mu, "Performance Analysis and Control Simulation of Pneumatic Liquid Online Automatic
+Balancing System for Rotating Machinery".
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Final
+
+from ringbalance.mesh.geometry import chamber_volume
+from ringbalance.scene.models import Disc, Scene
+from ringbalance.verification.comparison import from_half_width, from_rounding
+from ringbalance.verification.evidence import Reference
+
+
+@dataclass(frozen=True, kw_only=True)
+class Printed:
+    """A printed number."""
+
+    value: float
+    """SI."""
+    last_digit: float
+    """One unit of the last digit printed, SI."""
+
+    @property
+    def reference(self) -> Reference:
+        """The number with the standard uncertainty of its rounding."""
+        return Reference(value=self.value, uncertainty=from_rounding(self.last_digit))
+
+
+CHAMBER_VOLUME: Final = Printed(value=67.7e-6, last_digit=0.1e-6)
+"""Eq. 4."""
+MAX_LIQUID_VOLUME: Final = Printed(value=33.9e-6, last_digit=0.1e-6)
+"""Eq. 5."""
+INITIAL_LIQUID_VOLUME: Final = Printed(value=16.9e-6, last_digit=0.1e-6)
+"""Eq. 6."""
+RING_RADIUS: Final = Printed(value=34.9e-3, last_digit=0.1e-3)
+"""R1'min, after Eq. 6."""
+CHAMBER_MOMENT: Final = Printed(value=1333e-6, last_digit=1e-6)
+"""After Eq. 7."""
+DISC_MOMENT: Final = Printed(value=1885e-6, last_digit=1e-6)
+"""Eq. 8."""
+DENSE_DISC_MOMENT: Final = Printed(value=3770e-6, last_digit=10e-6)
+"""After Eq. 8, twice 1885 and so known to ten."""
+LOWEST_PRESSURE: Final = Printed(value=0.54e6, last_digit=0.01e6)
+HIGHEST_PRESSURE: Final = Printed(value=1.77e6, last_digit=0.01e6)
+"""Working range, after Eq. 19."""
+DEPARTURE_LOW: Final = Printed(value=0.456, last_digit=0.001)
+"""Under Fig. 4, at LOW_PRESSURE."""
+DEPARTURE_HIGH: Final = Printed(value=0.229, last_digit=0.001)
+"""Under Fig. 4, at HIGH_PRESSURE."""
+LOW_PRESSURE: Final = 0.7e6
+HIGH_PRESSURE: Final = 1.5e6
+"""Of Fig. 4, Pa."""
+DENSITY: Final = 1000.0
+"""Table 1, kg/m^3."""
+LAMBDA_TOLERANCE: Final = 0.007
+"""Section 5.2: 72 mm within 0.7 %."""
+PLATE_QUANTITY: Final = "plate_thickness"
+
+
+def at_paper_density(scene: Scene) -> Scene:
+    """A scene with the density of Table 1 in place of the liquid's own.
+
+    Args:
+        scene: the scene.
+
+    Returns:
+        The scene with 1000 kg/m^3.
+    """
+    return dataclasses.replace(scene, liquid=dataclasses.replace(scene.liquid, density=DENSITY))
+
+
+def plate_uncertainty(scene: Scene) -> float:
+    """Standard uncertainty of the plate thickness.
+
+    From the scene's own statement, where it makes one.  Otherwise a disc whose volume prints as the paper's
+    67.7 ml has its thickness inferred from that number, and inherits its rounding.
+
+    Args:
+        scene: the scene.
+
+    Returns:
+        u(t), m; zero where the scene gives the thickness as exact.
+    """
+    disc = scene.disc
+    for stated in scene.uncertainty:
+        if stated.quantity == PLATE_QUANTITY:
+            scale = disc.plate_thickness if stated.relative else 1.0
+            return from_half_width(stated.half_width * scale)
+    if abs(chamber_volume(disc=disc) - CHAMBER_VOLUME.value) > CHAMBER_VOLUME.last_digit / 2:
+        return 0.0
+    strips = 2 * (disc.outer_radius - disc.inner_radius) * disc.axial_width
+    return from_rounding(CHAMBER_VOLUME.last_digit) / strips
+
+
+def with_plate(disc: Disc, thickness: float) -> Disc:
+    """A disc with another plate thickness.
+
+    Args:
+        disc: the disc.
+        thickness: t, m.
+
+    Returns:
+        The changed disc.
+    """
+    return dataclasses.replace(disc, plate_thickness=thickness)

@@ -1,0 +1,37 @@
+"""Tabulated references of the cases: CSV files whose first lines, marked #, give source and uncertainty."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from importlib.resources import files
+
+from ringbalance.physics.grid_convergence import GridConvergence, Verdict
+
+
+def read_rows(case_id: str, name: str) -> tuple[Mapping[str, str], ...]:
+    """Rows of a case's tabulated reference.
+
+    Args:
+        case_id: whose data it is.
+        name: of the file in the case's data folder.
+
+    Returns:
+        One mapping per row, column name to text.
+    """
+    path = files("ringbalance.verification.cases") / case_id / "data" / name
+    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    return tuple(csv.DictReader(lines))
+
+
+def conclusive(convergence: GridConvergence) -> bool:
+    """Whether a sequence of values may be judged at all.
+
+    Args:
+        convergence: of the sequence.
+
+    Returns:
+        True when it converges steadily or has reached round-off; a number from a sequence that oscillates,
+        grows or is not asymptotic makes its case inconclusive.
+    """
+    return convergence.verdict in (Verdict.MONOTONE, Verdict.ROUND_OFF)

@@ -1,0 +1,112 @@
+"""What running a case gives: each quantity judged, the case's verdict, the evidence, and its mutations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ringbalance.verification.case import CaseDefinition, Quantity
+from ringbalance.verification.comparison import COVERAGE_FACTOR, Comparison
+from ringbalance.verification.evidence import Evidence, Found, Level, Reference
+from ringbalance.verification.text import fill
+from ringbalance.verification.verdicts import Verdict
+
+
+@dataclass(frozen=True, kw_only=True)
+class QuantityResult:
+    """One judged quantity; its numbers are None when the case was not run."""
+
+    quantity: Quantity
+    verdict: Verdict
+    found: Found | None = None
+    reference: Reference | None = None
+    comparison: Comparison | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class MutationResult:
+    """What became of a case with a defect built in on purpose."""
+
+    id: str
+    what: str
+    expect: Verdict
+    verdict: Verdict
+    status: str
+    judged: bool
+    """False when the run broke down before anything was judged."""
+
+    @property
+    def caught(self) -> bool:
+        """Whether the case was judged with this defect, and came out as it must."""
+        return self.judged and self.verdict is self.expect
+
+
+@dataclass(frozen=True, kw_only=True)
+class CaseResult:
+    """One case, run or not."""
+
+    definition: CaseDefinition
+    verdict: Verdict
+    quantities: tuple[QuantityResult, ...]
+    evidence: Evidence | None
+    status: str
+    """How the run ended; why it did not take place."""
+    level: Level
+    scene_name: str
+    scene_sha256: str
+    time_s: float = 0.0
+    mutations: tuple[MutationResult, ...] = ()
+
+    @property
+    def broken(self) -> bool:
+        """True when a mutation was run and not caught: the case proves nothing."""
+        return any(not mutation.caught for mutation in self.mutations)
+
+    @property
+    def numbers(self) -> Mapping[str, float]:
+        """All numbers that the case's text may ask for.
+
+        For each quantity q: q, q_reference, q_error, q_relative (error over reference), q_uncertainty (95 %
+        half-width of the comparison), q_limit; and the evidence's own.
+        """
+        named: dict[str, float] = {}
+        for result in self.quantities:
+            named |= _named_numbers(result)
+        return named | dict(self.evidence.numbers if self.evidence else {})
+
+    def filled(self, text: str) -> str:
+        """A text of the case with its numbers put in.
+
+        Args:
+            text: with placeholders.
+
+        Returns:
+            The text; empty when the case was not run and the text needs numbers.
+
+        Raises:
+            ValueError: the text asks for a number that the evidence does not hold.
+        """
+        if self.evidence is None and "{" in text:
+            return ""
+        return fill(text, self.numbers)
+
+
+def _named_numbers(result: QuantityResult) -> dict[str, float]:
+    name, found, comparison = result.quantity.name, result.found, result.comparison
+    if found is None or comparison is None:
+        return {}
+    named = {
+        name: found.value,
+        f"{name}_error": comparison.error,
+        f"{name}_uncertainty": comparison.half_width,
+        f"{name}_limit": result.quantity.limit,
+    }
+    if found.corrected is not None:
+        named[f"{name}_corrected"] = found.corrected
+    reference = result.reference
+    if reference is not None:
+        named[f"{name}_reference"] = reference.value
+        named[f"{name}_reference_uncertainty"] = COVERAGE_FACTOR * reference.uncertainty
+        if reference.value != 0:
+            named[f"{name}_relative"] = comparison.error / reference.value
+    return named

@@ -1,0 +1,266 @@
+"""Running cases and their mutations: one at a time or on several processes, in the order of the catalogue."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from functools import lru_cache, partial
+from multiprocessing import get_context
+
+from ringbalance.scene import bundled_scene, load_scene
+from ringbalance.scene.models import Scene
+from ringbalance.verification.case import NEEDS_REFERENCE, CaseDefinition, Mutation, Quantity
+from ringbalance.verification.catalogue import case_code, load_case, load_cases
+from ringbalance.verification.evidence import CaseCode, Evidence, Level, NotRunError, Reference
+from ringbalance.verification.result import CaseResult, MutationResult, QuantityResult
+from ringbalance.verification.verdicts import Verdict, combine, judge_quantity
+
+Progress = Callable[[CaseResult], None]
+PAPER_SCENE = "liquid_ring_paper"
+
+
+@lru_cache(maxsize=1)
+def paper_scene() -> Scene:
+    """The liquid-ring paper's own disc.
+
+    Returns:
+        The bundled scene.
+    """
+    return load_scene(bundled_scene(PAPER_SCENE))
+
+
+def run_case(case_id: str, *, scene: Scene, level: Level = "light", defect: str | None = None) -> CaseResult:
+    """Run one case and judge it.
+
+    Args:
+        case_id: of the catalogue.
+        scene: the scene at hand; a case on the paper's own numbers takes the paper's disc instead.
+        level: "light" leaves heavy cases unrun.
+        defect: id of one of the case's mutations, to be built in on purpose.
+
+    Returns:
+        CaseResult; a case that cannot be run is `not run`, with the reason in its status.
+
+    Raises:
+        KeyError: an unknown case or mutation.
+    """
+    definition = load_case(case_id)
+    return run_definition(
+        definition, case_code(case_id), scene=_scene_of(definition, scene), level=level, defect=defect
+    )
+
+
+def run_definition(
+    definition: CaseDefinition,
+    code: CaseCode,
+    *,
+    scene: Scene,
+    level: Level = "light",
+    defect: str | None = None,
+) -> CaseResult:
+    """Run and judge one case given by its text and its code, on the scene exactly as given.
+
+    Args:
+        definition: the case's text.
+        code: its two functions.
+        scene: the scene to judge.
+        level: "light" leaves heavy cases unrun.
+        defect: id of a mutation.
+
+    Returns:
+        CaseResult.
+
+    Raises:
+        KeyError: an unknown mutation.
+    """
+    start = time.perf_counter()
+    outcome = partial(_outcome, definition, scene=scene, level=level)
+    if definition.cost == "heavy" and level == "light":
+        return outcome(status="heavy: run with --level heavy")
+    mutation = None if defect is None else _mutation(definition, defect)
+    try:
+        mutated = scene if mutation is None else overridden(scene, mutation.scene)
+        built_in = None if mutation is None or mutation.scene else mutation.id
+        evidence = code.compute(mutated, level, built_in)
+        quantities = _judge(definition, evidence, code.reference(mutated))
+    except NotRunError as error:
+        return outcome(status=str(error))
+    except (ValueError, ArithmeticError, RuntimeError) as error:
+        # A case that breaks down has not shown what it is there to show.
+        return outcome(status=f"{type(error).__name__}: {error}", verdict=_broken_down(definition))
+    verdict = combine(kind=definition.kind, verdicts=[result.verdict for result in quantities])
+    if not evidence.status.ok and verdict not in (Verdict.FAILED, Verdict.REFUTED):
+        verdict = Verdict.INCONCLUSIVE
+    result = outcome(status=evidence.status.text, verdict=verdict)
+    return dataclasses.replace(
+        result, quantities=quantities, evidence=evidence, time_s=time.perf_counter() - start
+    )
+
+
+def _broken_down(definition: CaseDefinition) -> Verdict:
+    return Verdict.INCONCLUSIVE if definition.kind == "claim" else Verdict.FAILED
+
+
+def _outcome(
+    definition: CaseDefinition, *, scene: Scene, level: Level, status: str, verdict: Verdict = Verdict.NOT_RUN
+) -> CaseResult:
+    return CaseResult(
+        definition=definition,
+        verdict=verdict,
+        quantities=tuple(QuantityResult(quantity=q, verdict=verdict) for q in definition.quantity),
+        evidence=None,
+        status=status,
+        level=level,
+        scene_name=scene.name,
+        scene_sha256=scene.sha256,
+    )
+
+
+def _scene_of(definition: CaseDefinition, scene: Scene) -> Scene:
+    return paper_scene() if definition.judged_on == "paper" else scene
+
+
+def _mutation(definition: CaseDefinition, defect: str) -> Mutation:
+    found = [mutation for mutation in definition.must_fail if mutation.id == defect]
+    if not found:
+        raise KeyError(f"{definition.id} has no mutation {defect}")
+    return found[0]
+
+
+def overridden(scene: Scene, overrides: Mapping[str, float | None]) -> Scene:
+    """A scene with some of its quantities changed.
+
+    Args:
+        scene: the scene.
+        overrides: SI values by "table.quantity", such as "disc.plate_thickness".
+
+    Returns:
+        The changed scene.
+
+    Raises:
+        ValueError: a table or quantity that a scene does not have.
+    """
+    for path, value in overrides.items():
+        table, _, key = path.partition(".")
+        if not hasattr(getattr(scene, table, None), key):
+            raise ValueError(f'a scene has no quantity "{path}"')
+        part = dataclasses.replace(getattr(scene, table), **{key: value})
+        scene = dataclasses.replace(scene, **{table: part})
+    return scene
+
+
+def _judge(
+    definition: CaseDefinition, evidence: Evidence, references: Mapping[str, Reference]
+) -> tuple[QuantityResult, ...]:
+    names = {quantity.name for quantity in definition.quantity}
+    if set(evidence.found) != names or not set(references) <= names:
+        raise ValueError(
+            f"{definition.id}: judged are {sorted(names)}, found {sorted(evidence.found)}, "
+            f"referenced {sorted(references)}"
+        )
+    return tuple(_judge_one(definition, quantity, evidence, references) for quantity in definition.quantity)
+
+
+def _judge_one(
+    definition: CaseDefinition, quantity: Quantity, evidence: Evidence, references: Mapping[str, Reference]
+) -> QuantityResult:
+    found = evidence.found[quantity.name]
+    reference = references.get(quantity.name) if quantity.metric in NEEDS_REFERENCE else None
+    judgement = judge_quantity(
+        kind=definition.kind,
+        metric=quantity.metric,
+        limit=quantity.limit,
+        found=found,
+        reference=reference,
+    )
+    return QuantityResult(
+        quantity=quantity,
+        verdict=judgement.verdict,
+        found=found,
+        reference=references.get(quantity.name),
+        comparison=judgement.comparison,
+    )
+
+
+def run_mutations(case_id: str, *, scene: Scene, level: Level = "light") -> tuple[MutationResult, ...]:
+    """Run a case once with each of its mutations.
+
+    Args:
+        case_id: of the catalogue.
+        scene: the scene at hand.
+        level: "light" leaves out mutations and cases that are heavy.
+
+    Returns:
+        One result per mutation that was run.
+    """
+    definition = load_case(case_id)
+    if definition.cost == "heavy" and level == "light":
+        return ()
+    affordable = [m for m in definition.must_fail if level == "heavy" or m.cost == "light"]
+    return tuple(_run_mutation(case_id, mutation, scene, level) for mutation in affordable)
+
+
+def _run_mutation(case_id: str, mutation: Mutation, scene: Scene, level: Level) -> MutationResult:
+    result = run_case(case_id, scene=scene, level=level, defect=mutation.id)
+    return MutationResult(
+        id=mutation.id,
+        what=mutation.what,
+        expect=mutation.expect,
+        verdict=result.verdict,
+        status=result.status,
+        judged=result.evidence is not None,
+    )
+
+
+def _run_whole(case_id: str, *, scene: Scene, level: Level, mutations: bool) -> CaseResult:
+    result = run_case(case_id, scene=scene, level=level)
+    if not mutations or result.verdict is Verdict.NOT_RUN:
+        return result
+    return dataclasses.replace(result, mutations=run_mutations(case_id, scene=scene, level=level))
+
+
+def run_cases(
+    case_ids: Sequence[str] = (),
+    *,
+    scene: Scene,
+    level: Level = "light",
+    mutations: bool = False,
+    workers: int = 1,
+    progress: Progress | None = None,
+) -> tuple[CaseResult, ...]:
+    """Run several cases.
+
+    Args:
+        case_ids: of the catalogue; none for all.
+        scene: the scene at hand.
+        level: "light" leaves heavy cases `not run`.
+        mutations: whether to run each case's mutations too.
+        workers: processes; one runs here, without starting any.
+        progress: called with each result as it comes, in order.
+
+    Returns:
+        Results, in the order asked for; an interrupt ends the run and leaves no process behind.
+
+    Raises:
+        KeyError: an unknown case.
+    """
+    wanted = tuple(case_ids) or tuple(definition.id for definition in load_cases())
+    for case_id in wanted:
+        load_case(case_id)
+    run = partial(_run_whole, scene=scene, level=level, mutations=mutations)
+    results = []
+    for result in map(run, wanted) if workers == 1 else _spread(run, wanted, workers):
+        results.append(result)
+        if progress is not None:
+            progress(result)
+    return tuple(results)
+
+
+def _spread(run: Callable[[str], CaseResult], wanted: Sequence[str], workers: int) -> Iterator[CaseResult]:
+    pool = ProcessPoolExecutor(max_workers=workers, mp_context=get_context("spawn"))
+    try:
+        yield from pool.map(run, wanted)
+    finally:
+        pool.shutdown(cancel_futures=True)

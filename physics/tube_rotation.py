@@ -19,7 +19,6 @@ BoolArray = npt.NDArray[np.bool_]
 
 STRAIGHT_CRITICAL_REYNOLDS: Final = 1070 * 28**0.23
 """Critical Re without rotation: the recalled formula at its lower end, R_Om = 28, about 2303."""
-_ITO_START: Final = 500.0
 _TURBULENT_JOIN: Final = 500.0
 
 
@@ -30,12 +29,9 @@ def _harmonic(a: FloatArray, b: FloatArray, power: float) -> FloatArray:
 
 def _slow_rotation_excess(kl: FloatArray) -> FloatArray:
     """F - 1 for R_Om/Re -> 0: the exact Kl^2 series joined with Ito and Nanbu's formula."""
-    start = 0.0883 * _ITO_START**0.25 * (1 + 11.2 * _ITO_START**-0.325)
-    slope = start * (0.25 - 0.325 * (1 - 0.0883 * _ITO_START**0.25 / start)) / (start - 1)
-    above = np.maximum(kl, _ITO_START)
-    ito = 0.0883 * above**0.25 * (1 + 11.2 * above**-0.325) - 1
-    below = (start - 1) * (np.minimum(kl, _ITO_START) / _ITO_START) ** slope
-    return _harmonic(kl**2 / 16515072, np.where(kl > _ITO_START, ito, below), 1.3)
+    # Their formula falls below 1 at Kl = 220, where its range ends; the last term keeps it out of the way there.
+    ito = 0.0883 * kl**0.25 * (1 + 11.2 * kl**-0.325) - 1 + 0.011 * (220 / kl) ** 2
+    return _harmonic(kl**2 / 16515072, ito, 1.3)
 
 
 def _fast_rotation_excess(rotation: FloatArray) -> FloatArray:
@@ -119,7 +115,7 @@ def turbulent_friction_ratio(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.
     kt = rotation**2 / re
     power = 0.942 + 0.058 * (1 + np.minimum(kt, 1e9) ** (0.282 * 8)) ** (1 / 8)
     far = 0.942 * np.maximum(kt, 1.0) ** 0.05
-    weight = _smooth_step(np.log(np.maximum(kt, 1e-300) / _TURBULENT_JOIN) / np.log(4.0) + 0.5)
+    weight = 1 / (1 + (_TURBULENT_JOIN / np.maximum(kt, 1e-9)) ** 4)
     ratio = (1 - weight) * power + weight * far
     excess = np.abs(ratio - 1)
     return Estimate(value=ratio, uncertainty=0.3 * excess + 0.03 * excess / (excess + 0.01))
@@ -141,9 +137,3 @@ def critical_reynolds(*, rotation_reynolds: npt.ArrayLike) -> FloatArray:
     rotation = np.asarray(rotation_reynolds, dtype=np.float64)
     ratio = (1 + (rotation / 28) ** (0.23 * 8)) ** (1 / 8)
     return np.asarray(STRAIGHT_CRITICAL_REYNOLDS * ratio, dtype=np.float64)
-
-
-def _smooth_step(s: FloatArray) -> FloatArray:
-    """0 below 0, 1 above 1, twice continuously differentiable."""
-    c = np.clip(s, 0.0, 1.0)
-    return np.asarray(c**3 * (10 - 15 * c + 6 * c**2), dtype=np.float64)

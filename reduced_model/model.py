@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
@@ -43,3 +44,57 @@ class BalancerModel:
     """S, m^2."""
     density: float
     """kg/m^3."""
+
+
+class CompleteLaw(FlowLaw, Protocol):
+    """A flow law that carries all else that the closed loop needs; what `load_law` returns."""
+
+    @property
+    def moment(self) -> MomentCurve:
+        """The moment that goes with the law."""
+        ...
+
+    @property
+    def chamber_volume(self) -> float:
+        """V of one chamber, m^3."""
+        ...
+
+    @property
+    def tube_area(self) -> float:
+        """S, m^2."""
+        ...
+
+    @property
+    def density(self) -> float:
+        """rho, kg/m^3."""
+        ...
+
+    def save(self, path: Path | str) -> Path:
+        """Write the law to a file that `load_law` reads back bit for bit.
+
+        Args:
+            path: the file.
+
+        Returns:
+            The path.
+        """
+        ...
+
+
+def balancer_model(law: CompleteLaw) -> BalancerModel:
+    """The balancer that a complete law describes.
+
+    Args:
+        law: the law.
+
+    Returns:
+        BalancerModel with the law's name.
+    """
+    return BalancerModel(
+        name=law.name,
+        flow=law,
+        moment=law.moment,
+        chamber_volume=law.chamber_volume,
+        tube_area=law.tube_area,
+        density=law.density,
+    )

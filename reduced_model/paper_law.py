@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +12,8 @@ import numpy.typing as npt
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.conditions import checked_conditions
 from ringbalance.reduced_model.flow_law import Flow, Regime
-from ringbalance.reduced_model.model import BalancerModel
+from ringbalance.reduced_model.model import BalancerModel, balancer_model
+from ringbalance.reduced_model.storage import save_record
 from ringbalance.scene.models import Scene
 
 FloatArray = npt.NDArray[np.float64]
@@ -136,8 +138,23 @@ class PaperLaw:
             primed=np.asarray(flows),
         )
 
+    def save(self, path: Path | str) -> Path:
+        """Write the law to a file that `load_law` reads back bit for bit.
+
+        Args:
+            path: the file.
+
+        Returns:
+            The path.
+        """
+        return save_record(path=Path(path), record=self)
+
     def table(self) -> Mapping[str, FloatArray]:
-        """The two coefficients of u^2, named in the class's docstring, each of shape (1,)."""
+        """The two coefficients of u^2, named in the class's docstring.
+
+        Returns:
+            Arrays of shape (1,).
+        """
         return {
             "velocity_squared_per_pressure": np.array([self.velocity_squared_per_pressure]),
             "pressure_per_fill_difference": np.array([self.pressure_per_fill_difference]),
@@ -186,12 +203,4 @@ def paper_model(scene: Scene) -> BalancerModel:
 
     Source: sections 3 and 5 of the liquid-ring paper.
     """
-    law = paper_law(scene)
-    return BalancerModel(
-        name=law.name,
-        flow=law,
-        moment=law.moment,
-        chamber_volume=law.chamber_volume,
-        tube_area=law.tube_area,
-        density=law.density,
-    )
+    return balancer_model(paper_law(scene))

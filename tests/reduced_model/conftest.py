@@ -6,6 +6,7 @@ import math
 
 import pytest
 
+from ringbalance.reduced_model.calibration import Calibration, calibrate
 from ringbalance.scene import models
 
 DISC = models.Disc(
@@ -77,7 +78,7 @@ CONTROLLER = models.ControllerSettings(
 )
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def table_1_scene() -> models.Scene:
     """Table 1 of the liquid-ring paper with its density of 1 g/ml and an assumed tube."""
     return models.Scene(
@@ -96,3 +97,9 @@ def table_1_scene() -> models.Scene:
         source="test.toml",
         sha256="0" * 64,
     )
+
+
+@pytest.fixture(scope="session")
+def table_1_calibration(table_1_scene: models.Scene) -> Calibration:
+    """Calibration of that scene."""
+    return calibrate(table_1_scene)

@@ -1,0 +1,178 @@
+"""The flow law distilled from finite-element wall pressures and the tube's loss, with all its regimes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.reduced_model.calibrated_moment import CalibratedMoment
+from ringbalance.reduced_model.conditions import Conditions, checked_conditions
+from ringbalance.reduced_model.directed_flow import (
+    DirectedFlow,
+    Drive,
+    InputSpread,
+    TubePath,
+    directed_flow,
+)
+from ringbalance.reduced_model.flow_law import Flow, Regime
+from ringbalance.reduced_model.hermite import HermiteTable
+from ringbalance.reduced_model.storage import save_record
+from ringbalance.reduced_model.tube_heads import TubeHeads
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CalibratedLaw:
+    """Flow of the tube for any fills, gas pressure and history: blocked, siphon, separated or reverse.
+
+    The velocity is continuous in fills and pressure, except where the physics jumps: when an empty tube
+    starts to flow, when a column tears at rest, and when a chamber's level leaves the port.
+
+    `table()` holds `log_velocity` (ln m/s), `log_head`, `log_hump_head` and `log_return_hump_head`
+    (ln m^2/s^2; the last two only with a hump), `fill_ratio`, `wall_pressure` (Pa), and, of shape (1,),
+    `density`, `port_pressure`, `hump_pressure` (only with a hump) and `vapour_pressure` (gauge, Pa).
+    """
+
+    name: str
+    """ "calibrated"."""
+    max_fill_ratio: float
+    """Liquid of the pair as a share of one chamber's volume."""
+    ambient_pressure: float
+    """Absolute, Pa."""
+    chamber_volume: float
+    """V, m^3."""
+    tube_area: float
+    """S, m^2."""
+    wall_pressure: HermiteTable
+    """Level of a chamber, Pa, over its fill ratio."""
+    wall_pressure_spread: HermiteTable
+    """Its 95 % half-width, Pa, over the fill ratio."""
+    path: TubePath
+    """Radii of the tube, as pressures."""
+    heads: TubeHeads
+    """Loss of the tube."""
+    inputs: InputSpread
+    """Half-widths of what drives the flow."""
+    moment: CalibratedMoment
+    """The moment that goes with this law."""
+
+    @property
+    def density(self) -> float:
+        """rho, kg/m^3."""
+        return self.path.density
+
+    def evaluate(
+        self,
+        *,
+        fill_ratio: npt.ArrayLike,
+        opposite_fill_ratio: npt.ArrayLike | None = None,
+        gas_pressure: npt.ArrayLike,
+        primed: npt.ArrayLike = False,
+    ) -> Flow:
+        """Flow for a driven chamber's fill ratio and gauge gas pressure.
+
+        Args:
+            fill_ratio: x of the driven chamber, any shape, within [0, max_fill_ratio].
+            opposite_fill_ratio: of the opposite chamber; default max_fill_ratio - fill_ratio.
+            gas_pressure: gauge, Pa, in the driven chamber; the opposite one is vented.
+            primed: whether the tube holds a continuous column beforehand.
+
+        Returns:
+            Flow, of the broadcast shape of the arguments.
+
+        Raises:
+            ValueError: a fill ratio outside the range, a NaN, or a negative absolute pressure.
+        """
+        asked = checked_conditions(
+            max_fill_ratio=self.max_fill_ratio,
+            ambient_pressure=self.ambient_pressure,
+            fill_ratio=fill_ratio,
+            opposite_fill_ratio=opposite_fill_ratio,
+            gas_pressure=gas_pressure,
+            primed=primed,
+        )
+        forward = self._directed(asked, reverse=False)
+        if np.all(forward.velocity > 0):
+            return _joined(forward, forward, np.zeros_like(asked.primed))
+        backward = self._directed(asked, reverse=True)
+        return _joined(forward, backward, (backward.velocity > 0) & ~(forward.velocity > 0))
+
+    def _directed(self, asked: Conditions, *, reverse: bool) -> DirectedFlow:
+        own, other = asked.fill_ratio, asked.opposite_fill_ratio
+        levels = [np.maximum(self.wall_pressure(x), 0.0) for x in (own, other)]
+        gases = [asked.gas_pressure, np.zeros_like(asked.gas_pressure)]
+        allowed = np.ones_like(asked.primed)
+        if self.path.hump_pressure is None:
+            allowed = (asked.gas_pressure > 0) & (asked.primed | (not reverse))
+        if reverse:
+            levels, gases = levels[::-1], gases[::-1]
+        return directed_flow(
+            path=self.path,
+            heads=self.heads,
+            hump_head=self.heads.return_hump_head if reverse else self.heads.hump_head,
+            inputs=self.inputs,
+            drive=Drive(
+                gas=gases[0],
+                back_gas=gases[1],
+                level=levels[0],
+                back_level=levels[1],
+                level_spread=np.hypot(self.wall_pressure_spread(own), self.wall_pressure_spread(other)),
+                primed=asked.primed,
+                allowed=allowed,
+            ),
+        )
+
+    def save(self, path: Path | str) -> Path:
+        """Write the law to a file that `load_law` reads back bit for bit.
+
+        Args:
+            path: the file.
+
+        Returns:
+            The path.
+        """
+        return save_record(path=Path(path), record=self)
+
+    def table(self) -> Mapping[str, FloatArray]:
+        """Plain arrays for compiled code, named in the class's docstring.
+
+        Returns:
+            Copies, so that nothing can change the law.
+        """
+        heads = {
+            "log_head": self.heads.head,
+            "log_hump_head": self.heads.hump_head,
+            "log_return_hump_head": self.heads.return_hump_head,
+        }
+        scalars = {
+            "density": self.path.density,
+            "port_pressure": self.path.port_pressure,
+            "hump_pressure": self.path.hump_pressure,
+            "vapour_pressure": self.path.vapour_pressure,
+        }
+        return (
+            {"log_velocity": self.heads.head.nodes}
+            | {name: table.value.copy() for name, table in heads.items() if table is not None}
+            | {"fill_ratio": self.wall_pressure.nodes, "wall_pressure": self.wall_pressure.value.copy()}
+            | {name: np.array([value]) for name, value in scalars.items() if value is not None}
+        )
+
+
+def _joined(forward: DirectedFlow, backward: DirectedFlow, reverse: BoolArray) -> Flow:
+    """One flow from both directions, of which at most one flows."""
+    ahead = forward.velocity > 0
+    regime = np.select(
+        [ahead & forward.separated, ahead, reverse], [Regime.SEPARATED, Regime.SIPHON, Regime.REVERSE]
+    )
+    return Flow(
+        velocity=np.where(reverse, -backward.velocity, forward.velocity),
+        regime=np.asarray(np.where(ahead | reverse, regime, Regime.BLOCKED), dtype=np.int64),
+        uncertainty=np.where(reverse, backward.half_width, forward.half_width),
+        primed=np.where(reverse, backward.primed, forward.primed),
+    )

@@ -1,0 +1,240 @@
+"""Wall pressure and moment of a chamber over its fill, by finite elements, with what they leave open."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.mesh.geometry import chamber_volume
+from ringbalance.physics.results import Estimate, Statistics, Status
+from ringbalance.physics.ring import RingQuantities, ring_quantities
+from ringbalance.reduced_model.chamber_inputs import InputEffect, chamber_closed_forms, input_effects
+from ringbalance.reduced_model.gravity import SAFETY, GravityEffect, closed_ring, gravity_effect
+from ringbalance.reduced_model.hermite import HermiteTable
+from ringbalance.reduced_model.hermite_fit import table_from_samples
+from ringbalance.scene.models import Scene
+
+FloatArray = npt.NDArray[np.float64]
+
+FILL_STEP: Final = 0.05
+"""Of the fill ratios that a calibration reports."""
+ROUND_OFF: Final = 16 * float(np.finfo(np.float64).eps)
+"""Relative floor of a numerical half-width."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Curve:
+    """One quantity over the fill ratio: values, their half-widths by cause, and a smooth table.
+
+    Arrays run along `ChamberCalibration.fill_ratio`, whose first entries are the table's nodes.
+    """
+
+    value: FloatArray
+    """By finite elements."""
+    numerical: FloatArray
+    """95 % half-width by grid convergence, with a floor for round-off."""
+    left_out: FloatArray
+    """95 % half-width for gravity where it is left out; zero where it is modelled."""
+    inputs: FloatArray
+    """95 % half-width by the scene's uncertain inputs."""
+    table: HermiteTable
+    """Interpolates the values."""
+    interpolation: float
+    """95 % half-width of the table between its nodes."""
+
+    @property
+    def uncertainty(self) -> FloatArray:
+        """Half-width of the value for the scene's inputs as they stand: numerical and left-out terms."""
+        return np.hypot(self.numerical, self.left_out)
+
+    def spread_table(self, *, inputs: FloatArray) -> HermiteTable:
+        """Half-width over the fill ratio: numerical, left-out terms, interpolation and some inputs.
+
+        Args:
+            inputs: 95 % half-width by those inputs, along the fill ratio.
+
+        Returns:
+            The table.
+        """
+        squares = (self.uncertainty**2 + inputs**2 + self.interpolation**2)[: self.table.value.size]
+        nodes = self.table.nodes
+        return table_from_samples(start=float(nodes[0]), stop=float(nodes[-1]), value=np.sqrt(squares))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ChamberCalibration:
+    """Finite-element totals of one chamber over its fill ratio, and lambda."""
+
+    volume: float
+    """V, m^3."""
+    fill_ratio: FloatArray
+    """Nodes, equally spaced from zero to max_fill_ratio, and behind them those reported that are no nodes."""
+    ring: RingQuantities
+    """Finite elements at `fill_ratio`."""
+    reported_fill_ratio: FloatArray
+    """0, 0.05, ... max_fill_ratio."""
+    reported: tuple[int, ...]
+    """Where these stand in `fill_ratio`."""
+    wall_pressure: Curve
+    """Liquid part, mean over the outer wall, Pa."""
+    moment: Curve
+    """U, kg m."""
+    moment_per_mass: Estimate
+    """lambda at equal fills, per transferred mass, m, shape (); half-width without the inputs."""
+    moment_per_mass_inputs: float
+    """95 % half-width of lambda by the scene's uncertain inputs, m."""
+    input_effects: Mapping[str, InputEffect]
+    """Effect of each uncertain input."""
+    gravity: GravityEffect
+    """Second-order estimate along `fill_ratio`."""
+    gravity_share: float
+    """Its largest share of wall pressure or moment at equal fills."""
+    gravity_modelled: bool
+    """Whether the finite elements hold it."""
+    status: Status
+    statistics: Statistics
+
+
+def fill_nodes(scene: Scene) -> tuple[FloatArray, FloatArray]:
+    """Fill ratios of the tables and of the report.
+
+    Args:
+        scene: the scene.
+
+    Returns:
+        Nodes (an odd number, at most half a step apart) and reported fill ratios (0, 0.05, ... max).
+    """
+    largest = scene.disc.max_fill_ratio
+    steps = math.ceil(largest / FILL_STEP - 1e-9)
+    # At least eleven nodes, so that even a small range has an error estimate from every second node.
+    nodes = np.linspace(0.0, largest, 2 * max(steps, 5) + 1)
+    reported = np.append(np.round(FILL_STEP * np.arange(steps), 10), largest)
+    return nodes, reported
+
+
+def calibrate_chamber(scene: Scene) -> ChamberCalibration:
+    """Run the finite elements over the fill range and judge what they leave open.
+
+    Gravity is modelled when its second-order share at equal fills exceeds the scene's tolerance; otherwise
+    its estimate goes into the half-widths.
+
+    Args:
+        scene: the scene; a ring must exist.
+
+    Returns:
+        ChamberCalibration.
+
+    Source: Eqs. 2 to 12 of the liquid-ring paper with exact plates, by finite elements.
+    """
+    nodes, reported = fill_nodes(scene)
+    fills = np.append(nodes, [x for x in reported if np.min(np.abs(nodes - x)) > 1e-12])
+    effect, share = _gravity(scene, fills), gravity_share(scene)
+    modelled = share > scene.tolerance
+    ring = ring_quantities(
+        disc=scene.disc,
+        density=scene.liquid.density,
+        angular_velocity=scene.rotor.speed,
+        fill_ratio=fills,
+        gravity=scene.environment.gravity if modelled else 0.0,
+        shaft=scene.environment.shaft,
+    )
+    effects = input_effects(scene=scene, fill_ratio=fills)
+    scale = 0.0 if modelled else SAFETY
+    open_ring = ~_closed(scene, fills) & (not modelled)
+    pressure, moment = (scale * np.abs(e) for e in (effect.wall_pressure, effect.moment))
+    pressures = [e.wall_pressure for e in effects.values()]
+    moments = [e.moment for e in effects.values()]
+    return ChamberCalibration(
+        volume=chamber_volume(disc=scene.disc),
+        fill_ratio=fills,
+        ring=ring,
+        reported_fill_ratio=reported,
+        reported=tuple(int(np.argmin(np.abs(fills - x))) for x in reported),
+        wall_pressure=_curve(nodes, ring.wall_pressure, pressure, open_ring, pressures),
+        moment=_curve(nodes, ring.moment, moment, open_ring, moments),
+        moment_per_mass=_central(scene, nodes, ring.moment_per_volume, scale * effect.moment),
+        moment_per_mass_inputs=math.hypot(*(e.moment_per_mass for e in effects.values())),
+        input_effects=effects,
+        gravity=effect,
+        gravity_share=share,
+        gravity_modelled=modelled,
+        status=ring.status,
+        statistics=ring.statistics,
+    )
+
+
+def _curve(
+    nodes: FloatArray,
+    estimate: Estimate,
+    gravity: FloatArray,
+    open_ring: npt.NDArray[np.bool_],
+    inputs: list[FloatArray],
+) -> Curve:
+    value, n = estimate.value, nodes.size
+    table = table_from_samples(start=float(nodes[0]), stop=float(nodes[-1]), value=value[:n])
+    coarse = table_from_samples(start=float(nodes[0]), stop=float(nodes[-1]), value=value[:n:2])
+    # Twice the step at worst triples the error; half of what the coarse table misses is on the safe side.
+    missed = float(np.max(np.abs(coarse(nodes) - value[:n])))
+    return Curve(
+        value=value,
+        numerical=estimate.uncertainty + ROUND_OFF * np.abs(value),
+        left_out=gravity + np.where(open_ring, np.abs(value), 0.0),
+        inputs=np.sqrt(sum((i**2 for i in inputs), start=np.zeros_like(value))),
+        table=table,
+        interpolation=missed / 2,
+    )
+
+
+def _central(scene: Scene, nodes: FloatArray, slope: Estimate, gravity: FloatArray) -> Estimate:
+    """lambda at equal fills, 2 (dU/dV')/rho; gravity's share by how its moment changes with the fill."""
+    m, density = nodes.size // 2, scene.liquid.density
+    value = 2 * float(slope.value[m]) / density
+    numerical = 2 * float(slope.uncertainty[m]) / density + ROUND_OFF * value
+    mass = density * chamber_volume(disc=scene.disc) * float(nodes[m + 1] - nodes[m - 1])
+    left_out = 2 * abs(float(gravity[m + 1] - gravity[m - 1])) / mass
+    return Estimate(
+        value=np.asarray(value), uncertainty=np.asarray(math.hypot(numerical, left_out)), status=slope.status
+    )
+
+
+def _gravity(scene: Scene, fills: FloatArray) -> GravityEffect:
+    return gravity_effect(
+        disc=scene.disc,
+        density=scene.liquid.density,
+        angular_velocity=scene.rotor.speed,
+        gravity=scene.environment.gravity,
+        vertical=scene.environment.shaft == "vertical",
+        fill_ratio=fills,
+    )
+
+
+def _closed(scene: Scene, fills: FloatArray) -> npt.NDArray[np.bool_]:
+    return closed_ring(
+        disc=scene.disc,
+        angular_velocity=scene.rotor.speed,
+        gravity=scene.environment.gravity,
+        vertical=scene.environment.shaft == "vertical",
+        fill_ratio=fills,
+    )
+
+
+def gravity_share(scene: Scene) -> float:
+    """Largest relative second-order change by gravity, of wall pressure or moment, at equal fills.
+
+    Args:
+        scene: the scene.
+
+    Returns:
+        Share; first-order effects, which vanish over a turn, are not in it.
+
+    Source: `gravity_effect` over the closed forms.
+    """
+    x = np.array([scene.disc.max_fill_ratio / 2])
+    effect = _gravity(scene, x)
+    pressure, moment, _ = chamber_closed_forms(scene=scene, fill_ratio=x)
+    return float(np.max(np.abs([effect.wall_pressure / pressure, effect.moment / moment])))

@@ -1,0 +1,179 @@
+"""A calibration as the JSON document of `ringbalance calibrate --json`, and a law as tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.reduced_model import paper
+from ringbalance.reduced_model.calibration import Calibration, lambda_over_fill, lambda_variation
+from ringbalance.reduced_model.chamber_calibration import Curve
+from ringbalance.reduced_model.flow_law import Regime
+
+FloatArray = npt.NDArray[np.float64]
+
+PRESSURE_FACTORS: Final = (0.5, 0.75, 1.0, 1.25, 1.5, 2.0)
+"""Gas pressures of the law's table, over the scene's own."""
+
+
+def calibration_document(calibration: Calibration) -> dict[str, Any]:
+    """Lay a calibration out as plain lists, numbers and texts.
+
+    `*_uncertainty` are 95 % half-widths.  Those of wall pressure, moment and lambda hold for the scene's
+    inputs as they stand (grid convergence, round-off and left-out gravity); what uncertain inputs add stands
+    beside them (`*_input_uncertainty`), and the two combine as the root of the sum of squares.  Those of k
+    and of velocities hold everything.  The law's rows run along `gas_pressure_Pa`, its columns along
+    `fill_ratio`, for a tube that is empty beforehand.
+
+    Args:
+        calibration: the calibration.
+
+    Returns:
+        The document, in SI units and gauge pressures; no value is NaN or infinite.
+
+    Source: combination after ASME V&V 20-2009.
+    """
+    scene = calibration.scene
+    return {
+        "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
+        "chamber": _chamber(calibration),
+        "lambda": _lambda(calibration),
+        "tube": _tube(calibration),
+        "law": _law(calibration),
+        "operating_point": _operating_point(calibration),
+        "identifiability": calibration.identifiability,
+        "models_used": [asdict(term) for term in calibration.models_used],
+        "status": {"code": str(calibration.chamber.status.code), "text": calibration.chamber.status.text},
+        "statistics": dict(calibration.statistics),
+    }
+
+
+def _listed(values: npt.ArrayLike) -> Any:
+    return np.asarray(values).tolist()
+
+
+def _curve(curve: Curve, at: list[int], name: str, unit: str) -> dict[str, Any]:
+    return {
+        f"{name}_{unit}": _listed(curve.value[at]),
+        f"{name}_uncertainty": _listed(curve.uncertainty[at]),
+        f"{name}_input_uncertainty": _listed(curve.inputs[at]),
+        f"{name}_uncertainty_parts": {
+            "numerical": _listed(curve.numerical[at]),
+            "left_out_gravity": _listed(curve.left_out[at]),
+        },
+    }
+
+
+def _chamber(calibration: Calibration) -> dict[str, Any]:
+    scene, chamber, at = calibration.scene, calibration.chamber, list(calibration.chamber.reported)
+    fills = chamber.reported_fill_ratio
+    return (
+        {
+            "volume_m3": chamber.volume,
+            "max_liquid_volume_m3": scene.disc.max_fill_ratio * chamber.volume,
+            "fill_ratio": _listed(fills),
+            "free_surface_radius_m": _listed(chamber.ring.surface_radius[at]),
+        }
+        | _curve(chamber.wall_pressure, at, "wall_pressure", "Pa")
+        | _curve(chamber.moment, at, "moment", "kg_m")
+        | {name: _listed(values) for name, values in paper_columns(calibration, fills).items()}
+        | {
+            "lambda_per_transferred_mass_m": _listed(
+                lambda_over_fill(calibration=calibration, fill_ratio=fills)
+            )
+        }
+    )
+
+
+def paper_columns(calibration: Calibration, fill_ratio: FloatArray) -> Mapping[str, FloatArray]:
+    """What the liquid-ring paper gives for wall pressure and moment at fill ratios.
+
+    Args:
+        calibration: the calibration.
+        fill_ratio: x, shape (n,).
+
+    Returns:
+        "wall_pressure_paper_Pa" and "moment_paper_kg_m", shape (n,), by the paper's own volume.
+
+    Source: Eqs. 3, 4, 7 and 12.
+    """
+    scene = calibration.scene
+    volume = fill_ratio * paper.chamber_volume_paper(disc=scene.disc)
+    radius = paper.surface_radius_paper(disc=scene.disc, liquid_volume=volume)
+    return {
+        "wall_pressure_paper_Pa": paper.wall_pressure_paper(
+            disc=scene.disc,
+            density=scene.liquid.density,
+            angular_velocity=scene.rotor.speed,
+            liquid_volume=volume,
+        ),
+        "moment_paper_kg_m": paper.moment_paper(
+            disc=scene.disc, density=scene.liquid.density, surface_radius=radius
+        ),
+    }
+
+
+def _lambda(calibration: Calibration) -> dict[str, Any]:
+    chamber = calibration.chamber
+    value = float(chamber.moment_per_mass.value)
+    return {
+        "per_transferred_mass_m": value,
+        "per_mass_difference_m": value / 2,
+        "uncertainty_m": float(chamber.moment_per_mass.uncertainty),
+        "input_uncertainty_m": chamber.moment_per_mass_inputs,
+        "variation_over_range": lambda_variation(calibration=calibration),
+        "paper_m": paper.PAPER_LAMBDA,
+    }
+
+
+def _tube(calibration: Calibration) -> dict[str, Any]:
+    tube = calibration.tube
+    return {
+        "velocity_m_s": _listed(tube.velocity),
+        "reynolds": _listed(tube.reynolds),
+        "rotation_reynolds": tube.rotation_reynolds,
+        "k": _listed(tube.k.value),
+        "k_uncertainty": _listed(tube.k.uncertainty),
+        "flow_state": _listed(tube.flow_state),
+        "in_range": _listed(tube.in_range),
+        "range_notes": list(tube.range_notes),
+        "terms": {name: _listed(term) for name, term in tube.terms.items()},
+        "uncertainty_parts": {name: _listed(part) for name, part in tube.uncertainty_parts.items()},
+    }
+
+
+def _law(calibration: Calibration) -> dict[str, Any]:
+    fills = calibration.chamber.reported_fill_ratio
+    pressures = np.array(PRESSURE_FACTORS) * calibration.scene.gas.pressure
+    flow = calibration.flow_law.evaluate(fill_ratio=fills[None, :], gas_pressure=pressures[:, None])
+    by_paper = calibration.paper_law.evaluate(fill_ratio=fills[None, :], gas_pressure=pressures[:, None])
+    return {
+        "gas_pressure_Pa": _listed(pressures),
+        "fill_ratio": _listed(fills),
+        "velocity_m_s": _listed(flow.velocity),
+        "velocity_uncertainty": _listed(flow.uncertainty),
+        "regime": [[Regime(int(r)).label for r in row] for row in flow.regime],
+        "velocity_paper_m_s": _listed(by_paper.velocity),
+    }
+
+
+def _operating_point(calibration: Calibration) -> dict[str, Any]:
+    point = calibration.operating_point
+    return {
+        "fill_ratio": point.fill_ratio,
+        "gas_pressure_Pa": point.gas_pressure,
+        "regime": point.regime.label,
+        "velocity_m_s": point.velocity,
+        "velocity_uncertainty": point.velocity_uncertainty,
+        "k_at_velocity_m_s": point.loss_velocity,
+        "k": point.k,
+        "k_uncertainty": point.k_uncertainty,
+        "priming_pressure_vented_Pa": point.priming_vented,
+        "priming_pressure_trapped_Pa": point.priming_trapped,
+        "stall_pressure_Pa": point.stall,
+        "stall_pressure_paper_Pa": point.stall_paper,
+    }

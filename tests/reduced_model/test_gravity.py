@@ -1,0 +1,65 @@
+"""Second-order gravity effects against finite elements with a found free surface, and the lowest speed."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from ringbalance.physics.ring import ring_quantities
+from ringbalance.reduced_model.gravity import check_ring, closed_ring, gravity_effect, gravity_ratio
+from ringbalance.scene import SceneError
+from ringbalance.scene.models import Scene, Shaft
+
+
+@pytest.mark.parametrize("shaft", ["horizontal", "vertical"])
+def test_second_order_effect_agrees_with_finite_elements(table_1_scene: Scene, shaft: Shaft) -> None:
+    disc, x = table_1_scene.disc, np.array([0.25, 0.5])
+    common = {"disc": disc, "density": 1000.0, "angular_velocity": 100.0, "fill_ratio": x}
+    plain = ring_quantities(**common)  # type: ignore[arg-type]
+    heavy = ring_quantities(**common, gravity=9.80665, shaft=shaft)  # type: ignore[arg-type]
+    effect = gravity_effect(**common, gravity=9.80665, vertical=shaft == "vertical")  # type: ignore[arg-type]
+    # Plates are taken as radial in the estimate: it is good to a quarter, which its safety factor covers.
+    for found, estimate in (
+        (heavy.wall_pressure.value - plain.wall_pressure.value, effect.wall_pressure),
+        (heavy.moment.value - plain.moment.value, effect.moment),
+    ):
+        np.testing.assert_allclose(found, estimate, rtol=0.2)
+
+
+def test_effect_falls_with_the_fourth_power_of_speed_against_the_whole(table_1_scene: Scene) -> None:
+    def share(omega: float) -> float:
+        common = {"disc": table_1_scene.disc, "density": 1000.0, "fill_ratio": np.array([0.25])}
+        effect = gravity_effect(**common, angular_velocity=omega, gravity=9.81, vertical=False)  # type: ignore[arg-type]
+        return float(effect.wall_pressure[0]) / omega**2
+
+    assert share(100.0) / share(1000.0) == pytest.approx(1e4, rel=1e-9)
+
+
+def test_slow_rotors_are_refused_with_the_lowest_speed(table_1_scene: Scene) -> None:
+    slow = dataclasses.replace(table_1_scene, rotor=dataclasses.replace(table_1_scene.rotor, speed=10.0))
+    with pytest.raises(SceneError, match=r"\[rotor\] speed.*above 160.* rpm"):
+        check_ring(slow)
+    upright = dataclasses.replace(slow, environment=dataclasses.replace(slow.environment, shaft="vertical"))
+    check_ring(upright)
+    check_ring(table_1_scene)
+
+
+def test_ratio_is_gravity_over_centrifugal_acceleration(table_1_scene: Scene) -> None:
+    assert gravity_ratio(table_1_scene) == pytest.approx(
+        9.80665 / (table_1_scene.rotor.speed**2 * 0.04001), rel=1e-3
+    )
+
+
+def test_a_thin_ring_opens_first(table_1_scene: Scene) -> None:
+    closed = closed_ring(
+        disc=table_1_scene.disc,
+        angular_velocity=60.0,
+        gravity=9.80665,
+        vertical=False,
+        fill_ratio=np.array([0.0, 0.05, 0.25]),
+    )
+    assert list(closed) == [True, False, True]
+    assert math.isclose(9.80665 / 60**2, 2.724e-3, rel_tol=1e-3)

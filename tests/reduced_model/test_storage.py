@@ -1,0 +1,136 @@
+"""A law survives its file to the last bit; what is no law is refused with every fault named."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ringbalance.reduced_model.calibration import Calibration
+from ringbalance.reduced_model.loading import load_law, load_model
+from ringbalance.reduced_model.paper_law import paper_law, paper_model
+from ringbalance.scene import SceneError
+from ringbalance.scene.models import Scene
+
+
+def test_calibrated_law_comes_back_bit_for_bit(table_1_calibration: Calibration, tmp_path: Path) -> None:
+    law = table_1_calibration.flow_law
+    first = law.save(tmp_path / "law.json")
+    back = load_law(first)
+    second = back.save(tmp_path / "again.json")
+    assert first.read_bytes() == second.read_bytes()
+    conditions: dict[str, Any] = {
+        "fill_ratio": np.linspace(0, 0.5, 41)[:, None],
+        "gas_pressure": np.linspace(-1e5, 3e6, 37),
+        "primed": True,
+    }
+    here, there = law.evaluate(**conditions), back.evaluate(**conditions)
+    for name in ("velocity", "regime", "uncertainty", "primed"):
+        np.testing.assert_array_equal(getattr(here, name), getattr(there, name))
+    fills = np.linspace(0, 0.5, 23)
+    moments = (
+        m.pair_moment(fill_ratio=fills, opposite_fill_ratio=0.5 - fills) for m in (law.moment, back.moment)
+    )
+    np.testing.assert_array_equal(*moments)
+
+
+def test_paper_law_comes_back_whole(table_1_scene: Scene, tmp_path: Path) -> None:
+    law = paper_law(table_1_scene)
+    path = law.save(tmp_path / "paper.json")
+    assert load_law(path) == law
+    assert load_model(path) == paper_model(table_1_scene)
+
+
+def test_load_model_carries_moment_volumes_and_density(
+    table_1_calibration: Calibration, tmp_path: Path
+) -> None:
+    model = load_model(table_1_calibration.flow_law.save(tmp_path / "law.json"))
+    assert model.name == "calibrated"
+    assert model.chamber_volume == table_1_calibration.chamber.volume
+    assert model.density == 1000.0
+    assert model.tube_area == pytest.approx(np.pi / 4 * 1.5e-3**2)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (None, "cannot be read"),
+        ("", "not JSON"),
+        ("{", "not JSON"),
+        ("[1, 2]", "not a saved law"),
+        ('{"format": "another"}', "not a saved law"),
+        ('{"format": "ringbalance law", "version": 99}', "another release"),
+        ('{"format": "ringbalance law", "version": 1}', "law"),
+        ('{"format": "ringbalance law", "version": 1, "law": {"type": "TubePath"}}', "PaperLaw"),
+        ("[" * 100000, "not JSON"),
+    ],
+)
+def test_files_that_are_no_law_are_refused(tmp_path: Path, text: str | None, told: str) -> None:
+    path = tmp_path / "broken.json"
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(SceneError) as caught:
+        load_law(path)
+    assert told in str(caught.value)
+    assert all(fault.file == str(path) for fault in caught.value.faults)
+
+
+def _set(key: str, value: object) -> Callable[[dict[str, Any]], None]:
+    def change(law: dict[str, Any]) -> None:
+        *way, last = key.split(".")
+        for part in way:
+            law = law[part]
+        law[last] = value
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("chamber_volume", -1.0),
+        ("tube_area", "thick"),
+        ("max_fill_ratio", True),
+        ("ambient_pressure", float("nan")),
+        ("path.density", 10**400),
+        ("path.trapped", 1),
+        ("wall_pressure.value", [0.0, "a"]),
+        ("wall_pressure.slope", [1.0]),
+        ("heads.head", None),
+        ("moment.type", "PaperMoment"),
+        ("surprise", 3),
+    ],
+)
+def test_each_fault_names_its_key(
+    table_1_calibration: Calibration, tmp_path: Path, key: str, value: object
+) -> None:
+    path = table_1_calibration.flow_law.save(tmp_path / "law.json")
+    content = json.loads(path.read_text())
+    _set(key, value)(content["law"])
+    path.write_text(json.dumps(content))
+    with pytest.raises(SceneError) as caught:
+        load_law(path)
+    (fault,) = caught.value.faults
+    assert fault.table.startswith("law")
+    assert fault.key in {key.split(".")[-1], "type"}
+    assert fault.allowed
+
+
+def test_all_faults_come_in_one_go(table_1_scene: Scene, tmp_path: Path) -> None:
+    path = paper_law(table_1_scene).save(tmp_path / "law.json")
+    content = json.loads(path.read_text())
+    del content["law"]["density"]
+    content["law"]["tube_area"] = 0
+    content["law"]["moment"]["density"] = "heavy"
+    path.write_text(json.dumps(content))
+    with pytest.raises(SceneError) as caught:
+        load_law(path)
+    assert {(f.table, f.key) for f in caught.value.faults} == {
+        ("law", "density"),
+        ("law", "tube_area"),
+        ("law.moment", "density"),
+    }

@@ -29,7 +29,7 @@ def _harmonic(a: FloatArray, b: FloatArray, power: float) -> FloatArray:
 
 def _slow_rotation_excess(kl: FloatArray) -> FloatArray:
     """F - 1 for R_Om/Re -> 0: the exact Kl^2 series joined with Ito and Nanbu's formula."""
-    # Their formula falls below 1 at Kl = 220, where its range ends; the last term keeps it out of the way there.
+    # Their formula falls below 1 at Kl = 220, where its range ends; the last term keeps it away from there.
     ito = 0.0883 * kl**0.25 * (1 + 11.2 * kl**-0.325) - 1 + 0.011 * (220 / kl) ** 2
     return _harmonic(kl**2 / 16515072, ito, 1.3)
 

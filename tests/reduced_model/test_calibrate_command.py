@@ -1,0 +1,44 @@
+"""`ringbalance calibrate`: tables for people, one clean document for scripts, a law for `simulate`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from ringbalance.reduced_model.cli import calibrate
+from ringbalance.reduced_model.loading import load_law
+from ringbalance.scene import SceneError, bundled_scene
+
+
+def test_json_is_one_clean_document(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    target = tmp_path / "deep" / "law.json"
+    assert calibrate(bundled_scene("liquid_ring_paper"), json=True, save=target) == 0
+    captured = capsys.readouterr()
+    document = json.loads(captured.out)
+    assert document["scene"]["source"] == "liquid_ring_paper.toml"
+    assert len(captured.out.splitlines()) == 1
+    assert load_law(target).chamber_volume == document["chamber"]["volume_m3"]
+
+
+@pytest.mark.parametrize("name", ["liquid_ring_paper", "silicone_oil_100cst"])
+def test_tables_show_what_matters(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert calibrate(bundled_scene(name)) == 0
+    shown = capsys.readouterr().out
+    for word in (
+        "lambda",
+        "operating point",
+        "Chamber",
+        "Tube",
+        "Velocity",
+        "Models used",
+        "full siphon stalls",
+    ):
+        assert word in shown
+    assert "nan" not in shown
+
+
+def test_a_missing_scene_is_a_fault_not_a_traceback(tmp_path: Path) -> None:
+    with pytest.raises(SceneError):
+        calibrate(tmp_path / "none.toml")

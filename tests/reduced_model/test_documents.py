@@ -1,0 +1,101 @@
+"""The JSON of `calibrate --json`: every promised key, shapes that fit, nothing that JSON cannot hold."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ringbalance.reduced_model.calibration import Calibration, calibrate
+from ringbalance.reduced_model.documents import calibration_document
+from ringbalance.scene.models import Scene
+
+CHAMBER = (
+    "free_surface_radius_m",
+    "wall_pressure_Pa",
+    "wall_pressure_uncertainty",
+    "wall_pressure_paper_Pa",
+    "moment_kg_m",
+    "moment_uncertainty",
+    "moment_paper_kg_m",
+    "lambda_per_transferred_mass_m",
+)
+LAW = ("velocity_m_s", "velocity_uncertainty", "regime", "velocity_paper_m_s")
+
+
+@pytest.fixture(scope="module")
+def document(table_1_calibration: Calibration) -> dict[str, Any]:
+    text = json.dumps(calibration_document(table_1_calibration), allow_nan=False)
+    loaded: dict[str, Any] = json.loads(text)
+    return loaded
+
+
+def test_promised_keys_are_there_and_shapes_fit(document: dict[str, Any]) -> None:
+    chamber, tube, law = document["chamber"], document["tube"], document["law"]
+    n = len(chamber["fill_ratio"])
+    assert chamber["fill_ratio"] == [0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5]
+    assert all(len(chamber[key]) == n for key in CHAMBER)
+    assert set(chamber) >= {"volume_m3", "max_liquid_volume_m3"}
+    assert set(document["lambda"]) >= {
+        "per_transferred_mass_m",
+        "per_mass_difference_m",
+        "uncertainty_m",
+        "variation_over_range",
+    }
+    m = len(tube["velocity_m_s"])
+    assert tube["velocity_m_s"][0] == pytest.approx(0.1)
+    assert tube["velocity_m_s"][-1] == pytest.approx(20)
+    assert all(len(tube[key]) == m for key in ("reynolds", "k", "k_uncertainty", "flow_state", "in_range"))
+    assert all(len(term) == m for term in tube["terms"].values())
+    assert set(tube["flow_state"]) <= {"laminar", "transitional", "turbulent"}
+    assert all(isinstance(value, bool) for value in tube["in_range"])
+    shape = (len(law["gas_pressure_Pa"]), len(law["fill_ratio"]))
+    assert all(np.array(law[key]).shape == shape for key in LAW)
+    assert set(np.array(law["regime"]).ravel()) <= {"blocked", "siphon", "separated", "reverse"}
+    assert all(
+        set(term) == {"term", "model", "why", "estimated_contribution"} for term in document["models_used"]
+    )
+    assert document["statistics"]["finite_element_solves"] > 0
+
+
+def test_numbers_agree_with_each_other(document: dict[str, Any]) -> None:
+    chamber, lam = document["chamber"], document["lambda"]
+    assert chamber["max_liquid_volume_m3"] == pytest.approx(0.5 * chamber["volume_m3"])
+    assert lam["per_mass_difference_m"] == lam["per_transferred_mass_m"] / 2
+    assert chamber["lambda_per_transferred_mass_m"][5] == lam["per_transferred_mass_m"]
+    parts = chamber["moment_uncertainty_parts"]
+    np.testing.assert_allclose(
+        chamber["moment_uncertainty"], np.hypot(parts["numerical"], parts["left_out_gravity"])
+    )
+    velocity, regime = np.array(document["law"]["velocity_m_s"]), np.array(document["law"]["regime"])
+    assert np.all((velocity == 0) == (regime == "blocked"))
+
+
+def test_wall_pressure_of_the_paper_is_eq_12(document: dict[str, Any], table_1_scene: Scene) -> None:
+    # By hand: rho omega^2/(B theta) = 1.1260e10 Pa/m^3, V' = 33.85 ml.
+    last = document["chamber"]["wall_pressure_paper_Pa"][-1]
+    assert last == pytest.approx(381.15e3, rel=1e-4)
+    assert document["chamber"]["moment_paper_kg_m"][-1] * 1e6 == pytest.approx(1334.46, abs=0.02)
+    # Without plates Eq. 12 is low by what the plates take from the volume.
+    assert document["chamber"]["wall_pressure_Pa"][-1] / last == pytest.approx(1.098, abs=2e-3)
+    assert table_1_scene.disc.plate_thickness > 0
+
+
+def test_fill_range_that_is_no_multiple_of_the_step(table_1_scene: Scene) -> None:
+    disc = dataclasses.replace(table_1_scene.disc, max_fill_ratio=0.33, initial_fill=0.165)
+    chamber = calibration_document(calibrate(dataclasses.replace(table_1_scene, disc=disc)))["chamber"]
+    assert chamber["fill_ratio"] == [0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.33]
+    assert np.all(np.diff(chamber["wall_pressure_Pa"]) > 0)
+    assert np.ptp(chamber["lambda_per_transferred_mass_m"]) < 1e-3
+
+
+def test_blocked_scene_still_makes_a_clean_document(table_1_scene: Scene) -> None:
+    weak = dataclasses.replace(table_1_scene, gas=dataclasses.replace(table_1_scene.gas, pressure=0.0))
+    document = calibration_document(calibrate(weak))
+    json.dumps(document, allow_nan=False)
+    assert document["operating_point"]["regime"] == "blocked"
+    assert document["operating_point"]["k"] is None
+    assert document["operating_point"]["priming_pressure_vented_Pa"] == pytest.approx(0.5417e6, rel=1e-3)

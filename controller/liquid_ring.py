@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -208,6 +208,18 @@ def initial_state(*, disc: Disc) -> DiscState:
     """
     pair = PairState(fill=disc.initial_fill, total=2 * disc.initial_fill)
     return DiscState(pairs=(pair,) * (disc.chambers // 2))
+
+
+def longest(operations: Sequence[Operation]) -> Operation:
+    """The operation of a command that was given the most gas.
+
+    Args:
+        operations: of one command, at least one.
+
+    Returns:
+        Operation.
+    """
+    return max(operations, key=lambda operation: operation.duration)
 
 
 def _first_fill(pair: PairState, transfer: Transfer, *, first: bool) -> FloatArray:

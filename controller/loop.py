@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 from ringbalance.controller.algorithm import Command, Controller, Measurement, usable
 from ringbalance.controller.algorithms import controller_of
-from ringbalance.controller.checks import check_ring
+from ringbalance.controller.checks import check_fit
 from ringbalance.controller.closed_form import closed_form, has_closed_form
 from ringbalance.controller.judgement import misadjustments, noise_floor, overshoots, rose, settling_time
-from ringbalance.controller.liquid_ring import Advance, DiscState, LiquidRing, initial_state
+from ringbalance.controller.liquid_ring import Advance, DiscState, LiquidRing, initial_state, longest
 from ringbalance.controller.outcome import Cause, Facts, outcome_of, status_text
 from ringbalance.controller.quadrature import quadrature
 from ringbalance.controller.rotor import chamber_letters, disc_unbalance, vibration
@@ -22,7 +22,8 @@ from ringbalance.controller.sensor import Sensor, noisy_sensor
 from ringbalance.controller.simulation import Injection, Outcome, Sample, Simulation
 from ringbalance.controller.terms import terms
 from ringbalance.controller.transfer import Integrator
-from ringbalance.reduced_model.model import BalancerModel
+from ringbalance.reduced_model.gravity import check_ring
+from ringbalance.reduced_model.model import BalancerModel, CompleteLaw, balancer_model
 from ringbalance.scene.models import Scene
 
 FloatArray = npt.NDArray[np.float64]
@@ -35,13 +36,14 @@ DRIFT_POINTS: Final = 4
 """Instants recorded within a wait during which liquid may run back."""
 MAX_SAMPLES: Final = 100_000
 IDLE_OPERATIONS: Final = 3
-"""Commands in a row, beyond one for each chamber, that may move nothing before the run ends."""
+"""Commands in a row, beyond one for each chamber, whose longest injection may move nothing."""
 
 
 def simulate(
     scene: Scene,
-    model: BalancerModel,
+    model: BalancerModel | None = None,
     *,
+    flow_law: CompleteLaw | None = None,
     controller: Controller[Any] | None = None,
     integrator: Integrator | None = None,
     sensor: Sensor | None = None,
@@ -55,6 +57,7 @@ def simulate(
     Args:
         scene: rotor, sensor, controller settings, gas pressure, seed and time limit.
         model: flow law and moments of the balancer.
+        flow_law: in place of `model`, a law that carries its own moments and volumes.
         controller: the algorithm; default the one that the scene names.
         integrator: how operations are carried through time; default the closed form when the law has one,
             else the quadrature.
@@ -65,16 +68,20 @@ def simulate(
         Simulation; its status says how the run ended and what to do next.
 
     Raises:
-        SceneError: an algorithm that this program does not have, or a rotor too slow to form a ring.
+        SceneError: an algorithm that this program does not have, a rotor too slow to form a ring, or a model
+            made for another disc.
+        ValueError: both a model and a flow law, or neither.
 
     Source: section 5 and Fig. 5 of the liquid-ring paper.
     """
     check_ring(scene)
-    chosen = integrator or (closed_form if has_closed_form(model.flow) else quadrature)
+    balancer = _one_of(model, flow_law)
+    check_fit(scene, balancer)
+    chosen = integrator or (closed_form if has_closed_form(balancer.flow) else quadrature)
     run = _Run(
         scene=scene,
         plant=LiquidRing(
-            model=model,
+            model=balancer,
             chambers=scene.disc.chambers,
             gas_pressure=scene.gas.pressure,
             integrator=chosen,
@@ -86,6 +93,14 @@ def simulate(
     )
     cause = run.go(progress or _silent)
     return _record(run, cause, integrator=getattr(chosen, "__name__", "custom"))
+
+
+def _one_of(model: BalancerModel | None, flow_law: CompleteLaw | None) -> BalancerModel:
+    if model is not None and flow_law is None:
+        return model
+    if flow_law is not None and model is None:
+        return balancer_model(flow_law)
+    raise ValueError("give a model or a flow_law, such as calibrate(scene).flow_law; not both, not neither")
 
 
 def _silent(_: float, __: float) -> None:
@@ -183,9 +198,13 @@ class _Run:
             Injection(time=self.time, chamber=letters[operation.chamber], operation=operation)
             for operation in advance.operations
         ]
-        self.operated = True
-        self.idle = 0 if any(operation.moved for operation in advance.operations) else self.idle + 1
+        before = self._vibration()
         self._pass(advance)
+        change = abs(self._vibration() - before)
+        self.operated = True
+        # Noise keeps opening the other valve a little; what counts is the one that should do the work.
+        working = longest(advance.operations).moved or change > self.scene.controller.limit
+        self.idle = 0 if working else self.idle + 1
 
     def _wait(self) -> None:
         duration = min(self.scene.controller.period, self.remaining)

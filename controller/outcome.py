@@ -19,6 +19,7 @@ MICROMETRE: Final = 1e-6
 GRAM_MILLIMETRE: Final = 1e-6
 CONFIRMING_SAMPLES: Final = 5
 """Samples over which the amplitude must have stayed when something could still change it."""
+MANY_OVERSHOOTS: Final = 2
 NEARLY_EMPTY: Final = 1e-6
 """Fill ratio at which a chamber's last liquid is looked at."""
 
@@ -30,7 +31,7 @@ class Cause(StrEnum):
     """The controller rests, the sensor is exact and no liquid can move: nothing will change."""
     TIME = "time"
     IDLE = "idle"
-    """Several commands in a row moved no liquid."""
+    """Several commands in a row whose longest injection moved no liquid."""
     RISING = "rising"
     """The amplitude rose after more operations in a row than the algorithm can explain."""
     SAMPLES = "samples"
@@ -83,10 +84,9 @@ class Facts:
         return self.samples[-min(CONFIRMING_SAMPLES, len(self.samples))].time
 
     @property
-    def last_events(self) -> frozenset[Event]:
-        """What ended the flows of the last command."""
-        last = self.injections[-1].time if self.injections else None
-        return frozenset(i.operation.event for i in self.injections if i.time == last)
+    def last_command(self) -> tuple[Injection, ...]:
+        """The injections of the last command; empty when there was none."""
+        return tuple(i for i in self.injections if i.time == self.injections[-1].time)
 
 
 def outcome_of(facts: Facts) -> Outcome:
@@ -107,9 +107,14 @@ def outcome_of(facts: Facts) -> Outcome:
         return Outcome.DRIFTING if facts.drift > NOTICEABLE else Outcome.DIVERGING
     if facts.unreachable_amplitude > limit:
         return Outcome.CAPACITY_EXCEEDED
-    if facts.cause is Cause.IDLE:
-        return Outcome.STALLED if Event.BLOCKED in facts.last_events else Outcome.CHAMBER_EMPTY
+    if facts.last_command and not _longest(facts).operation.moved:
+        empty = _longest(facts).operation.event in {Event.EMPTY, Event.FULL}
+        return Outcome.CHAMBER_EMPTY if empty else Outcome.STALLED
     return Outcome.TOO_MANY_SAMPLES if facts.cause is Cause.SAMPLES else _out_of_time(facts)
+
+
+def _longest(facts: Facts) -> Injection:
+    return max(facts.last_command, key=lambda injection: injection.operation.duration)
 
 
 def _out_of_time(facts: Facts) -> Outcome:
@@ -141,9 +146,11 @@ def _um(length: float) -> str:
 
 
 def _settled(facts: Facts) -> str:
+    many = facts.overshoots > MANY_OVERSHOOTS
+    cure = f"{facts.overshoots} overshoots: lower controller.proportional" if many else "nothing to do"
     return (
         f"settled: not above the limit of {_um(facts.scene.controller.limit)} from "
-        f"{facts.settling_time:.4g} s on, {_um(facts.final_amplitude)} at the end; nothing to do"
+        f"{facts.settling_time:.4g} s on, {_um(facts.final_amplitude)} at the end; {cure}"
     )
 
 
@@ -155,7 +162,7 @@ def _not_settled(facts: Facts) -> str:
 
 
 def _time_limit(facts: Facts) -> str:
-    if facts.overshoots > 2:
+    if facts.overshoots > MANY_OVERSHOOTS:
         cure = f"{facts.overshoots} overshoots: lower controller.proportional, or shorten the trial steps"
     else:
         cure = "raise controller.proportional or run.time_limit"
@@ -163,7 +170,7 @@ def _time_limit(facts: Facts) -> str:
 
 
 def _stalled(facts: Facts) -> str:
-    last = next(i for i in reversed(facts.injections) if i.operation.event is Event.BLOCKED)
+    last = _longest(facts)
     fill, law = last.operation.fill_after, facts.plant.model.flow
     total, pressure = facts.state.pairs[0].total, facts.scene.gas.pressure
     lowest = max(0.0, total - law.max_fill_ratio)
@@ -191,11 +198,10 @@ def _capacity(facts: Facts) -> str:
 
 
 def _empty(facts: Facts) -> str:
-    letters = ", ".join(sorted({i.chamber for i in facts.injections if i.time == facts.injections[-1].time}))
     return (
-        f"{_not_settled(facts)}; no liquid is left to drive out of chamber {letters} although the unbalance "
-        "is within the disc's capacity: check rotor.influence_coefficient, the lag angle that the controller "
-        "assumes, and the sense of rotation"
+        f"{_not_settled(facts)}; no liquid can leave chamber {_longest(facts).chamber} although the "
+        "unbalance is within the disc's capacity: check rotor.influence_coefficient, the lag angle that the "
+        "controller assumes, and the sense of rotation"
     )
 
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from ringbalance.controller.algorithm import Command, Measurement
 from ringbalance.controller.liquid_ring import Operation
-from ringbalance.controller.terms import Term
+from ringbalance.reduced_model.ladder import Term
 
 FloatArray = npt.NDArray[np.float64]
 

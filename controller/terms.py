@@ -4,32 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Final
 
+from ringbalance.reduced_model.ladder import LEFT_OUT, Term
 from ringbalance.reduced_model.model import BalancerModel
+from ringbalance.reduced_model.transients import REFERENCE_PRESSURE, REFERENCE_TEMPERATURE
 from ringbalance.scene.models import Scene
 
-REFERENCE_DENSITY: Final = 1.185
-"""Air at the reference atmosphere of ISO 6358, kg/m^3."""
-REFERENCE_TEMPERATURE: Final = 293.15
-"""K."""
 NO_PRESSURE: Final = 1.0
 """Gauge, Pa, below which there is no gas drive to speak of."""
-GAS_CONSTANT: Final = 287.06
-"""Dry air, J/(kg K)."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Term:
-    """One physical term of a closed-loop run."""
-
-    term: str
-    model: str
-    """How it is modelled, or "left out"."""
-    why: str
-    estimated_contribution: float | None
-    """Share of the liquid moved that the term would change; None where the scene gives no basis."""
 
 
 def terms(
@@ -82,28 +65,25 @@ def inertia_time(*, scene: Scene, model: BalancerModel) -> float | None:
 
 
 def filling_time(*, scene: Scene, model: BalancerModel) -> float | None:
-    """Time in which choked flow brings a chamber from ambient to the gas pressure.
-
-    t = (p - p_ambient) V_gas/(R T m') with m' = C p rho0 sqrt(T0/T).
+    """Time in which choked flow fills a chamber at level fills, t = V_gas p/(C p_1 p_0) sqrt(T/T_0).
 
     Args:
         scene: the scene.
         model: the balancer.
 
     Returns:
-        s, at level fills; None when the scene gives no conductance.
+        s; None when the scene gives no conductance.
 
-    Source: ISO 6358 mass flow rate at choked flow, upstream pressure taken as the chamber's final one.
+    Source: ISO 6358-1, volume flow at reference conditions C p_1 sqrt(T_0/T), with the upstream pressure p_1
+        taken as the chamber's final one and p_0 = 100 kPa.
     """
     gas = scene.gas
     if gas.conductance is None:
         return None
     volume = (1 - scene.disc.initial_fill) * model.chamber_volume + (gas.dead_volume or 0.0)
-    absolute = gas.pressure + gas.ambient_pressure
-    mass_flow = (
-        gas.conductance * absolute * REFERENCE_DENSITY * math.sqrt(REFERENCE_TEMPERATURE / gas.temperature)
-    )
-    return gas.pressure * volume / (GAS_CONSTANT * gas.temperature * mass_flow)
+    upstream = gas.pressure + gas.ambient_pressure
+    warm = math.sqrt(REFERENCE_TEMPERATURE / gas.temperature)
+    return volume * gas.pressure * warm / (gas.conductance * upstream * REFERENCE_PRESSURE)
 
 
 def _left_out(term: str, time: float | None, mean: float | None) -> Term:
@@ -114,4 +94,4 @@ def _left_out(term: str, time: float | None, mean: float | None) -> Term:
     else:
         why = f"costs about {time * 1e3:.3g} ms of an operation of {mean * 1e3:.3g} ms on average"
     share = None if time is None or mean is None else time / mean
-    return Term(term=term, model="left out", why=why, estimated_contribution=share)
+    return Term(term=term, model=LEFT_OUT, why=why, estimated_contribution=share)

@@ -9,16 +9,26 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from ringbalance.face import simulate as simulate
+    from ringbalance.reduced_model import calibrate as calibrate
+    from ringbalance.reduced_model import load_law as load_law
+    from ringbalance.reduced_model import paper_law as paper_law
     from ringbalance.scene import SceneError as SceneError
     from ringbalance.scene import bundled_scene as bundled_scene
     from ringbalance.scene import load_scene as load_scene
+    from ringbalance.verification.runner import run_cases as run_cases
 
 __version__ = "0.1.0"
 
 _HOME = {
     "SceneError": "ringbalance.scene",
     "bundled_scene": "ringbalance.scene",
+    "calibrate": "ringbalance.reduced_model",
+    "load_law": "ringbalance.reduced_model",
     "load_scene": "ringbalance.scene",
+    "paper_law": "ringbalance.reduced_model",
+    "run_cases": "ringbalance.verification.runner",
+    "simulate": "ringbalance.face",
 }
 
 

@@ -1,0 +1,26 @@
+"""What a Python user calls, where it takes more than one room."""
+
+from __future__ import annotations
+
+from ringbalance.controller import Simulation
+from ringbalance.controller import simulate as run_closed_loop
+from ringbalance.reduced_model import CompleteLaw, balancer_model, calibrate
+from ringbalance.scene import Scene
+
+
+def simulate(scene: Scene, *, flow_law: CompleteLaw | None = None) -> Simulation:
+    """One closed-loop run of a scene's rotor under a flow law.
+
+    Args:
+        scene: the scene.
+        flow_law: the law, from `calibrate(scene).flow_law`, `paper_law(scene)` or `load_law(path)`;
+            default the calibrated law of the scene.
+
+    Returns:
+        Simulation.
+
+    Raises:
+        SceneError: a rotor too slow for the liquid to form a ring.
+    """
+    law = calibrate(scene).flow_law if flow_law is None else flow_law
+    return run_closed_loop(scene, balancer_model(law))

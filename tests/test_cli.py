@@ -1,0 +1,197 @@
+"""The command line end to end: exit codes, one clear message, clean JSON, nothing half-written."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from ringbalance import cli
+from ringbalance.scene import Fault, SceneError, bundled_scene
+
+PAPER = str(bundled_scene("liquid_ring_paper"))
+LAUNCH = [sys.executable, "-c", "import sys; from ringbalance.cli import main; sys.exit(main())"]
+
+
+def run(*words: str | Path) -> subprocess.CompletedProcess[str]:
+    """One command line in a process of its own."""
+    return subprocess.run(
+        [*LAUNCH, *map(str, words)], capture_output=True, text=True, check=False, timeout=120
+    )
+
+
+def assert_bad_input(found: subprocess.CompletedProcess[str], *told: str) -> None:
+    """Exit code 2, nothing on standard output, no traceback, and the words that tell what is wrong."""
+    assert found.returncode == 2
+    assert found.stdout == ""
+    assert "Traceback" not in found.stderr
+    for word in told:
+        assert word in found.stderr
+
+
+@pytest.fixture
+def broken_scene(tmp_path: Path) -> Path:
+    """The paper's scene with three faults in it."""
+    text = Path(PAPER).read_text()
+    for old, new in [
+        ("outer_radius", "outer_radiuss"),
+        ('"10000 rpm"', '"10000 furlongs"'),
+        ("chambers = 4", "chambers = 3"),
+    ]:
+        assert old in text
+        text = text.replace(old, new, 1)
+    path = tmp_path / "broken.toml"
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["reprt"], ["reprt", '"report"']),
+        (["calibrate", PAPER, "--jsn"], ["--jsn", "--json"]),
+        (["calibrate"], ["scene"]),
+        (["verify", "--level", "extreme"], ["extreme", "light", "heavy"]),
+        (["verify", "no_such_case"], ["no_such_case"]),
+        (["simulate", PAPER, "--law", "no_such_law.json"], ["no_such_law.json"]),
+        (["calibrate", "no_such_scene.toml"], ["no_such_scene.toml"]),
+    ],
+)
+def test_wrong_usage(words: list[str], told: list[str]) -> None:
+    assert_bad_input(run(*words), *told)
+
+
+@pytest.mark.parametrize("command", ["calibrate", "simulate", "report", "plot"])
+def test_a_broken_scene_is_told_in_one_message(command: str, broken_scene: Path, tmp_path: Path) -> None:
+    more = ["--out", tmp_path / "out"] if command in {"report", "plot"} else []
+    found = run(command, broken_scene, *more)
+    assert_bad_input(found, "broken.toml", "outer_radiuss", "outer_radius", "furlongs", "chambers = 3")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("command", ["calibrate", "simulate"])
+def test_json_is_one_clean_document(command: str) -> None:
+    found = run(command, PAPER, "--json")
+    assert found.returncode in {0, 1}, found.stderr
+    document = json.loads(found.stdout)
+    assert isinstance(document, dict)
+    assert "NaN" not in found.stdout
+    assert "Warning" not in found.stderr
+
+
+def test_the_list_of_cases_is_clean_json() -> None:
+    found = run("verify", "--list", "--json")
+    assert found.returncode == 0
+    assert {"id", "kind"} <= set(json.loads(found.stdout)[0])
+
+
+def test_a_saved_law_gives_the_same_run(tmp_path: Path) -> None:
+    assert run("calibrate", PAPER, "--save", tmp_path / "law.json").returncode == 0
+    fresh, saved = (
+        run("simulate", PAPER, "--json"),
+        run("simulate", PAPER, "--law", tmp_path / "law.json", "--json"),
+    )
+    assert json.loads(fresh.stdout)["amplitude_m"] == json.loads(saved.stdout)["amplitude_m"]
+
+
+@pytest.mark.parametrize("words", [["calibrate", PAPER, "--save"], ["plot", PAPER, "--out"]])
+def test_a_file_where_a_folder_should_be(words: list[str], tmp_path: Path) -> None:
+    (tmp_path / "in_the_way").touch()
+    found = run(*words, tmp_path / "in_the_way" / "law.json")
+    assert found.returncode == 2
+    assert "Traceback" not in found.stderr
+    assert "in_the_way" in found.stderr
+
+
+@pytest.mark.parametrize("delay", [0.2, 5.0])
+def test_an_interrupted_report_leaves_nothing_half_written(tmp_path: Path, delay: float) -> None:
+    """Interrupted while modules are loaded, and in the middle of the work."""
+    ready = "import sys; from ringbalance.cli import main; print('ready', flush=True); sys.exit(main())"
+    command = [sys.executable, "-c", ready, "report", PAPER, "--out", str(tmp_path / "out")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as child:
+        assert child.stdout is not None
+        child.stdout.readline()
+        time.sleep(delay)
+        assert child.poll() is None
+        child.send_signal(signal.SIGINT)
+        _, told = child.communicate(timeout=60)
+    assert child.returncode == 130
+    assert "Traceback" not in told
+    assert not (tmp_path / "out" / "report.html").exists()
+    assert [path for path in tmp_path.rglob(".*") if path.is_file()] == []
+
+
+def test_a_reader_that_goes_away_is_no_error() -> None:
+    command = [*LAUNCH, "verify", "--list", "--json"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as child:
+        assert child.stdout is not None
+        assert child.stderr is not None
+        child.stdout.close()
+        assert child.stderr.read() == b""
+    assert child.returncode == 141
+
+
+@pytest.fixture
+def command(monkeypatch: pytest.MonkeyPatch) -> Callable[[BaseException | int], int]:
+    """Runs a command that gives back a number or raises."""
+
+    def run_it(outcome: BaseException | int) -> int:
+        def act() -> int:
+            if isinstance(outcome, BaseException):
+                raise outcome
+            return outcome
+
+        module = ModuleType("acting_command")
+        module.act = act  # type: ignore[attr-defined]
+        monkeypatch.setitem(sys.modules, "acting_command", module)
+        monkeypatch.setattr(cli, "COMMANDS", {"act": ("acting_command:act", "acts")})
+        return cli.main(["act"])
+
+    return run_it
+
+
+def fault(key: str) -> Fault:
+    return Fault(
+        file="a.toml", table="disc", key=key, value='"1 mm"', problem="too small", allowed="above 2 mm"
+    )
+
+
+@pytest.mark.parametrize("code", [0, 1])
+def test_a_command_s_exit_code_is_passed_on(command: Callable[[BaseException | int], int], code: int) -> None:
+    assert command(code) == code
+
+
+def test_every_fault_stands_on_its_line(
+    command: Callable[[BaseException | int], int], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert command(SceneError((fault("bore"), fault("length")))) == 2
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert len(told.err.strip().splitlines()) == 2
+
+
+def test_an_interrupt_gives_130(command: Callable[[BaseException | int], int]) -> None:
+    assert command(KeyboardInterrupt()) == 130
+
+
+def test_an_unwritable_file_is_bad_input(
+    command: Callable[[BaseException | int], int], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert command(PermissionError(13, "Permission denied", "law.json")) == 2
+    assert "law.json" in capsys.readouterr().err
+
+
+def test_a_fault_of_the_program_is_not_hidden(command: Callable[[BaseException | int], int]) -> None:
+    with pytest.raises(ZeroDivisionError):
+        command(ZeroDivisionError())
+
+
+def test_version_is_told() -> None:
+    assert run("--version").stdout.strip() == "0.1.0"

@@ -1,0 +1,50 @@
+"""The names that a Python user types, as the documentation promises them."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ringbalance as rb
+from ringbalance.scene.models import Scene
+
+
+def promised_for_type_checkers() -> dict[str, str]:
+    """Name to module, as `ringbalance/__init__.py` tells type checkers."""
+    tree = ast.parse(Path(rb.__file__).read_text())
+    blocks = [node for node in tree.body if isinstance(node, ast.If)]
+    imports = [node for block in blocks for node in block.body if isinstance(node, ast.ImportFrom)]
+    return {alias.name: node.module or "" for node in imports for alias in node.names}
+
+
+def test_type_checkers_are_told_what_is_loaded() -> None:
+    assert promised_for_type_checkers() == rb._HOME
+
+
+@pytest.mark.parametrize("name", sorted(rb._HOME))
+def test_every_name_is_there(name: str) -> None:
+    assert callable(getattr(rb, name))
+    assert name in dir(rb)
+
+
+def test_an_unknown_name_is_refused() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'calibrat'"):
+        _ = rb.calibrat
+
+
+def test_a_saved_law_runs_as_the_fresh_one(paper_scene: Scene, tmp_path: Path) -> None:
+    """What the README shows: calibrate, evaluate, save, load, simulate."""
+    scene = dataclasses.replace(paper_scene, run=dataclasses.replace(paper_scene.run, time_limit=5.0))
+    law = rb.calibrate(scene).flow_law
+    flow = law.evaluate(fill_ratio=[0.1, 0.25], gas_pressure=0.7e6)
+    assert flow.velocity.shape == (2,)
+    law.save(tmp_path / "law.json")
+    fresh = rb.simulate(scene, flow_law=law)
+    for run in (rb.simulate(scene), rb.simulate(scene, flow_law=rb.load_law(tmp_path / "law.json"))):
+        np.testing.assert_array_equal(run.amplitude, fresh.amplitude)
+    paper = rb.simulate(scene, flow_law=rb.paper_law(scene))
+    assert not np.array_equal(paper.amplitude, fresh.amplitude)

@@ -89,7 +89,9 @@ def _run_guarded(arguments: Sequence[str] | None) -> int:
     except ringbalance.SceneError as error:
         _say(str(error))
     except OSError as error:
-        _say(f"ringbalance: {error}")
+        _say(
+            f"ringbalance: {error.filename}: {error.strerror}" if error.filename else f"ringbalance: {error}"
+        )
     return BAD_INPUT
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from scipy.integrate import solve_ivp
 
@@ -53,26 +55,7 @@ def _solve(drive: Drive, t: FloatArray, tolerance: float) -> Transfer:
         event = boundary_event(drive, end) if drive.fill == end else Event.NONE
         return _unmoved(drive, t, regime, event)
 
-    def slope(_: float, x: FloatArray) -> FloatArray:
-        return np.asarray(-drive.exchange_rate * drive.flow(x).velocity, dtype=np.float64)
-
-    def at_end(_: float, x: FloatArray) -> float:
-        return float(x[0] - end)
-
-    def at_stall(_: float, x: FloatArray) -> float:
-        return float(drive.flow(x[0]).velocity / u0 - tolerance**0.5)
-
-    at_end.terminal = at_stall.terminal = True  # type: ignore[attr-defined]
-    solved = solve_ivp(
-        slope,
-        (0.0, float(t[-1])),
-        [drive.fill],
-        method="DOP853",
-        rtol=max(tolerance, 1e-13),
-        atol=tolerance * 1e-2,
-        dense_output=True,
-        events=(at_end, at_stall),
-    )
+    solved = _march(drive, u0, end, float(t[-1]), tolerance)
     last = float(solved.t[-1])
     event = _event(drive, end, [bool(times.size) for times in solved.t_events], finished_=solved.status >= 0)
     fill = np.asarray(solved.sol(np.minimum(t, last))[0], dtype=np.float64)
@@ -86,6 +69,29 @@ def _solve(drive: Drive, t: FloatArray, tolerance: float) -> Transfer:
         event=event,
         event_time=None if event is Event.NONE else last,
         evaluations=int(solved.nfev) + 1,
+    )
+
+
+def _march(drive: Drive, u0: float, end: float, duration: float, tolerance: float) -> Any:
+    def slope(_: float, x: FloatArray) -> FloatArray:
+        return np.asarray(-drive.exchange_rate * drive.flow(x).velocity, dtype=np.float64)
+
+    def at_end(_: float, x: FloatArray) -> float:
+        return float(x[0] - end)
+
+    def at_stall(_: float, x: FloatArray) -> float:
+        return float(drive.flow(x[0]).velocity / u0 - tolerance**0.5)
+
+    at_end.terminal = at_stall.terminal = True  # type: ignore[attr-defined]
+    return solve_ivp(
+        slope,
+        (0.0, duration),
+        [drive.fill],
+        method="DOP853",
+        rtol=max(tolerance, 1e-13),
+        atol=tolerance * 1e-2,
+        dense_output=True,
+        events=(at_end, at_stall),
     )
 
 

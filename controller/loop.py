@@ -231,8 +231,35 @@ def _record(run: _Run, cause: Cause, *, integrator: str) -> Simulation:
     time, fills = np.concatenate(run.times), np.concatenate(run.fills, axis=1)
     moment = disc_unbalance(moment=run.plant.model.moment, fill_ratio=fills)
     seen = vibration(rotor=run.scene.rotor, moment=moment)
-    amplitude, limit = np.abs(seen), run.scene.controller.limit
-    facts = Facts(
+    facts = _facts(run, cause, time, np.abs(seen))
+    outcome = outcome_of(facts)
+    settled = outcome is Outcome.SETTLED
+    gas_times = [injection.operation.duration for injection in run.injections]
+    return Simulation(
+        balancer="liquid_ring",
+        law=run.plant.model.name,
+        integrator=integrator,
+        outcome=outcome,
+        settled=settled,
+        settling_time=facts.settling_time if settled else None,
+        status=status_text(facts, outcome),
+        time=time,
+        amplitude=np.abs(seen),
+        phase=np.angle(seen),
+        fill_ratio=dict(zip(chamber_letters(run.plant.chambers), fills, strict=True)),
+        injections=facts.injections,
+        samples=facts.samples,
+        overshoots=facts.overshoots,
+        misadjustments=misadjustments(run.samples, floor=run.floor),
+        noise_floor=run.floor,
+        limit=run.scene.controller.limit,
+        terms=terms(scene=run.scene, model=run.plant.model, integrator=integrator, gas_times=gas_times),
+    )
+
+
+def _facts(run: _Run, cause: Cause, time: FloatArray, amplitude: FloatArray) -> Facts:
+    limit = run.scene.controller.limit
+    return Facts(
         scene=run.scene,
         plant=run.plant,
         state=run.state,
@@ -246,31 +273,4 @@ def _record(run: _Run, cause: Cause, *, integrator: str) -> Simulation:
         overshoots=overshoots(run.samples, limit=limit),
         samples=tuple(run.samples),
         injections=tuple(run.injections),
-    )
-    outcome = outcome_of(facts)
-    settled = outcome is Outcome.SETTLED
-    return Simulation(
-        balancer="liquid_ring",
-        law=run.plant.model.name,
-        integrator=integrator,
-        outcome=outcome,
-        settled=settled,
-        settling_time=facts.settling_time if settled else None,
-        status=status_text(facts, outcome),
-        time=time,
-        amplitude=amplitude,
-        phase=np.angle(seen),
-        fill_ratio=dict(zip(chamber_letters(run.plant.chambers), fills, strict=True)),
-        injections=facts.injections,
-        samples=facts.samples,
-        overshoots=facts.overshoots,
-        misadjustments=misadjustments(run.samples, floor=run.floor),
-        noise_floor=run.floor,
-        limit=limit,
-        terms=terms(
-            scene=run.scene,
-            model=run.plant.model,
-            integrator=integrator,
-            gas_times=[injection.operation.duration for injection in run.injections],
-        ),
     )

@@ -15,6 +15,7 @@ from ringbalance.physics.results import Estimate, Statistics, Status
 from ringbalance.physics.ring import RingQuantities, ring_quantities
 from ringbalance.reduced_model.chamber_inputs import InputEffect, chamber_closed_forms, input_effects
 from ringbalance.reduced_model.gravity import SAFETY, GravityEffect, closed_ring, gravity_effect
+from ringbalance.reduced_model.gravity_open import open_ring_effect
 from ringbalance.reduced_model.hermite import HermiteTable
 from ringbalance.reduced_model.hermite_fit import table_from_samples
 from ringbalance.scene.models import Scene
@@ -91,7 +92,7 @@ class ChamberCalibration:
     input_effects: Mapping[str, InputEffect]
     """Effect of each uncertain input."""
     gravity: GravityEffect
-    """Second-order estimate along `fill_ratio`."""
+    """A-priori estimate along `fill_ratio`."""
     gravity_share: float
     """Its largest share of wall pressure or moment at equal fills."""
     gravity_modelled: bool
@@ -145,7 +146,6 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
     )
     effects = input_effects(scene=scene, fill_ratio=fills)
     scale = 0.0 if modelled else SAFETY
-    open_ring = ~_closed(scene, fills) & (not modelled)
     pressure, moment = (scale * np.abs(e) for e in (effect.wall_pressure, effect.moment))
     pressures = [e.wall_pressure for e in effects.values()]
     moments = [e.moment for e in effects.values()]
@@ -155,8 +155,8 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
         ring=ring,
         reported_fill_ratio=reported,
         reported=tuple(int(np.argmin(np.abs(fills - x))) for x in reported),
-        wall_pressure=_curve(nodes, ring.wall_pressure, pressure, open_ring, pressures),
-        moment=_curve(nodes, ring.moment, moment, open_ring, moments),
+        wall_pressure=_curve(nodes, ring.wall_pressure, pressure, pressures),
+        moment=_curve(nodes, ring.moment, moment, moments),
         moment_per_mass=_central(scene, nodes, ring.moment_per_volume, scale * effect.moment),
         moment_per_mass_inputs=math.hypot(*(e.moment_per_mass for e in effects.values())),
         input_effects=effects,
@@ -172,7 +172,6 @@ def _curve(
     nodes: FloatArray,
     estimate: Estimate,
     gravity: FloatArray,
-    open_ring: npt.NDArray[np.bool_],
     inputs: list[FloatArray],
 ) -> Curve:
     value, n = estimate.value, nodes.size
@@ -183,7 +182,7 @@ def _curve(
     return Curve(
         value=value,
         numerical=estimate.uncertainty + ROUND_OFF * np.abs(value),
-        left_out=gravity + np.where(open_ring, np.abs(value), 0.0),
+        left_out=gravity,
         inputs=np.sqrt(sum((i**2 for i in inputs), start=np.zeros_like(value))),
         table=table,
         interpolation=missed / 2,
@@ -203,24 +202,33 @@ def _central(scene: Scene, nodes: FloatArray, slope: Estimate, gravity: FloatArr
 
 
 def _gravity(scene: Scene, fills: FloatArray) -> GravityEffect:
-    return gravity_effect(
-        disc=scene.disc,
+    """Second-order effect; by quadrature where the ring is open."""
+    disc, speed, gravity = scene.disc, scene.rotor.speed, scene.environment.gravity
+    vertical = scene.environment.shaft == "vertical"
+    effect = gravity_effect(
+        disc=disc,
         density=scene.liquid.density,
-        angular_velocity=scene.rotor.speed,
-        gravity=scene.environment.gravity,
-        vertical=scene.environment.shaft == "vertical",
+        angular_velocity=speed,
+        gravity=gravity,
+        vertical=vertical,
         fill_ratio=fills,
     )
-
-
-def _closed(scene: Scene, fills: FloatArray) -> npt.NDArray[np.bool_]:
-    return closed_ring(
-        disc=scene.disc,
-        angular_velocity=scene.rotor.speed,
-        gravity=scene.environment.gravity,
-        vertical=scene.environment.shaft == "vertical",
-        fill_ratio=fills,
+    is_open = ~closed_ring(
+        disc=disc, angular_velocity=speed, gravity=gravity, vertical=vertical, fill_ratio=fills
     )
+    if not np.any(is_open):
+        return effect
+    opened = open_ring_effect(
+        disc=disc,
+        density=scene.liquid.density,
+        angular_velocity=speed,
+        gravity=gravity,
+        vertical=vertical,
+        fill_ratio=fills[is_open],
+    )
+    pressure, moment = effect.wall_pressure.copy(), effect.moment.copy()
+    pressure[is_open], moment[is_open] = opened.wall_pressure, opened.moment
+    return GravityEffect(wall_pressure=pressure, moment=moment)
 
 
 def gravity_share(scene: Scene) -> float:

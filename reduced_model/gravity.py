@@ -16,8 +16,8 @@ from ringbalance.scene.models import Disc, Scene
 
 FloatArray = npt.NDArray[np.float64]
 
-SAFETY: Final = 1.25
-"""Factor on the second-order estimates, for the orders above and the plates' shape."""
+SAFETY: Final = 1.5
+"""Factor on the estimates, for the orders above and the plates' shape."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,6 +10,7 @@ import pytest
 
 from ringbalance.physics.ring import ring_quantities
 from ringbalance.reduced_model.gravity import check_ring, closed_ring, gravity_effect, gravity_ratio
+from ringbalance.reduced_model.gravity_open import open_ring_effect
 from ringbalance.scene import SceneError
 from ringbalance.scene.models import Scene, Shaft
 
@@ -63,3 +64,30 @@ def test_a_thin_ring_opens_first(table_1_scene: Scene) -> None:
     )
     assert list(closed) == [True, False, True]
     assert math.isclose(9.80665 / 60**2, 2.724e-3, rel_tol=1e-3)
+
+
+@pytest.mark.parametrize("vertical", [False, True])
+def test_two_derivations_of_the_effect_agree_on_closed_rings(table_1_scene: Scene, vertical: bool) -> None:
+    bare = dataclasses.replace(table_1_scene.disc, plate_thickness=0.0)
+    common = {"disc": bare, "density": 1000.0, "gravity": 9.81, "vertical": vertical}
+    fills = np.array([0.1, 0.25, 0.5])
+    expansion, quadrature = (
+        effect(**common, angular_velocity=200.0, fill_ratio=fills)  # type: ignore[operator]
+        for effect in (gravity_effect, open_ring_effect)
+    )
+    np.testing.assert_allclose(quadrature.moment, expansion.moment, rtol=2e-3)
+    np.testing.assert_allclose(quadrature.wall_pressure, expansion.wall_pressure, rtol=2e-3, atol=1e-9)
+
+
+def test_an_open_ring_loses_less_than_the_expansion_says(table_1_scene: Scene) -> None:
+    bare = dataclasses.replace(table_1_scene.disc, plate_thickness=0.0)
+    common = {"disc": bare, "density": 1000.0, "gravity": 9.81, "vertical": False, "angular_velocity": 50.0}
+    fills = np.array([0.0, 0.005, 0.02])
+    expansion, quadrature = (
+        effect(**common, fill_ratio=fills)  # type: ignore[operator]
+        for effect in (gravity_effect, open_ring_effect)
+    )
+    assert quadrature.wall_pressure[0] == pytest.approx(0.0, abs=1e-9)
+    assert np.all(quadrature.wall_pressure[1:] < expansion.wall_pressure[1:])
+    whole = 1000.0 * 50.0**2 * (0.0445**2 - 0.0442**2) / 2
+    assert abs(quadrature.wall_pressure[1]) < whole

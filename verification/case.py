@@ -64,8 +64,8 @@ class Mutation(_Record):
     id: Identifier
     what: Text
     expect: Verdict
-    scene: Mapping[str, float | None] = Field(default_factory=dict)
-    """Overrides of scene quantities in SI, such as "disc.plate_thickness" = 0.0."""
+    scene: Mapping[str, float | Literal["absent"]] = Field(default_factory=dict)
+    """Overrides of scene quantities in SI, such as "disc.plate_thickness" = 0.0; "absent" takes one away."""
     cost: Literal["light", "heavy"] = "light"
 
 

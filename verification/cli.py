@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from json import dumps
 from pathlib import Path
 from typing import Final
 
 from rich.console import Console
+from rich.padding import Padding
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Table
 from rich.text import Text
@@ -15,7 +17,7 @@ from rich.text import Text
 from ringbalance.scene import load_scene
 from ringbalance.verification.case import CaseDefinition
 from ringbalance.verification.catalogue import UnknownCaseError, load_case, load_cases
-from ringbalance.verification.document import results_document
+from ringbalance.verification.document import comparison_half_width, definition_document, results_document
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.result import CaseResult, QuantityResult
 from ringbalance.verification.runner import paper_scene, run_cases
@@ -85,7 +87,7 @@ def verify(
     if json:
         print(dumps(results_document(results), allow_nan=False))
     else:
-        _print_results(results, mutations=mutations)
+        _print_results(results)
     return exit_code(results)
 
 
@@ -112,23 +114,14 @@ def _bar(console: Console) -> Progress:
 
 def _print_list(definitions: Sequence[CaseDefinition], *, json: bool) -> None:
     if json:
-        listed = [
-            {
-                "id": d.id,
-                "kind": d.kind,
-                "number": d.number,
-                "title": d.title,
-                "cost": d.cost,
-                "claim": d.claim,
-                "mutations": [mutation.id for mutation in d.must_fail],
-            }
-            for d in definitions
-        ]
-        print(dumps(listed, allow_nan=False))
+        print(dumps([definition_document(d) for d in definitions], allow_nan=False))
         return
-    table = Table("case", "kind", "cost", "what is claimed or required")
+    table = Table(box=None, header_style="dim", padding=(0, 1))
+    table.add_column("case", no_wrap=True)
+    for header in ("kind", "cost", "title"):
+        table.add_column(header)
     for d in definitions:
-        table.add_row(d.id, d.kind.replace("_", " ") + _numbered(d), d.cost, d.claim)
+        table.add_row(d.id, d.kind.replace("_", " ") + _numbered(d), d.cost, d.title)
     Console().print(table)
 
 
@@ -136,51 +129,65 @@ def _numbered(definition: CaseDefinition) -> str:
     return "" if definition.number is None else f" {definition.number}"
 
 
-def _print_results(results: Sequence[CaseResult], *, mutations: bool) -> None:
+def _print_results(results: Sequence[CaseResult]) -> None:
     console = Console()
-    table = Table("case", "quantity", "found", "reference or limit", "95 % ±", "verdict")
     for result in results:
-        name = f"{result.definition.id}\n[dim]{result.definition.kind.replace('_', ' ')}[/]"
-        table.add_row(name, result.definition.title, "", "", "", _styled(result), end_section=False)
-        for quantity in result.quantities:
-            table.add_row("", *_quantity_row(quantity))
-        table.add_section()
+        _print_case(console, result)
+    counts = Counter(result.verdict for result in results)
+    words = [
+        Text(f"{counts[verdict]} {verdict}", style=_STYLES[verdict]) for verdict in Verdict if counts[verdict]
+    ]
+    console.print(Text(", ").join(words))
+
+
+def _print_case(console: Console, result: CaseResult) -> None:
+    definition = result.definition
+    kind = definition.kind.replace("_", " ") + _numbered(definition)
+    heading = Text.assemble((definition.id, "bold"), (f"  {kind}  ", "dim"), _styled(result))
+    console.print(heading, soft_wrap=True)
+    console.print(_indented(definition.claim))
+    if result.evidence is None:
+        console.print(_indented(result.status, style="dim"), "")
+        return
+    table = Table(box=None, header_style="dim", padding=(0, 1, 0, 2))
+    for header in ("quantity", "found", "reference or limit", "95 % ±", "verdict"):
+        table.add_column(header, justify="left" if header in ("quantity", "verdict") else "right")
+    for quantity in result.quantities:
+        table.add_row(*_quantity_row(quantity))
     console.print(table)
-    for result in results:
-        _print_remarks(console, result, mutations=mutations)
+    for remark in _remarks(result):
+        console.print(remark)
+    console.print()
 
 
 def _styled(result: CaseResult) -> Text:
     if result.broken:
-        return Text(f"{result.verdict}, BROKEN", style="bold red")
+        return Text(f"{result.verdict}, BROKEN: a defect was not caught", style="bold red")
     return Text(result.verdict, style=_STYLES[result.verdict])
 
 
 def _quantity_row(result: QuantityResult) -> tuple[str | Text, ...]:
-    quantity, found, comparison = result.quantity, result.found, result.comparison
+    quantity, found = result.quantity, result.found
     verdict = Text(result.verdict, style=_STYLES[result.verdict])
-    title = f"{quantity.title} [{quantity.unit}]" if quantity.unit != "1" else quantity.title
-    if found is None or comparison is None:
-        return Text(title), "", "", "", verdict
-    against = {"at_most": f"≤ {quantity.limit:.4g}", "at_least": f"≥ {quantity.limit:.4g}"}
+    title = Text(quantity.title if quantity.unit == "1" else f"{quantity.title} [{quantity.unit}]")
+    if found is None:
+        return title, "", "", "", verdict
+    bound = {"at_most": f"≤ {quantity.limit:.4g}", "at_least": f"≥ {quantity.limit:.4g}"}
     reference = "" if result.reference is None else f"{result.reference.value:.6g}"
-    return (
-        Text(title),
-        f"{found.value:.6g}",
-        against.get(quantity.metric, reference),
-        f"{comparison.half_width:.2g}",
-        verdict,
-    )
+    half_width = comparison_half_width(result)
+    shown = f"{half_width:.2g}" if half_width else ""
+    return title, f"{found.value:.6g}", bound.get(quantity.metric, reference), shown, verdict
 
 
-def _print_remarks(console: Console, result: CaseResult, *, mutations: bool) -> None:
+def _remarks(result: CaseResult) -> Iterator[Padding]:
     definition = result.definition
-    if definition.kind == "claim" and result.evidence is not None:
-        sentence = result.filled(definition.consequence_of(result.verdict))
-        console.print(Text.assemble((f"{definition.title}: ", "bold"), (f"{result.verdict}. "), sentence))
-    if result.evidence is None:
-        console.print(Text.assemble((f"{definition.title}: ", "bold"), f"{result.verdict}. ", result.status))
-    for mutation in result.mutations if mutations else ():
-        word = "caught" if mutation.caught else "NOT CAUGHT: the case is broken"
-        style = "green" if mutation.caught else "bold red"
-        console.print(Text(f"  {definition.id}: {mutation.what}: {mutation.verdict}, {word}", style=style))
+    if definition.kind == "claim":
+        yield _indented(result.filled(definition.consequence_of(result.verdict)), style="italic")
+    for mutation in result.mutations:
+        word = "caught" if mutation.caught else f"NOT CAUGHT (must come out {mutation.expect})"
+        text = f"with a defect, {mutation.what}: {mutation.verdict}, {word}"
+        yield _indented(text, style="green" if mutation.caught else "bold red")
+
+
+def _indented(text: str, *, style: str = "") -> Padding:
+    return Padding(Text(text, style=style), (0, 0, 0, 2))

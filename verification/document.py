@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ringbalance.verification.case import NEEDS_REFERENCE, CaseDefinition
 from ringbalance.verification.comparison import COVERAGE_FACTOR
 from ringbalance.verification.evidence import Axis, Convergence, Curve, Evidence, Series, Table
 from ringbalance.verification.result import CaseResult, MutationResult, QuantityResult
@@ -65,6 +66,43 @@ def case_document(result: CaseResult) -> Document:
     }
 
 
+def definition_document(definition: CaseDefinition) -> Document:
+    """What a list of cases says of one of them.
+
+    Args:
+        definition: of the case.
+
+    Returns:
+        id, kind, number, title, claim, cost and the ids of its mutations.
+    """
+    return {
+        "id": definition.id,
+        "kind": definition.kind,
+        "number": definition.number,
+        "title": definition.title,
+        "claim": definition.claim,
+        "cost": definition.cost,
+        "mutations": [mutation.id for mutation in definition.must_fail],
+    }
+
+
+def comparison_half_width(result: QuantityResult) -> float | None:
+    """95 % half-width of the comparison that decided a quantity.
+
+    Args:
+        result: of the quantity.
+
+    Returns:
+        2 u_val; zero where nothing uncertain entered; None where the case was not run.
+    """
+    found, comparison = result.found, result.comparison
+    if found is None or comparison is None:
+        return None
+    certain = found.numerical == 0 and found.input == 0
+    judged_alone = result.quantity.metric not in NEEDS_REFERENCE
+    return 0.0 if certain and judged_alone else comparison.half_width
+
+
 def _consequence(result: CaseResult) -> str:
     if result.verdict is Verdict.NOT_RUN:
         return ""
@@ -72,12 +110,7 @@ def _consequence(result: CaseResult) -> str:
 
 
 def _quantity(result: QuantityResult) -> Document:
-    quantity, found, reference, comparison = (
-        result.quantity,
-        result.found,
-        result.reference,
-        result.comparison,
-    )
+    quantity, found, reference = result.quantity, result.found, result.reference
     return {
         "name": quantity.name,
         "title": quantity.title,
@@ -86,7 +119,7 @@ def _quantity(result: QuantityResult) -> Document:
         "value": None if found is None else found.value,
         "reference": None if reference is None else reference.value,
         "error": None if reference is None or found is None else found.value - reference.value,
-        "uncertainty": None if comparison is None else comparison.half_width,
+        "uncertainty": comparison_half_width(result),
         "value_uncertainty": (
             None if found is None else COVERAGE_FACTOR * float(np.hypot(found.numerical, found.input))
         ),

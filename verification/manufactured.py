@@ -211,7 +211,5 @@ def _exact_wall_integral(disc: Disc, exact: Manufactured, *, dimension: int) -> 
     if dimension == 2:
         return float(area @ exact.pressure(np.stack([arc.real, arc.imag])))
     axial = disc.axial_width / 2 * abscissa
-    places = np.stack(
-        np.broadcast_arrays(arc.real[:, None], arc.imag[:, None], axial[None, :])  # type: ignore[arg-type]
-    )
+    places = np.stack(np.broadcast_arrays(arc.real[:, None], arc.imag[:, None], axial[None, :]))
     return float(area @ exact.pressure(places) @ (disc.axial_width / 2 * weight))

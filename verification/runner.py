@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import lru_cache, partial
 from multiprocessing import get_context
+from typing import Literal
 
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.models import Scene
@@ -129,12 +130,12 @@ def _mutation(definition: CaseDefinition, defect: str) -> Mutation:
     return found[0]
 
 
-def overridden(scene: Scene, overrides: Mapping[str, float | None]) -> Scene:
+def overridden(scene: Scene, overrides: Mapping[str, float | Literal["absent"]]) -> Scene:
     """A scene with some of its quantities changed.
 
     Args:
         scene: the scene.
-        overrides: SI values by "table.quantity", such as "disc.plate_thickness".
+        overrides: SI values by "table.quantity", such as "disc.plate_thickness"; "absent" for None.
 
     Returns:
         The changed scene.
@@ -146,7 +147,7 @@ def overridden(scene: Scene, overrides: Mapping[str, float | None]) -> Scene:
         table, _, key = path.partition(".")
         if not hasattr(getattr(scene, table, None), key):
             raise ValueError(f'a scene has no quantity "{path}"')
-        part = dataclasses.replace(getattr(scene, table), **{key: value})
+        part = dataclasses.replace(getattr(scene, table), **{key: None if value == "absent" else value})
         scene = dataclasses.replace(scene, **{table: part})
     return scene
 

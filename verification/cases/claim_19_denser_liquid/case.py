@@ -3,6 +3,7 @@
 # ruff: noqa: ARG001 - every case answers to one interface
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -43,7 +44,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     felt = light if defect == "weightless" else dense
     stalls = [_stall_by_elements(scene, density) for density in (light, felt)]
     ratio = stalls[1].value / stalls[0].value
-    spread = ratio * float(np.hypot(*(stall.numerical / stall.value for stall in stalls)))
+    spread = ratio * math.hypot(*(stall.numerical / stall.value for stall in stalls))
     reach_light, reach_dense = (_reach(scene, density, scene.gas.pressure) for density in (light, felt))
     gain = _ability(scene, dense, reach_dense) / _ability(scene, light, reach_light)
     return Evidence(

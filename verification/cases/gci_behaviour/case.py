@@ -121,7 +121,7 @@ def _by_magnitude(values: FloatArray) -> FloatArray:
 
 
 def _misses(one: _Sequence, result: GridConvergence) -> bool:
-    return abs(one.values[0] - _LIMIT) > result.uncertainty
+    return abs(float(one.values[0]) - _LIMIT) > result.uncertainty
 
 
 def _table(judged: Mapping[str, GridConvergence]) -> Table:

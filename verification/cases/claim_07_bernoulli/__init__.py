@@ -1,0 +1,1 @@
+"""Eqs. 13 to 18 of the liquid-ring paper."""

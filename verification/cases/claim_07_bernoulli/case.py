@@ -1,0 +1,163 @@
+"""The three things that Eqs. 13 to 18 take for granted: one k, '+1', and a tube that runs full."""
+
+# ruff: noqa: ARG001 - every case answers to one interface
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.mesh.geometry import surface_radius
+from ringbalance.reduced_model.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.flow_law import Regime
+from ringbalance.scene.models import Scene
+from ringbalance.verification.calibrations import calibration_of
+from ringbalance.verification.comparison import from_half_width
+from ringbalance.verification.evidence import (
+    Axis,
+    Curve,
+    Evidence,
+    Found,
+    Level,
+    Reference,
+    Series,
+)
+from ringbalance.verification.paper_numbers import plate_uncertainty
+from ringbalance.verification.tube_running import driving_head, running_tube, tube_curve
+
+FloatArray = npt.NDArray[np.float64]
+
+_PRESSURES: Final = np.geomspace(0.77, 2.53, 9)
+"""In units of the scene's."""
+_FILLS: Final = np.linspace(0.02, 1.0, 50)
+"""In units of the largest."""
+_HUMP: Final = "hump_radius"
+
+
+def reference(scene: Scene) -> Mapping[str, Reference]:
+    """None: deviations are judged against limits.
+
+    Args:
+        scene: not used.
+
+    Returns:
+        Nothing.
+    """
+    return {}
+
+
+def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Errors of one k and of '+1', and the share of conditions with a full tube.
+
+    Args:
+        scene: the scene.
+        level: not used.
+        defect: none is known here; the scene carries it.
+
+    Returns:
+        Evidence.
+    """
+    share = _siphon_share(scene)
+    low, high = _hump_bounds(scene)
+    at_low, at_high = (_siphon_share(_with_hump(scene, radius)) for radius in (low, high))
+    excess, by_exit = _exit(scene)
+    return Evidence(
+        found={
+            "one_k": _one_k(scene),
+            "exit_velocity": Found(value=by_exit),
+            "siphon_share": Found(value=share, input=_hump_spread(scene, at_low, at_high)),
+        },
+        numbers={
+            "exit_excess": excess,
+            "hump_low": low,
+            "hump_high": high,
+            "share_low": at_low,
+            "share_high": at_high,
+        },
+        series=(_figure(scene),),
+    )
+
+
+def _one_k(scene: Scene) -> Found:
+    """k's own uncertainty is common to all velocities, so it only scales the difference."""
+    middle = running_tube(scene, head=driving_head(scene, share=0.5))
+    errors = []
+    for share in (0.0, 0.25, 0.75, 1.0):
+        head = driving_head(scene, share=share)
+        errors.append(abs(math.sqrt(2 * head / (middle.k + 1)) / running_tube(scene, head=head).velocity - 1))
+    worst = max(errors)
+    return Found(value=worst, input=from_half_width(worst * middle.half_width / (middle.k + 1)))
+
+
+def _exit(scene: Scene) -> tuple[float, float]:
+    """Exit loss beyond '+1', and half its share of k + 1: its effect on the velocity."""
+    if scene.tube.drag_coefficient is not None:
+        return 0.0, 0.0
+    own = running_tube(scene, head=driving_head(scene, share=0.5))
+    curve = tube_curve(scene)
+    excess = float(np.interp(np.log(own.velocity), np.log(curve.velocity), curve.terms["exit"]))
+    return excess, abs(excess) / (2 * (own.k + 1))
+
+
+def _law(scene: Scene) -> CalibratedLaw:
+    return calibration_of(scene).flow_law
+
+
+def _siphon_share(scene: Scene) -> float:
+    law = _law(scene)
+    flow = law.evaluate(
+        fill_ratio=_FILLS[:, None] * law.max_fill_ratio,
+        gas_pressure=_PRESSURES[None, :] * scene.gas.pressure,
+        primed=False,
+    )
+    return float(np.mean(flow.regime == Regime.SIPHON))
+
+
+def _with_hump(scene: Scene, radius: float) -> Scene:
+    if scene.tube.hump_radius is None:
+        return scene
+    return dataclasses.replace(scene, tube=dataclasses.replace(scene.tube, hump_radius=radius))
+
+
+def _hump_bounds(scene: Scene) -> tuple[float, float]:
+    """From the chamber's inner wall to just inside the fullest ring: beyond that the tube is never dry."""
+    ring = float(surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio))
+    return scene.disc.inner_radius, min(0.999 * ring, scene.tube.port_radius)
+
+
+def _hump_spread(scene: Scene, at_low: float, at_high: float) -> float:
+    """Stated, or for the paper's own disc, whose hump is inferred, anything within its bounds."""
+    if scene.tube.hump_radius is None:
+        return 0.0
+    for stated in scene.uncertainty:
+        if stated.quantity == _HUMP:
+            width = stated.half_width * (scene.tube.hump_radius if stated.relative else 1.0)
+            ends = [_siphon_share(_with_hump(scene, scene.tube.hump_radius + s * width)) for s in (-1, 1)]
+            return from_half_width(abs(ends[1] - ends[0]) / 2)
+    inferred = plate_uncertainty(scene) > 0
+    return abs(at_high - at_low) / (2 * math.sqrt(3)) if inferred else 0.0
+
+
+def _figure(scene: Scene) -> Series:
+    law = _law(scene)
+    fills = _FILLS * law.max_fill_ratio
+    flow = law.evaluate(fill_ratio=fills, gas_pressure=scene.gas.pressure, primed=False)
+    middle = running_tube(scene, head=driving_head(scene, share=0.5))
+    one_k = [math.sqrt(2 * driving_head(scene, share=float(s)) / (middle.k + 1)) for s in _FILLS]
+    return Series(
+        name="velocity at the scene's gas pressure",
+        x=Axis(name="fill ratio", unit="1", values=fills),
+        y=(
+            Curve(
+                name="calibrated law",
+                unit="m/s",
+                values=flow.velocity,
+                uncertainty=flow.uncertainty,
+            ),
+            Curve(name="Eq. 14 with one k", unit="m/s", values=np.array(one_k), style="paper"),
+        ),
+    )

@@ -1,0 +1,1 @@
+"""Eq. 19 and Fig. 4 of the liquid-ring paper."""

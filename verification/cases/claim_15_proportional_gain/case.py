@@ -1,0 +1,130 @@
+"""Overshoot of the target-vector algorithm over Kp, and the rule behind it."""
+
+# ruff: noqa: ARG001 - every case answers to one interface
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from ringbalance.controller import Simulation
+from ringbalance.reduced_model.model import BalancerModel
+from ringbalance.reduced_model.paper_law import paper_model
+from ringbalance.scene.models import Scene
+from ringbalance.verification.calibrations import calibration_of
+from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table
+from ringbalance.verification.loops import amplitude_series, loop_scene, run_loop, settling
+
+_GAINS: Final = (0.04e6, 0.08e6, 0.12e6, 0.16e6, 0.20e6)
+"""Kp of Fig. 7, s/m."""
+_SEARCHED: Final = tuple((np.arange(2, 41) * 0.01e6).tolist())
+_LAST_WITHOUT: Final = 0.12e6
+_FIRST_WITH: Final = 0.16e6
+_UNKNOWN: Final = 0.25
+"""Standard uncertainty of the rate, relative: influence coefficient and bore are not in the paper."""
+
+
+def reference(scene: Scene) -> Mapping[str, Reference]:
+    """Between 0.12 and 0.16, and half a turn.
+
+    Args:
+        scene: not used.
+
+    Returns:
+        References.
+    """
+    middle = (_LAST_WITHOUT + _FIRST_WITH) / 2
+    between = (_FIRST_WITH - _LAST_WITHOUT) / (2 * math.sqrt(3))
+    return {
+        "onset": Reference(value=middle, uncertainty=between),
+        "overshoot_turn": Reference(value=math.pi),
+    }
+
+
+def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Runs over Kp, and the fall of the vibration per second of gas.
+
+    Args:
+        scene: the paper's disc.
+        level: not used.
+        defect: none is known here; the scene carries it.
+
+    Returns:
+        Evidence.
+    """
+    runs = {gain: _run(scene, gain) for gain in _GAINS}
+    rate = _rate(scene, paper_model(scene))
+    calibrated = _rate(scene, calibration_of(scene).model)
+    onset = _onset(scene)
+    return Evidence(
+        found={
+            "onset": Found(value=onset, input=_UNKNOWN * onset),
+            "overshoot_turn": _turn(scene),
+        },
+        numbers={
+            "rate_um": rate * 1e6,
+            "calibrated_rate_um": calibrated * 1e6,
+            "onset_rule": 1e-6 / rate,
+            "onset_um": onset * 1e-6,
+            "onset_with_integral": _onset(scene, alone=False) * 1e-6,
+            "calibrated_onset": 1e-6 / calibrated,
+        },
+        series=(
+            amplitude_series(
+                "amplitude over Kp", {f"Kp = {gain * 1e-6:.2f} s/um": run for gain, run in runs.items()}
+            ),
+        ),
+        tables=(_table(runs),),
+    )
+
+
+def _run(scene: Scene, gain: float, *, alone: bool = True) -> Simulation:
+    time = None if alone else scene.controller.integral_time
+    return run_loop(loop_scene(scene, kind="target_vector", proportional=gain, integral_time=time))
+
+
+def _onset(scene: Scene, *, alone: bool = True) -> float:
+    """Smallest searched Kp at which the residual turns round; the largest searched one where none does."""
+    found = (gain for gain in _SEARCHED if _run(scene, gain, alone=alone).overshoots > 0)
+    return float(next(found, _SEARCHED[-1]))
+
+
+def _rate(scene: Scene, model: BalancerModel) -> float:
+    """Fall of the vibration per second of gas into one chamber at equal fills, m/s."""
+    middle = model.flow.max_fill_ratio / 2
+    step = 1e-3 * middle
+    velocity = float(model.flow.evaluate(fill_ratio=middle, gas_pressure=scene.gas.pressure).velocity)
+    moments = model.moment.pair_moment(
+        fill_ratio=np.array([middle + step, middle - step]),
+        opposite_fill_ratio=np.array([middle - step, middle + step]),
+    )
+    per_fill = float(moments[0] - moments[1]) / (2 * step)
+    fills_per_second = velocity * model.tube_area / model.chamber_volume
+    return scene.rotor.influence_coefficient * per_fill * fills_per_second
+
+
+def _turn(scene: Scene) -> Found:
+    """The vibration along a chamber's own axis, so that a single valve answers for the overshoot."""
+    phase = -scene.rotor.lag_angle
+    run = run_loop(
+        loop_scene(scene, kind="target_vector", proportional=_GAINS[-1], integral_time=None, phase=phase)
+    )
+    seen = [sample.measurement for sample in run.samples if sample.measurement is not None]
+    turn = abs(math.remainder(seen[1].phase - seen[0].phase, 2 * math.pi))
+    return Found(value=turn, numerical=1e-9)
+
+
+def _table(runs: Mapping[float, Simulation]) -> Table:
+    times = [settling(run) for run in runs.values()]
+    return Table(
+        name="target-vector algorithm, proportional part alone, 10 micrometres at 90 degrees",
+        columns={
+            "Kp": list(runs),
+            "overshoots": [float(run.overshoots) for run in runs.values()],
+            "misadjustments": [float(run.misadjustments) for run in runs.values()],
+            "settled after": [time if math.isfinite(time) else "not settled" for time in times],
+        },
+        units={"Kp": "s/m", "settled after": "s"},
+    )

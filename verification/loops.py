@@ -1,0 +1,123 @@
+"""Closed-loop runs as section 6 of the liquid-ring paper has them: its own law, an exact sensor."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from functools import lru_cache
+from typing import Any, Final
+
+import numpy as np
+
+from ringbalance.controller import Simulation, simulate
+from ringbalance.reduced_model.model import BalancerModel
+from ringbalance.reduced_model.paper_law import paper_model
+from ringbalance.scene.models import ControllerKind, Scene
+from ringbalance.verification.calibrations import calibration_of
+from ringbalance.verification.evidence import Axis, Curve, Series
+
+PHASES: Final = tuple(math.radians(angle) for angle in (90, 180, 270, 360))
+"""Of the initial vibration, the four cases of Fig. 6."""
+AMPLITUDES: Final = (2e-6, 4e-6, 6e-6, 8e-6, 10e-6)
+"""Of the initial vibration, the five cases of Fig. 8, m."""
+LARGEST: Final = 10e-6
+
+
+def loop_scene(
+    scene: Scene,
+    *,
+    kind: ControllerKind,
+    amplitude: float = LARGEST,
+    phase: float = PHASES[0],
+    **settings: Any,
+) -> Scene:
+    """A scene set up for one run of section 6.
+
+    Args:
+        scene: the scene.
+        kind: of the controller.
+        amplitude: of the initial vibration, m.
+        phase: of the initial vibration, rad.
+        settings: further controller settings, SI.
+
+    Returns:
+        The scene with an exact sensor: the paper's simulation names no noise.
+    """
+    return dataclasses.replace(
+        scene,
+        controller=dataclasses.replace(scene.controller, kind=kind, **settings),
+        rotor=dataclasses.replace(scene.rotor, initial_amplitude=amplitude, initial_phase=phase),
+        sensor=dataclasses.replace(scene.sensor, amplitude_noise=0.0, phase_noise=0.0),
+    )
+
+
+@lru_cache(maxsize=512)
+def run_loop(scene: Scene, law: str = "paper") -> Simulation:
+    """One closed-loop run.
+
+    Args:
+        scene: the scene.
+        law: "paper" or "calibrated".
+
+    Returns:
+        Simulation.
+    """
+    return simulate(scene, _model(scene, law))
+
+
+def _model(scene: Scene, law: str) -> BalancerModel:
+    return paper_model(scene) if law == "paper" else calibration_of(_plain(scene)).model
+
+
+def _plain(scene: Scene) -> Scene:
+    """The calibration does not see rotor vibration, sensor and controller: one serves all runs."""
+    rotor = dataclasses.replace(scene.rotor, initial_amplitude=LARGEST, initial_phase=0.0)
+    controller = dataclasses.replace(
+        scene.controller, kind="target_vector", period=1.0, proportional=1.0, integral_time=None
+    )
+    return dataclasses.replace(scene, rotor=rotor, controller=controller)
+
+
+def sampled_amplitudes(run: Simulation) -> np.ndarray:
+    """Amplitudes that the controller saw, in order.
+
+    Args:
+        run: a closed-loop run.
+
+    Returns:
+        m, shape (samples,).
+    """
+    seen = [sample.measurement.amplitude for sample in run.samples if sample.measurement is not None]
+    return np.array(seen)
+
+
+def settling(run: Simulation) -> float:
+    """Settling time, infinite where the run did not settle.
+
+    Args:
+        run: a closed-loop run.
+
+    Returns:
+        s.
+    """
+    return math.inf if run.settling_time is None else run.settling_time
+
+
+def amplitude_series(name: str, runs: dict[str, Simulation], *, points: int = 400) -> Series:
+    """Amplitude against time of several runs, on one time axis.
+
+    Args:
+        name: of the figure.
+        runs: by the name of their curve.
+        points: of the time axis.
+
+    Returns:
+        Series.
+    """
+    longest = max(float(run.time[-1]) for run in runs.values())
+    time = np.linspace(0.0, longest, points)
+    curves = tuple(
+        Curve(name=label, unit="m", values=np.interp(time, run.time, run.amplitude))
+        for label, run in runs.items()
+    )
+    return Series(name=name, x=Axis(name="time", unit="s", values=time), y=curves)

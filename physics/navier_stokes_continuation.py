@@ -17,6 +17,8 @@ class StepRule:
 
     first: float = 1.0
     smallest: float = 1 / 64
+    largest: float = float("inf")
+    """Where several flows exist for one parameter, long steps can land on another branch."""
     growth: float = 1.6
     """Factor after an easy step; a failed step is halved."""
     easy_iterations: int = 6
@@ -73,7 +75,7 @@ def _advance(walk: _Walk, solve: Solve, target: float, rule: StepRule) -> bool:
     easy = flow.statistics.iterations <= rule.easy_iterations
     walk.before, walk.flow_before = walk.at, walk.flow
     walk.at, walk.flow = parameter, flow
-    walk.step = max(walk.step, full) * (rule.growth if easy else 1.0)
+    walk.step = min(max(walk.step, full) * (rule.growth if easy else 1.0), rule.largest)
     return True
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from skfem import MeshHex, MeshTet
 
 from ringbalance.physics.navier_stokes import (
     Coefficients,
@@ -229,6 +230,32 @@ def test_jacobian_is_the_exact_derivative() -> None:
     difference = (residual(vector + change) - residual(vector - change))[system.free] / 2
     matrix = free_matrix(system, linear + c.inertia * convection_entries(system, vector))
     np.testing.assert_allclose(matrix @ change[system.free], difference, rtol=1e-10, atol=1e-10)
+
+
+def _solid_force(points: np.ndarray) -> np.ndarray:
+    """Right-hand side for u = (y^2, z^2, x^2), p = x + 2 y - z, inertia 1, viscosity 1/2."""
+    x, y, z = points
+    carried = np.stack([2 * y * z**2, 2 * z * x**2, 2 * x * y**2])
+    return carried + np.array([1.0, 2.0, -1.0]).reshape(3, 1, 1) - 1.0
+
+
+@pytest.mark.parametrize("kind", [MeshHex, MeshTet])
+def test_a_flow_inside_the_space_is_exact_in_three_dimensions(kind: type) -> None:
+    line = np.array([0.0, 0.4, 1.0])
+    mesh = kind.init_tensor(line, line, line)
+    mesh = mesh.with_boundaries({"wall": mesh.boundary_facets()})
+    conditions = [
+        Dirichlet(boundary="wall", component=c, value=lambda x, c=c: x[(c + 1) % 3] ** 2) for c in range(3)
+    ]
+    space = taylor_hood(mesh=mesh)
+    system = flow_system(space=space, conditions=conditions, enclosed=True, body_force=_solid_force)
+    solution = solve_flow(system=system, coefficients=Coefficients(viscosity=0.5))
+    assert solution.status.ok
+    at = space.node_coordinates()
+    np.testing.assert_allclose(solution.velocity, at[[1, 2, 0]] ** 2, atol=1e-10)
+    p = np.asarray(space.pressure.doflocs)
+    expected = p[0] + 2 * p[1] - p[2]
+    np.testing.assert_allclose(solution.pressure - solution.pressure[0], expected - expected[0], atol=1e-8)
 
 
 def test_a_failed_solve_says_what_to_do() -> None:

@@ -101,19 +101,20 @@ class ChamberCalibration:
     statistics: Statistics
 
 
-def fill_nodes(scene: Scene) -> tuple[FloatArray, FloatArray]:
+def fill_nodes(*, largest: float, sparse: bool) -> tuple[FloatArray, FloatArray]:
     """Fill ratios of the tables and of the report.
 
     Args:
-        scene: the scene.
+        largest: max_fill_ratio.
+        sparse: whether each solve is dear: nodes a step apart instead of half a step.
 
     Returns:
-        Nodes (an odd number, at most half a step apart) and reported fill ratios (0, 0.05, ... max).
+        Nodes (an odd number, so that equal fills are one) and reported fill ratios (0, 0.05, ... largest).
     """
-    largest = scene.disc.max_fill_ratio
     steps = math.ceil(largest / FILL_STEP - 1e-9)
     # At least eleven nodes, so that even a small range has an error estimate from every second node.
-    nodes = np.linspace(0.0, largest, 2 * max(steps, 5) + 1)
+    pairs = max(5, -(-steps // 2) if sparse else steps)
+    nodes = np.linspace(0.0, largest, 2 * pairs + 1)
     reported = np.append(np.round(FILL_STEP * np.arange(steps), 10), largest)
     return nodes, reported
 
@@ -132,10 +133,11 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
 
     Source: Eqs. 2 to 12 of the liquid-ring paper with exact plates, by finite elements.
     """
-    nodes, reported = fill_nodes(scene)
-    fills = np.append(nodes, [x for x in reported if np.min(np.abs(nodes - x)) > 1e-12])
-    effect, share = _gravity(scene, fills), gravity_share(scene)
+    share = gravity_share(scene)
     modelled = share > scene.tolerance
+    nodes, reported = fill_nodes(largest=scene.disc.max_fill_ratio, sparse=modelled)
+    fills = np.append(nodes, [x for x in reported if np.min(np.abs(nodes - x)) > 1e-12])
+    effect = _gravity(scene, fills)
     ring = ring_quantities(
         disc=scene.disc,
         density=scene.liquid.density,

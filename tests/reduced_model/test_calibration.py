@@ -146,11 +146,9 @@ def test_gravity_is_modelled_only_above_the_tolerance(table_1_scene: Scene) -> N
     # The bar of the cheaper rung holds the dearer one.
     for name in ("wall_pressure", "moment"):
         cheap, dear = getattr(left_out.chamber, name), getattr(modelled.chamber, name)
-        closed = slice(3, None)  # thinner rings than these are open under gravity
-        assert np.all(
-            np.abs(cheap.value - dear.value)[closed] <= (cheap.uncertainty + dear.uncertainty)[closed]
-        )
-        assert np.any(np.abs(cheap.value - dear.value) > 0)
+        off = np.abs(cheap.value[::2] - dear.value)  # the dearer rung has every second node
+        assert np.all(off <= cheap.uncertainty[::2] + dear.uncertainty)
+        assert np.any(off > dear.numerical)
     terms = {t.term: t.model for t in modelled.models_used}
     assert "quasi-static" in terms["gravity, mean over a turn"]
 

@@ -10,9 +10,12 @@ from ringbalance.physics.pressure import (
 from ringbalance.physics.pressure_surface import find_surface, solve_with_gravity
 from ringbalance.physics.results import Estimate, Statistics, Status, StatusCode
 from ringbalance.physics.ring import RingQuantities, ring_quantities
+from ringbalance.physics.tube_loss import FlowState, TubeLoss, tube_loss
+from ringbalance.physics.tube_numbers import reynolds_number, rotation_reynolds_number
 
 __all__ = [
     "Estimate",
+    "FlowState",
     "GridConvergence",
     "PressureProblem",
     "PressureSolution",
@@ -21,10 +24,14 @@ __all__ = [
     "Statistics",
     "Status",
     "StatusCode",
+    "TubeLoss",
     "Verdict",
     "find_surface",
     "gci",
+    "reynolds_number",
     "ring_quantities",
+    "rotation_reynolds_number",
     "solve_pressure",
     "solve_with_gravity",
+    "tube_loss",
 ]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -34,7 +36,7 @@ class OperatingPoint:
     """Loss coefficient there; None without any velocity."""
     k_uncertainty: float | None
     """95 % half-width."""
-    k_parts: dict[str, float]
+    k_parts: Mapping[str, float]
     """Terms of k, by name."""
     priming_vented: float | None
     """Gauge pressure that starts a flow, hump gas vented, driven chamber empty, Pa; None: no hump."""
@@ -82,7 +84,7 @@ def operating_point(*, scene: Scene, law: CalibratedLaw) -> OperatingPoint:
         loss_velocity=u,
         k=None if loss is None else float(loss.k.value),
         k_uncertainty=None if loss is None else float(loss.k.uncertainty),
-        k_parts={} if loss is None else {name: float(part) for name, part in loss.terms.items()},
+        k_parts=MappingProxyType({} if loss is None else {n: float(k) for n, k in loss.terms.items()}),
         priming_vented=None if vented is None else float(vented),
         priming_trapped=None if trapped is None else float(trapped),
         stall=float(np.maximum(siphon_stall_pressure(law=law, fill_ratio=0.0), 0.0)),

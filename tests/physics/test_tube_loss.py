@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 from fluids.fittings import bend_rounded, entrance_sharp
+from fluids.friction import friction_factor
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -188,3 +189,15 @@ def test_velocity_must_be_positive_and_finite(velocity: float) -> None:
 def test_arcs_longer_than_the_tube_are_refused() -> None:
     with pytest.raises(ValueError, match="arcs"):
         loss(dataclasses.replace(TUBE, length=5e-3))
+
+
+def test_traps_of_the_library_are_there_and_are_kept_out_of_k() -> None:
+    below, above = (friction_factor(Re=re, eD=1e-3) for re in (2039.9, 2040.1))
+    assert above / below > 1.5  # its default friction factor jumps
+    ends = 2 * (2040.1 - 2039.9) / 2040
+    tube = dataclasses.replace(TUBE, bends=())
+    velocity = np.array([2039.9, 2040.1]) * 1e-6 / tube.bore
+    assert abs(float(np.diff(np.log(loss(tube, omega=0.0, velocity=velocity).k.value))[0])) < ends
+    with pytest.raises(ValueError, match="math domain"):
+        bend_rounded(Di=1.5e-3, angle=90.0, rc=3e-3, Re=1.5)  # it calls a turbulent formula there
+    assert np.all(np.isfinite(loss(nu=1e-3, velocity=np.array([1e-4, 1.0])).k.value))

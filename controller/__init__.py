@@ -3,6 +3,7 @@
 from ringbalance.controller.algorithm import Command, Controller, Measurement, ValveCommand
 from ringbalance.controller.algorithms import controller_of
 from ringbalance.controller.document import simulation_document
+from ringbalance.controller.law_based import LawBased
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Injection, Outcome, Simulation
 from ringbalance.controller.target_vector import TargetVector
@@ -12,6 +13,7 @@ __all__ = [
     "Command",
     "Controller",
     "Injection",
+    "LawBased",
     "Measurement",
     "Outcome",
     "Simulation",

@@ -5,37 +5,48 @@ from __future__ import annotations
 from typing import Any
 
 from ringbalance.controller.algorithm import Controller
-from ringbalance.controller.rotor import chamber_letters
+from ringbalance.controller.closed_form import closed_form, has_closed_form
+from ringbalance.controller.law_based import LawBased
+from ringbalance.controller.liquid_ring import LiquidRing, initial_state
+from ringbalance.controller.quadrature import quadrature
+from ringbalance.controller.rotor import chamber_letters, influence
 from ringbalance.controller.target_vector import TargetVector
 from ringbalance.controller.trial import Trial
+from ringbalance.reduced_model.model import BalancerModel
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 
 
-def controller_of(scene: Scene) -> Controller[Any]:
+def controller_of(scene: Scene, model: BalancerModel | None = None) -> Controller[Any]:
     """The control algorithm that a scene asks for.
 
     Args:
         scene: the scene.
+        model: the balancer as the law-based algorithm believes it; the others do without.
 
     Returns:
         Controller, with the scene's settings.
 
     Raises:
         SceneError: an algorithm that this program does not have.
+        ValueError: the law-based algorithm without a model.
     """
     kind = scene.controller.kind
     if kind == "target_vector":
         return target_vector_of(scene)
     if kind == "trial":
         return trial_of(scene)
+    if kind == "law_based":
+        if model is None:
+            raise ValueError("the law-based algorithm needs a model, such as calibrate(scene).model")
+        return law_based_of(scene, model)
     fault = scene_fault(
         scene=scene,
         table="controller",
         key="kind",
         problem="this version does not simulate this algorithm",
-        allowed='"target_vector", "trial"',
+        allowed='"target_vector", "trial", "law_based"',
     )
     raise SceneError([fault])
 
@@ -79,6 +90,37 @@ def trial_of(scene: Scene) -> Trial:
         long_step=settings.long_step,
         short_step=settings.short_step,
         fine_below=settings.fine_below,
+        minimum_gas_time=settings.minimum_gas_time,
+        maximum_gas_time=settings.maximum_gas_time,
+    )
+
+
+def law_based_of(scene: Scene, model: BalancerModel) -> LawBased:
+    """The law-based algorithm with a scene's settings.
+
+    Args:
+        scene: the scene.
+        model: the balancer as the algorithm believes it, which need not be the one that is controlled.
+
+    Returns:
+        LawBased.
+    """
+    settings = scene.controller
+    return LawBased(
+        ring=LiquidRing(
+            model=model,
+            chambers=scene.disc.chambers,
+            gas_pressure=scene.gas.pressure,
+            integrator=closed_form if has_closed_form(model.flow) else quadrature,
+        ),
+        initial=initial_state(disc=scene.disc),
+        influence=influence(
+            coefficient=settings.assumed_influence_coefficient, lag_angle=settings.assumed_lag_angle
+        ),
+        limit=settings.limit,
+        amplitude_noise=scene.sensor.amplitude_noise,
+        phase_noise=scene.sensor.phase_noise,
+        probe=settings.period,
         minimum_gas_time=settings.minimum_gas_time,
         maximum_gas_time=settings.maximum_gas_time,
     )

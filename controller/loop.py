@@ -86,7 +86,7 @@ def simulate(
             gas_pressure=scene.gas.pressure,
             integrator=chosen,
         ),
-        controller=controller or controller_of(scene),
+        controller=controller or controller_of(scene, balancer),
         sensor=sensor or noisy_sensor(sensor=scene.sensor, seed=scene.run.seed),
         exact=sensor is None and scene.sensor.amplitude_noise == scene.sensor.phase_noise == 0,
         state=initial_state(disc=scene.disc),

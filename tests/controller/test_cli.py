@@ -81,11 +81,20 @@ def test_bad_input_is_exit_code_2_and_says_what(
 ) -> None:
     assert main(["simulate", str(scene_file), "--law", str(tmp_path / "none.json")]) == 2
     assert "none.json" in capsys.readouterr().err
-    path = changed(scene_file, tmp_path, 'kind = "target_vector"', 'kind = "law_based"')
+    path = changed(scene_file, tmp_path, 'kind = "target_vector"', 'kind = "guesswork"')
     assert main(["simulate", str(path), "--law", "paper", "--json"]) == 2
     printed = capsys.readouterr()
     assert printed.out == ""
-    assert '[controller] kind = "law_based"' in printed.err
+    assert '[controller] kind = "guesswork"' in printed.err
+
+
+def test_the_law_based_algorithm_runs_from_a_scene(
+    scene_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = changed(scene_file, tmp_path, 'kind = "target_vector"', 'kind = "law_based"')
+    assert main(["simulate", str(path), "--law", "paper", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert len({injection["time_s"] for injection in found["injections"]}) == 1
 
 
 @pytest.mark.parametrize(

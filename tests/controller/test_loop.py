@@ -271,7 +271,7 @@ def test_progress_runs_to_the_end(scene: Scene, model: BalancerModel) -> None:
 
 def test_an_algorithm_that_is_not_there_is_a_fault_of_the_scene(scene: Scene, model: BalancerModel) -> None:
     with pytest.raises(SceneError, match=r"test\.toml: \[controller\] kind"):
-        simulate(with_controller(scene, kind="law_based"), model)
+        simulate(with_controller(scene, kind="guesswork"), model)
 
 
 def test_a_rotor_too_slow_for_a_ring_is_a_fault_of_the_scene(scene: Scene, model: BalancerModel) -> None:

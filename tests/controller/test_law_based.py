@@ -1,0 +1,291 @@
+"""The law-based algorithm: gas times by the law, moments over the pairs, what it learns from responses."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ringbalance.controller.algorithm import Command, Measurement
+from ringbalance.controller.algorithms import controller_of, law_based_of, target_vector_of
+from ringbalance.controller.closed_form import closed_form
+from ringbalance.controller.law_based_estimate import InfluenceEstimate, updated
+from ringbalance.controller.law_based_times import fill_for_moment, gas_time, pair_changes
+from ringbalance.controller.loop import simulate
+from ringbalance.controller.quadrature import quadrature
+from ringbalance.controller.rotor import chamber_directions
+from ringbalance.controller.simulation import Outcome
+from ringbalance.controller.transfer import Drive
+from ringbalance.reduced_model.model import BalancerModel
+from ringbalance.reduced_model.paper_law import PaperMoment, paper_model
+from ringbalance.scene.models import Scene
+
+K = cmath.rect(0.0108, -math.radians(17))
+
+
+def law_based(scene: Scene, **controller: Any) -> Scene:
+    return replace(scene, controller=replace(scene.controller, kind="law_based", **controller))
+
+
+def exact(scene: Scene) -> Scene:
+    """No noise, and an algorithm that knows the rotor."""
+    settings = replace(
+        scene.controller,
+        assumed_influence_coefficient=scene.rotor.influence_coefficient,
+        assumed_lag_angle=scene.rotor.lag_angle,
+    )
+    sensor = replace(scene.sensor, amplitude_noise=0.0, phase_noise=0.0)
+    return replace(scene, sensor=sensor, controller=settings)
+
+
+def with_chambers(scene: Scene, chambers: int) -> Scene:
+    disc = replace(scene.disc, chambers=chambers, central_angle=2 * math.pi / max(chambers, 3))
+    return replace(scene, disc=disc, rotor=replace(scene.rotor, initial_amplitude=4e-6))
+
+
+# --- gas times ---
+
+
+def test_a_gas_time_is_the_integral_of_dx_over_u(drive_by: Callable[..., Drive]) -> None:
+    # S/V = 0.02: constant 5 m/s; u^2 = 400 (x - 0.1) is linear in time; 40 (x - 0.1) is exponential.
+    expected = {
+        "constant": 0.1 / (0.02 * 5),
+        "square_root": (math.sqrt(0.15) - math.sqrt(0.05)) / (0.02 * 10),
+        "proportional": math.log(0.15 / 0.05) / (0.02 * 40),
+        "two_regimes": 0.05 / (0.02 * 5) + math.log(0.2 / 0.15) / (0.02 * 25),
+    }
+    for name, time in expected.items():
+        found = gas_time(drive=drive_by(name), fill=0.15, integrator=quadrature, longest=10.0)
+        assert found == pytest.approx(time, rel=1e-7), name
+
+
+def test_a_gas_time_ends_at_the_stall_and_at_the_longest(drive_by: Callable[..., Drive]) -> None:
+    drive = drive_by("square_root")
+    stall = math.sqrt(0.15) / (0.02 * 10)
+    assert gas_time(drive=drive, fill=0.05, integrator=quadrature, longest=10.0) == pytest.approx(stall)
+    assert gas_time(drive=drive, fill=0.15, integrator=quadrature, longest=0.1) == 0.1
+    assert gas_time(drive=drive, fill=0.3, integrator=quadrature, longest=1.0) == 0.0
+    assert gas_time(drive=replace(drive, gas_pressure=0.0), fill=0.1, integrator=quadrature, longest=1.0) == 0
+
+
+def test_a_fill_beyond_empty_goes_on_at_the_last_velocity(drive_by: Callable[..., Drive]) -> None:
+    found = gas_time(drive=drive_by("constant"), fill=-0.1, integrator=quadrature, longest=10.0)
+    assert found == pytest.approx(0.35 / (0.02 * 5))
+
+
+def test_closed_form_and_quadrature_give_one_gas_time(drive: Drive) -> None:
+    times = [
+        gas_time(drive=drive, fill=0.1, integrator=integrator, longest=5.0)
+        for integrator in (closed_form, quadrature)
+    ]
+    # Eq. 20 in the limit: 2 D/(u0 + u1) with D the metres of flow.
+    u0, u1 = (float(drive.flow(x).velocity) for x in (0.25, 0.1))
+    assert times == pytest.approx([2 * 0.15 / drive.exchange_rate / (u0 + u1)] * 2, rel=1e-8)
+
+
+def test_the_fill_for_a_moment_goes_on_straight_beyond_the_ends() -> None:
+    moment = PaperMoment(moment_per_transferred_mass=0.072, density=1000.0, chamber_volume=6e-5)
+    per_fill = 0.072 * 1000.0 * 6e-5
+    for x in (-0.2, 0.0, 0.1, 0.25, 0.5, 0.6):
+        wanted = per_fill * (x - 0.25)
+        found = fill_for_moment(moment=moment, wanted=wanted, total=0.5, lowest=0.0, highest=0.5)
+        assert found == pytest.approx(x, abs=1e-10)
+
+
+# --- pairs ---
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(half=st.integers(1, 5), length=st.floats(0, 10), angle=st.floats(-4, 4))
+def test_within_bounds_the_changes_add_up(half: int, length: float, angle: float) -> None:
+    axes = chamber_directions(2 * half)[:half]
+    wanted = cmath.rect(length, angle)
+    found = pair_changes(wanted=wanted, bounds=[(-50.0, 50.0)] * half)
+    reached = complex(np.dot(axes, found))
+    expected = wanted if half > 1 else complex(wanted.real)
+    assert reached == pytest.approx(expected, abs=1e-11)
+    assert np.count_nonzero(np.abs(found) > 1e-11) <= 2
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(
+    room=st.lists(st.tuples(st.floats(-2, 0), st.floats(0, 2)), min_size=3, max_size=4),
+    length=st.floats(0.01, 1.5),
+    angle=st.floats(-4, 4),
+)
+def test_what_one_pair_cannot_give_the_others_do(
+    room: list[tuple[float, float]], length: float, angle: float
+) -> None:
+    wide = [*room[:-2], (-10.0, 10.0), (-10.0, 10.0)]
+    wanted = cmath.rect(length, angle)
+    found = pair_changes(wanted=wanted, bounds=wide)
+    axes = chamber_directions(2 * len(wide))[: len(wide)]
+    assert complex(np.dot(axes, found)) == pytest.approx(wanted, abs=1e-9)
+    assert all(low - 1e-12 <= c <= high + 1e-12 for c, (low, high) in zip(found, wide, strict=True))
+
+
+def test_what_no_pair_can_give_is_asked_of_those_at_their_ends() -> None:
+    found = pair_changes(wanted=3 + 1j, bounds=[(-2.0, 2.0), (-2.0, 2.0)])
+    assert found == pytest.approx((3.0, 1.0))
+
+
+# --- the influence coefficient ---
+
+
+def learn(*, k: complex, seen: complex, noise: float, spread: float = 0.0) -> InfluenceEstimate:
+    return updated(
+        InfluenceEstimate(value=k, variance=abs(0.5 * k) ** 2),
+        moment_change=2e-4 + 1e-4j,
+        vibration_change=seen * (2e-4 + 1e-4j),
+        noise_variance=noise,
+        law_spread=spread,
+        assumed_magnitude=abs(k),
+    )
+
+
+def test_an_exact_response_is_believed_at_once() -> None:
+    found = learn(k=K, seen=-1.3j * K, noise=0.0)
+    assert found.value == pytest.approx(-1.3j * K)
+    assert found.variance == pytest.approx(0.0, abs=1e-30)
+
+
+def test_a_response_within_the_noise_is_not_believed() -> None:
+    expected = abs(K) ** 2 * 5e-8
+    found = learn(k=K, seen=-K, noise=expected * 1e4)
+    assert found.value == pytest.approx(K, rel=1e-3)
+    # Equal weights when the noise is as large as the doubt, 0.5 |K dU|.
+    half = learn(k=K, seen=1.2 * K, noise=expected / 4)
+    assert half.value == pytest.approx(1.1 * K)
+    assert half.variance == pytest.approx(abs(0.5 * K) ** 2 / 2)
+
+
+def test_the_estimate_stays_within_a_decade_and_goes_on_following() -> None:
+    assert abs(learn(k=K, seen=0.0, noise=0.0).value) == pytest.approx(abs(K) / 10)
+    assert abs(learn(k=K, seen=50 * K, noise=0.0).value) == pytest.approx(abs(K) * 10)
+    followed = learn(k=K, seen=K, noise=0.0, spread=0.05)
+    assert followed.variance == pytest.approx(abs(0.05 * K) ** 2)
+
+
+def test_the_average_of_many_noisy_responses_is_the_coefficient() -> None:
+    random = np.random.default_rng(3)
+    true, estimate = 1.3 * K * cmath.exp(0.4j), InfluenceEstimate(value=K, variance=abs(0.5 * K) ** 2)
+    for _ in range(400):
+        change = complex(*random.standard_normal(2)) * 1e-4
+        noise = complex(*random.standard_normal(2)) * 1e-6
+        estimate = updated(
+            estimate,
+            moment_change=change,
+            vibration_change=true * change + noise,
+            noise_variance=2e-12,
+            law_spread=0.0,
+            assumed_magnitude=abs(K),
+        )
+    assert abs(estimate.value / true - 1) < 0.06
+    # The filter's own account of its error: sigma^2/sum |dU|^2.
+    assert estimate.variance == pytest.approx(2e-12 / (400 * 2e-8), rel=0.15)
+
+
+# --- the step and the loop ---
+
+
+def test_a_scene_can_ask_for_it(scene: Scene, model: BalancerModel) -> None:
+    assert controller_of(law_based(scene), model) == law_based_of(scene, model)
+    with pytest.raises(ValueError, match="needs a model"):
+        controller_of(law_based(scene))
+
+
+@pytest.mark.parametrize("chambers", [2, 4, 6, 8])
+def test_right_beliefs_settle_in_one_operation(scene: Scene, chambers: int) -> None:
+    disc = law_based(with_chambers(exact(scene), chambers))
+    if chambers == 2:
+        # One axis: the unbalance must lie along it, and the vibration lags behind.
+        disc = replace(disc, rotor=replace(disc.rotor, initial_phase=-disc.rotor.lag_angle))
+    run = simulate(disc, paper_model(disc))
+    assert run.settled
+    assert len(run.samples) == 2
+    assert run.amplitude[-1] < 1e-6 * run.amplitude[0]
+
+
+def test_a_law_without_closed_form_does_as_well(
+    scene: Scene, model: BalancerModel, laws: Mapping[str, Any]
+) -> None:
+    small = law_based(exact(replace(scene, rotor=replace(scene.rotor, initial_amplitude=4e-6))))
+    for name in ("two_regimes", "square_root"):
+        run = simulate(small, replace(model, name=name, flow=laws[name]))
+        assert run.amplitude[-1] < 1e-6 * run.amplitude[0]
+        assert len({i.time for i in run.injections}) == 1
+
+
+@pytest.mark.parametrize("degrees", [95.0, 135.0, 180.0, -120.0])
+def test_a_lag_that_drives_the_target_vector_apart_is_learnt(
+    scene: Scene, model: BalancerModel, degrees: float
+) -> None:
+    wrong = law_based(scene, assumed_lag_angle=scene.controller.assumed_lag_angle + math.radians(degrees))
+    noisy = replace(wrong, sensor=replace(scene.sensor, amplitude_noise=1e-8, phase_noise=0.01))
+    assert simulate(noisy, model, controller=target_vector_of(noisy)).outcome is Outcome.DIVERGING
+    run = simulate(noisy, model)
+    assert run.settled
+    assert run.misadjustments <= 1
+    assert run.settling_time is not None
+    assert run.settling_time < 8.0
+
+
+@pytest.mark.parametrize("factor", [0.3, 3.0])
+def test_a_wrong_coefficient_and_a_wrong_k_are_learnt_together(
+    scene: Scene, model: BalancerModel, factor: float
+) -> None:
+    assumed = scene.controller.assumed_influence_coefficient * factor
+    small = replace(scene, rotor=replace(scene.rotor, initial_amplitude=5e-6))
+    asked = law_based(small, assumed_influence_coefficient=assumed)
+    # The algorithm believes k = 20 where it is 50: 1.56 times too fast.
+    tube = replace(scene.tube, drag_coefficient=20.0)
+    believed = paper_model(replace(asked, tube=tube))
+    run = simulate(asked, model, controller=law_based_of(asked, believed))
+    assert run.settled
+    assert len({i.time for i in run.injections}) <= 8
+
+
+def test_an_empty_belief_does_not_stop_it(scene: Scene, model: BalancerModel) -> None:
+    # 12 um need nearly all that a pair has; believing the flow 1.4 times too fast empties it on paper first.
+    heavy = replace(scene, rotor=replace(scene.rotor, initial_amplitude=12e-6))
+    fast = paper_model(replace(scene, tube=replace(scene.tube, drag_coefficient=25.0)))
+    asked = law_based(heavy)
+    assert simulate(asked, model, controller=law_based_of(asked, fast)).settled
+
+
+def test_beyond_the_capacity_and_without_pressure_it_says_so(scene: Scene, model: BalancerModel) -> None:
+    far = replace(scene, rotor=replace(scene.rotor, initial_amplitude=40e-6))
+    assert simulate(law_based(far), model).outcome is Outcome.CAPACITY_EXCEEDED
+    weak = replace(scene, gas=replace(scene.gas, pressure=0.0))
+    assert simulate(law_based(weak), model).outcome is Outcome.STALLED
+
+
+def test_the_step_is_pure_and_a_bad_sample_holds_everything(scene: Scene, model: BalancerModel) -> None:
+    algorithm = law_based_of(scene, model)
+    first = Measurement(time=0.0, amplitude=6e-6, phase=1.0)
+    once, again = (algorithm.step(algorithm.start(), first) for _ in range(2))
+    assert once == again
+    for bad in (None, Measurement(time=1.0, amplitude=math.nan, phase=0.0)):
+        held, command = algorithm.step(once[0], bad)
+        assert held is once[0]
+        assert command == Command(reason="no usable sample")
+    turned = replace(first, phase=1.0 + 4 * math.pi)
+    other = algorithm.step(algorithm.start(), turned)[1]
+    assert [v.duration for v in other.valves] == pytest.approx([v.duration for v in once[1].valves])
+
+
+def test_limits_of_the_valves_hold(scene: Scene, model: BalancerModel) -> None:
+    algorithm = replace(law_based_of(scene, model), maximum_gas_time=0.2, minimum_gas_time=0.01)
+    _, command = algorithm.step(algorithm.start(), Measurement(time=0.0, amplitude=9e-6, phase=0.6))
+    assert max(valve.duration for valve in command.valves) == 0.2
+    _, small = algorithm.step(algorithm.start(), Measurement(time=0.0, amplitude=6e-8, phase=0.6))
+    assert small == Command(reason="the gas time is below the minimum")
+    _, rest = algorithm.step(algorithm.start(), Measurement(time=0.0, amplitude=5e-8, phase=0.6))
+    assert rest == Command(resting=True)

@@ -237,7 +237,7 @@ class RotorTable(_Table):
 
     speed: Annotated[float | None, quantity("speed", _POSITIVE)] = _needed("speed of the rotor")
     influence_coefficient: Influence = _standard(
-        "0.0104 um/(g*mm)",
+        "0.0108 um/(g*mm)",
         "zero-to-peak vibration per unbalance; the default is inferred for the paper's rotor",
     )
     lag_angle: Turn = _standard(

@@ -7,6 +7,7 @@ from types import MappingProxyType
 from typing import Final
 
 import numpy as np
+from rich.box import SIMPLE_HEAD
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
@@ -19,9 +20,9 @@ from ringbalance.reduced_model.operating_point import OperatingPoint
 _MARKS: Final = MappingProxyType(
     {
         Regime.BLOCKED: "-",
-        Regime.SIPHON: "{:.2f}",
-        Regime.SEPARATED: "{:.2f}*",
-        Regime.REVERSE: "{:.2f}r",
+        Regime.SIPHON: "{:.1f}",
+        Regime.SEPARATED: "{:.1f}*",
+        Regime.REVERSE: "{:.1f}r",
     }
 )
 
@@ -46,7 +47,17 @@ def calibration_view(calibration: Calibration) -> RenderableType:
 
 
 def _table(title: str, *columns: str, left: int = 1) -> Table:
-    table = Table(title=title, title_justify="left", title_style="bold", header_style="bold")
+    table = Table(
+        title=title,
+        title_justify="left",
+        title_style="bold",
+        caption_justify="left",
+        header_style="bold",
+        box=SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+        pad_edge=False,
+        collapse_padding=True,
+    )
     for i, name in enumerate(columns):
         table.add_column(name, justify="left" if i < left else "right")
     return table
@@ -126,35 +137,40 @@ def _off(found: float, reference: float) -> str:
 
 def _tube_table(calibration: Calibration) -> Table:
     tube = calibration.tube
-    table = _table("Tube", "u m/s", "Re", "k", "±", "state", "in range", *tube.terms)
+    terms = {name: term for name, term in tube.terms.items() if np.any(term)}
+    table = _table("Tube", "u m/s", "Re", "k", "±", "state", *terms)
+    table.columns[4].justify = "left"
     for i in np.unique(np.linspace(0, tube.velocity.size - 1, 9).astype(int)):
         table.add_row(
             f"{tube.velocity[i]:.3g}",
             f"{tube.reynolds[i]:.0f}",
-            f"{tube.k.value[i]:.2f}",
-            f"{tube.k.uncertainty[i]:.2f}",
-            str(tube.flow_state[i]),
-            "yes" if tube.in_range[i] else "no",
-            *(f"{term[i]:.2f}" for term in tube.terms.values()),
+            f"{tube.k.value[i]:.3g}",
+            f"{tube.k.uncertainty[i]:.2g}",
+            f"{tube.flow_state[i]}{'' if tube.in_range[i] else '*'}",
+            *(_short(float(term[i])) for term in terms.values()),
         )
     if tube.range_notes:
-        table.caption = "stretched: " + "; ".join(tube.range_notes)
+        table.caption = "* outside the range of a source: " + "; ".join(tube.range_notes)
     return table
 
 
+def _short(value: float) -> str:
+    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.1f}" if abs(value) >= 10 else f"{value:.2f}"
+
+
 def _law_table(calibration: Calibration) -> Table:
-    x = np.linspace(0, calibration.flow_law.max_fill_ratio, 6)
-    table = _table("Velocity from an empty tube, m/s (Eq. 19)", "gas", *(f"x = {v:g}" for v in x))
+    x = np.linspace(0, calibration.flow_law.max_fill_ratio, 5)
+    table = _table("Velocity from an empty tube, m/s (Eq. 19)", "MPa", *(f"x = {v:.3g}" for v in x))
     table.caption = "* separated at the hump, r reverse, - blocked; x is the driven chamber's fill ratio"
     for factor in PRESSURE_FACTORS:
         p = factor * calibration.scene.gas.pressure
         flow = calibration.flow_law.evaluate(fill_ratio=x, gas_pressure=p)
         by_paper = calibration.paper_law.evaluate(fill_ratio=x, gas_pressure=p).velocity
         cells = (
-            f"{_MARKS[Regime(int(r))].format(u)} ({v:.2f})"
+            f"{_MARKS[Regime(int(r))].format(u)} ({v:.1f})"
             for u, r, v in zip(flow.velocity, flow.regime, by_paper, strict=True)
         )
-        table.add_row(_mpa(p), *cells)
+        table.add_row(f"{p / 1e6:.3g}", *cells)
     return table
 
 

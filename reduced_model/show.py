@@ -54,9 +54,8 @@ def _table(title: str, *columns: str, left: int = 1) -> Table:
         caption_justify="left",
         header_style="bold",
         box=SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
+        padding=0,
         pad_edge=False,
-        collapse_padding=True,
     )
     for i, name in enumerate(columns):
         table.add_column(name, justify="left" if i < left else "right")

@@ -29,7 +29,7 @@ from ringbalance.physics.pressure_assembly import (
     volume_load,
     volume_points,
 )
-from ringbalance.physics.pressure_linear import LinearSolution, solve_linear
+from ringbalance.physics.pressure_linear import LinearSolution, linear_prolongation, solve_linear
 from ringbalance.physics.results import Statistics, Status
 
 FloatArray = npt.NDArray[np.float64]
@@ -149,10 +149,12 @@ def solve_pressure(
     pressure[surface] = problem.surface_pressure(places(chamber)[:, surface])
     free = chamber.grid[1:].ravel()
     rows = discrete.matrix[free]
+    corners = int(np.prod([n + 1 for n in chamber.cells[1:]]))
     linear = solve_linear(
         rows[:, free],
         discrete.load[free] - rows @ pressure,
         dimension=chamber.dimension,
+        prolongation=lambda: linear_prolongation(chamber.cells)[surface.size :, corners:],
         direct_limit=direct_limit,
     )
     pressure[free] = linear.values

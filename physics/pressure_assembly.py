@@ -26,7 +26,7 @@ NormalFunction = Callable[[FloatArray, FloatArray], FloatArray]
 
 # Three Gauss points along each axis: exact for the load on the cells of a chamber, of order six for the rest.
 _ORDER = 5
-_CHUNK = 4096
+_CHUNK = 8192
 
 
 @dataclass(frozen=True, kw_only=True)

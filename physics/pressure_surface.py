@@ -25,7 +25,7 @@ from ringbalance.physics.pressure import (
     wall_load,
 )
 from ringbalance.physics.pressure_assembly import at_facets, facet_points, volume_points
-from ringbalance.physics.pressure_linear import solve_linear
+from ringbalance.physics.pressure_linear import linear_prolongation, solve_linear
 from ringbalance.physics.results import Statistics, Status, StatusCode
 from ringbalance.scene.models import Disc
 
@@ -254,9 +254,16 @@ def _free_pressure(chamber: ChamberMesh, liquid: RotatingLiquid) -> FloatArray:
     on_surface = replace(problem, wall_flux=lambda x, n: _normal_force(liquid, x, n))
     load = discrete.load + wall_load(chamber=chamber, problem=on_surface, boundary=FREE_SURFACE)
     load -= load.mean()  # what quadrature leaves of the balance would become a spike at the pinned node
-    free = np.delete(np.arange(load.size), chamber.grid.flat[-1])
-    linear = solve_linear(discrete.matrix[free][:, free], load[free], dimension=chamber.dimension)
-    return np.insert(linear.values, chamber.grid.flat[-1], 0.0)
+    free = chamber.grid.ravel()[:-1]
+    linear = solve_linear(
+        discrete.matrix[free][:, free],
+        load[free],
+        dimension=chamber.dimension,
+        prolongation=lambda: linear_prolongation(chamber.cells)[:-1, :-1],
+    )
+    pressure = np.zeros(load.size)
+    pressure[free] = linear.values
+    return pressure
 
 
 def _wanted_move(chamber: ChamberMesh, liquid: RotatingLiquid, target: float) -> FloatArray:

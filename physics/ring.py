@@ -38,7 +38,7 @@ PLATE_ORDER = 3.0
 """Of what a plate alone feels: its edge on the free surface, where the conditions change, costs one order."""
 
 _EPSILON = float(np.finfo(np.float64).eps)
-_AVERAGING = 1e-10
+_AVERAGING = 1e-8
 """Left-over harmonics in the mean over a turn, relative; decides the number of samples."""
 
 
@@ -122,7 +122,7 @@ def ring_quantities(
         dimension: 2 or 3; default 2, or 3 for a vertical shaft with gravity, which 2 cannot describe.
         cells: meshes, finest first, each with half the cells of the one before; default `default_cells` and
             two coarser ones.
-        turn_samples: even number of angles of gravity over a turn; default enough for a mean within 1e-10.
+        turn_samples: even number of angles of gravity over a turn; default enough for a mean within 1e-8.
         source_factor: multiplies the source term; anything but 1 is a deliberate fault.
         wall_factor: multiplies the walls' condition; anything but 1 is a deliberate fault.
 

@@ -23,7 +23,7 @@ from ringbalance.physics.pressure_assembly import (
     volume_load,
     volume_points,
 )
-from ringbalance.physics.pressure_linear import solve_linear
+from ringbalance.physics.pressure_linear import linear_prolongation, solve_linear
 from ringbalance.physics.results import StatusCode
 from ringbalance.scene.models import Disc, Scene
 
@@ -169,6 +169,24 @@ def test_multigrid_agrees_with_factorisation_bit_for_bit_from_run_to_run(disc: D
     assert runs[0].statistics.relative_residual < 1e-10
     np.testing.assert_allclose(runs[0].pressure, direct.pressure, atol=1e-9 * direct.pressure.max())
     np.testing.assert_array_equal(runs[0].pressure, runs[1].pressure)
+
+
+def test_prolongation_carries_linear_functions_from_corners_to_all_nodes(disc: Disc) -> None:
+    for cells in ((2, 3), (2, 3, 4)):
+        chamber = chamber_mesh(disc=disc, surface_radius=30e-3, cells=cells, geometry="straight")
+        linear = np.array([1.0, -2.0, 0.5])[: len(cells)] @ chamber.mesh.doflocs
+        corners = linear[chamber.grid[(slice(None, None, 2),) * len(cells)]]
+        found = linear_prolongation(cells) @ corners.ravel()
+        np.testing.assert_allclose(found, linear[chamber.grid].ravel(), rtol=1e-12)
+
+
+def test_multigrid_needs_few_steps_whatever_the_mesh(disc: Disc) -> None:
+    steps = []
+    for cells in ((4, 12, 2), (8, 24, 4)):
+        chamber = chamber_mesh(disc=disc, surface_radius=30e-3, cells=cells)
+        solution = solve_pressure(chamber=chamber, problem=WATER.problem(), direct_limit=0)
+        steps.append(solution.statistics.iterations)
+    assert steps[1] < 1.5 * steps[0] < 75
 
 
 def test_a_solve_that_does_not_converge_says_so(disc: Disc, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -142,6 +142,6 @@ def _check_known(case_id: str) -> None:
 
 def _by_number(case_id: str) -> list[str]:
     """A claim may be asked for by its number alone."""
-    number = re.search(r"\d+", case_id)
-    wanted = f"claim_{int(number[0]):02d}_" if number else None
+    number = re.fullmatch(r"(?:claim)?_?0*(\d+)\w*", case_id)
+    wanted = f"claim_{int(number[1]):02d}_" if number else None
     return [known for known in _CODE if wanted and known.startswith(wanted)]

@@ -197,22 +197,40 @@ def run_mutations(case_id: str, *, scene: Scene, level: Level = "light") -> tupl
         One result per mutation that was run.
     """
     definition = load_case(case_id)
+    return mutate_definition(definition, case_code(case_id), scene=_scene_of(definition, scene), level=level)
+
+
+def mutate_definition(
+    definition: CaseDefinition, code: CaseCode, *, scene: Scene, level: Level = "light"
+) -> tuple[MutationResult, ...]:
+    """Run a case given by its text and its code once with each of its mutations.
+
+    Args:
+        definition: the case's text.
+        code: its two functions.
+        scene: the scene to judge.
+        level: "light" leaves out mutations and cases that are heavy.
+
+    Returns:
+        One result per mutation that was run.
+    """
     if definition.cost == "heavy" and level == "light":
         return ()
     affordable = [m for m in definition.must_fail if level == "heavy" or m.cost == "light"]
-    return tuple(_run_mutation(case_id, mutation, scene, level) for mutation in affordable)
-
-
-def _run_mutation(case_id: str, mutation: Mutation, scene: Scene, level: Level) -> MutationResult:
-    result = run_case(case_id, scene=scene, level=level, defect=mutation.id)
-    return MutationResult(
-        id=mutation.id,
-        what=mutation.what,
-        expect=mutation.expect,
-        verdict=result.verdict,
-        status=result.status,
-        judged=result.evidence is not None,
-    )
+    results = []
+    for mutation in affordable:
+        result = run_definition(definition, code, scene=scene, level=level, defect=mutation.id)
+        results.append(
+            MutationResult(
+                id=mutation.id,
+                what=mutation.what,
+                expect=mutation.expect,
+                verdict=result.verdict,
+                status=result.status,
+                judged=result.evidence is not None,
+            )
+        )
+    return tuple(results)
 
 
 def _run_whole(case_id: str, *, scene: Scene, level: Level, mutations: bool) -> CaseResult:

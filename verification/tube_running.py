@@ -12,7 +12,7 @@ from ringbalance.physics.tube_loss import TubeLoss, tube_loss
 from ringbalance.scene.models import Scene
 from ringbalance.verification.exact_chamber import exact_wall_pressure
 
-_VELOCITIES: Final = (0.01, 100.0, 161)
+_VELOCITIES: Final = (1e-4, 3000.0, 401)
 _LEAST: Final = 0.05
 """Smallest head asked for, in units of the gas pressure's: below it lies a stall."""
 
@@ -32,7 +32,7 @@ class Running:
 
 @lru_cache(maxsize=256)
 def tube_curve(scene: Scene) -> TubeLoss:
-    """k(u) of a scene's tube over four decades of velocity.
+    """k(u) of a scene's tube over all velocities that any scene may reach.
 
     Args:
         scene: the scene.

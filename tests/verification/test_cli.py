@@ -1,0 +1,91 @@
+"""`ringbalance verify`: exit codes, clean JSON, and a guess at what was meant."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ringbalance.scene import SceneError
+from ringbalance.scene.models import Scene
+from ringbalance.verification.case import CaseDefinition
+from ringbalance.verification.cli import exit_code, verify
+from ringbalance.verification.evidence import Found
+from ringbalance.verification.runner import mutate_definition, run_definition
+
+
+def test_json_is_one_clean_document(capsys: pytest.CaptureFixture[str]) -> None:
+    assert verify("gci_celik2008", "claim_12_correction_mass", json=True) == 0
+    printed = capsys.readouterr()
+    document = json.loads(printed.out)
+    assert [case["id"] for case in document] == ["gci_celik2008", "claim_12_correction_mass"]
+    assert [case["verdict"] for case in document] == ["passed", "refuted"]
+    assert printed.err == ""
+
+
+def test_the_table_says_verdict_and_consequence(capsys: pytest.CaptureFixture[str]) -> None:
+    assert verify("claim_12_correction_mass", mutations=True) == 0
+    words = " ".join(capsys.readouterr().out.split())
+    assert "claim_12_correction_mass claim 12 refuted" in words
+    assert "Read 72 mm per transferred mass" in words
+    assert "confirmed, caught" in words
+    assert words.endswith("1 refuted")
+
+
+def test_the_list_runs_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    assert verify(list_=True, json=True) == 0
+    listed = json.loads(capsys.readouterr().out)
+    assert sorted(case["number"] for case in listed if case["number"]) == list(range(1, 21))
+    assert verify(list_=True) == 0
+    assert "claim_20_rectangular_element" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("asked", "meant"),
+    [
+        ("claim_6", "claim_06_wall_pressure"),
+        ("gci_celik", "gci_celik2008"),
+        ("manufactured2d", "manufactured_2d"),
+        ("zzz", None),
+    ],
+)
+def test_an_unknown_case_is_bad_input(
+    capsys: pytest.CaptureFixture[str], asked: str, meant: str | None
+) -> None:
+    assert verify(asked) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert f'unknown case "{asked}"' in printed.err
+    assert ("did you mean" in printed.err) == (meant is not None)
+    assert meant is None or f'"{meant}"' in printed.err
+
+
+def test_a_scene_that_is_none_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "disc.toml"
+    path.write_text("name = 3")
+    with pytest.raises(SceneError):
+        verify("claim_20_rectangular_element", scene=path)
+
+
+def test_only_code_verification_and_missed_defects_fail_the_run(
+    claim: CaseDefinition, verification: CaseDefinition, made_up_code: Any, paper_scene: Scene
+) -> None:
+    wrong = made_up_code(found=Found(value=20.0))
+    refuted = run_definition(claim, wrong, scene=paper_scene)
+    failed = run_definition(verification, wrong, scene=paper_scene)
+    solution = dataclasses.replace(
+        failed, definition=verification.model_copy(update={"kind": "solution_verification"})
+    )
+    assert refuted.verdict == "refuted"
+    assert failed.verdict == "failed"
+    assert exit_code([refuted]) == 0
+    assert exit_code([solution]) == 0
+    assert exit_code([refuted, failed]) == 1
+    blind = made_up_code(defect=lambda found, _, __: found)
+    mutations = mutate_definition(claim, blind, scene=paper_scene)
+    sound = run_definition(claim, blind, scene=paper_scene)
+    assert exit_code([sound]) == 0
+    assert exit_code([dataclasses.replace(sound, mutations=mutations)]) == 1

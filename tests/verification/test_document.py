@@ -1,0 +1,110 @@
+"""The JSON of a case: what scripts rely on, clean at any state of the case."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ringbalance.scene.models import Scene
+from ringbalance.verification.case import CaseDefinition, parse_case
+from ringbalance.verification.document import case_document, definition_document, merge_saved
+from ringbalance.verification.evidence import (
+    Axis,
+    Curve,
+    Evidence,
+    Found,
+    Level,
+    NotRunError,
+    Reference,
+    Series,
+)
+from ringbalance.verification.runner import run_definition
+
+PROMISED = {"id", "kind", "verdict", "quantities"}
+PROMISED_OF_QUANTITY = {"name", "unit", "value", "reference", "error", "uncertainty", "limit", "verdict"}
+
+
+def test_what_is_promised_is_there(claim: CaseDefinition, made_up_code: Any, paper_scene: Scene) -> None:
+    code = made_up_code(found=Found(value=10.2, input=0.05))
+    document = case_document(run_definition(claim, code, scene=paper_scene))
+    assert set(document) >= PROMISED
+    (quantity,) = document["quantities"]
+    assert set(quantity) >= PROMISED_OF_QUANTITY
+    assert quantity["error"] == pytest.approx(0.2)
+    assert quantity["uncertainty"] == pytest.approx(0.1)
+    assert quantity["verdict"] == document["verdict"] == "refuted"
+    assert document["consequence"] == "Use 10.2."
+    assert json.loads(json.dumps(document, allow_nan=False)) == document
+
+
+def test_a_case_that_was_not_run_is_still_listed(
+    claim: CaseDefinition, made_up_code: Any, paper_scene: Scene
+) -> None:
+    def refuse(*_: object) -> Found:
+        raise NotRunError("there is no disc")
+
+    document = case_document(run_definition(claim, made_up_code(defect=refuse), scene=paper_scene))
+    assert document["verdict"] == "not run"
+    assert document["status"] == "there is no disc"
+    assert document["consequence"] == document["explanation"] == ""
+    assert document["quantities"][0]["value"] is None
+    json.dumps(document, allow_nan=False)
+
+
+def test_a_bound_without_uncertainty_has_none(claim_text: str, made_up_code: Any, paper_scene: Scene) -> None:
+    text = claim_text.replace('metric = "validation"', 'metric = "at_most"')
+    bound = parse_case(text, source="x")
+    document = case_document(run_definition(bound, made_up_code(), scene=paper_scene))
+    assert document["quantities"][0]["uncertainty"] == 0.0
+
+
+def test_gaps_in_a_curve_become_null(claim: CaseDefinition, paper_scene: Scene) -> None:
+    class Gappy:
+        def reference(self, scene: Scene) -> dict[str, Reference]:  # noqa: ARG002
+            return {"answer": Reference(value=10.0)}
+
+        def compute(self, scene: Scene, level: Level, defect: str | None = None) -> Evidence:  # noqa: ARG002
+            curve = Curve(name="c", unit="m", values=np.array([1.0, np.nan]), uncertainty=np.zeros(2))
+            axis = Axis(name="x", unit="s", values=np.array([0.0, 1.0]))
+            return Evidence(
+                found={"answer": Found(value=10.0)},
+                numbers={"doubt": 1.0},
+                series=(Series(name="s", x=axis, y=(curve,)),),
+            )
+
+    document = case_document(run_definition(claim, Gappy(), scene=paper_scene))
+    (series,) = document["series"]
+    assert series["y"][0]["values"] == [1.0, None]
+    assert series["x"] == {"name": "x", "unit": "s", "values": [0.0, 1.0]}
+    json.dumps(document, allow_nan=False)
+
+
+def heavy(verdict: str, *, sha: str = "aa", cost: str = "heavy") -> dict[str, Any]:
+    return {"id": "coverage", "verdict": verdict, "cost": cost, "scene_sha256": sha}
+
+
+@pytest.mark.parametrize(
+    ("now", "saved", "expected"),
+    [
+        (heavy("not run"), heavy("passed"), "passed"),
+        (heavy("not run"), heavy("passed", sha="bb"), "not run"),
+        (heavy("failed"), heavy("passed"), "failed"),
+        (heavy("not run", cost="light"), heavy("passed"), "not run"),
+        (heavy("not run"), heavy("not run"), "not run"),
+    ],
+)
+def test_heavy_results_are_kept_for_the_same_scene_only(
+    now: dict[str, Any], saved: dict[str, Any], expected: str
+) -> None:
+    (merged,) = merge_saved([now], [saved | {"date": "2025-01-31"}])
+    assert merged["verdict"] == expected
+    assert ("2025-01-31" in merged.get("status", "")) == (expected == "passed")
+
+
+def test_a_list_names_claim_and_mutations(claim: CaseDefinition) -> None:
+    listed = definition_document(claim)
+    assert listed["claim"] == "The answer is ten."
+    assert listed["mutations"] == ["off_by_one", "thicker"]

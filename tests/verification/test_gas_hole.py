@@ -1,0 +1,43 @@
+"""The safe fill of a gas hole where geometry gives it without any calculation."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+from ringbalance.scene.models import Scene
+from ringbalance.verification.cases.claim_18_gas_hole.case import compute
+
+
+def safe_fill(scene: Scene, state: str) -> float:
+    return compute(scene, "light").found[f"margin_{state}"].value + scene.disc.max_fill_ratio
+
+
+def test_a_nearly_rectangular_chamber_is_safe_up_to_one_half(paper_scene: Scene) -> None:
+    """A rectangle is centrally symmetric: every line through its middle halves it."""
+    disc = dataclasses.replace(
+        paper_scene.disc,
+        inner_radius=0.99,
+        outer_radius=1.0,
+        central_angle=0.01,
+        plate_thickness=0.0,
+        chambers=6,
+    )
+    scene = dataclasses.replace(paper_scene, disc=disc)
+    assert safe_fill(scene, "stopped") == pytest.approx(0.5, abs=2e-3)
+
+
+def test_running_the_safe_fill_is_what_lies_outside_the_hole(paper_scene: Scene) -> None:
+    disc = paper_scene.disc
+    evidence = compute(paper_scene, "light")
+    radius = evidence.numbers["best_radius"]
+    bare = dataclasses.replace(disc, plate_thickness=0.0)
+    outside = (bare.outer_radius**2 - radius**2) / (bare.outer_radius**2 - bare.inner_radius**2)
+    # The plates take about as much from either side of the hole.
+    assert evidence.numbers["safe_running"] == pytest.approx(outside, abs=0.03)
+
+
+def test_no_sector_is_safe_beyond_one_half(paper_scene: Scene) -> None:
+    """Gravity and its opposite cut the chamber in two through any point: one part holds at most a half."""
+    assert safe_fill(paper_scene, "stopped") < 0.5

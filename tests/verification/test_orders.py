@@ -1,0 +1,52 @@
+"""Orders of sequences whose order is known."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ringbalance.verification.orders import extrapolate, order_study
+
+
+@given(st.floats(0.5, 5), st.floats(1e-6, 1), st.floats(1.2, 3))
+def test_a_power_is_recovered(order: float, scale: float, ratio: float) -> None:
+    size = [ratio**-k for k in range(4)]
+    study = order_study(size=size, error=[scale * h**order for h in size])
+    assert study.order == pytest.approx([order] * 3)
+    assert study.finest_error == pytest.approx(scale * size[-1] ** order)
+
+
+def test_the_lowest_of_the_two_finest_pairs_counts() -> None:
+    study = order_study(size=[8, 4, 2, 1], error=[1.0, 0.5, 0.125, 0.0625])
+    assert study.order == pytest.approx([1, 2, 1])
+    assert study.settled_order == pytest.approx(1)
+
+
+@pytest.mark.parametrize(
+    ("size", "error"),
+    [
+        ([1.0], [1.0]),
+        ([1.0, 0.5], [1.0]),
+        ([1.0, 1.0], [1.0, 0.5]),
+        ([0.5, 1.0], [1.0, 0.5]),
+        ([1.0, 0.5], [1.0, 0.0]),
+        ([1.0, 0.5], [1.0, 1e-16]),
+        ([1.0, 0.5], [1.0, float("nan")]),
+    ],
+)
+def test_sequences_that_show_no_order_are_refused(size: list[float], error: list[float]) -> None:
+    with pytest.raises(ValueError, match=r"levels|sizes|errors"):
+        order_study(size=size, error=error)
+
+
+def test_extrapolation_removes_the_leading_error() -> None:
+    def value(h: float) -> float:
+        return 3.0 + 0.7 * h**2
+
+    assert extrapolate(coarse=value(0.2), fine=value(0.1), ratio=2, order=2) == pytest.approx(3.0)
+
+
+def test_extrapolation_needs_refinement() -> None:
+    with pytest.raises(ValueError, match="ratio"):
+        extrapolate(coarse=1.0, fine=1.0, ratio=1.0, order=2)

@@ -1,0 +1,141 @@
+"""The references themselves are held against routes that share nothing with them."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import dblquad
+
+from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_area, surface_radius
+from ringbalance.scene.models import Disc, Scene
+from ringbalance.verification.exact_chamber import (
+    central_lambda,
+    exact_moment,
+    exact_wall_pressure,
+    pair_lambda,
+)
+from ringbalance.verification.gravity_exact import exact_ring
+from ringbalance.verification.manufactured import Manufactured
+from ringbalance.verification.paper_numbers import plate_uncertainty
+from ringbalance.verification.sensitivity import input_uncertainty
+
+
+def test_the_moment_is_that_of_a_sector_without_plates(paper_scene: Scene) -> None:
+    # Closed form: 2/3 rho B (R2^3 - a^3) sin(theta/2).
+    disc = dataclasses.replace(paper_scene.disc, plate_thickness=0.0)
+    a = math.sqrt(disc.outer_radius**2 - 0.4 * (disc.outer_radius**2 - disc.inner_radius**2))
+    expected = 2 / 3 * 1000 * disc.axial_width * (disc.outer_radius**3 - a**3) * math.sin(math.pi / 4)
+    assert float(exact_moment(disc=disc, density=1000, fill_ratio=0.4)) == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_moment_with_plates_by_two_integrals(paper_scene: Scene) -> None:
+    disc = paper_scene.disc
+    a = float(surface_radius(disc=disc, fill_ratio=0.3))
+
+    def angle(r: float) -> float:
+        return math.pi / 4 - math.asin(disc.plate_thickness / r)
+
+    value, _ = dblquad(
+        lambda phi, r: r**2 * math.cos(phi),
+        a,
+        disc.outer_radius,
+        lambda r: -angle(r),
+        angle,
+        epsabs=0,
+        epsrel=1e-10,
+    )
+    found = float(exact_moment(disc=disc, density=1000, fill_ratio=0.3))
+    assert found == pytest.approx(1000 * disc.axial_width * value, rel=1e-9)
+
+
+def test_lambda_approaches_its_limit_at_the_centre(paper_scene: Scene) -> None:
+    near = pair_lambda(disc=paper_scene.disc, fill_ratio=[0.2499, 0.2501])
+    assert near == pytest.approx([central_lambda(disc=paper_scene.disc)] * 2, rel=1e-6)
+    with pytest.raises(ValueError, match="centre"):
+        pair_lambda(disc=paper_scene.disc, fill_ratio=0.25)
+
+
+def test_the_wall_pressure_holds_the_centrifugal_force_of_a_thin_film(paper_scene: Scene) -> None:
+    disc = paper_scene.disc
+    fill = 1e-6
+    film = fill * chamber_volume(disc=disc) / disc.axial_width
+    arc = 2 * disc.outer_radius * float(half_angle(disc=disc, radius=disc.outer_radius))
+    thin = 1000 * 500.0**2 * disc.outer_radius * film / arc
+    found = exact_wall_pressure(disc=disc, density=1000, angular_velocity=500.0, fill_ratio=fill)
+    assert float(found) == pytest.approx(thin, rel=1e-5)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_derivatives_of_the_manufactured_pressure(dimension: int) -> None:
+    exact = Manufactured(length=0.0445, width=0.062, half_angle=math.pi / 4)
+    place = np.array([0.031, 0.012, 0.009])[:dimension]
+    step = 1e-5
+    shifts = step * np.eye(dimension)
+    ahead = np.array([exact.pressure(place + d) for d in shifts])
+    behind = np.array([exact.pressure(place - d) for d in shifts])
+    np.testing.assert_allclose(exact.gradient(place), (ahead - behind) / (2 * step), rtol=1e-6)
+    curvature = np.sum(ahead + behind - 2 * exact.pressure(place)) / step**2
+    assert float(exact.laplacian(place)) == pytest.approx(float(curvature), rel=1e-4)
+
+
+def test_the_exact_ring_across_the_shaft_is_a_circle_that_holds_the_liquid(disc: Disc) -> None:
+    ring = exact_ring(disc=disc, density=800, angular_velocity=60.0, fill_ratio=0.4, across=(5.0, 4.0))
+    angle = np.linspace(-0.5, 0.5, 7)
+    surface = ring.radius(angle) * np.exp(1j * angle)
+    centre = -complex(5.0, 4.0) / 60.0**2
+    np.testing.assert_allclose(np.abs(surface - centre), ring.level, rtol=1e-13)
+    np.testing.assert_allclose(ring.pressure(np.stack([surface.real, surface.imag])), 0, atol=1e-9)
+    assert counted_area(disc, centre, ring.level) == pytest.approx(
+        0.4 * float(liquid_area(disc=disc, surface_radius=disc.inner_radius)), rel=1e-4
+    )
+
+
+def test_the_exact_ring_along_the_shaft_is_a_paraboloid_that_holds_the_liquid(disc: Disc) -> None:
+    ring = exact_ring(disc=disc, density=800, angular_velocity=60.0, fill_ratio=0.4, along=9.81)
+    z = np.linspace(-disc.axial_width / 2, disc.axial_width / 2, 2001)
+    radius = ring.radius(0.0, z)
+    np.testing.assert_allclose(radius**2 - ring.level**2, 2 * 9.81 / 60.0**2 * z, atol=1e-15)
+    volume = np.trapezoid(liquid_area(disc=disc, surface_radius=radius), z)
+    assert float(volume) == pytest.approx(0.4 * chamber_volume(disc=disc), rel=1e-6)
+
+
+def counted_area(disc: Disc, centre: complex, level: float) -> float:
+    """Area of the chamber beyond a circle, on a fine polar grid."""
+    radial, angular = 1500, 1500
+    r = disc.inner_radius + (disc.outer_radius - disc.inner_radius) * (np.arange(radial) + 0.5) / radial
+    alpha = half_angle(disc=disc, radius=r)
+    phi = np.outer(alpha, 2 * (np.arange(angular) + 0.5) / angular - 1)
+    beyond = np.abs(r[:, None] * np.exp(1j * phi) - centre) > level
+    return float(
+        np.sum(beyond.mean(axis=1) * 2 * alpha * r) * (disc.outer_radius - disc.inner_radius) / radial
+    )
+
+
+@pytest.fixture
+def disc(paper_scene: Scene) -> Disc:
+    return paper_scene.disc
+
+
+def test_input_uncertainty_of_a_product() -> None:
+    # f = a b with a = 3 +- 0.1, b = 4 +- 0.2: u^2 = (4 0.1)^2 + (3 0.2)^2.
+    found = input_uncertainty([(lambda a: a * 4, 3.0, 0.1), (lambda b: 3 * b, 4.0, 0.2)])
+    assert found == pytest.approx(math.hypot(0.4, 0.6))
+
+
+def test_an_exact_input_is_not_evaluated() -> None:
+    def refuse(_: float) -> float:
+        raise AssertionError
+
+    assert input_uncertainty([(refuse, 1.0, 0.0)]) == 0.0
+
+
+def test_the_plates_inherit_the_rounding_of_the_volume(paper_scene: Scene) -> None:
+    # dV/dt = 2 (R2 - R1) B = 2.976 ml/mm; 67.7 ml is rounded to 0.1.
+    assert plate_uncertainty(paper_scene) == pytest.approx(0.05 / math.sqrt(3) / 2.976 * 1e-3, rel=1e-3)
+    other = dataclasses.replace(
+        paper_scene, disc=dataclasses.replace(paper_scene.disc, plate_thickness=1e-3), uncertainty=()
+    )
+    assert plate_uncertainty(other) == 0.0

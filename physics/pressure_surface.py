@@ -14,7 +14,7 @@ import numpy.typing as npt
 from scipy.interpolate import make_interp_spline
 
 from ringbalance.mesh.chamber import ChamberMesh, chamber_mesh
-from ringbalance.mesh.geometry import liquid_area, surface_radius
+from ringbalance.mesh.geometry import half_angle, liquid_area, surface_radius
 from ringbalance.physics.pressure import (
     FREE_SURFACE,
     PressureSolution,
@@ -143,7 +143,7 @@ def find_surface(
     if not 0 < fill_ratio <= 1:
         raise ValueError("fill_ratio must lie within (0, 1] to search a surface")
     concentric = float(surface_radius(disc=disc, fill_ratio=fill_ratio))
-    no_ring = _no_ring(liquid, concentric)
+    no_ring = _no_ring(disc, liquid, concentric)
     if no_ring is None:
         return _search(disc, liquid, fill_ratio, cells, concentric if start is None else start)
     chamber = chamber_mesh(disc=disc, surface_radius=concentric, cells=cells)
@@ -235,16 +235,27 @@ def _measure(chamber: ChamberMesh) -> float:
     return float(volume_points(chamber.mesh).weights.sum())
 
 
-def _no_ring(liquid: RotatingLiquid, radius: float) -> Status | None:
+def _no_ring(disc: Disc, liquid: RotatingLiquid, radius: float) -> Status | None:
+    """Why there is no ring, where that can be told without a search."""
     across = float(np.linalg.norm(liquid.gravity[:2]))
     lowest = float(np.sqrt(across / radius))
     if abs(liquid.angular_velocity) > lowest:
-        return None
+        return _DRY if _far_too_thin(disc, liquid, radius) else None
     return Status(
         code=StatusCode.NO_RING,
         text=f"gravity across the shaft exceeds the centrifugal force at {1e3 * radius:.4g} mm: "
         f"no ring forms; turn faster than {lowest:.4g} rad/s ({lowest * 30 / np.pi:.4g} rpm)",
     )
+
+
+def _far_too_thin(disc: Disc, liquid: RotatingLiquid, radius: float) -> bool:
+    """Whether gravity would tilt the surface by a hundred times the depth over the outer wall."""
+    half = float(half_angle(disc=disc, radius=disc.outer_radius))
+    angle = np.linspace(-half, half, 33)
+    pull = np.pad(np.asarray(liquid.gravity, dtype=np.float64), (0, 3 - len(liquid.gravity)))
+    across = disc.outer_radius * (pull[0] * np.cos(angle) + pull[1] * np.sin(angle))
+    fall = float(np.ptp(across)) + abs(float(pull[2])) * disc.axial_width
+    return fall > 100 * liquid.angular_velocity**2 * radius * (disc.outer_radius - radius)
 
 
 def _free_pressure(chamber: ChamberMesh, liquid: RotatingLiquid) -> FloatArray:

@@ -14,10 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.mesh.chamber import default_cells
-from ringbalance.mesh.geometry import chamber_volume, half_angle, surface_radius
+from ringbalance.mesh.geometry import half_angle, surface_radius
 from ringbalance.physics.grid_convergence import GridConvergence, gci
 from ringbalance.physics.pressure import RotatingLiquid
-from ringbalance.physics.results import Estimate, Statistics, Status, StatusCode
+from ringbalance.physics.results import Estimate, Statistics, Status
+from ringbalance.physics.ring_bounds import Case, rounding_bound, stated_widths
 from ringbalance.physics.ring_samples import (
     COLUMNS,
     SCALARS,
@@ -37,7 +38,8 @@ FORMAL_ORDER = 4.0
 PLATE_ORDER = 3.0
 """Of what a plate alone feels: its edge on the free surface, where the conditions change, costs one order."""
 
-_EPSILON = float(np.finfo(np.float64).eps)
+_SHALLOWEST = 1e-10
+"""Depth over outer radius at which coordinates still tell the nodes of a film apart."""
 _AVERAGING = 1e-8
 """Left-over harmonics in the mean over a turn, relative; decides the number of samples."""
 
@@ -105,12 +107,11 @@ def ring_quantities(
     source_factor: float = 1.0,
     wall_factor: float = 1.0,
 ) -> RingQuantities:
-    """Finite-element totals of one chamber's liquid over fill ratios, with uncertainties from grid
-    convergence.
+    """Finite-element totals of one chamber's liquid over fill ratios, each with its uncertainty.
 
     laplace(p) = 2 rho omega^2, n.grad p = rho (omega^2 r e_r + g).n on walls, p = 0 on the free surface; then
-    volume, mean p on the outer wall, U = int rho x, dU/dV' = rho int x/|n.grad p| / int 1/|n.grad p|, int p
-    n.
+    volume, mean p on the outer wall, U = int rho x, dU/dV' = rho int x/|n.grad p| / int 1/|n.grad p|, and
+    the forces int p n.
 
     Args:
         disc: the disc.
@@ -121,24 +122,27 @@ def ring_quantities(
         shaft: "horizontal" turns gravity across the chamber, "vertical" points it along -z.
         dimension: 2 or 3; default 2, or 3 for a vertical shaft with gravity, which 2 cannot describe.
         cells: meshes, finest first, each with half the cells of the one before; default `default_cells` and
-            two coarser ones.
+            two coarser ones; they decide the dimension when given.
         turn_samples: even number of angles of gravity over a turn; default enough for a mean within 1e-8.
         source_factor: multiplies the source term; anything but 1 is a deliberate fault.
         wall_factor: multiplies the walls' condition; anything but 1 is a deliberate fault.
 
     Returns:
-        The totals.  Where gravity leaves no closed ring, status is NO_RING, `closed` is False and the values
-        are those without gravity, their half-widths widened by all that gravity could do to the liquid there.
+        The totals.  Where gravity leaves no closed ring, or its surface is not found, status says so,
+        `closed` is False and the values are those without gravity, their half-widths widened by all that
+        gravity could do to the liquid there.
 
     Raises:
-        ValueError: fill ratios outside [0, 1]; density, speed or number of samples that make no sense; two
-            dimensions for gravity along the shaft; fewer than three meshes.
+        ValueError: fill ratios outside [0, 1], or above 0 but too small for a mesh; density, speed or number
+            of samples that make no sense; two dimensions for gravity along the shaft; fewer than three
+            meshes.
 
     Source: Eqs. 3 to 12 of the liquid-ring paper, with exact plates; Celik et al. (2008),
     doi:10.1115/1.2960953.
     """
     fills = np.atleast_1d(np.asarray(fill_ratio, dtype=np.float64)).ravel()
     _check(fills, density, angular_velocity, gravity)
+    _check_depth(disc, fills)
     axial = gravity > 0 and shaft == "vertical"
     meshes = _meshes(disc, cells, dimension or (3 if axial else 2))
     if axial and len(meshes[0]) == 2:
@@ -150,8 +154,8 @@ def ring_quantities(
         wall_factor=wall_factor,
     )
     turn = Turn(gravity=gravity, shaft=shaft, samples=_turn_samples(disc, liquid, gravity, turn_samples))
-    samples = [_on_meshes(disc, liquid, float(x), meshes, turn) for x in fills]
-    return _collect(disc, liquid, fills, meshes, samples, gravity)
+    case = Case(disc=disc, liquid=liquid, fills=fills, meshes=meshes, turn=turn)
+    return _collect(case, [_on_meshes(case, float(x), turn) for x in fills])
 
 
 def _check(fills: FloatArray, density: float, omega: float, gravity: float) -> None:
@@ -161,6 +165,16 @@ def _check(fills: FloatArray, density: float, omega: float, gravity: float) -> N
         raise ValueError("density must be positive and angular_velocity not zero, both finite")
     if not (gravity >= 0 and np.isfinite(gravity)):
         raise ValueError("gravity must be zero or positive")
+
+
+def _check_depth(disc: Disc, fills: FloatArray) -> None:
+    depth = 1 - surface_radius(disc=disc, fill_ratio=fills) / disc.outer_radius
+    thin = fills[(fills > 0) & (depth < _SHALLOWEST)]
+    if thin.size:
+        raise ValueError(
+            f"fill_ratio {thin[0]:.3g} leaves a ring shallower than {_SHALLOWEST:g} of the outer radius, "
+            "which no mesh resolves; give zero instead"
+        )
 
 
 def _meshes(
@@ -185,10 +199,9 @@ def _turn_samples(disc: Disc, liquid: RotatingLiquid, gravity: float, wanted: in
     return 2 * max(2, int(np.ceil(harmonics / 2)))
 
 
-def _on_meshes(
-    disc: Disc, liquid: RotatingLiquid, x: float, meshes: tuple[tuple[int, ...], ...], turn: Turn
-) -> tuple[Sample, ...]:
+def _on_meshes(case: Case, x: float, turn: Turn) -> tuple[Sample, ...]:
     """Samples on every mesh, finest first, each starting from the surfaces of the coarser one."""
+    disc, liquid, meshes = case.disc, case.liquid, case.meshes
     if x == 0:
         half = float(half_angle(disc=disc, radius=disc.outer_radius))
         drop = liquid.density * disc.outer_radius * np.sin(half) / half
@@ -196,42 +209,65 @@ def _on_meshes(
     found: list[Sample] = []
     for k, cells in reversed(list(enumerate(meshes))):
         halves = found and all(n == 2 * m for n, m in zip(cells, meshes[k + 1], strict=True))
-        coarser = found[-1] if halves else None
-        sample = turn_mean(disc=disc, liquid=liquid, fill_ratio=x, cells=cells, turn=turn, coarser=coarser)
+        sample = turn_mean(
+            disc=disc,
+            liquid=liquid,
+            fill_ratio=x,
+            cells=cells,
+            turn=turn,
+            coarser=found[-1] if halves else None,
+        )
         found.append(sample)
     return tuple(reversed(found))
 
 
-def _collect(
-    disc: Disc,
-    liquid: RotatingLiquid,
-    fills: FloatArray,
-    meshes: tuple[tuple[int, ...], ...],
-    samples: Sequence[tuple[Sample, ...]],
-    gravity: float,
-) -> RingQuantities:
+def _collect(case: Case, samples: Sequence[tuple[Sample, ...]]) -> RingQuantities:
     failed = [next((s.status for s in levels if not s.status.ok), Status()) for levels in samples]
-    closed = np.array([status.ok for status in failed])
-    plain = Turn(gravity=0.0, shaft="horizontal", samples=2)
+    still = Turn(gravity=0.0, shaft="horizontal", samples=2)
     kept = [
-        levels if ok else _on_meshes(disc, liquid, float(x), meshes, plain)
-        for levels, ok, x in zip(samples, closed, fills, strict=True)
+        levels if status.ok else _on_meshes(case, float(x), still)
+        for levels, status, x in zip(samples, failed, case.fills, strict=True)
     ]
     values = np.array([[sample.values for sample in levels] for levels in kept])
-    rounding = [max(sample.rounding for sample in levels) for levels in kept]
-    records = _judge(disc, liquid, fills, meshes, values, rounding)
+    records = _judge(case, kept, values)
+    closed = np.array([status.ok for status in failed])
     widths = np.array([[record.uncertainty for record in row] for row in records])
-    # An empty chamber is exact, but where its first drop goes is not once gravity pulls on it.
-    widths[fills == 0] = 0.0
-    displaced = _displaced(disc, liquid, fills, gravity)
-    widths = widths + np.where(closed[:, None], 0.0, displaced)
-    widths[fills == 0, 3] = displaced[fills == 0, 3]
-    status = _status(fills, failed)
+    widths = stated_widths(case=case, samples=kept, widths=widths, closed=closed)
+    status = _status(case, failed)
     parts = {
         name: Estimate(value=_part(values[:, 0], name), uncertainty=_part(widths, name), status=status)
         for name in COLUMNS
     }
-    return _quantities(disc, fills, meshes, kept, values, records, parts, closed, status)
+    return RingQuantities(
+        fill_ratio=case.fills,
+        surface_radius=surface_radius(disc=case.disc, fill_ratio=case.fills),
+        **{name: parts[name] for name in SCALARS},
+        wall_force={name: parts[f"force {name}"] for name in WALLS},
+        resultant_force=parts["force resultant"],
+        wall_torque={name: parts[f"torque {name}"] for name in WALLS},
+        resultant_torque=parts["torque resultant"],
+        ripple=_ripple(kept),
+        convergence={name: tuple(row[k] for row in records) for k, name in enumerate(SCALARS)},
+        mesh_values={name: values[:, :, k].T.copy() for k, name in enumerate(SCALARS)},
+        cells=case.meshes,
+        closed=closed,
+        status=status,
+        statistics=_statistics(kept),
+    )
+
+
+def _ripple(samples: Sequence[tuple[Sample, ...]]) -> dict[str, FloatArray]:
+    ripple = np.array([levels[0].ripple for levels in samples])
+    return {"wall_pressure": ripple[:, 0], "moment": ripple[:, 1]}
+
+
+def _statistics(samples: Sequence[tuple[Sample, ...]]) -> Statistics:
+    finest = [levels[0] for levels in samples]
+    return Statistics(
+        unknowns=max(sample.unknowns for sample in finest),
+        relative_residual=max(sample.residual for levels in samples for sample in levels),
+        extra={"surface_flux_mismatch": max(sample.flux_mismatch for sample in finest)},
+    )
 
 
 def _part(table: FloatArray, name: str) -> FloatArray:
@@ -239,114 +275,34 @@ def _part(table: FloatArray, name: str) -> FloatArray:
     return np.array(columns if columns.shape[1] > 1 else columns[:, 0])
 
 
-def _quantities(
-    disc: Disc,
-    fills: FloatArray,
-    meshes: tuple[tuple[int, ...], ...],
-    kept: Sequence[tuple[Sample, ...]],
-    values: FloatArray,
-    records: list[list[GridConvergence]],
-    parts: Mapping[str, Estimate],
-    closed: npt.NDArray[np.bool_],
-    status: Status,
-) -> RingQuantities:
-    finest = [levels[0] for levels in kept]
-    ripple = np.array([sample.ripple for sample in finest])
-    return RingQuantities(
-        fill_ratio=fills,
-        surface_radius=surface_radius(disc=disc, fill_ratio=fills),
-        liquid_volume=parts["liquid_volume"],
-        wall_pressure=parts["wall_pressure"],
-        moment=parts["moment"],
-        moment_per_volume=parts["moment_per_volume"],
-        wall_force={name: parts[f"force {name}"] for name in WALLS},
-        resultant_force=parts["force resultant"],
-        wall_torque={name: parts[f"torque {name}"] for name in WALLS},
-        resultant_torque=parts["torque resultant"],
-        ripple={"wall_pressure": ripple[:, 0], "moment": ripple[:, 1]},
-        convergence={name: tuple(row[k] for row in records) for k, name in enumerate(SCALARS)},
-        mesh_values={name: values[:, :, k].T.copy() for k, name in enumerate(SCALARS)},
-        cells=meshes,
-        closed=closed,
-        status=status,
-        statistics=Statistics(
-            unknowns=max(sample.unknowns for sample in finest),
-            relative_residual=max(sample.residual for levels in kept for sample in levels),
-            extra={"surface_flux_mismatch": max(sample.flux_mismatch for sample in finest)},
-        ),
-    )
-
-
 def _judge(
-    disc: Disc,
-    liquid: RotatingLiquid,
-    fills: FloatArray,
-    meshes: tuple[tuple[int, ...], ...],
-    values: FloatArray,
-    rounding: Sequence[float],
+    case: Case, samples: Sequence[tuple[Sample, ...]], values: FloatArray
 ) -> list[list[GridConvergence]]:
-    sizes = [float(np.prod(cells)) ** (-1 / len(cells)) for cells in meshes]
+    sizes = [float(np.prod(cells)) ** (-1 / len(cells)) for cells in case.meshes]
     orders = np.full(WIDTH, FORMAL_ORDER)
     for name, columns in COLUMNS.items():
         if "plate" in name:
             orders[columns] = PLATE_ORDER
-    bounds = [
-        _noise(disc, liquid, float(x), meshes[0], moved) for x, moved in zip(fills, rounding, strict=True)
-    ]
-    return [
-        [
-            gci(values=levels[:, k], sizes=sizes, formal_order=float(orders[k]), round_off=float(bound[k]))
-            for k in range(WIDTH)
-        ]
-        for levels, bound in zip(values, bounds, strict=True)
-    ]
+    rows = []
+    for x, levels, found in zip(case.fills, samples, values, strict=True):
+        noise = rounding_bound(case=case, fill_ratio=float(x), samples=levels)
+        rows.append(
+            [
+                gci(
+                    values=found[:, k],
+                    sizes=sizes,
+                    formal_order=float(orders[k]),
+                    round_off=float(noise[k]),
+                )
+                for k in range(WIDTH)
+            ]
+        )
+    return rows
 
 
-def _scales(disc: Disc, liquid: RotatingLiquid, x: float) -> FloatArray:
-    """Natural size of every column, for what is zero by symmetry."""
-    a, outer = float(surface_radius(disc=disc, fill_ratio=x)), disc.outer_radius
-    volume = x * chamber_volume(disc=disc)
-    pressure = liquid.density * liquid.angular_velocity**2 * (outer - a) * (outer + a) / 2
-    force = pressure * disc.central_angle * outer * (disc.axial_width + outer)
-    scales = np.full(WIDTH, force * outer)
-    scales[4:22] = force
-    scales[:4] = volume, pressure, liquid.density * volume * outer, liquid.density * outer
-    return scales
-
-
-def _noise(
-    disc: Disc, liquid: RotatingLiquid, x: float, cells: tuple[int, ...], rounding: float
-) -> FloatArray:
-    """Bound of the rounding in every column on the finest mesh."""
-    if x == 0:
-        return np.zeros(WIDTH)
-    a = float(surface_radius(disc=disc, fill_ratio=x))
-    depth, arc = disc.outer_radius - a, 2 * a * float(half_angle(disc=disc, radius=a))
-    # Coordinates of a thin film cancel; a cell that is narrow for the liquid's depth makes the matrix stiff.
-    stiffness = max(2 * cells[0], 2 * cells[1] * depth / arc) ** 2
-    relative = _EPSILON * (4 * disc.outer_radius / depth + 0.2 * stiffness) + rounding
-    return relative * _scales(disc, liquid, x)
-
-
-def _displaced(disc: Disc, liquid: RotatingLiquid, fills: FloatArray, gravity: float) -> FloatArray:
-    """All that gravity could do where it leaves no closed ring, shape (n, columns)."""
-    if gravity == 0:
-        return np.zeros((fills.size, WIDTH))
-    a = surface_radius(disc=disc, fill_ratio=fills)
-    reach = disc.outer_radius - a * np.cos(half_angle(disc=disc, radius=a))  # of the liquid's mean x
-    excess = 2 * liquid.density * gravity * disc.outer_radius
-    force = excess * disc.central_angle * disc.outer_radius * (disc.axial_width + disc.outer_radius)
-    widths = np.full((fills.size, WIDTH), force * disc.outer_radius)
-    widths[:, 4:22] = force
-    widths[:, 0], widths[:, 1] = 0.0, excess
-    widths[:, 2] = liquid.density * fills * chamber_volume(disc=disc) * reach
-    widths[:, 3] = liquid.density * reach
-    return widths
-
-
-def _status(fills: FloatArray, failed: Sequence[Status]) -> Status:
-    for x, status in zip(fills, failed, strict=True):
+def _status(case: Case, failed: Sequence[Status]) -> Status:
+    for x, status in zip(case.fills, failed, strict=True):
         if not status.ok:
-            remedy = "; values there are without gravity" if status.code is StatusCode.NO_RING else ""
-            return Status(code=status.code, text=f"at a fill ratio of {x:.4g}: {status.text}{remedy}")
+            said = "; values there are without gravity" if case.turn.gravity else ""
+            return Status(code=status.code, text=f"at a fill ratio of {x:.4g}: {status.text}{said}")
     return Status()

@@ -216,6 +216,13 @@ def test_linear_solver_reports_the_true_residual() -> None:
     assert solve_linear(matrix, np.zeros(300), dimension=2).status.ok
 
 
+def test_a_singular_matrix_is_a_status_and_not_an_exception() -> None:
+    matrix = csr_matrix(diags_array([1.0, 1.0, 0.0]))
+    found = solve_linear(matrix, np.ones(3), dimension=2)
+    assert found.status.code is StatusCode.NOT_CONVERGED
+    assert np.all(np.isfinite(found.values))
+
+
 @pytest.mark.parametrize("factor", ["source_factor", "wall_factor"])
 def test_a_deliberate_fault_changes_the_pressure(disc: Disc, factor: str) -> None:
     chamber = chamber_mesh(disc=disc, surface_radius=30e-3, cells=(2, 6))

@@ -114,7 +114,12 @@ def test_volume_is_the_one_asked_for(disc: Disc) -> None:
 
 @pytest.mark.parametrize(
     ("speed", "angle", "fill", "word"),
-    [(100.0, 0.0, 0.3, "rpm"), (250.0, 0.0, 0.05, "dry"), (600.0, np.pi / 2, 0.97, "inner radius")],
+    [
+        (100.0, 0.0, 0.3, "rpm"),
+        (250.0, 0.0, 0.05, "dry"),
+        (10_000.0, 0.3, 1e-7, "dry"),
+        (600.0, np.pi / 2, 0.97, "inner radius"),
+    ],
 )
 def test_no_ring_is_a_status_and_not_a_solve(
     disc: Disc, speed: float, angle: float, fill: float, word: str

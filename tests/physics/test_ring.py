@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_first_moment, surface_radius
+from ringbalance.physics import pressure_linear
 from ringbalance.physics.grid_convergence import Verdict
-from ringbalance.physics.results import Estimate
+from ringbalance.physics.results import Estimate, StatusCode
 from ringbalance.physics.ring import RingQuantities, ring_quantities
 from ringbalance.scene.models import Disc, Scene
 
@@ -162,6 +163,7 @@ def test_a_deliberate_fault_leaves_the_half_width(disc: Disc, factor: str) -> No
         {"fill_ratio": []},
         {"fill_ratio": [0.2, 1.1]},
         {"fill_ratio": [np.nan]},
+        {"fill_ratio": [1e-12]},
         {"density": 0.0},
         {"angular_velocity": 0.0},
         {"angular_velocity": np.inf},
@@ -175,6 +177,18 @@ def test_impossible_arguments_are_refused(disc: Disc, change: Mapping[str, objec
     arguments = {"disc": disc, "density": RHO, "angular_velocity": OMEGA, "fill_ratio": [0.2]}
     with pytest.raises(ValueError, match=r"fill_ratio|density|gravity|turn_samples|cells"):
         ring_quantities(**{**arguments, **change})
+
+
+def test_a_failed_solve_is_said_and_claims_nothing(disc: Disc, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pressure_linear, "DIRECT_LIMIT", {2: 0, 3: 0})
+    monkeypatch.setattr(pressure_linear, "_MAX_ITERATIONS", 1)
+    ring = ring_quantities(disc=disc, density=RHO, angular_velocity=OMEGA, fill_ratio=[0.0, 0.2])
+    assert ring.status.code is StatusCode.NOT_CONVERGED
+    assert "0.2" in ring.status.text
+    exact = closed_forms(disc, 0.2, RHO, OMEGA)
+    assert ring.wall_pressure.uncertainty[1] >= 0.99 * exact["wall_pressure"]
+    assert ring.moment.uncertainty[1] >= exact["moment"]
+    assert ring.moment.uncertainty[0] == 0.0
 
 
 def test_turning_the_other_way_changes_nothing(disc: Disc, paper_ring: RingQuantities) -> None:

@@ -40,6 +40,8 @@ from ringbalance.verification.cases.independent_routes import case as independen
 from ringbalance.verification.cases.integrator_orders import case as integrator_orders
 from ringbalance.verification.cases.manufactured_2d import case as manufactured_2d
 from ringbalance.verification.cases.manufactured_3d import case as manufactured_3d
+from ringbalance.verification.cases.manufactured_flow import case as manufactured_flow
+from ringbalance.verification.cases.rotating_section import case as rotating_section
 from ringbalance.verification.evidence import CaseCode
 
 _CODE: Mapping[str, CaseCode] = {
@@ -48,6 +50,8 @@ _CODE: Mapping[str, CaseCode] = {
     "gravity_circle_2d": gravity_circle_2d,
     "gravity_paraboloid_3d": gravity_paraboloid_3d,
     "conservation": conservation,
+    "manufactured_flow": manufactured_flow,
+    "rotating_section": rotating_section,
     "gci_celik2008": gci_celik2008,
     "gci_behaviour": gci_behaviour,
     "independent_routes": independent_routes,

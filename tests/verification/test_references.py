@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from scipy.integrate import dblquad
 
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_area, surface_radius
 from ringbalance.scene.models import Disc, Scene
+from ringbalance.verification import manufactured_flow as flow
 from ringbalance.verification.exact_chamber import (
     central_lambda,
     exact_moment,
@@ -79,6 +81,28 @@ def test_derivatives_of_the_manufactured_pressure(dimension: int) -> None:
     np.testing.assert_allclose(exact.gradient(place), (ahead - behind) / (2 * step), rtol=1e-6)
     curvature = np.sum(ahead + behind - 2 * exact.pressure(place)) / step**2
     assert float(exact.laplacian(place)) == pytest.approx(float(curvature), rel=1e-4)
+
+
+def test_the_manufactured_flow_satisfies_its_equation() -> None:
+    """All derivatives once more by central differences, in the equation itself."""
+    place, step = np.array([0.12, 0.21]), 1e-4
+
+    def derivative(field: Callable[[np.ndarray], np.ndarray], axis: int) -> np.ndarray:
+        shift = step * np.eye(2)[axis]
+        return (field(place + shift) - field(place - shift)) / (2 * step)
+
+    def second(axis: int) -> np.ndarray:
+        shift = step * np.eye(2)[axis]
+        ahead, behind = flow.velocity(place + shift), flow.velocity(place - shift)
+        return (ahead + behind - 2 * flow.velocity(place)) / step**2
+
+    u, v, w = flow.velocity(place)
+    along = [derivative(flow.velocity, axis) for axis in (0, 1)]
+    assert along[0][0] + along[1][1] == pytest.approx(0.0, abs=1e-7)
+    turning = np.array([w, 0.0, -u])
+    slope = np.array([*(derivative(flow.pressure, axis) for axis in (0, 1)), 0.0])
+    expected = 3.0 * (u * along[0] + v * along[1]) + 5.0 * turning - 0.7 * (second(0) + second(1)) + slope
+    np.testing.assert_allclose(flow.body_force(place), expected, rtol=1e-5, atol=1e-5)
 
 
 def test_the_exact_ring_across_the_shaft_is_a_circle_that_holds_the_liquid(disc: Disc) -> None:

@@ -3,6 +3,7 @@
 # ruff: noqa: ARG001 - every case answers to one interface
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from typing import Final
 
@@ -158,43 +159,33 @@ def _over_plates(scene: Scene) -> Series:
 
 def _gravity_table(scene: Scene) -> Table:
     """Mean wall pressure over a turn with gravity, relative to that without, at falling speeds."""
-    fill, g = scene.disc.max_fill_ratio / 2, scene.environment.gravity
     speeds = [share * scene.rotor.speed for share in _SPEEDS]
-    rings = [
-        ring_quantities(
-            disc=scene.disc,
-            density=scene.liquid.density,
-            angular_velocity=speed,
-            fill_ratio=fill,
-            gravity=g,
-            dimension=2,
-        )
-        for speed in speeds
-    ]
-    plain = [
-        float(
-            exact_wall_pressure(
-                disc=scene.disc,
-                density=scene.liquid.density,
-                angular_velocity=speed,
-                fill_ratio=fill,
-            )
-        )
-        for speed in speeds
-    ]
+    rings = [_with_gravity(scene, speed) for speed in speeds]
+    middle = scene.disc.max_fill_ratio / 2
+    plain = [float(_exact(_at_speed(scene, speed), scene.disc, np.array(middle))) for speed in speeds]
+    pairs = list(zip(rings, plain, strict=True))
     return Table(
         name="gravity across the shaft: change of the mean wall pressure, and its ripple over a turn",
         columns={
             "speed": speeds,
-            "change by gravity": [
-                float(ring.wall_pressure.value[0]) / exact - 1
-                for ring, exact in zip(rings, plain, strict=True)
-            ],
-            "ripple": [
-                float(ring.ripple["wall_pressure"][0]) / exact
-                for ring, exact in zip(rings, plain, strict=True)
-            ],
+            "change by gravity": [float(ring.wall_pressure.value[0]) / exact - 1 for ring, exact in pairs],
+            "ripple": [float(ring.ripple["wall_pressure"][0]) / exact for ring, exact in pairs],
             "ring": ["closed" if bool(ring.closed[0]) else "no closed ring" for ring in rings],
         },
         units={"speed": "rad/s", "change by gravity": "1", "ripple": "1"},
+    )
+
+
+def _at_speed(scene: Scene, speed: float) -> Scene:
+    return dataclasses.replace(scene, rotor=dataclasses.replace(scene.rotor, speed=speed))
+
+
+def _with_gravity(scene: Scene, speed: float) -> RingQuantities:
+    return ring_quantities(
+        disc=scene.disc,
+        density=scene.liquid.density,
+        angular_velocity=speed,
+        fill_ratio=scene.disc.max_fill_ratio / 2,
+        gravity=scene.environment.gravity,
+        dimension=2,
     )

@@ -97,22 +97,13 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     limit = extrapolate(coarse=moved[-2], fine=moved[-1], ratio=2, order=1)
     # One half of the last correction bounds what the extrapolation has left.
     spread = from_half_width(abs(limit - moved[-1]) / 2)
-    brief = _Operation(drive=operation.drive, duration=_SHORT * operation.duration)
     return Evidence(
         found={
             "moved_fill": Found(value=limit, numerical=spread),
             "order": Found(value=study.settled_order),
             "finest_error": Found(value=study.finest_error),
         },
-        numbers={
-            "duration": operation.duration,
-            "moved": exact,
-            "single": operation.error(1),
-            "segments_percent": _segments_for(operation, 1e-2),
-            "segments_per_mille": _segments_for(operation, 1e-3),
-            "short": brief.duration,
-            "short_segments": _segments_for(brief, 1e-3),
-        },
+        numbers=_numbers(operation),
         series=(_figure(error),),
         convergence=(
             Convergence(
@@ -125,6 +116,19 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             ),
         ),
     )
+
+
+def _numbers(operation: _Operation) -> dict[str, float]:
+    brief = _Operation(drive=operation.drive, duration=_SHORT * operation.duration)
+    return {
+        "duration": operation.duration,
+        "moved": operation.exact(),
+        "single": operation.error(1),
+        "segments_percent": _segments_for(operation, 1e-2),
+        "segments_per_mille": _segments_for(operation, 1e-3),
+        "short": brief.duration,
+        "short_segments": _segments_for(brief, 1e-3),
+    }
 
 
 def _long_operation(scene: Scene) -> _Operation:

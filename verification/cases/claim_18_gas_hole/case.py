@@ -81,38 +81,42 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     coarse, fine = (_cells(disc, *grid) for grid in _GRIDS)
     best = _safest_radius(disc, fine, angles)
     offset = scene.environment.gravity / scene.rotor.speed**2
-
-    def margin(cells: _Cells, state: str) -> float:
-        fills = {
-            "stopped": lambda: _safe_at_rest(cells, best, angles),
-            "running": lambda: _safe_turning(cells, best, np.array([offset]), angles),
-            "any_speed": lambda: min(
-                _safe_at_rest(cells, best, angles),
-                _safe_turning(cells, best, _OFFSETS * disc.outer_radius, angles),
-            ),
-        }
-        return float(fills[state]()) - disc.max_fill_ratio
-
-    def found(state: str) -> Found:
-        value = margin(fine, state)
-        return Found(value=value, numerical=from_half_width(abs(value - margin(coarse, state))))
-
-    margins = {state: found(state) for state in ("running", "stopped", "any_speed")}
-    turning = _safe_turning(fine, best, _OFFSETS * disc.outer_radius, angles)
+    rough, safe = (_safe_fills(disc, cells, best, offset, angles) for cells in (coarse, fine))
+    found = {
+        f"margin_{state}": Found(
+            value=fill - disc.max_fill_ratio, numerical=from_half_width(abs(fill - rough[state]))
+        )
+        for state, fill in safe.items()
+        if state != "turning"
+    }
     ring = float(surface_radius(disc=disc, fill_ratio=disc.max_fill_ratio))
     return Evidence(
-        found={f"margin_{state}": margin_ for state, margin_ in margins.items()},
+        found=found,
         numbers={
             "best_radius": best,
             "max_fill": disc.max_fill_ratio,
-            "safe_running": margins["running"].value + disc.max_fill_ratio,
-            "safe_stopped": margins["stopped"].value + disc.max_fill_ratio,
+            "safe_running": safe["running"],
+            "safe_stopped": safe["stopped"],
             "ring_radius": ring,
             "safe_at_ring": _safe_at_rest(fine, ring, angles),
-            "between_margin": turning - margins["stopped"].value - disc.max_fill_ratio,
+            "between_margin": safe["turning"] - safe["stopped"],
         },
         series=(_figure(disc, fine, offset),),
     )
+
+
+def _safe_fills(
+    disc: Disc, cells: _Cells, radius: float, offset: float, angles: FloatArray
+) -> Mapping[str, float]:
+    """Safe fills with the hole at a radius: at full speed, at rest, at any speed between, at the worst."""
+    stopped = _safe_at_rest(cells, radius, angles)
+    turning = _safe_turning(cells, radius, _OFFSETS * disc.outer_radius, angles)
+    return {
+        "running": _safe_turning(cells, radius, np.array([offset]), angles),
+        "stopped": stopped,
+        "turning": turning,
+        "any_speed": min(stopped, turning),
+    }
 
 
 def _cells(disc: Disc, radial: int, angular: int) -> _Cells:

@@ -1,0 +1,1 @@
+"""The laminar flow solver against a manufactured solution."""

@@ -1,0 +1,88 @@
+"""Orders of velocity and pressure on the curved half section."""
+
+# ruff: noqa: ARG001 - every case answers to one interface
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from ringbalance.scene.models import Scene
+from ringbalance.verification.evidence import (
+    Axis,
+    Convergence,
+    Curve,
+    Evidence,
+    Found,
+    Level,
+    Reference,
+    Series,
+)
+from ringbalance.verification.manufactured_flow import FlowStudy, flow_study
+
+_AROUND: Final = {"light": (1, 2, 4, 8), "heavy": (1, 2, 4, 8, 16)}
+
+
+def reference(scene: Scene) -> Mapping[str, Reference]:
+    """None: orders and errors are judged against limits.
+
+    Args:
+        scene: not used.
+
+    Returns:
+        Nothing.
+    """
+    return {}
+
+
+def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Errors over levels.
+
+    Args:
+        scene: not used: the section has unit bore.
+        level: "heavy" adds a finer level.
+        defect: a fault of the momentum equation's coefficients.
+
+    Returns:
+        Evidence.
+    """
+    study = flow_study(around=_AROUND[level], defect=defect)
+    return Evidence(
+        found={
+            "velocity_order": Found(value=study.velocity.settled_order),
+            "velocity_error": Found(value=study.velocity.finest_error),
+            "pressure_order": Found(value=study.pressure.settled_order),
+            "pressure_error": Found(value=study.pressure.finest_error),
+        },
+        numbers={"unknowns": float(study.unknowns[-1])},
+        series=(_figure(study),),
+        convergence=tuple(
+            Convergence(
+                quantity=f"{name}, relative error",
+                unit="1",
+                formal_order=formal,
+                size=orders.size,
+                error=orders.error,
+                observed_order=orders.order,
+                geometry="quadratic",
+                note=f"unknowns {', '.join(map(str, study.unknowns))}",
+            )
+            for name, formal, orders in (
+                ("velocity", 3.0, study.velocity),
+                ("pressure", 2.0, study.pressure),
+            )
+        ),
+    )
+
+
+def _figure(study: FlowStudy) -> Series:
+    return Series(
+        name="error against mesh size",
+        x=Axis(name="relative mesh size", unit="1", values=np.array(study.velocity.size)),
+        y=(
+            Curve(name="velocity", unit="1", values=np.array(study.velocity.error)),
+            Curve(name="pressure", unit="1", values=np.array(study.pressure.error)),
+        ),
+        log=True,
+    )

@@ -1,0 +1,1 @@
+"""Friction of laminar flow in a turning tube against its exact limits."""

@@ -1,0 +1,98 @@
+"""The rotating section at rest, in slow rotation and in fast rotation."""
+
+# ruff: noqa: ARG001 - every case answers to one interface
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from ringbalance.physics.navier_stokes import FlowSystem
+from ringbalance.physics.rotating_section import (
+    SectionMesh,
+    friction_ratio,
+    section_system,
+    solve_section,
+    solve_section_without_inertia,
+)
+from ringbalance.scene.models import Scene
+from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
+
+_SERIES: Final = 9216.0
+_INERTIA_SERIES: Final = 16515072.0
+_LIMIT: Final = 0.07863
+_SLOW: Final = 1.0
+_SLOW_KL: Final = 20.0
+_FAST: Final = (1e1, 1e2, 1e3, 1e4)
+_FACTORS: Final = {None: 1.0, "coriolis_off_by_a_percent": 1.01, "radius_for_bore": 0.25}
+_AROUND: Final = {"light": 8, "heavy": 20}
+
+
+def reference(scene: Scene) -> Mapping[str, Reference]:
+    """The exact limits.
+
+    Args:
+        scene: not used.
+
+    Returns:
+        References.
+    """
+    return {
+        "slow": Reference(value=1.0),
+        "inertia": Reference(value=1.0),
+        "ekman": Reference(value=float(np.sqrt(10))),
+    }
+
+
+def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Friction ratios at rest, in slow and in fast rotation.
+
+    Args:
+        scene: not used: the section has unit bore.
+        level: "heavy" refines the mesh.
+        defect: "coriolis_off_by_a_percent" or "radius_for_bore".
+
+    Returns:
+        Evidence.
+    """
+    around = _AROUND[level]
+    system = section_system(cells=SectionMesh(around=around, across=3 * around // 2, wall_ratio=15.0))
+    factor = _FACTORS[defect]
+    rest = _linear(system, 0.0)
+    slow = (_linear(system, factor * _SLOW) - rest) / (_SLOW**2 / _SERIES)
+    flow = solve_section(system=system, kl=factor * _SLOW_KL, s=0.0)
+    inertia = (friction_ratio(flow) - rest) / (_SLOW_KL**2 / _INERTIA_SERIES)
+    fast = np.array([_linear(system, factor * rotation) for rotation in _FAST])
+    gaps = fast / (_LIMIT * np.sqrt(_FAST)) - 1
+    return Evidence(
+        found={
+            "at_rest": Found(value=abs(rest - 1)),
+            "slow": Found(value=slow),
+            "inertia": Found(value=inertia),
+            "ekman": Found(value=float(gaps[2] / gaps[3])),
+        },
+        numbers={"gap": float(gaps[-1])},
+        series=(_figure(fast),),
+    )
+
+
+def _linear(system: FlowSystem, rotation: float) -> float:
+    flow = solve_section_without_inertia(system=system, rotation_reynolds=rotation)
+    if not flow.status.ok:
+        raise ValueError(flow.status.text)
+    return friction_ratio(flow)
+
+
+def _figure(fast: np.ndarray) -> Series:
+    rotation = np.array(_FAST)
+    return Series(
+        name="friction over that at rest, without inertia",
+        x=Axis(name="rotation Reynolds number", unit="1", values=rotation),
+        y=(
+            Curve(name="finite elements", unit="1", values=fast),
+            Curve(name="slow series", unit="1", values=1 + rotation**2 / _SERIES, style="reference"),
+            Curve(name="fast limit", unit="1", values=_LIMIT * np.sqrt(rotation), style="reference"),
+        ),
+        log=True,
+    )

@@ -1,0 +1,231 @@
+"""The evidence document: all that a report says, as plain numbers and texts, gathered from every room.
+
+Everything but `times` is the same, to the last bit, for the same scene file, seed and versions.
+"""
+
+from __future__ import annotations
+
+import math
+import platform
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
+from datetime import date
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any, Final, Literal
+
+import numpy as np
+
+import ringbalance
+from ringbalance.controller import simulate, simulation_document
+from ringbalance.reduced_model import paper
+from ringbalance.reduced_model.calibration import Calibration, calibrate
+from ringbalance.reduced_model.documents import calibration_document
+from ringbalance.reduced_model.flow_law import FlowLaw, Regime
+from ringbalance.reduced_model.paper_law import paper_model
+from ringbalance.reports.fields import chamber_field, mesh_record, pressure_profile
+from ringbalance.scene import Scene, scene_table
+from ringbalance.verification import paper_numbers
+from ringbalance.verification.document import merge_saved, results_document
+from ringbalance.verification.runner import run_cases
+
+Record = dict[str, Any]
+Level = Literal["light", "heavy"]
+Progress = Callable[[str], None]
+
+FORMAT: Final = 1
+PACKAGES: Final = (
+    "numpy",
+    "scipy",
+    "scikit-fem",
+    "pyamg",
+    "fluids",
+    "chemicals",
+    "meshio",
+    "pydantic",
+    "matplotlib",
+    "pyvista",
+    "vtk",
+    "jinja2",
+    "ziamath",
+)
+LAW_POINTS: Final = 51
+"""Fill ratios at which the flow law is drawn."""
+
+
+def collect_evidence(
+    scene: Scene,
+    *,
+    level: Level = "light",
+    scene_text: str = "",
+    saved: Sequence[Mapping[str, Any]] = (),
+    workers: int = 1,
+    progress: Progress | None = None,
+) -> Record:
+    """Run everything that a report rests on, pictures excepted, and gather it in one JSON-able document.
+
+    Args:
+        scene: the scene.
+        level: "light" leaves heavy cases to `saved`, else `not run`.
+        scene_text: the scene file's own text, for the appendix; empty where there is none.
+        saved: case records of earlier runs, each with its `date`; one on another scene is not used.
+        workers: processes for the verification cases.
+        progress: called with the name of each stage; None for silence.
+
+    Returns:
+        The document; no value in it is NaN or infinite.
+
+    Raises:
+        SceneError: a scene that cannot be calibrated or simulated.
+    """
+    tell = progress or (lambda _: None)
+    tell("pressure field")
+    pressure = _pressure(scene)
+    tell("calibration")
+    calibration = calibrate(scene)
+    tell("closed loop")
+    runs = _closed_loop(scene, calibration)
+    tell("verification")
+    cases = _verification(scene, level, saved, workers, tell)
+    return {
+        "format": FORMAT,
+        "level": level,
+        "versions": versions(),
+        "scene": _scene(scene, scene_text),
+        "seeds": {"run": scene.run.seed},
+        "limit_m": scene.controller.limit,
+        "paper": _paper(),
+        "operating_point": _operating_point(scene, calibration),
+        "pressure": pressure,
+        "calibration": calibration_document(calibration),
+        "flow_law": _flow_law(scene, calibration),
+        "closed_loop": runs,
+        "verification": cases,
+        "pictures": {"drawn": False, "text": "The 3-D pictures were not asked for.", "files": []},
+        "times": {"date": date.today().isoformat()},
+    }
+
+
+def versions() -> Record:
+    """Versions of this program, of Python and of the packages that numbers come from.
+
+    Returns:
+        Versions by name; a package that is not installed is left out.
+    """
+    found = {"ringbalance": ringbalance.__version__, "python": platform.python_version()}
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def _scene(scene: Scene, text: str) -> Record:
+    return {
+        "name": scene.name,
+        "file": scene.source,
+        "sha256": scene.sha256,
+        "text": text,
+        "table": [asdict(row) for row in scene_table(scene)],
+    }
+
+
+def _paper() -> Record:
+    """What the paper says, for comparison."""
+    low, high = paper_numbers.LOWEST_PRESSURE, paper_numbers.HIGHEST_PRESSURE
+    return {
+        "drag_coefficient": paper.PAPER_DRAG_COEFFICIENT,
+        "lambda_m": paper.PAPER_LAMBDA,
+        "lambda_spread": paper_numbers.LAMBDA_TOLERANCE,
+        "working_range_Pa": [low.value, high.value],
+        "figure_4_pressures_Pa": [paper_numbers.LOW_PRESSURE, paper_numbers.HIGH_PRESSURE],
+    }
+
+
+def _pressure(scene: Scene) -> Record:
+    field = chamber_field(scene, fill_ratio=scene.disc.max_fill_ratio)
+    return {"profile": pressure_profile(scene=scene, field=field), "mesh": mesh_record(field)}
+
+
+def _closed_loop(scene: Scene, calibration: Calibration) -> Record:
+    models = {"calibrated": calibration.model, "paper": paper_model(scene)}
+    return {name: simulation_document(simulate(scene, model)) for name, model in models.items()}
+
+
+def _verification(
+    scene: Scene, level: Level, saved: Sequence[Mapping[str, Any]], workers: int, tell: Progress
+) -> list[Record]:
+    results = run_cases(
+        scene=scene,
+        level=level,
+        mutations=level == "heavy",
+        workers=workers,
+        progress=lambda result: tell(f"verification: {result.definition.title}"),
+    )
+    cases = [_without_time(case) for case in results_document(results)]
+    return merge_saved(cases, saved)
+
+
+def _without_time(case: Record) -> Record:
+    """Wall time does not reproduce, and a verdict must not hang on it."""
+    return {key: value for key, value in case.items() if key != "time_s"}
+
+
+def _operating_point(scene: Scene, calibration: Calibration) -> Record:
+    """The calibration's operating point, with the flow state there and Eq. 19's velocity."""
+    record: Record = dict(calibration_document(calibration)["operating_point"])
+    speed, tube = record["k_at_velocity_m_s"], calibration.tube
+    reynolds = speed * scene.tube.bore / scene.liquid.kinematic_viscosity
+    nearest = int(np.argmin(np.abs(np.asarray(tube.velocity) - speed)))
+    by_paper = calibration.paper_law.evaluate(
+        fill_ratio=record["fill_ratio"],
+        opposite_fill_ratio=record["fill_ratio"],
+        gas_pressure=scene.gas.pressure,
+    )
+    return record | {
+        "reynolds": reynolds,
+        "flow_state": str(np.asarray(tube.flow_state)[nearest]),
+        "velocity_paper_m_s": float(by_paper.velocity),
+        **_threshold_uncertainties(record, calibration),
+    }
+
+
+def _threshold_uncertainties(point: Record, calibration: Calibration) -> Record:
+    """95 % half-widths of the pressures at which flow begins and stalls."""
+    law = calibration.flow_law
+    level = float(law.wall_pressure_spread(law.max_fill_ratio))
+    scale = math.hypot(law.inputs.relative_density, 2 * law.inputs.relative_speed)
+
+    def width(pressure: float | None, own: float) -> float | None:
+        return None if pressure is None else math.hypot(scale * pressure, own, level)
+
+    return {
+        "priming_uncertainty": width(point["priming_pressure_vented_Pa"], law.inputs.hump_pressure),
+        "stall_uncertainty": width(point["stall_pressure_Pa"], 0.0),
+    }
+
+
+def _flow_law(scene: Scene, calibration: Calibration) -> Record:
+    """Both laws over the fill, at the scene's gas pressure and at one higher in the ratio of Fig. 4."""
+    ratio = paper_numbers.HIGH_PRESSURE / paper_numbers.LOW_PRESSURE
+    pressures = [scene.gas.pressure, scene.gas.pressure * ratio]
+    fill = np.linspace(0.0, scene.disc.max_fill_ratio, LAW_POINTS)
+
+    def rows(law: FlowLaw) -> Record:
+        flow = law.evaluate(fill_ratio=fill[None, :], gas_pressure=np.array(pressures)[:, None])
+        return {
+            "velocity": flow.velocity.tolist(),
+            "uncertainty": flow.uncertainty.tolist(),
+            "regime": [[Regime(int(value)).label for value in row] for row in flow.regime],
+        }
+
+    found, printed = rows(calibration.flow_law), rows(calibration.paper_law)
+    return {
+        "gas_pressure_Pa": pressures,
+        "fill_ratio": fill.tolist(),
+        "velocity_m_s": found["velocity"],
+        "velocity_uncertainty": found["uncertainty"],
+        "regime": found["regime"],
+        "velocity_paper_m_s": printed["velocity"],
+        "regime_paper": printed["regime"],
+    }

@@ -1,0 +1,65 @@
+"""The report page from its templates and the evidence alone: nothing is calculated, nothing is fetched."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib.resources import files
+from typing import Any
+
+import jinja2
+from markupsafe import Markup
+
+from ringbalance.reports import summary
+from ringbalance.reports.equations import GLYPHS, share_glyphs
+from ringbalance.reports.figure_style import DARK, LIGHT
+from ringbalance.reports.page import PageContent, page_content
+
+Record = dict[str, Any]
+
+
+def render(evidence: Record, *, pictures: Mapping[str, bytes] | None = None) -> str:
+    """One self-contained HTML page.
+
+    Args:
+        evidence: the document of `collect_evidence`.
+        pictures: PNG bytes by the file names that the evidence lists; a picture that is missing is left out.
+
+    Returns:
+        HTML that needs no other file and no network; the same evidence gives the same bytes.
+
+    Raises:
+        KeyError: an evidence document that lacks a part.
+    """
+    return render_page(page_content(evidence, pictures=pictures))
+
+
+def render_page(content: PageContent) -> str:
+    """Fills the templates.
+
+    Args:
+        content: of `page_content`.
+
+    Returns:
+        HTML.
+    """
+    environment = jinja2.Environment(
+        loader=jinja2.FunctionLoader(_template),
+        autoescape=True,
+        trim_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    environment.filters["tone"] = summary.tone
+    page = environment.get_template("report.html").render(
+        content.context, style=Markup(_style()), glyphs=Markup(GLYPHS)
+    )
+    return share_glyphs(page) + "\n"
+
+
+def _template(name: str) -> str:
+    return files("ringbalance.reports").joinpath("templates", name).read_text(encoding="utf-8")
+
+
+def _style() -> str:
+    blocks = ["".join(f"{key}:{value};" for key, value in colours.items()) for colours in (LIGHT, DARK)]
+    text = _template("style.css")
+    return text.replace("{{ figure_light }}", blocks[0]).replace("{{ figure_dark }}", blocks[1])

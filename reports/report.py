@@ -1,0 +1,151 @@
+"""The whole report: evidence, figures, fields, pictures and page, put in place once all of it is there."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ringbalance.reports.evidence import Level, Progress, collect_evidence
+from ringbalance.reports.figure_style import standalone
+from ringbalance.reports.opengl import OpenGL
+from ringbalance.reports.page import page_content
+from ringbalance.reports.pictures import finish_drawing, start_drawing, stop_drawing, write_fields
+from ringbalance.reports.render import render_page
+from ringbalance.reports.saved import saved_cases
+from ringbalance.scene import Scene
+
+Record = dict[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """A finished report."""
+
+    page: Path
+    """report.html."""
+    evidence: Record
+    """What evidence.json holds."""
+
+    @property
+    def sound(self) -> bool:
+        """False when a code-verification case failed, or the loop settled under neither law.
+
+        A loop that settles under the paper's law alone is a finding, not a fault.
+        """
+        failed = any(
+            case.get("broken") or (case["kind"] == "code_verification" and case["verdict"] == "failed")
+            for case in self.evidence["verification"]
+        )
+        return not failed and any(run["settled"] for run in self.evidence["closed_loop"].values())
+
+
+def write_report(
+    scene: Scene,
+    out: Path | str,
+    *,
+    level: Level = "light",
+    scene_text: str = "",
+    workers: int = 1,
+    progress: Progress | None = None,
+    opengl: OpenGL | None = None,
+) -> Report:
+    """Verify, calibrate, simulate and draw a scene into one folder.
+
+    Args:
+        scene: the scene.
+        out: folder for report.html, evidence.json, figures/ and fields/; made when there is none.
+        level: "heavy" runs the cases that take long, "light" takes them from earlier evidence.
+        scene_text: the scene file's own text, for the appendix.
+        workers: processes for the verification cases; more than one needs an importable main module.
+        progress: called with the name of each stage; None for silence.
+        opengl: what this machine can draw with; None: it is asked.
+
+    Returns:
+        The report.
+
+    Raises:
+        SceneError: a scene that cannot be calibrated or simulated; nothing is written.
+        OSError: the folder cannot be written, or holds an evidence.json that is none.
+    """
+    folder, start = Path(out), time.perf_counter()
+    saved = saved_cases(folder)
+    with staging(folder) as stage:
+        drawing = start_drawing(
+            scene=scene, fields=write_fields(scene=scene, folder=stage), folder=stage, opengl=opengl
+        )
+        try:
+            evidence = collect_evidence(
+                scene, level=level, scene_text=scene_text, saved=saved, workers=workers, progress=progress
+            )
+            _tell(progress, "pictures")
+            evidence["pictures"] = finish_drawing(drawing)
+        finally:
+            stop_drawing(drawing)
+        _tell(progress, "page")
+        evidence["times"]["total_s"] = round(time.perf_counter() - start, 1)
+        _write_page(evidence, stage)
+        move_into_place(stage, folder)
+    return Report(page=folder / "report.html", evidence=evidence)
+
+
+def _tell(progress: Progress | None, stage: str) -> None:
+    if progress is not None:
+        progress(stage)
+
+
+def _write_page(evidence: Record, stage: Path) -> None:
+    """Evidence, figures and page; the page is made of the evidence as it will be read back."""
+    text = json.dumps(evidence, allow_nan=False, indent=1, ensure_ascii=False)
+    (stage / "evidence.json").write_text(text + "\n", encoding="utf-8")
+    figures = stage / "figures"
+    names = [item[theme] for item in evidence["pictures"]["files"] for theme in ("light", "dark")]
+    pictures = {name: (figures / name).read_bytes() for name in names}
+    content = page_content(json.loads(text), pictures=pictures)
+    for drawing in content.drawings:
+        (figures / f"{drawing.name}.svg").write_text(standalone(drawing), encoding="utf-8")
+    (stage / "report.html").write_text(render_page(content), encoding="utf-8")
+
+
+@contextmanager
+def staging(folder: Path) -> Iterator[Path]:
+    """A folder beside the one that is wanted, gone again at the end whatever happens.
+
+    Args:
+        folder: where the files shall stand in the end.
+
+    Yields:
+        The folder to write into.
+
+    Raises:
+        OSError: no folder can be made there.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise NotADirectoryError(f"{folder} is a file, not a folder")
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}.") as stage:
+        yield Path(stage)
+
+
+def move_into_place(stage: Path, folder: Path) -> None:
+    """Move every finished file to where it belongs, the page last.
+
+    Args:
+        stage: holds the finished files.
+        folder: shall hold them; files of other names in it are left alone.
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
+    finished = sorted(path for path in stage.rglob("*") if path.is_file())
+    for path in sorted(finished, key=lambda path: path.name == "report.html"):
+        target = folder / path.relative_to(stage)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        path.chmod(0o644)
+        os.replace(path, target)

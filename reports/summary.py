@@ -1,0 +1,299 @@
+"""What a busy engineer reads first: verdict counts, calibrated numbers, what changes in the closed loop."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+from ringbalance.reports.numbers import MISSING, PLUS_MINUS, THIN_SPACE, number, percent, short
+from ringbalance.reports.units import given, shown, shown_apart
+
+Record = dict[str, Any]
+
+CLAIM_VERDICTS: Final = ("confirmed", "confirmed with correction", "refuted", "inconclusive", "not run")
+CHECK_VERDICTS: Final = ("passed", "failed", "inconclusive", "not run")
+_TONES: Final = {
+    "confirmed": "good",
+    "passed": "good",
+    "confirmed with correction": "fair",
+    "refuted": "bad",
+    "failed": "bad",
+    "inconclusive": "open",
+    "not run": "idle",
+}
+_LAWS: Final = ("calibrated", "paper")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Count:
+    """How many cases share a verdict."""
+
+    verdict: str
+    tone: str
+    count: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class KeyNumber:
+    """One calibrated number, beside the paper's."""
+
+    label: str
+    value: str
+    half_width: str
+    """95 %, as text; empty when there is none."""
+    unit: str
+    paper: str
+    """The paper's value as text; empty when it has none."""
+    note: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopRow:
+    """One line of the comparison of the closed loop under both laws."""
+
+    label: str
+    calibrated: str
+    paper: str
+
+
+def tone(verdict: str) -> str:
+    """Colour group of a verdict.
+
+    Args:
+        verdict: as in the evidence.
+
+    Returns:
+        Name of the group; the page never shows a colour without the word.
+    """
+    return _TONES.get(verdict, "open")
+
+
+def claims(evidence: Record) -> list[Record]:
+    """Cases that judge the paper, in its order.
+
+    Args:
+        evidence: the document.
+
+    Returns:
+        Case records.
+    """
+    found = [case for case in evidence["verification"] if case["kind"] == "claim"]
+    return sorted(found, key=lambda case: (case.get("number") or math.inf, case["id"]))
+
+
+def checks(evidence: Record) -> list[Record]:
+    """Cases that judge this program's own solvers.
+
+    Args:
+        evidence: the document.
+
+    Returns:
+        Case records.
+    """
+    return [case for case in evidence["verification"] if case["kind"] != "claim"]
+
+
+def verdict_counts(cases: list[Record], verdicts: tuple[str, ...]) -> list[Count]:
+    """Number of cases under each verdict, in a fixed order, without the empty ones.
+
+    Args:
+        cases: case records.
+        verdicts: order in which to list.
+
+    Returns:
+        Counts.
+    """
+    tally = Counter(case["verdict"] for case in cases)
+    return [Count(verdict=v, tone=tone(v), count=tally[v]) for v in verdicts if tally[v]]
+
+
+def lead_sentence(evidence: Record) -> str:
+    """The whole result in two sentences, counted from the verdicts.
+
+    Args:
+        evidence: the document.
+
+    Returns:
+        Prose.
+    """
+    counts = verdict_counts(claims(evidence), CLAIM_VERDICTS)
+    parts = [f"{item.count} {'is' if item.count == 1 else 'are'} {item.verdict}" for item in counts]
+    own = checks(evidence)
+    run = [case for case in own if case["verdict"] != "not run"]
+    passed = sum(case["verdict"] == "passed" for case in run)
+    told = f"Of {len(claims(evidence))} claims of the liquid-ring paper {_series(parts)}. "
+    return told + f"Of {len(run)} checks of this program itself that were run, {passed} passed."
+
+
+def _series(parts: list[str]) -> str:
+    if len(parts) < 2:
+        return parts[0] if parts else "none was judged"
+    return f"{', '.join(parts[:-1])} and {parts[-1]}"
+
+
+def headlines(evidence: Record) -> list[Record]:
+    """Claims worth a line in the summary: those so marked, else those that did not simply hold.
+
+    Args:
+        evidence: the document.
+
+    Returns:
+        Case records.
+    """
+    every = claims(evidence)
+    marked = [case for case in every if case.get("headline")]
+    return marked or [case for case in every if tone(case["verdict"]) in {"bad", "fair"}]
+
+
+def key_numbers(evidence: Record) -> list[KeyNumber]:
+    """The calibrated numbers with their 95 % half-widths.
+
+    Args:
+        evidence: the document.
+
+    Returns:
+        Numbers in reading order.
+    """
+    point, paper, calibration = evidence["operating_point"], evidence["paper"], evidence["calibration"]
+    return [
+        _lambda_number(calibration["lambda"], paper),
+        _drag_number(point, paper),
+        _pressure_number(calibration["chamber"]),
+        _velocity_number(point),
+        *_priming_number(point, paper),
+        _stall_number(point),
+    ]
+
+
+def _key(label: str, parts: tuple[str, str], paper: str, note: str) -> KeyNumber:
+    value, sign, half_width = parts[0].partition(PLUS_MINUS)
+    # A power of ten stands behind both numbers, so such a text is left in one piece.
+    whole = value.startswith("(")
+    return KeyNumber(
+        label=label,
+        value=parts[0] if whole else value,
+        half_width=f"±{THIN_SPACE}{half_width}" if sign and not whole else "",
+        unit=parts[1],
+        paper=paper,
+        note=note,
+    )
+
+
+def _lambda_number(record: Record, paper: Record) -> KeyNumber:
+    half_width = math.hypot(record["uncertainty_m"], record["input_uncertainty_m"])
+    parts = shown_apart(record["per_transferred_mass_m"], "m", half_width)
+    varies = percent(record["variation_over_range"])
+    note = f"Moment per transferred mass; varies by {varies} over the fill range."
+    said = f"{given(paper['lambda_m'], 'm')} within {short(100 * paper['lambda_spread'])} %"
+    return _key("Lever arm λ", parts, said, note)
+
+
+def _drag_number(point: Record, paper: Record) -> KeyNumber:
+    parts = shown_apart(point["k"], "1", point["k_uncertainty"])
+    said = f"about {short(paper['drag_coefficient'])}"
+    if point["k"] is None:
+        return _key("Drag coefficient k", parts, said, "Nothing flows at the scene’s gas pressure.")
+    note = (
+        f"At {shown(point['k_at_velocity_m_s'], 'm/s', digits=3)}, Re {number(point['reynolds'], digits=2)}, "
+    )
+    return _key("Drag coefficient k", parts, said, note + f"{point['flow_state']}.")
+
+
+def _pressure_number(chamber: Record) -> KeyNumber:
+    half_width = math.hypot(
+        chamber["wall_pressure_uncertainty"][-1], chamber["wall_pressure_input_uncertainty"][-1]
+    )
+    parts = shown_apart(chamber["wall_pressure_Pa"][-1], "Pa", half_width)
+    said = f"{shown(chamber['wall_pressure_paper_Pa'][-1], 'Pa')} by Eq. 12"
+    note = f"Of the liquid, at the largest fill ratio of {short(chamber['fill_ratio'][-1])}."
+    return _key("Wall pressure", parts, said, note)
+
+
+def _velocity_number(point: Record) -> KeyNumber:
+    parts = shown_apart(point["velocity_m_s"], "m/s", point["velocity_uncertainty"], digits=3)
+    said = f"{shown(point['velocity_paper_m_s'], 'm/s', digits=3)} by Eq. 19"
+    note = f"At {given(point['gas_pressure_Pa'], 'Pa')} and equal fills; the tube is {point['regime']}."
+    return _key("Velocity in the tube", parts, said, note)
+
+
+def _priming_number(point: Record, paper: Record) -> list[KeyNumber]:
+    if point["priming_pressure_vented_Pa"] is None:
+        return []
+    parts = shown_apart(point["priming_pressure_vented_Pa"], "Pa", point["priming_uncertainty"])
+    low = given(paper["working_range_Pa"][0], "Pa")
+    trapped = shown(point["priming_pressure_trapped_Pa"], "Pa")
+    note = f"Over the hump, gas vented, driven chamber empty. Gas trapped, equal fills: {trapped}."
+    return [_key("Priming pressure", parts, f"works from {low}", note)]
+
+
+def _stall_number(point: Record) -> KeyNumber:
+    parts = shown_apart(point["stall_pressure_Pa"], "Pa", point["stall_uncertainty"])
+    said = f"{shown(point['stall_pressure_paper_Pa'], 'Pa')} by Eq. 19"
+    return _key("Stall pressure", parts, said, "Below it a full siphon stops before the chamber is empty.")
+
+
+def _settling(run: Record) -> str:
+    return shown(run["settling_time_s"], "s", digits=3) if run["settled"] else "does not settle"
+
+
+def _regimes(run: Record) -> str:
+    return ", ".join(dict.fromkeys(item["regime"] for item in run["injections"])) or MISSING
+
+
+def _gas_time(run: Record) -> str:
+    return shown(math.fsum(item["duration_s"] for item in run["injections"]), "s", digits=3)
+
+
+def loop_rows(evidence: Record) -> list[LoopRow]:
+    """The closed loop under both laws, line by line.
+
+    Args:
+        evidence: the document.
+
+    Returns:
+        Rows; a law that was not run shows a dash.
+    """
+    runs = evidence["closed_loop"]
+
+    def row(label: str, read: Callable[[Record], str]) -> LoopRow:
+        calibrated, paper = (read(runs[law]) if law in runs else MISSING for law in _LAWS)
+        return LoopRow(label=label, calibrated=calibrated, paper=paper)
+
+    return [
+        row("Settling time", _settling),
+        row("Gas operations", lambda run: str(len(run["injections"]))),
+        row("Gas time in all", _gas_time),
+        row("Final amplitude", lambda run: shown(run["amplitude_m"][-1], "m", digits=2)),
+        row("Overshoots", lambda run: str(run["overshoots"])),
+        row("Misadjustments", lambda run: str(run["misadjustments"])),
+        row("Regime of the tube", _regimes),
+    ]
+
+
+def loop_sentence(evidence: Record) -> str:
+    """What changes in the closed loop, in one sentence.
+
+    Args:
+        evidence: the document.
+
+    Returns:
+        A sentence made of the runs' own numbers.
+    """
+    runs = evidence["closed_loop"]
+    if not set(_LAWS) <= runs.keys():
+        return "The closed loop was not run under both laws."
+    found, paper = runs["calibrated"], runs["paper"]
+    if not (found["settled"] and paper["settled"] and paper["settling_time_s"]):
+        return f"Under the calibrated law the run {_ending(found)}; under the paper’s it {_ending(paper)}."
+    ratio = number(found["settling_time_s"] / paper["settling_time_s"], digits=2)
+    return (
+        f"With the calibrated law the loop settles in {_settling(found)}, "
+        f"{ratio} times the {_settling(paper)} that the paper’s law predicts."
+    )
+
+
+def _ending(run: Record) -> str:
+    return f"settles in {_settling(run)}" if run["settled"] else "does not settle"

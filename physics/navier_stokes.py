@@ -80,6 +80,8 @@ class _Iteration:
     factors: Factors | None = None
     bordering: FloatArray | None = None
     update: float = np.inf
+    contracting: bool = True
+    """Whether the last step was well below the one before, so that old factors may serve once more."""
     iterations: int = 0
     factorizations: int = 0
 
@@ -123,7 +125,8 @@ def _step(
     state.vector = state.vector + full
     largest = float(np.abs(split(system.space, state.vector)[0]).max())
     moved = float(np.abs(split(system.space, full)[0]).max())
-    state.update = moved / largest if largest > 0.0 else 0.0
+    before, state.update = state.update, moved / largest if largest > 0.0 else 0.0
+    state.contracting = state.update < 0.1 * before
     state.iterations += 1
 
 
@@ -134,7 +137,7 @@ def _iterate(
     entries = linear_entries(system, c)
     for _ in range(settings.max_iterations):
         residual = _residual(system, c, entries, state)
-        keep = state.update < settings.keep_factors_below or c.inertia == 0.0
+        keep = c.inertia == 0.0 or (state.update < settings.keep_factors_below and state.contracting)
         try:
             if state.factors is None or not keep:
                 state.factors = _factorize(system, c, entries, state)

@@ -1,0 +1,234 @@
+"""The rotating section against exact limits, its table against fresh solutions and its own promises."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import replace
+from functools import cache
+from importlib import resources
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ringbalance.physics.navier_stokes import FlowSolution, FlowSystem, NewtonSettings
+from ringbalance.physics.navier_stokes_continuation import StepRule, follow
+from ringbalance.physics.results import Status, StatusCode
+from ringbalance.physics.rotating_section import (
+    SectionMesh,
+    friction_ratio,
+    section_system,
+    solve_section,
+    solve_section_without_inertia,
+)
+from ringbalance.physics.rotating_section_generate import settings_hash
+from ringbalance.physics.rotating_section_grid import slow_first, table_settings
+from ringbalance.physics.rotating_section_table import (
+    friction_table,
+    ito_nanbu_laminar,
+    rotating_friction_ratio,
+    rotation_table_covers,
+)
+
+
+@cache
+def _system(around: int = 8, wall_ratio: float = 15.0) -> FlowSystem:
+    return section_system(cells=SectionMesh(around=around, across=3 * around // 2, wall_ratio=wall_ratio))
+
+
+def _still(system: FlowSystem) -> float:
+    return friction_ratio(solve_section_without_inertia(system=system, rotation_reynolds=0.0))
+
+
+def test_tube_at_rest_has_hagen_and_poiseuilles_friction() -> None:
+    assert _still(_system()) == pytest.approx(1.0, abs=5e-7)
+
+
+def test_slow_rotation_without_inertia_follows_the_series() -> None:
+    flow = solve_section_without_inertia(system=_system(), rotation_reynolds=1.0)
+    assert friction_ratio(flow) - _still(_system()) == pytest.approx(1 / 9216, rel=1e-3)
+
+
+@pytest.mark.parametrize("kl", [20.0, 60.0])
+def test_slow_rotation_with_inertia_follows_the_series(kl: float) -> None:
+    flow = solve_section(system=_system(), kl=kl, s=0.0)
+    expected = kl**2 / 16515072
+    # The next term of the series is of the order of the square of this one.
+    assert friction_ratio(flow) - _still(_system()) == pytest.approx(expected, rel=0.002 + 20 * expected)
+
+
+def test_the_series_adds_its_two_terms() -> None:
+    flow = solve_section(system=_system(), kl=30.0, s=0.02)
+    expected = 30.0 * 0.02 / 9216 + 30.0**2 / 16515072
+    assert friction_ratio(flow) - _still(_system()) == pytest.approx(expected, rel=0.003)
+
+
+def test_fast_rotation_without_inertia_tends_to_the_exact_limit() -> None:
+    gaps = []
+    for rotation in (1e3, 1e4, 1e5):
+        flow = solve_section_without_inertia(system=_system(10), rotation_reynolds=rotation)
+        gaps.append(friction_ratio(flow) / (0.07863 * np.sqrt(rotation)) - 1)
+    # The gap falls as the thickness of the Ekman layer, R^(-1/2).
+    assert gaps[0] / gaps[1] == pytest.approx(np.sqrt(10), rel=0.15)
+    assert gaps[2] == pytest.approx(gaps[1] / np.sqrt(10), abs=0.005)
+
+
+@pytest.mark.heavy
+def test_fast_rotation_up_to_a_million() -> None:
+    system = section_system(cells=SectionMesh(around=28, across=44, wall_ratio=60.0))
+    for rotation, gap in ((1e2, 0.7754), (1e4, 0.0753), (1e6, 0.0075)):
+        flow = solve_section_without_inertia(system=system, rotation_reynolds=rotation)
+        found = friction_ratio(flow) / (0.07863 * np.sqrt(rotation)) - 1
+        assert found == pytest.approx(gap, abs=0.004)
+
+
+def test_little_inertia_agrees_with_none() -> None:
+    linear = solve_section_without_inertia(system=_system(), rotation_reynolds=200.0)
+    full = solve_section(system=_system(), kl=200.0**2 / 1e3, s=1e3)
+    assert friction_ratio(full) == pytest.approx(friction_ratio(linear), rel=1e-5)
+
+
+def _followed(kl: float, s: float, around: int) -> float:
+    """F at a point, followed from slow rotation."""
+    system = _system(around)
+
+    def solve(a: float, start: FlowSolution | None) -> FlowSolution:
+        newton = NewtonSettings(max_iterations=12)
+        return solve_section(system=system, kl=300 * np.expm1(a), s=s, start=start, settings=newton)
+
+    rule = StepRule(first=0.8, largest=1.2, smallest=0.01)
+    path = follow(
+        solve=solve, start=solve(0.5, None), start_at=0.5, targets=[float(slow_first(kl))], rule=rule
+    )
+    assert path.status.ok
+    return friction_ratio(path.solutions[0])
+
+
+def test_a_path_recovers_from_steps_that_fail() -> None:
+    system, taken = _system(4), [0.0]
+
+    def solve(kl: float, start: FlowSolution) -> FlowSolution:
+        found = solve_section(system=system, kl=kl, s=1.0, start=start)
+        if kl - taken[-1] > 40.0:
+            return replace(found, status=Status(code=StatusCode.NOT_CONVERGED, text="too far"))
+        taken.append(kl)
+        return found
+
+    start = solve_section(system=system, kl=0.0, s=1.0)
+    rule = StepRule(first=100.0, smallest=1.0)
+    path = follow(solve=solve, start=start, start_at=0.0, targets=[100.0], rule=rule)
+    assert path.status.ok
+    assert path.failures >= 2
+    short = StepRule(first=100.0, smallest=60.0)
+    taken[:] = [0.0]
+    stuck = follow(solve=solve, start=start, start_at=0.0, targets=[100.0], rule=short)
+    assert stuck.status.code is StatusCode.NOT_CONVERGED
+    assert stuck.solutions == ()
+
+
+def test_the_committed_table_is_whole() -> None:
+    path = resources.files("ringbalance.physics") / "data" / "rotating_friction.csv"
+    text = path.read_text(encoding="utf-8")
+    assert len(text.encode()) < 200_000
+    lines = text.splitlines(keepends=True)
+    body = "".join(line for line in lines if not line.startswith("#"))
+    head = dict(line[2:].rstrip().split(": ", 1) for line in lines if line.startswith("#") and ": " in line)
+    assert head["data_sha256"] == hashlib.sha256(body.encode()).hexdigest()
+    assert head["settings_sha256"] == settings_hash(table_settings())
+    plain = json.loads(json.dumps(table_settings().plain()))
+    assert json.loads(head["settings"]) == plain
+
+
+def test_the_table_is_fine_enough() -> None:
+    table = friction_table()
+    inner = [r for r in table.rows if r["table"] == "slow" and float(r["a"]) <= slow_first(1e6)]
+    assert max(float(r["uncertainty"]) / float(r["fine"]) for r in inner) < 1e-3
+    assert table.interpolation_error < 2e-3
+    assert table.edge_interpolation_error < 1e-2
+
+
+@pytest.mark.parametrize(("a", "b"), [(3, 4), (9, 10)])
+def test_points_of_the_table_come_out_again(a: int, b: int) -> None:
+    settings, table = table_settings(), friction_table()
+    place = (settings.slow_a[a], settings.slow_b[b])
+    row = next(r for r in table.rows if r["table"] == "slow" and (float(r["a"]), float(r["b"])) == place)
+    kl, s = 300 * np.expm1(place[0]), place[1] / (1 - place[1])
+    assert _followed(kl, s, 8) == pytest.approx(float(row["coarse"]), rel=2e-6)
+
+
+@pytest.mark.parametrize(("reynolds", "rotation"), [(173.0, 61.0), (40.0, 170.0), (600.0, 190.0)])
+def test_unseen_points_lie_within_half_a_percent(reynolds: float, rotation: float) -> None:
+    fresh = _followed(reynolds * rotation, rotation / reynolds, 6)
+    found = rotating_friction_ratio(reynolds=reynolds, rotation_reynolds=rotation)
+    assert found.status.ok
+    assert float(found.value) == pytest.approx(fresh, rel=2e-3)
+    assert float(found.uncertainty) < 5e-3 * float(found.value)
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("seed", range(6))
+def test_many_unseen_points_lie_within_half_a_percent(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    kl, s = 10 ** rng.uniform(2.5, 6.0), rng.uniform(0.0, 5.0)
+    found = rotating_friction_ratio(reynolds=np.sqrt(kl / s), rotation_reynolds=np.sqrt(kl * s))
+    assert float(found.value) == pytest.approx(_followed(kl, s, 14), rel=5e-3)
+
+
+def test_exact_limits_hold_in_the_table() -> None:
+    still = rotating_friction_ratio(reynolds=[0.0, 10.0, 2000.0], rotation_reynolds=0.0)
+    np.testing.assert_array_equal(still.value, 1.0)
+    np.testing.assert_array_equal(still.uncertainty, 0.0)
+    slow = rotating_friction_ratio(reynolds=0.0, rotation_reynolds=2.0)
+    assert float(slow.value) - 1 == pytest.approx(4 / 9216, rel=0.2)
+    fast = rotating_friction_ratio(reynolds=0.0, rotation_reynolds=1e5)
+    assert float(fast.value) == pytest.approx(0.07863 * np.sqrt(1e5), rel=0.03)
+
+
+@given(reynolds=st.floats(1.0, 3000.0), rotation=st.floats(0.1, 3000.0), growth=st.floats(1.02, 3.0))
+def test_friction_grows_with_rotation_and_never_falls_below_rest(
+    reynolds: float, rotation: float, growth: float
+) -> None:
+    pair = rotating_friction_ratio(reynolds=reynolds, rotation_reynolds=[rotation, growth * rotation])
+    assert np.all(pair.value >= 1 - 1e-5)
+    assert pair.value[1] > pair.value[0] - 1e-5
+    assert np.all(np.isfinite(pair.uncertainty))
+    assert np.all(pair.uncertainty >= 0)
+
+
+def test_the_two_rectangles_join_smoothly() -> None:
+    s = np.geomspace(1.5, 8.0, 400)
+    for rotation in (20.0, 300.0, 3000.0):
+        value = np.log(rotating_friction_ratio(reynolds=rotation / s, rotation_reynolds=rotation).value)
+        slope = np.diff(value) / np.diff(np.log(s))
+        assert np.abs(np.diff(slope)).max() < 2e-3
+
+
+def test_outside_the_table_the_answer_is_wide_and_says_so() -> None:
+    found = rotating_friction_ratio(reynolds=[100.0, 1e5, 10.0], rotation_reynolds=[100.0, 1e3, 1e6])
+    assert found.status.code is StatusCode.OUT_OF_RANGE
+    assert np.all(np.isfinite(found.value))
+    covered = rotation_table_covers(reynolds=[100.0, 1e5, 10.0], rotation_reynolds=[100.0, 1e3, 1e6])
+    np.testing.assert_array_equal(covered, [True, False, False])
+    assert np.all(found.uncertainty[~covered] > 0.25 * found.value[~covered])
+    assert found.uncertainty[0] < 0.01 * found.value[0]
+
+
+@pytest.mark.parametrize("bad", [-1.0, np.nan, np.inf])
+def test_bad_arguments_are_refused(bad: float) -> None:
+    with pytest.raises(ValueError, match="reynolds"):
+        rotating_friction_ratio(reynolds=bad, rotation_reynolds=1.0)
+
+
+def test_ito_and_nanbus_formula_holds_for_slow_rotation_only() -> None:
+    """Their formula knows Kl alone; S raises friction beyond it."""
+    kl = np.geomspace(1e4, 1e6, 9)
+
+    def gap(s: float) -> float:
+        value = rotating_friction_ratio(reynolds=np.sqrt(kl / s), rotation_reynolds=np.sqrt(kl * s)).value
+        return float(np.abs(ito_nanbu_laminar(kl=kl) / value - 1).max())
+
+    assert gap(0.05) < 0.03
+    assert gap(0.5) < 0.08
+    assert gap(2.0) > 0.13

@@ -3,6 +3,7 @@
 from ringbalance.controller.algorithm import Command, Controller, Measurement, ValveCommand
 from ringbalance.controller.algorithms import controller_of
 from ringbalance.controller.document import simulation_document
+from ringbalance.controller.ensemble import Ensemble, ensemble_document, simulate_ensemble
 from ringbalance.controller.law_based import LawBased
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Injection, Outcome, Simulation
@@ -12,6 +13,7 @@ from ringbalance.controller.trial import Trial
 __all__ = [
     "Command",
     "Controller",
+    "Ensemble",
     "Injection",
     "LawBased",
     "Measurement",
@@ -21,6 +23,8 @@ __all__ = [
     "Trial",
     "ValveCommand",
     "controller_of",
+    "ensemble_document",
     "simulate",
+    "simulate_ensemble",
     "simulation_document",
 ]

@@ -1,0 +1,312 @@
+"""Ensembles against `simulate` member by member, and what a crowd of members says."""
+
+from __future__ import annotations
+
+import cmath
+import json
+import math
+import tracemalloc
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ringbalance.controller.algorithm import Measurement
+from ringbalance.controller.ensemble import (
+    binomial_share,
+    ensemble_document,
+    simulate_ensemble,
+    simulate_members,
+)
+from ringbalance.controller.ensemble_members import (
+    BLOCK,
+    Members,
+    Spread,
+    drawn_members,
+    members_alike,
+    noise_stream,
+    spread_of,
+)
+from ringbalance.controller.ensemble_transfer import TableTransfer, moment_table, pair_transfer
+from ringbalance.controller.loop import simulate
+from ringbalance.controller.quadrature import quadrature
+from ringbalance.controller.sensor import Sensor
+from ringbalance.controller.simulation import Outcome
+from ringbalance.controller.transfer import Drive
+from ringbalance.reduced_model.flow_law import Regime
+from ringbalance.reduced_model.model import BalancerModel
+from ringbalance.reduced_model.paper_law import PaperLaw, PaperMoment, paper_model
+from ringbalance.scene.models import Scene
+
+EXACT = Spread(velocity=0.0, moment=0.0, influence_coefficient=0.0, lag_angle=0.0)
+
+
+def noisy(scene: Scene, *, time_limit: float = 12.0, **controller: Any) -> Scene:
+    return replace(
+        scene,
+        sensor=replace(scene.sensor, amplitude_noise=2e-8, phase_noise=0.02),
+        controller=replace(scene.controller, **controller),
+        run=replace(scene.run, time_limit=time_limit),
+    )
+
+
+def sensor_of(scene: Scene, *, seed: int, member: int) -> Sensor:
+    """The sensor that one member of the first block sees."""
+    stream = noise_stream(seed=seed, block=0)
+
+    def measure(time: float, vibration: complex) -> Measurement:
+        a, b = stream.standard_normal((2, BLOCK))[:, member]
+        return Measurement(
+            time=time,
+            amplitude=abs(abs(vibration) + scene.sensor.amplitude_noise * float(a)),
+            phase=cmath.phase(vibration) + scene.sensor.phase_noise * float(b),
+        )
+
+    return measure
+
+
+def alone(scene: Scene, model: BalancerModel, members: Members, member: int) -> tuple[Scene, BalancerModel]:
+    """One member as a scene and a model of its own; k takes up the velocity, lambda the moment."""
+    rotor = replace(
+        scene.rotor,
+        influence_coefficient=float(members.influence_coefficient[member]),
+        lag_angle=float(members.lag_angle[member]),
+    )
+    settings = replace(scene.controller, proportional=float(members.proportional[member]))
+    law, moment = model.flow, model.moment
+    assert isinstance(law, PaperLaw)
+    assert isinstance(moment, PaperMoment)
+    k = (law.drag_coefficient + 1) / float(members.velocity_factor[member]) ** 2 - 1
+    held = moment.moment_per_transferred_mass * float(members.moment_factor[member])
+    changed = replace(
+        model,
+        flow=replace(law, drag_coefficient=k),
+        moment=replace(moment, moment_per_transferred_mass=held),
+    )
+    return replace(scene, rotor=rotor, controller=settings), changed
+
+
+def various(scene: Scene, *, size: int) -> Members:
+    """Members that differ in everything, some of them badly: overshooting, and with a wrong lag."""
+    random = np.random.default_rng(11)
+    base = members_alike(scene, size=size)
+    lag = base.lag_angle + random.uniform(-0.4, 0.4, size)
+    lag[-1] += 2.5
+    return Members(
+        velocity_factor=random.uniform(0.6, 1.7, size),
+        moment_factor=random.uniform(0.8, 1.2, size),
+        influence_coefficient=base.influence_coefficient * random.uniform(0.8, 1.2, size),
+        lag_angle=lag,
+        proportional=base.proportional * random.uniform(0.4, 3.0, size),
+    )
+
+
+# --- agreement, member by member ---
+
+
+@pytest.mark.parametrize(("chambers", "noise"), [(4, True), (4, False), (6, True), (2, True)])
+def test_every_member_is_the_scalar_run(scene: Scene, chambers: int, noise: bool) -> None:
+    size = 10
+    disc = replace(scene.disc, chambers=chambers, central_angle=2 * math.pi / max(chambers, 3))
+    asked = replace(noisy(scene), disc=disc)
+    if not noise:
+        asked = replace(asked, sensor=scene.sensor)
+    model = paper_model(asked)
+    members = various(asked, size=size)
+    found = simulate_members(asked, model, members=members, seed=4)
+    outcomes = []
+    for member in range(size):
+        own_scene, own_model = alone(asked, model, members, member)
+        sensor = sensor_of(asked, seed=4, member=member) if noise else None
+        run = simulate(own_scene, own_model, sensor=sensor)
+        outcomes.append(run.outcome)
+        assert found.settled[member] == run.settled
+        assert found.overshoots[member] == run.overshoots
+        assert found.misadjustments[member] == run.misadjustments
+        assert found.samples[member] == len(run.samples)
+        assert found.diverged[member] == (run.outcome is Outcome.DIVERGING)
+        assert found.final_amplitude[member] == pytest.approx(run.amplitude[-1], abs=1e-15)
+        time = math.inf if run.settling_time is None else run.settling_time
+        assert found.settling_time[member] == pytest.approx(time, rel=1e-9)
+    if chambers != 2:
+        assert Outcome.SETTLED in outcomes
+        assert Outcome.DIVERGING in outcomes
+        assert np.any(found.overshoots > 0)
+
+
+@pytest.mark.parametrize("name", ["two_regimes", "square_root", "constant"])
+def test_laws_without_closed_form_agree_as_well(
+    scene: Scene, model: BalancerModel, laws: Mapping[str, Any], name: str
+) -> None:
+    other = replace(model, name=name, flow=laws[name])
+    asked = noisy(replace(scene, rotor=replace(scene.rotor, initial_amplitude=7e-6)), proportional=0.1e6)
+    found = simulate_members(asked, other, size=4, seed=2)
+    for member in range(4):
+        run = simulate(asked, other, sensor=sensor_of(asked, seed=2, member=member))
+        assert found.settled[member] == run.settled
+        assert found.overshoots[member] == run.overshoots
+        assert found.samples[member] == len(run.samples)
+        assert found.final_amplitude[member] == pytest.approx(run.amplitude[-1], abs=1e-12)
+        time = math.inf if run.settling_time is None else run.settling_time
+        assert found.settling_time[member] == pytest.approx(time, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["two_regimes", "square_root", "constant"])
+def test_the_table_gives_the_fills_of_the_quadrature(
+    model: BalancerModel, laws: Mapping[str, Any], name: str
+) -> None:
+    other = replace(model, flow=laws[name])
+    transfer = pair_transfer(model=other, total=0.5, gas_pressure=1e5, longest=60.0)
+    assert isinstance(transfer, TableTransfer)
+    rate = model.tube_area / model.chamber_volume
+    times = np.array([1e-3, 0.05, 0.4, 1.5, 4.0])
+    worst = 0.0
+    for fill in (0.11, 0.2001, 0.25, 0.43, 0.5):
+        drive = Drive(
+            law=laws[name], fill=fill, total=0.5, exchange_rate=rate, gas_pressure=1e5, primed=False
+        )
+        table = transfer.after(np.array([fill])[:, None], times[None, :])[0]
+        worst = max(worst, float(np.max(np.abs(table - quadrature(drive, times).fill))))
+    assert worst < 1e-7
+
+
+def test_an_empty_tube_starts_where_the_law_says(model: BalancerModel, laws: Mapping[str, Any]) -> None:
+    transfer = pair_transfer(
+        model=replace(model, flow=laws["square_root"]), total=0.5, gas_pressure=1e5, longest=60.0
+    )
+    assert list(transfer.starts(np.array([0.05, 0.0999999, 0.1000001, 0.3]))) == [False, False, True, True]
+    paper = pair_transfer(model=model, total=0.5, gas_pressure=0.1e6, longest=60.0)
+    # Eq. 19 at 0.1 MPa stalls where the levels differ by 0.1/0.763.
+    law = model.flow
+    assert isinstance(law, PaperLaw)
+    stall = (0.5 - 0.1e6 / law.pressure_per_fill_difference) / 2
+    assert list(paper.starts(np.array([stall - 1e-9, stall + 1e-9]))) == [False, True]
+    assert float(paper.after(np.array([0.25]), np.array([100.0]))[0]) == pytest.approx(stall, abs=1e-12)
+
+
+def test_the_moment_table_is_the_curve(model: BalancerModel) -> None:
+    class Curve:
+        def pair_moment(self, *, fill_ratio: Any, opposite_fill_ratio: Any) -> Any:
+            return np.sin(3 * np.asarray(fill_ratio)) - np.sin(3 * np.asarray(opposite_fill_ratio))
+
+    table = moment_table(model=replace(model, moment=Curve()), total=0.5)
+    x = np.random.default_rng(0).uniform(0, 0.5, 200)
+    assert np.max(np.abs(table(x) - np.sin(3 * x) + np.sin(3 * (0.5 - x)))) < 1e-10
+
+
+def test_liquid_that_runs_back_is_told_and_not_guessed(
+    scene: Scene, model: BalancerModel, laws: Mapping[str, Any]
+) -> None:
+    def levelling(x: Any, y: Any, p: Any, _: Any) -> tuple[Any, Any]:
+        return 20 * (x - y) + np.where(p > 0, 12.0, 0.0), np.full(x.shape, Regime.SIPHON)
+
+    law = replace(laws["levelling"], function=levelling)
+    found = simulate_members(noisy(scene), replace(model, flow=law), size=3)
+    assert found.drifted.all()
+    assert not found.settled.any()
+    with pytest.raises(ValueError, match="one by one"):
+        simulate_members(noisy(scene), replace(model, flow=laws["levelling"]), size=3)
+
+
+# --- the crowd ---
+
+
+def test_the_same_seed_gives_the_same_numbers_for_any_threads(scene: Scene, model: BalancerModel) -> None:
+    asked = noisy(scene, time_limit=5.0)
+    one = simulate_ensemble(asked, model, 2 * BLOCK + 5, 3, workers=1)
+    two = simulate_ensemble(asked, model, 2 * BLOCK + 5, 3, workers=2)
+    assert ensemble_document(one) == ensemble_document(two)
+    assert one.members == 2 * BLOCK + 5
+    other = simulate_ensemble(asked, model, 2 * BLOCK + 5, 4, workers=2)
+    assert ensemble_document(other) != ensemble_document(one)
+
+
+def test_a_larger_ensemble_begins_with_the_smaller(scene: Scene, model: BalancerModel) -> None:
+    asked = noisy(scene, time_limit=10.0)
+    spread = spread_of(asked, model)
+    drawn = drawn_members(asked, spread=spread, seed=1, block=0)
+    few = Members(**{name: values[:7] for name, values in vars(drawn).items()})
+    more = Members(**{name: values[:50] for name, values in vars(drawn).items()})
+    a, b = (simulate_members(asked, model, members=m, seed=1) for m in (few, more))
+    assert np.array_equal(a.settling_time, b.settling_time[:7])
+    counted = simulate_ensemble(asked, model, 50, 1)
+    assert counted.settled.value == pytest.approx(b.settled.mean())
+    assert counted.overshoot.value == pytest.approx((b.overshoots > 0).mean())
+    assert counted.mean_settling_time == pytest.approx(float(b.settling_time[b.settled].mean()))
+    assert counted.settling_quantiles[2] == pytest.approx(
+        float(np.median(b.settling_time[b.settled])), abs=0.03
+    )
+
+
+def test_memory_does_not_grow_with_the_members(scene: Scene, model: BalancerModel) -> None:
+    asked = noisy(scene, time_limit=2.0)
+    simulate_ensemble(asked, model, 10, 0)
+    peaks = []
+    for blocks in (2, 6):
+        tracemalloc.start()
+        simulate_ensemble(asked, model, blocks * BLOCK, 0, workers=1)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 1.1 * peaks[0]
+
+
+def test_more_uncertainty_more_overshoot(scene: Scene, model: BalancerModel) -> None:
+    asked = noisy(scene, time_limit=9.0)
+    asked = replace(asked, sensor=replace(asked.sensor, amplitude_noise=2e-9))
+    wide = replace(EXACT, velocity=0.3, influence_coefficient=0.3)
+    calm, wild = (simulate_ensemble(asked, model, 2000, 0, spread=s) for s in (EXACT, wide))
+    assert wild.overshoot.low > calm.overshoot.high
+    assert wild.settling_quantiles[4] > calm.settling_quantiles[4]
+
+
+def test_members_are_drawn_with_the_half_widths(scene: Scene) -> None:
+    spread = Spread(velocity=0.1, moment=0.02, influence_coefficient=0.2, lag_angle=0.05)
+    drawn = drawn_members(scene, spread=spread, seed=0, block=0)
+    for values, low, high in (
+        (drawn.velocity_factor, 1 / 1.1, 1.1),
+        (drawn.moment_factor, 1 / 1.02, 1.02),
+        (drawn.influence_coefficient / scene.rotor.influence_coefficient, 1 / 1.2, 1.2),
+        (drawn.lag_angle - scene.rotor.lag_angle, -0.05, 0.05),
+    ):
+        assert np.mean((values > low) & (values < high)) == pytest.approx(0.95, abs=0.01)
+        assert np.mean(values > high) == pytest.approx(0.025, abs=0.007)
+
+
+def test_the_spread_says_where_it_comes_from(scene: Scene, model: BalancerModel) -> None:
+    found = spread_of(replace(scene, uncertainty=()), model)
+    # k = 50 within 10 %: (k + 1) within 5/51, the velocity within half of that.
+    assert found.velocity == pytest.approx(5 / 51 / 2)
+    assert all("assumed" in source for source in found.sources[2:])
+
+
+def test_a_share_has_its_interval() -> None:
+    # Wilson's interval for 5 of 50.
+    found = binomial_share(count=5, of=50)
+    assert (found.low, found.high) == pytest.approx((0.0435, 0.2136), abs=2e-4)
+    assert binomial_share(count=0, of=100).low == 0.0
+    assert binomial_share(count=0, of=100).high == pytest.approx(0.037, abs=1e-3)
+
+
+def test_the_document_is_small_clean_json(scene: Scene, model: BalancerModel) -> None:
+    seen: list[tuple[int, int]] = []
+    asked = noisy(scene, time_limit=5.0)
+    found = ensemble_document(
+        simulate_ensemble(asked, model, 300, 0, progress=lambda done, of: seen.append((done, of)))
+    )
+    text = json.dumps(found, allow_nan=False)
+    assert len(text) < 5000
+    assert seen == [(300, 300)]
+    times = found["settling_time_s"]
+    assert sum(times["counts"]) == round(300 * found["probability"]["settled"]["value"])
+    assert len(times["edges"]) == len(times["counts"]) + 1
+    assert sum(found["overshoots"]) == sum(found["misadjustments"]) == 300
+
+
+@pytest.mark.parametrize("n", [0, -3])
+def test_no_members_are_refused(scene: Scene, model: BalancerModel, n: int) -> None:
+    with pytest.raises(ValueError, match="members"):
+        simulate_ensemble(scene, model, n, 0)
+    with pytest.raises(ValueError, match="at most"):
+        simulate_members(scene, model, size=BLOCK + 1)

@@ -53,7 +53,7 @@ def range_notes(*, tube: Tube, state: TubeState, velocity: FloatArray) -> dict[s
             "friction: relative roughness above 0.05": np.full(
                 re.shape, tube.roughness > LARGEST_ROUGHNESS * tube.bore
             ),
-            "rotation: laminar factor beyond Kl = 1e7 or R_Om = 3500": ~_turbulent(laminar, unsteady)
+            "rotation: laminar factor beyond Kl = 1e7 or R_Om = 1e5": ~_turbulent(laminar, unsteady)
             & untested,
             "rotation: critical Re extrapolated beyond R_Om = 2000": unsteady & (rotation > 2000),
             "bends: formula rests on turbulent data": (laminar | unsteady) & bool(tube.bends),

@@ -1,8 +1,8 @@
 """Extra friction of a tube that turns about an axis across it: Coriolis forces drive a secondary flow.
 
-Three functions are all that the rest of the program knows of it, so that a table of finite-element solutions
-can take the place of the joined formulas below: `rotating_friction_ratio`, `turbulent_friction_ratio` and
-`critical_reynolds`.
+Laminar flow rests on a table of finite-element solutions, turbulent flow and transition on correlations:
+`rotating_friction_ratio`, `turbulent_friction_ratio` and `critical_reynolds` are all that the rest of the
+program knows of it.
 """
 
 from __future__ import annotations
@@ -13,6 +13,15 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.physics.results import Estimate
+from ringbalance.physics.rotating_section_table import rotating_friction_ratio, rotation_table_covers
+
+__all__ = [
+    "STRAIGHT_CRITICAL_REYNOLDS",
+    "critical_reynolds",
+    "rotating_friction_ratio",
+    "rotation_in_range",
+    "turbulent_friction_ratio",
+]
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -22,63 +31,8 @@ STRAIGHT_CRITICAL_REYNOLDS: Final = 1070 * 28**0.23
 _TURBULENT_JOIN: Final = 500.0
 
 
-def _harmonic(a: FloatArray, b: FloatArray, power: float) -> FloatArray:
-    """Smooth smaller of two positive numbers, (a^-p + b^-p)^(-1/p), a where b is far larger."""
-    return np.asarray(a * (1 + (a / b) ** power) ** (-1 / power), dtype=np.float64)
-
-
-def _slow_rotation_excess(kl: FloatArray) -> FloatArray:
-    """F - 1 for R_Om/Re -> 0: the exact Kl^2 series joined with Ito and Nanbu's formula."""
-    # Their formula falls below 1 at Kl = 220, where its range ends; the last term keeps it away from there.
-    ito = 0.0883 * kl**0.25 * (1 + 11.2 * kl**-0.325) - 1 + 0.011 * (220 / kl) ** 2
-    return _harmonic(kl**2 / 16515072, ito, 1.3)
-
-
-def _fast_rotation_excess(rotation: FloatArray) -> FloatArray:
-    """F - 1 for Re -> 0: between the exact series R_Om^2/9216 and the exact limit 0.07863 sqrt(R_Om)."""
-    root = np.sqrt(rotation)
-    limit = 0.07863 * root * rotation / (rotation + 5.18 * root + 26.8)
-    return np.asarray((rotation**2 / 9216) / np.sqrt(1 + (rotation**2 / 9216 / limit) ** 2), dtype=np.float64)
-
-
-def rotating_friction_ratio(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike) -> Estimate:
-    """Laminar friction factor with rotation over the one without, F = f/(64/Re), developed flow.
-
-    F = 1 + (y1^m + y2^m)^(1/m), m from 1 (small excess: the series add) to 4 (the larger one rules), with
-    y1(Kl) between Kl^2/16515072 and Ito and Nanbu's 0.0883 Kl^(1/4) (1 + 11.2 Kl^-0.325) - 1,
-    y2(R_Om) between R_Om^2/9216 and 0.07863 sqrt(R_Om).
-
-    Args:
-        reynolds: Re, any shape, positive.
-        rotation_reynolds: R_Om, any shape that broadcasts, zero or more.
-
-    Returns:
-        Estimate of F, of the broadcast shape.  Uncertainty: 4 % of F inside
-        `rotation_in_range`, 15 % outside, falling to zero with the excess F - 1.
-
-    Range: Kl up to 1e7 and R_Om up to 3500, where the tests hold it against spectral solutions.
-
-    Source: the series for slow rotation and the limit for fast rotation are exact; Ito and Nanbu, J. Basic
-        Eng. 93 (1971) 383 as recalled (there for 220 < Kl < 1e7 and R_Om/Re < 0.5); the joining is ours.
-    """
-    re, rotation = np.broadcast_arrays(
-        *(np.asarray(v, dtype=np.float64) for v in (reynolds, rotation_reynolds))
-    )
-    # A floor keeps the powers finite; at R_Om = 0 the excess is then 1e-28, which the sum with 1 drops.
-    turning = np.maximum(rotation, 1e-12)
-    slow = _slow_rotation_excess(np.maximum(turning * re, 1e-12))
-    fast = _fast_rotation_excess(turning)
-    total = slow + fast
-    power = 1 + 3 * total / (total + 0.4)
-    larger, smaller = np.maximum(slow, fast), np.minimum(slow, fast)
-    excess = larger * (1 + (smaller / larger) ** power) ** (1 / power)
-    share = np.where(rotation_in_range(reynolds=re, rotation_reynolds=rotation), 0.04, 0.15)
-    ratio = 1 + excess
-    return Estimate(value=ratio, uncertainty=np.asarray(share * ratio * excess / (excess + 0.03)))
-
-
 def rotation_in_range(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike) -> BoolArray:
-    """Whether the laminar rotation ratio was held against solutions: Kl <= 1e7 and R_Om <= 3500.
+    """Whether the laminar rotation ratio rests on finite-element solutions: Kl <= 1e7 and R_Om <= 1e5.
 
     Args:
         reynolds: Re, any shape.
@@ -87,11 +41,9 @@ def rotation_in_range(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLi
     Returns:
         True inside, of the broadcast shape.
 
-    Source: the spectral solutions in this package's tests.
+    Source: the table of `rotating_section_table`.
     """
-    rotation = np.asarray(rotation_reynolds, dtype=np.float64)
-    kl = rotation * np.asarray(reynolds, dtype=np.float64)
-    return np.asarray((kl <= 1e7) & (rotation <= 3500))
+    return rotation_table_covers(reynolds=reynolds, rotation_reynolds=rotation_reynolds)
 
 
 def turbulent_friction_ratio(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike) -> Estimate:

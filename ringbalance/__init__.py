@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from ringbalance.reduced_model import calibrate as calibrate
     from ringbalance.reduced_model import load_law as load_law
     from ringbalance.reduced_model import paper_law as paper_law
+    from ringbalance.reports.report import write_report as write_report
     from ringbalance.scene import SceneError as SceneError
     from ringbalance.scene import bundled_scene as bundled_scene
     from ringbalance.scene import load_scene as load_scene
@@ -29,6 +30,7 @@ _HOME = {
     "paper_law": "ringbalance.reduced_model",
     "run_cases": "ringbalance.verification.runner",
     "simulate": "ringbalance.face",
+    "write_report": "ringbalance.reports.report",
 }
 
 

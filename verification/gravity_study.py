@@ -187,7 +187,7 @@ def gravity_evidence(study: GravityStudy) -> Evidence:
             "field_error": Found(value=study.field.finest_error),
             "volume_error": Found(value=study.volume_error),
         },
-        numbers={"tilt": study.tilt},
+        numbers={"tilt": study.tilt, "direction": _DIRECTION},
         series=(
             Series(
                 name="error against mesh size",

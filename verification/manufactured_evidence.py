@@ -47,7 +47,10 @@ def manufactured_evidence(*, disc: Disc, cells: Sequence[tuple[int, ...]], defec
     }
     return Evidence(
         found=found,
-        numbers={"curving": straight.wall.finest_error / curved.wall.finest_error},
+        numbers={
+            "curving": straight.wall.finest_error / curved.wall.finest_error,
+            "unknowns": float(curved.unknowns[-1]),
+        },
         series=(_figure(studies["quadratic"], studies["straight"]),),
         convergence=tuple(entry for one in studies.values() for entry in _tables(one)),
     )

@@ -143,8 +143,8 @@ def _tube_table(calibration: Calibration) -> Table:
         table.add_row(
             f"{tube.velocity[i]:.3g}",
             f"{tube.reynolds[i]:.0f}",
-            f"{tube.k.value[i]:.3g}",
-            f"{tube.k.uncertainty[i]:.2g}",
+            _short(float(tube.k.value[i])),
+            _short(float(tube.k.uncertainty[i])),
             f"{tube.flow_state[i]}{'' if tube.in_range[i] else '*'}",
             *(_short(float(term[i])) for term in terms.values()),
         )

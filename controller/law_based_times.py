@@ -41,6 +41,7 @@ def pair_changes(*, wanted: complex, bounds: Sequence[tuple[float, float]]) -> t
     """
     axes = [complex(e) for e in chamber_directions(2 * len(bounds))[: len(bounds)]]
     fixed: dict[int, float] = {}
+    sense: dict[int, float] = {}
     free = dict.fromkeys(range(len(bounds)), 0.0)
     while free:
         left = wanted - sum(fixed[p] * axes[p] for p in fixed)
@@ -49,16 +50,17 @@ def pair_changes(*, wanted: complex, bounds: Sequence[tuple[float, float]]) -> t
         over = {p: c for p, c in over.items() if c != free[p]}
         if not over:
             break
+        sense |= {p: free[p] - bound for p, bound in over.items()}
         fixed |= over
         free = {p: c for p, c in free.items() if p not in over}
     missing = wanted - sum(c * axes[p] for p, c in (fixed | free).items())
-    more = {p: _further(c, (missing * axes[p].conjugate()).real) for p, c in fixed.items()}
+    more = {p: c + _onward((missing * axes[p].conjugate()).real, sense[p]) for p, c in fixed.items()}
     return tuple((free | more)[p] for p in range(len(bounds)))
 
 
-def _further(bound: float, component: float) -> float:
-    """Only in the sense in which the pair is already at its end."""
-    return bound + component if bound * component > 0 else bound
+def _onward(component: float, sense: float) -> float:
+    """Only in the sense in which the pair was asked for more than it has."""
+    return component if component * sense > 0 else 0.0
 
 
 def _shares(wanted: complex, axes: dict[int, complex]) -> dict[int, float]:

@@ -134,6 +134,9 @@ def test_what_one_pair_cannot_give_the_others_do(
 def test_what_no_pair_can_give_is_asked_of_those_at_their_ends() -> None:
     found = pair_changes(wanted=3 + 1j, bounds=[(-2.0, 2.0), (-2.0, 2.0)])
     assert found == pytest.approx((3.0, 1.0))
+    # A pair that has nothing left at all is asked as well.
+    empty = pair_changes(wanted=-3 + 1j, bounds=[(0.0, 4.0), (-2.0, 2.0)])
+    assert empty == pytest.approx((-3.0, 1.0))
 
 
 # --- the influence coefficient ---
@@ -258,6 +261,9 @@ def test_an_empty_belief_does_not_stop_it(scene: Scene, model: BalancerModel) ->
     fast = paper_model(replace(scene, tube=replace(scene.tube, drag_coefficient=25.0)))
     asked = law_based(heavy)
     assert simulate(asked, model, controller=law_based_of(asked, fast)).settled
+    # The same with k believed 15 times too small: empty on paper after a quarter of the way.
+    wild = paper_model(replace(scene, tube=replace(scene.tube, drag_coefficient=2.4)))
+    assert simulate(asked, model, controller=law_based_of(asked, wild)).settled
 
 
 def test_beyond_the_capacity_and_without_pressure_it_says_so(scene: Scene, model: BalancerModel) -> None:

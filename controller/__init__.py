@@ -2,6 +2,7 @@
 
 from ringbalance.controller.algorithm import Command, Controller, Measurement, ValveCommand
 from ringbalance.controller.algorithms import controller_of
+from ringbalance.controller.consequences import Consequences, consequences_document, find_consequences
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.ensemble import Ensemble, ensemble_document, simulate_ensemble
 from ringbalance.controller.law_based import LawBased
@@ -12,6 +13,7 @@ from ringbalance.controller.trial import Trial
 
 __all__ = [
     "Command",
+    "Consequences",
     "Controller",
     "Ensemble",
     "Injection",
@@ -22,8 +24,10 @@ __all__ = [
     "TargetVector",
     "Trial",
     "ValveCommand",
+    "consequences_document",
     "controller_of",
     "ensemble_document",
+    "find_consequences",
     "simulate",
     "simulate_ensemble",
     "simulation_document",

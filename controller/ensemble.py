@@ -91,6 +91,7 @@ def simulate_ensemble(
     seed: int,
     *,
     spread: Spread | None = None,
+    transfer: PairTransfer | None = None,
     workers: int = 2,
     progress: Progress | None = None,
 ) -> Ensemble:
@@ -106,6 +107,7 @@ def simulate_ensemble(
         n: members, above zero.
         seed: of all random numbers.
         spread: half-widths; default `spread_of(scene, model)`.
+        transfer: of `ensemble_transfer`, when it is at hand already.
         workers: threads, at least 1.
         progress: called once per block of members; None for silence.
 
@@ -122,13 +124,13 @@ def simulate_ensemble(
     if n < 1 or workers < 1:
         raise ValueError(f"an ensemble needs members and workers, not n={n} and workers={workers}")
     model = flow_law if isinstance(flow_law, BalancerModel) else balancer_model(flow_law)
-    transfer = ensemble_transfer(scene, model)
+    followed = ensemble_transfer(scene, model) if transfer is None else transfer
     widths = spread_of(scene, model) if spread is None else spread
     tally = _Tally(time_limit=scene.run.time_limit)
 
     def run(block: int) -> MemberRuns:
         members = drawn_members(scene, spread=widths, seed=seed, block=block)
-        return _block(scene, model, transfer, members, seed=seed, block=block, size=n - block * BLOCK)
+        return _block(scene, model, followed, members, seed=seed, block=block, size=n - block * BLOCK)
 
     for runs in _in_order(run, blocks=math.ceil(n / BLOCK), workers=workers):
         tally.add(runs)
@@ -138,7 +140,13 @@ def simulate_ensemble(
 
 
 def simulate_members(
-    scene: Scene, model: BalancerModel, *, members: Members | None = None, size: int = 1, seed: int = 0
+    scene: Scene,
+    model: BalancerModel,
+    *,
+    members: Members | None = None,
+    transfer: PairTransfer | None = None,
+    size: int = 1,
+    seed: int = 0,
 ) -> MemberRuns:
     """Run given members, at most one block of them, and keep each one's end.
 
@@ -146,6 +154,7 @@ def simulate_members(
         scene: the scene.
         model: the balancer.
         members: what differs; default `size` alike ones.
+        transfer: of `ensemble_transfer`, when it is at hand already.
         size: how many alike ones.
         seed: of the noise.
 
@@ -159,8 +168,8 @@ def simulate_members(
     given = members_alike(scene, size=size) if members is None else members
     if given.proportional.size > BLOCK:
         raise ValueError(f"at most {BLOCK} members at once")
-    transfer = ensemble_transfer(scene, model)
-    return _block(scene, model, transfer, given, seed=seed, block=0, size=given.proportional.size)
+    followed = ensemble_transfer(scene, model) if transfer is None else transfer
+    return _block(scene, model, followed, given, seed=seed, block=0, size=given.proportional.size)
 
 
 def ensemble_transfer(scene: Scene, model: BalancerModel) -> PairTransfer:

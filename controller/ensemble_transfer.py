@@ -109,8 +109,8 @@ class LinearTransfer:
         u0 = np.sqrt(np.maximum(self._squared(fill), 0.0))
         distance = (fill - self.lowest) / rate
         left = u0**2 - 2 * slowing * distance
-        tiny = np.finfo(np.float64).tiny
-        arrives = 2 * distance / np.maximum(u0 + np.sqrt(np.maximum(left, 0.0)), tiny)
+        # A floor for members that do not flow, whose time nobody asks for.
+        arrives = 2 * distance / np.maximum(u0 + np.sqrt(np.maximum(left, 0.0)), 1e-100)
         end = np.where(left <= 0, u0 / slowing, arrives)
         flowing = np.minimum(time, end)
         x = fill - rate * flowing * (u0 - slowing * flowing / 2)

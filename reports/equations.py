@@ -18,7 +18,7 @@ with warnings.catch_warnings():
 
 
 GLYPHS: Final = "<!-- glyphs -->"
-_SYMBOL: Final = re.compile(r'<symbol id="([^"]+)"(.*?)</symbol>', re.DOTALL)
+_SYMBOL: Final = re.compile(r'<symbol id="([^"]+)"([^>]*/>|[^>]*>.*?</symbol>)', re.DOTALL)
 _USE: Final = re.compile(r'href="#([^"]+)"')
 
 
@@ -61,7 +61,8 @@ def equation_svg(latex: str, words: str, name: str) -> str:
     """
     try:
         text = Latex(latex, size=16, color="currentColor").svg()
-    except (IndexError, KeyError, AttributeError, TypeError) as error:
+    # The library has no error class of its own: wrong LaTeX ends in whatever its parser met.
+    except Exception as error:
         raise ValueError(f"this equation cannot be set: {latex}") from error
     text = re.sub(r'\bid="', f'id="{name}-', text)
     text = re.sub(r'href="#', f'href="#{name}-', text)
@@ -86,7 +87,7 @@ def share_glyphs(page: str) -> str:
         renamed[match[1]] = names.setdefault(content, f"glyph-{len(names)}")
     bare = _SYMBOL.sub("", page)
     used = _USE.sub(lambda match: f'href="#{renamed.get(match[1], match[1])}"', bare)
-    sheet = "".join(f'<symbol id="{name}"{content}</symbol>' for content, name in names.items())
+    sheet = "".join(f'<symbol id="{name}"{content}' for content, name in names.items())
     hidden = 'width="0" height="0" style="position:absolute" aria-hidden="true"'
     return used.replace(GLYPHS, f'<svg xmlns="http://www.w3.org/2000/svg" {hidden}>{sheet}</svg>', 1)
 

@@ -15,7 +15,6 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-import ringbalance
 from ringbalance.controller import simulate, simulation_document
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration import Calibration, calibrate
@@ -111,13 +110,15 @@ def versions() -> Record:
     Returns:
         Versions by name; a package that is not installed is left out.
     """
-    found = {"ringbalance": ringbalance.__version__, "python": platform.python_version()}
-    for name in PACKAGES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            continue
-    return found
+    found = {"ringbalance": _version("ringbalance") or "not installed", "python": platform.python_version()}
+    return found | {name: told for name in PACKAGES if (told := _version(name))}
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return ""
 
 
 def _scene(scene: Scene, text: str) -> Record:

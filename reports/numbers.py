@@ -152,9 +152,10 @@ def measured(value: float | None, half_width: float | None, *, digits: int = 4) 
     """
     if value is None or not half_width:
         return number(value, digits=digits)
-    if half_width < 0:
+    exact, width = _exact(value), _exact(half_width)
+    if width < 0:
         raise ValueError("a half-width must not be negative")
-    exact, width, place = _exact(value), _exact(half_width), half_width_exponent(half_width)
+    place = half_width_exponent(half_width)
     top = max(_leading_exponent(exact), place)
     if top - place + 1 > _MOST_DIGITS:
         return f"{number(value, digits=_MOST_DIGITS)}{PLUS_MINUS}{number(half_width, digits=1)}"

@@ -62,7 +62,10 @@ def page_content(evidence: Record, *, pictures: Mapping[str, bytes] | None = Non
     Raises:
         KeyError: an evidence document that lacks a part.
     """
-    claims = [case_view(case) for case in summary.claims(evidence)]
+    claims = [
+        {**case_view(case), "elsewhere": summary.elsewhere(case, evidence)}
+        for case in summary.claims(evidence)
+    ]
     checks = [case_view(case) for case in summary.checks(evidence)]
     figures = page_figures(evidence)
     calibration, runs = evidence["calibration"], evidence["closed_loop"]

@@ -125,6 +125,11 @@ def lead_sentence(evidence: Record) -> str:
     run = [case for case in own if case["verdict"] != "not run"]
     passed = sum(case["verdict"] == "passed" for case in run)
     told = f"Of {len(claims(evidence))} claims of the liquid-ring paper {_series(parts)}. "
+    foreign = sum(elsewhere(case, evidence) for case in claims(evidence))
+    if foreign:
+        told += (
+            f"{foreign} of them hold for the paper’s own disc alone and were judged on it, not on this one. "
+        )
     return told + f"Of {len(run)} checks of this program itself that were run, {passed} passed."
 
 
@@ -134,8 +139,22 @@ def _series(parts: list[str]) -> str:
     return f"{', '.join(parts[:-1])} and {parts[-1]}"
 
 
+def elsewhere(case: Record, evidence: Record) -> bool:
+    """Whether a case was judged on another disc than the report's, such as the paper's own.
+
+    Args:
+        case: its record.
+        evidence: the document.
+
+    Returns:
+        True when its numbers are not those of the report's scene.
+    """
+    judged = case.get("scene_sha256")
+    return bool(judged) and judged != evidence["scene"]["sha256"]
+
+
 def headlines(evidence: Record) -> list[Record]:
-    """Claims worth a line in the summary: those so marked, else those that did not simply hold.
+    """Claims worth a line in the summary: judged on this disc and so marked, else those that did not hold.
 
     Args:
         evidence: the document.
@@ -143,7 +162,7 @@ def headlines(evidence: Record) -> list[Record]:
     Returns:
         Case records.
     """
-    every = claims(evidence)
+    every = [case for case in claims(evidence) if not elsewhere(case, evidence)]
     marked = [case for case in every if case.get("headline")]
     return marked or [case for case in every if tone(case["verdict"]) in {"bad", "fair"}]
 

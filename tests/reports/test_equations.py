@@ -1,0 +1,37 @@
+"""Equations are set in the text's colour, and one copy of a letter serves them all."""
+
+from __future__ import annotations
+
+import re
+from xml.etree import ElementTree
+
+import pytest
+
+from ringbalance.reports.equations import GLYPHS, equation_svg, equations, share_glyphs
+
+
+@pytest.mark.parametrize("name", sorted(equations()))
+def test_every_equation_is_set_in_the_text_colour(name: str) -> None:
+    item = equations()[name]
+    svg = equation_svg(item.latex, item.words, f"eq-{name}")
+    root = ElementTree.fromstring(svg)
+    assert root.attrib["aria-label"] == item.words
+    assert "currentColor" in svg
+    assert not re.search(r"#[0-9a-fA-F]{6}\b|rgb\(", svg)
+    assert all(found.startswith(f"eq-{name}-") for found in re.findall(r'id="([^"]+)"', svg))
+
+
+def test_glyphs_are_shared_and_all_found() -> None:
+    parts = [equation_svg(r"\rho\omega^2 r", "a", "one"), equation_svg(r"\rho r", "b", "two")]
+    page = share_glyphs(f"{GLYPHS}{parts[0]}{parts[1]}")
+    ids = re.findall(r'<symbol id="([^"]+)"', page)
+    used = re.findall(r'href="#([^"]+)"', page)
+    assert len(ids) == len(set(ids))
+    assert set(used) == set(ids)
+    assert len(used) == sum(part.count("<use") for part in parts)
+    assert len(page) < len(parts[0]) + len(parts[1])
+
+
+def test_latex_that_cannot_be_set_is_refused() -> None:
+    with pytest.raises(ValueError, match="cannot be set"):
+        equation_svg(r"\frac{a}", "broken", "x")

@@ -1,0 +1,132 @@
+"""Figures are reproduced to the byte, carry no colour of their own, and show the evidence's numbers."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+
+from ringbalance.reports.case_figures import series_plots
+from ringbalance.reports.figure_style import DARK, LIGHT, Drawing, decade, plain_number, standalone
+from ringbalance.reports.page import page_content
+
+Record = dict[str, Any]
+
+
+@pytest.fixture(scope="module")
+def drawings(whole: Record) -> dict[str, Drawing]:
+    found = page_content(whole).drawings
+    assert len({drawing.name for drawing in found}) == len(found)
+    return {drawing.name: drawing for drawing in found}
+
+
+def curve(drawing: Drawing, stroke: str) -> list[tuple[float, float]]:
+    """Points of the longest line of a colour, in the figure's own coordinates."""
+    pattern = rf'<path d="([^"]+)"[^>]*style="[^"]*stroke: var\({stroke}\)'
+    lines = [re.findall(r"[ML] ([\d.-]+) ([\d.-]+)", path) for path in re.findall(pattern, drawing.svg)]
+    return [(float(x), float(y)) for x, y in max(lines, key=len)]
+
+
+def test_the_same_evidence_gives_the_same_bytes(evidence: Record, drawings: dict[str, Drawing]) -> None:
+    again = {drawing.name: drawing.svg for drawing in page_content(evidence).drawings}
+    assert again == {name: drawing.svg for name, drawing in drawings.items()}
+
+
+def test_no_colour_font_date_or_size_is_fixed(drawings: dict[str, Drawing]) -> None:
+    for drawing in drawings.values():
+        assert not re.search(
+            r"#[0-9a-fA-F]{3,8}\b(?![-\w])", re.sub(r'(href="|url\()#[^")]+', "", drawing.svg)
+        ), drawing.name
+        assert not re.search(r"\bblack\b|\bwhite\b|rgb\(|DejaVu|<dc:date|<metadata", drawing.svg), (
+            drawing.name
+        )
+        assert not re.search(r"<svg[^>]* (width|height)=", drawing.svg)
+
+
+def test_every_figure_is_well_formed_and_told_in_words(drawings: dict[str, Drawing]) -> None:
+    for drawing in drawings.values():
+        root = ElementTree.fromstring(drawing.svg)
+        assert root.attrib["aria-label"] == drawing.alt
+        assert drawing.alt.endswith(".")
+        assert len(drawing.caption) > 10
+        ElementTree.fromstring(standalone(drawing).encode())
+
+
+def test_ids_are_unique_across_the_page(drawings: dict[str, Drawing]) -> None:
+    ids = [found for drawing in drawings.values() for found in re.findall(r'\bid="([^"]+)"', drawing.svg)]
+    assert len(ids) == len(set(ids))
+    for drawing in drawings.values():
+        wanted = re.findall(r'(?:href="|url\()#([^")]+)', drawing.svg)
+        assert set(wanted) <= set(ids)
+
+
+def test_a_file_of_its_own_follows_both_schemes(drawings: dict[str, Drawing]) -> None:
+    text = standalone(drawings["drag"])
+    assert "prefers-color-scheme:dark" in text
+    assert LIGHT["--fig-found"] in text
+    assert DARK["--fig-found"] in text
+
+
+def test_equation_12_lies_below_the_finite_elements(drawings: dict[str, Drawing]) -> None:
+    found, printed = (curve(drawings["pressure-profile"], name) for name in ("--fig-found", "--fig-paper"))
+    # SVG counts downward; both end at the wall, and both rise towards it.
+    assert found[-1][0] == pytest.approx(printed[-1][0])
+    assert found[-1][1] < printed[-1][1]
+    assert found[0][0] < printed[0][0]
+
+
+def test_the_points_are_the_evidence(evidence: Record, drawings: dict[str, Drawing]) -> None:
+    line = curve(drawings["moment"], "--fig-found")
+    values = evidence["calibration"]["chamber"]["moment_kg_m"]
+    heights = [line[0][1] - y for _, y in line]
+    assert len(line) == len(values)
+    assert [h / heights[-1] for h in heights] == pytest.approx([v / values[-1] for v in values], abs=1e-3)
+
+
+CHANGES: dict[str, tuple[Any, ...]] = {
+    "drag": ("calibration", "tube", "k", 5),
+    "pressure-error": ("calibration", "chamber", "wall_pressure_paper_Pa", 5),
+    "flow-law-0": ("flow_law", "velocity_m_s", 0, 5),
+    "amplitude": ("closed_loop", "paper", "amplitude_m", 12),
+    "order-manufactured-pressure": ("verification", 6, "convergence", 0, "error", 1),
+}
+
+
+def test_other_numbers_are_other_figures(evidence: Record, drawings: dict[str, Drawing]) -> None:
+    for path in CHANGES.values():
+        place: Any = evidence
+        for key in path[:-1]:
+            place = place[key]
+        place[path[-1]] *= 1.3
+    changed = {
+        drawing.name
+        for drawing in page_content(evidence).drawings
+        if drawing.svg != drawings[drawing.name].svg
+    }
+    assert set(CHANGES) <= changed
+    assert "moment" not in changed
+
+
+def test_a_gap_in_a_series_is_no_number() -> None:
+    series = {
+        "name": "speed",
+        "x": {"name": "time", "unit": "s", "values": [0.0, 1.0, 2.0, 3.0]},
+        "y": [{"name": "found", "unit": "m/s", "values": [1.0, None, 2.0, 3.0], "style": "found"}],
+        "log": False,
+    }
+    (drawing,) = series_plots({"id": "some_case", "series": [series]})
+    assert drawing.name == "case-some-case-0"
+    assert "nan" not in drawing.svg.lower()
+
+
+def test_tick_labels_are_plain_text() -> None:
+    assert [plain_number(v) for v in (0.0, 0.05, -8.0, 250.0, 1e-7)] == [
+        "0",
+        "0.05",
+        "−8",
+        "250",
+        "1\u202f×\u202f10⁻⁷",
+    ]
+    assert [decade(v) for v in (1e-3, 2e-3, 1.0)] == ["10⁻³", "", "10⁰"]

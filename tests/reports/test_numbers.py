@@ -1,0 +1,110 @@
+"""Numbers keep the digits that their uncertainty leaves standing, and no others."""
+
+from __future__ import annotations
+
+import math
+from decimal import Decimal
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ringbalance.reports.numbers import fixed, half_width_exponent, measured, number, percent, short
+
+VALUES = st.floats(min_value=-1e12, max_value=1e12, allow_nan=False, allow_subnormal=False)
+WIDTHS = st.floats(min_value=1e-12, max_value=1e9, allow_nan=False)
+SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
+
+
+def parsed(text: str) -> Decimal:
+    """A number's text read back."""
+    plain = text.replace("\u202f", "").replace("−", "-")
+    mantissa, _, power = plain.partition("×10")
+    return Decimal(mantissa).scaleb(int(power.translate(SUPERSCRIPTS)) if power else 0)
+
+
+def read(text: str) -> tuple[Decimal, Decimal]:
+    """Value and half-width of a text such as (1.20 ± 0.05) × 10⁻⁶."""
+    power = "0"
+    if text.startswith("("):
+        text, _, power = text[1:].partition(")")
+        power = power.partition("10")[2].translate(SUPERSCRIPTS)
+    value, _, width = text.partition("±")
+    return tuple(parsed(part.strip("\u00a0")).scaleb(int(power)) for part in (value, width))  # type: ignore[return-value]
+
+
+@pytest.mark.parametrize(
+    ("value", "half_width", "text"),
+    [
+        (72.0432, 0.0324, "72.04 ± 0.03"),
+        (49.83, 6.2, "50 ± 6"),
+        (0.53712, 0.00097, "0.5371 ± 0.0010"),
+        (-12.5, 0.96, "−12.5 ± 1.0"),
+        (5.0, 30.0, "0 ± 30"),
+        (0.0, 0.3, "0.0 ± 0.3"),
+        (1.2e-6, 5e-8, "(1.20 ± 0.05) × 10⁻⁶"),
+        (123456.0, 400.0, "123 500 ± 400"),
+        # GUM (JCGM 100:2008), 7.2.2: y = 10.057 62 ohm with u = 27 mohm becomes 10.058 ohm and 27 mohm.
+        (10.05762, 0.027, "10.058 ± 0.027"),
+    ],
+)
+def test_the_half_width_decides_the_digits(value: float, half_width: float, text: str) -> None:
+    shown = measured(value, half_width)
+    assert shown.replace("\u202f", " ").replace("\u00a0", " ") == text
+
+
+@given(value=VALUES, half_width=WIDTHS)
+def test_rounding_stays_well_inside_the_half_width(value: float, half_width: float) -> None:
+    shown, width = read(measured(value, half_width))
+    slack = Decimal(10) ** half_width_exponent(half_width) / 2 + abs(Decimal(value)) * Decimal("6e-6")
+    assert abs(shown - Decimal(value)) <= slack
+    assert abs(width - Decimal(half_width)) <= Decimal("0.34") * Decimal(half_width)
+
+
+@given(value=VALUES, half_width=st.floats(min_value=1e-6, max_value=1e6))
+def test_value_and_half_width_share_their_last_digit(value: float, half_width: float) -> None:
+    left, sign, right = measured(value, half_width).lstrip("(").partition("±")
+    right = right.partition(")")[0]
+    if sign and "×" not in left + right:
+        decimals = [len(part.strip("\u00a0").partition(".")[2]) for part in (left, right)]
+        assert decimals[0] == decimals[1] or half_width < 1e-5 * abs(value)
+
+
+@given(value=VALUES, digits=st.integers(min_value=1, max_value=8))
+def test_a_bare_number_keeps_its_significant_digits(value: float, digits: int) -> None:
+    shown = parsed(number(value, digits=digits))
+    assert abs(shown - Decimal(value)) <= abs(Decimal(value)) * Decimal(5) * Decimal(10) ** -digits
+
+
+@given(value=VALUES)
+def test_a_short_number_is_the_number(value: float) -> None:
+    assert parsed(short(value)) == parsed(number(value, digits=6))
+    assert not (
+        "." in short(value).partition("\u202f×")[0] and short(value).partition("\u202f×")[0].endswith("0")
+    )
+
+
+def test_signs_groups_and_gaps() -> None:
+    assert number(-1234567.0, digits=7) == "−1.234567\u202f×\u202f10⁶"
+    assert fixed(-12345.678, 1) == "−12\u202f345.7"
+    assert number(1234.0) == "1234"
+    assert number(0.0) == "0"
+    assert number(None) == "–"
+    assert measured(None, 0.1) == "–"
+    assert measured(0.25, None) == "0.2500"
+    assert percent(0.0123, signed=True) == "+1.2\u202f%"
+    assert short(0.25) == "0.25"
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_what_is_not_finite_is_refused(bad: float) -> None:
+    for call in (lambda: number(bad), lambda: measured(bad, 0.1), lambda: measured(1.0, bad)):
+        with pytest.raises(ValueError, match="only finite numbers"):
+            call()
+
+
+def test_a_negative_half_width_is_refused() -> None:
+    with pytest.raises(ValueError, match="negative"):
+        measured(1.0, -0.1)
+    with pytest.raises(ValueError, match="positive"):
+        half_width_exponent(0.0)

@@ -1,0 +1,51 @@
+"""A machine without OpenGL gets a sentence, not a crash."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from ringbalance.reports import opengl
+from ringbalance.reports.opengl import DEBIAN_PACKAGES, find_opengl
+
+
+def test_a_missing_library_is_named_with_what_to_install() -> None:
+    found = find_opengl(egl="libNoSuchEGL.so.1", osmesa="libNoSuchOSMesa.so.8")
+    assert not found.available
+    assert found.window == ""
+    assert "libNoSuchEGL.so.1" in found.text
+    assert DEBIAN_PACKAGES in found.text
+
+
+def test_a_library_that_is_no_egl_is_refused() -> None:
+    found = find_opengl(egl="libm.so.6", osmesa="libNoSuchOSMesa.so.8")
+    assert not found.available
+    assert "eglGetProcAddress" in found.text
+
+
+def fake_python(folder: Path, script: str) -> str:
+    """An interpreter that runs a shell script instead."""
+    path = folder / "python"
+    path.write_text(f"#!/bin/sh\n{script}\n")
+    path.chmod(0o755)
+    return str(path)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs a shell")
+def test_a_driver_that_crashes_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "executable", fake_python(tmp_path, "kill -SEGV $$"))
+    found = find_opengl()
+    assert not found.available
+    assert "code -11" in found.text
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs a shell")
+def test_a_driver_that_hangs_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "executable", fake_python(tmp_path, "exec sleep 60"))
+    monkeypatch.setattr(opengl, "_PATIENCE", 0.2)
+    found = find_opengl()
+    assert not found.available
+    assert "did not answer" in found.text

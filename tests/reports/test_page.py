@@ -1,0 +1,249 @@
+"""The page stands alone, is well formed and accessible, and says what the evidence says."""
+
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+from importlib.resources import files
+from itertools import pairwise
+from typing import Any
+
+from ringbalance.reports.figure_style import DARK, LIGHT
+from ringbalance.reports.picture_theme import THEMES
+from ringbalance.reports.render import render
+
+Record = dict[str, Any]
+VOID = {"meta", "link", "img", "br", "source", "col", "input", "hr"}
+
+
+class Reader(HTMLParser):
+    """Collects tags, and complains when they do not balance."""
+
+    def __init__(self) -> None:
+        super().__init__(convert_charrefs=True)
+        self.open: list[str] = []
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.faults: list[str] = []
+        self.text: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag: str) -> None:
+        if not self.open or self.open.pop() != tag:
+            self.faults.append(f"</{tag}> at {self.getpos()}")
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] not in {"style", "script"}:
+            self.text.append(data)
+
+
+def read(page: str) -> Reader:
+    reader = Reader()
+    reader.feed(page)
+    reader.close()
+    return reader
+
+
+def words(page: str) -> str:
+    """All text of a page, spaces made plain."""
+    return re.sub(r"\s+", " ", " ".join(read(page).text))
+
+
+def test_the_page_is_well_formed(page: str) -> None:
+    reader = read(page)
+    assert reader.faults == []
+    assert reader.open == []
+    ids = [attributes["id"] for _, attributes in reader.tags if "id" in attributes]
+    assert len(ids) == len(set(ids))
+    wanted = {str(a["href"])[1:] for _, a in reader.tags if str(a.get("href", "")).startswith("#")}
+    assert wanted <= set(ids)
+
+
+def test_the_page_needs_nothing_else(page: str) -> None:
+    bare = page.replace('xmlns="http://www.w3.org/2000/svg"', "").replace(
+        'xmlns:xlink="http://www.w3.org/1999/xlink"', ""
+    )
+    assert not re.search(r"https?:|//[a-z]+\.|<script|<link|@import|@font-face|<iframe", bare)
+    for tag, attributes in read(page).tags:
+        for name in ("src", "srcset", "href", "xlink:href"):
+            value = attributes.get(name)
+            assert value is None or value.startswith(("#", "data:image/png;base64,")), (tag, value)
+    assert all(target.startswith("#") for target in re.findall(r"url\(([^)]*)\)", page))
+
+
+def test_headings_come_in_order(page: str) -> None:
+    levels = [int(tag[1]) for tag, _ in read(page).tags if re.fullmatch(r"h[1-6]", tag)]
+    assert levels.count(1) == 1
+    assert levels[0] == 1
+    assert all(after <= before + 1 for before, after in pairwise(levels))
+
+
+def pictures() -> tuple[Record, dict[str, bytes]]:
+    """Record and bytes of two pictures in two schemes."""
+    names = ("disc", "pressure")
+    listed = [
+        {
+            "name": name,
+            "light": f"{name}-light.png",
+            "dark": f"{name}-dark.png",
+            "width": 3,
+            "height": 2,
+            "alt": "A disc.",
+            "caption": "The disc.",
+        }
+        for name in names
+    ]
+    contents = {
+        f"{name}-{theme}.png": f"{name}{theme}".encode() for name in names for theme in ("light", "dark")
+    }
+    return {"drawn": True, "text": "", "files": listed}, contents
+
+
+def test_pictures_come_in_both_schemes_and_can_be_read_aloud(evidence: Record) -> None:
+    evidence["pictures"], contents = pictures()
+    page = render(evidence, pictures=contents)
+    assert page.count('<source media="screen and (prefers-color-scheme: dark)"') == 2
+    assert page.count("data:image/png;base64,") == 4
+    assert all(attributes.get("alt") for tag, attributes in read(page).tags if tag == "img")
+
+
+def test_tables_and_drawings_can_be_read_aloud(page: str) -> None:
+    tags = read(page).tags
+    assert all(attributes.get("scope") for tag, attributes in tags if tag == "th")
+    assert all(a.get("aria-label") or a.get("aria-hidden") for tag, a in tags if tag == "svg")
+    assert [a.get("lang") for tag, a in tags if tag == "html"] == ["en"]
+    assert all(a.get("aria-labelledby") for tag, a in tags if tag == "section")
+
+
+def test_without_pictures_the_page_says_so(evidence: Record, page: str) -> None:
+    assert evidence["pictures"]["text"] in words(page)
+    assert "<img" not in page
+
+
+def test_the_same_evidence_gives_the_same_page(evidence: Record, page: str) -> None:
+    assert render(evidence) == page
+
+
+CHANGES: tuple[tuple[tuple[Any, ...], Any, str], ...] = (
+    (("calibration", "lambda", "per_transferred_mass_m"), 0.06543, "65.430"),
+    (("operating_point", "k"), 7.77, "7.8"),
+    (("operating_point", "priming_pressure_vented_Pa"), 0.611e6, "0.611"),
+    (("operating_point", "stall_pressure_Pa"), 0.333e6, "0.3330"),
+    (("paper", "drag_coefficient"), 41.0, "about 41"),
+    (("closed_loop", "calibrated", "settling_time_s"), 9.87, "9.87"),
+    (("closed_loop", "paper", "overshoots"), 1717, "1717"),
+    (("verification", 1, "quantities", 0, "value"), 2.345e5, "0.23450"),
+    (("verification", 1, "consequence"), "Use the other formula.", "Use the other formula."),
+    (("verification", 0, "doubts"), ["Nobody has seen it."], "Nobody has seen it."),
+    (("scene", "name"), "Another disc", "Another disc"),
+    (("scene", "sha256"), "cd" * 32, "cd" * 32),
+    (("versions", "numpy"), "9.9.9", "9.9.9"),
+    (("pressure", "mesh", "unknowns"), 12345, "12 345"),
+    (("calibration", "models_used", 0, "estimated_contribution"), 0.0777, "7.8 %"),
+    (("calibration", "chamber", "moment_kg_m", 3), 456.78e-6, "456.78"),
+    (("times", "date"), "2031-12-24", "2031-12-24"),
+)
+
+
+def test_the_page_says_what_the_evidence_says(evidence: Record, page: str) -> None:
+    before = words(page).replace("\u202f", " ")
+    for path, value, said in CHANGES:
+        place: Any = evidence
+        for key in path[:-1]:
+            place = place[key]
+        place[path[-1]] = value
+        assert said not in before
+    after = words(render(evidence)).replace("\u202f", " ")
+    assert [said for _, _, said in CHANGES if said not in after] == []
+
+
+def test_no_result_is_typed_into_a_template() -> None:
+    for item in files("ringbalance.reports").joinpath("templates").iterdir():
+        if item.name.endswith(".html"):
+            text = re.sub(r"\{[{%#].*?[}%#]\}|<[^>]+>", " ", item.read_text(encoding="utf-8"))
+            numbers = re.findall(r"(?<!Eq\. )(?<!Fig\. )(?<![\w-])\d+(?:\.\d+)?(?![\w-])", text)
+            # The level of confidence and the numbers of dimensions are no results.
+            assert set(numbers) <= {"95", "3"}, (item.name, numbers)
+
+
+def test_every_verdict_is_a_word(page: str) -> None:
+    text = words(page)
+    for verdict in ("confirmed", "confirmed with correction", "refuted", "inconclusive", "not run", "passed"):
+        assert f'">{verdict}</span>' in page
+        assert verdict in text
+
+
+def test_what_was_not_run_is_said(evidence: Record) -> None:
+    evidence["verification"][-1]["status"] = "heavy: run with --level heavy"
+    evidence["closed_loop"] = {}
+    text = words(render(evidence))
+    assert "Coverage of the bars" in text
+    assert "heavy: run with --level heavy" in text
+    assert "Trial algorithm in 40 s" in text
+    assert "The closed loop was not run." in text
+    assert "was not run under both laws" in text
+
+
+def test_markup_in_texts_is_shown_not_obeyed(evidence: Record) -> None:
+    evidence["scene"]["name"] = '<b onclick="x()">disc</b> & "co"'
+    evidence["verification"][0]["doubts"] = ["<script>alert()</script>"]
+    page = render(evidence)
+    assert "<b onclick" not in page
+    assert "<script" not in page
+
+
+def test_nothing_flows(evidence: Record) -> None:
+    point = evidence["operating_point"]
+    point.update(
+        velocity_m_s=0.0, velocity_uncertainty=0.0, k=None, k_uncertainty=None, k_at_velocity_m_s=0.0
+    )
+    point.update(regime="blocked", priming_pressure_vented_Pa=None, priming_pressure_trapped_Pa=None)
+    text = words(render(evidence))
+    assert "Nothing flows" in text
+    assert "Priming pressure" not in text
+
+
+def luminance(colour: str) -> float:
+    """Relative luminance of WCAG 2.2."""
+    parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def contrast(first: str, second: str) -> float:
+    light, dark = sorted((luminance(first), luminance(second)), reverse=True)
+    return (light + 0.05) / (dark + 0.05)
+
+
+def schemes() -> list[dict[str, str]]:
+    """Colours of the light and of the dark page."""
+    css = files("ringbalance.reports").joinpath("templates", "style.css").read_text(encoding="utf-8")
+    blocks = re.findall(
+        r":root \{(.*?)\}\s",
+        css.replace("{{ figure_light }}", "").replace("{{ figure_dark }}", ""),
+        re.DOTALL,
+    )
+    return [dict(re.findall(r"(--[\w-]+): (#[0-9a-f]{6});", block)) for block in blocks]
+
+
+def test_text_stands_out_from_its_ground() -> None:
+    for scheme, figure in zip(schemes(), (LIGHT, DARK), strict=True):
+        for ground in ("--bg", "--panel"):
+            for ink in ("--ink", "--soft", "--muted", "--accent"):
+                assert contrast(scheme[ink], scheme[ground]) >= 4.5, (ink, ground)
+        for tone in ("good", "fair", "bad", "open", "idle"):
+            assert contrast(scheme[f"--{tone}"], scheme[f"--{tone}-bg"]) >= 4.5, tone
+        for name, colour in figure.items():
+            if name not in {"--fig-grid", "--fig-surface"}:
+                assert contrast(colour, scheme["--bg"]) >= 4.5, name
+        assert contrast(figure["--fig-paper"], scheme["--panel"]) >= 4.5
+
+
+def test_pictures_have_the_ground_of_the_page() -> None:
+    assert [theme.background for theme in THEMES] == [scheme["--bg"] for scheme in schemes()]

@@ -1,0 +1,131 @@
+"""The 3-D pictures are drawn, are not blank, and are told about when they cannot be drawn."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from ringbalance.reports.cli import plot
+from ringbalance.reports.opengl import OpenGL, find_opengl
+from ringbalance.reports.picture_text import BAR_SHADES, Bar, letter, shade_bar, with_palette
+from ringbalance.reports.picture_theme import PICTURE, THEMES
+from ringbalance.reports.pictures import finish_drawing, start_drawing, stop_drawing, write_fields
+from ringbalance.scene import Scene, bundled_scene
+
+NO_OPENGL = OpenGL(available=False, window="", text="The 3-D pictures were left out: no OpenGL here.")
+OPENGL = find_opengl()
+needs_opengl = pytest.mark.skipif(not OPENGL.available, reason=OPENGL.text)
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The pictures of the six-chamber disc, through the command."""
+    out = tmp_path_factory.mktemp("plot") / "out"
+    assert plot(bundled_scene("six_chamber"), out=out) == 0
+    return out
+
+
+def pixels(path: Path) -> Any:
+    return np.asarray(Image.open(path).convert("RGB"), dtype=np.int64)
+
+
+@needs_opengl
+def test_files_are_there_and_of_moderate_size(drawn: Path) -> None:
+    names = {path.relative_to(drawn).as_posix() for path in drawn.rglob("*") if path.is_file()}
+    assert names == {
+        *(f"figures/{name}-{theme.name}.png" for name in ("disc", "pressure") for theme in THEMES),
+        "fields/chamber_at_start.vtu",
+        "fields/chamber_largest_fill.vtu",
+    }
+    assert all(path.stat().st_size < 150_000 for path in drawn.rglob("*.png"))
+
+
+@needs_opengl
+@pytest.mark.parametrize("theme", THEMES, ids=lambda theme: theme.name)
+@pytest.mark.parametrize("name", ["disc", "pressure"])
+def test_a_picture_shows_something_on_the_ground_of_its_page(drawn: Path, name: str, theme: Any) -> None:
+    image = pixels(drawn / "figures" / f"{name}-{theme.name}.png")
+    assert image.shape == (PICTURE[1], PICTURE[0], 3)
+    ground = np.array([int(theme.background[i : i + 2], 16) for i in (1, 3, 5)])
+    assert (image[:20, :20] == ground).all()
+    share = (np.abs(image - ground).sum(axis=2) > 12).mean()
+    assert 0.15 < share < 0.8
+    assert len(np.unique(image @ [65536, 256, 1])) > 100
+
+
+@needs_opengl
+def test_the_colour_bar_runs_from_end_to_end(drawn: Path) -> None:
+    image = pixels(drawn / "figures" / "pressure-light.png")
+    # Viridis: dark violet below, yellow on top.
+    bottom, top = image[round(0.82 * PICTURE[1]) - 6, 60], image[round(0.24 * PICTURE[1]) + 6, 60]
+    assert bottom == pytest.approx([68, 1, 84], abs=8)
+    assert top == pytest.approx([253, 231, 37], abs=8)
+
+
+@needs_opengl
+def test_a_drawing_that_fails_is_told(tmp_path: Path, paper_scene: Scene) -> None:
+    missing = {"pressure": tmp_path / "none.vtu", "disc": tmp_path / "none.vtu"}
+    record = finish_drawing(start_drawing(scene=paper_scene, fields=missing, folder=tmp_path))
+    assert record["drawn"] is False
+    assert record["files"] == []
+    assert "ended with code 1" in record["text"]
+    assert "none.vtu" in record["text"]
+
+
+def test_without_opengl_nothing_is_started(tmp_path: Path, paper_scene: Scene) -> None:
+    drawing = start_drawing(scene=paper_scene, fields={}, folder=tmp_path, opengl=NO_OPENGL)
+    assert drawing.process is None
+    assert finish_drawing(drawing) == {"drawn": False, "text": NO_OPENGL.text, "files": []}
+    stop_drawing(drawing)
+
+
+def test_captions_follow_the_scene(tmp_path: Path, paper_scene: Scene) -> None:
+    plain = dataclasses.replace(paper_scene, tube=dataclasses.replace(paper_scene.tube, hump_radius=None))
+    for scene, said in ((paper_scene, "radius of 31.5\u202fmm"), (plain, "straight across")):
+        drawing = start_drawing(scene=scene, fields={}, folder=tmp_path, opengl=NO_OPENGL)
+        alt, caption = drawing.captions["disc"]
+        assert said in alt
+        assert said in caption
+        assert "A to D" in alt
+
+
+def test_plot_without_opengl_writes_the_fields(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("ringbalance.reports.pictures.find_opengl", lambda: NO_OPENGL)
+    assert plot(bundled_scene("liquid_ring_paper"), out=tmp_path / "out") == 1
+    assert "no OpenGL here" in capsys.readouterr().err.replace("\n", " ")
+    assert len(list((tmp_path / "out" / "fields").glob("*.vtu"))) == 2
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def test_fields_are_written_at_two_fills(tmp_path: Path, paper_scene: Scene) -> None:
+    empty = dataclasses.replace(paper_scene, disc=dataclasses.replace(paper_scene.disc, initial_fill=0.0))
+    assert set(write_fields(scene=empty, folder=tmp_path)) == {"pressure", "disc"}
+
+
+def test_lettering_and_palette() -> None:
+    bar = Bar(
+        title="depth", colours=lambda x: np.c_[x, x, x, x], low=0.0, high=1.0, ticks=(0.5,), labels=("0.5",)
+    )
+    blank = Image.new("RGB", (200, 300), "#ffffff")
+    lettered = letter(blank, labels=[], bar=bar, ink="#000000", ground="#ffffff", scale=1)
+    shaded = shade_bar(lettered, bar)
+    column = np.asarray(shaded)[round(0.24 * 300) + 3 : round(0.82 * 300) - 2, 60, 0]
+    assert (np.diff(column.astype(int)) <= 0).all()
+    assert len(np.unique(column)) <= BAR_SHADES
+    kept = with_palette(shaded)
+    assert kept.mode == "P"
+    assert (np.asarray(kept.convert("RGB")) == np.asarray(shaded)).all()
+
+
+def test_a_palette_holds_no_more_than_it_can() -> None:
+    noise = np.arange(300 * 3, dtype=np.uint8).reshape(10, 30, 3)
+    noise[..., 1] = np.arange(10)[:, None]
+    with pytest.raises(ValueError, match="256 colours"):
+        with_palette(Image.fromarray(noise))

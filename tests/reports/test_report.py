@@ -1,0 +1,206 @@
+"""The whole report: complete, reproducible, and written whole or not at all."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ringbalance.reports import cli
+from ringbalance.reports import evidence as evidence_module
+from ringbalance.reports import report as report_module
+from ringbalance.reports.opengl import OpenGL
+from ringbalance.reports.render import render
+from ringbalance.reports.report import Report, write_report
+from ringbalance.reports.saved import heavy_cases, kept_document, saved_cases
+from ringbalance.scene import Scene, SceneError, bundled_scene
+from ringbalance.verification.runner import run_cases
+
+Record = dict[str, Any]
+NO_OPENGL = OpenGL(available=False, window="", text="The 3-D pictures were left out: no OpenGL here.")
+QUICK = ("gci_celik2008", "claim_01_volume", "coverage")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_cases() -> Iterator[None]:
+    """Three cases instead of all: one check, one claim, one heavy."""
+
+    def run(**settings: Any) -> Any:
+        return run_cases(QUICK, **{**settings, "workers": 1})
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(evidence_module, "run_cases", run)
+        yield
+
+
+Write = Callable[[Path], Report]
+
+
+@pytest.fixture(scope="module")
+def write(paper_scene: Scene) -> Write:
+    """Writes a report of the paper's disc without pictures."""
+    return partial(write_report, paper_scene, scene_text="# a scene\n", opengl=NO_OPENGL)
+
+
+@pytest.fixture(scope="module")
+def first(write: Write, tmp_path_factory: pytest.TempPathFactory) -> Report:
+    """A finished report."""
+    return write(tmp_path_factory.mktemp("report") / "out")
+
+
+def test_everything_is_there(first: Report) -> None:
+    folder = first.page.parent
+    assert json.loads((folder / "evidence.json").read_text()) == first.evidence
+    assert len(list((folder / "figures").glob("*.svg"))) >= 10
+    assert len(list((folder / "fields").glob("*.vtu"))) == 2
+    assert [path.name for path in folder.parent.iterdir()] == ["out"]
+    assert (folder / "report.html").stat().st_mode & 0o777 == 0o644
+
+
+def test_the_page_comes_from_the_evidence_file_alone(first: Report) -> None:
+    evidence = json.loads((first.page.parent / "evidence.json").read_text())
+    assert render(evidence) == first.page.read_text()
+
+
+def test_without_opengl_the_page_says_so(first: Report) -> None:
+    assert NO_OPENGL.text in first.page.read_text()
+    assert first.evidence["pictures"] == {"drawn": False, "text": NO_OPENGL.text, "files": []}
+
+
+def test_a_second_run_differs_in_times_alone(write: Write, first: Report, tmp_path: Path) -> None:
+    again = write(tmp_path / "again").evidence
+    assert {key for key in again if again[key] != first.evidence[key]} <= {"times"}
+    assert json.dumps(again["verification"]) == json.dumps(first.evidence["verification"])
+
+
+def test_a_real_document_has_the_shape_of_the_sample(first: Report, whole: Record) -> None:
+    """The page's tests stand on a sample: each of its keys must exist in the real thing."""
+
+    def lacking(sample: Any, real: Any, place: str) -> list[str]:
+        if isinstance(sample, dict) and not place.endswith(
+            ("terms", "versions", "verification", "fill_ratio")
+        ):
+            missing = [f"{place}/{key}" for key in sample if key not in real]
+            return missing + [
+                f for k in sample if k in real for f in lacking(sample[k], real[k], f"{place}/{k}")
+            ]
+        if isinstance(sample, list) and sample and isinstance(sample[0], dict) and real:
+            return lacking(sample[0], real[0], place)
+        return []
+
+    assert [fault for fault in lacking(whole, first.evidence, "") if "verification" not in fault] == []
+
+
+def test_the_scene_and_its_text_are_told(first: Report, paper_scene: Scene) -> None:
+    assert first.evidence["scene"]["sha256"] == paper_scene.sha256
+    assert first.evidence["scene"]["text"] == "# a scene\n"
+    assert first.evidence["seeds"] == {"run": paper_scene.run.seed}
+    assert first.evidence["versions"]["ringbalance"]
+
+
+def test_thresholds_of_the_papers_disc(first: Report) -> None:
+    point = first.evidence["operating_point"]
+    # rho omega^2 (R2^2 - r_m^2)/2 with 44.5 mm, 31.5 mm and 10 000 rpm, and Eq. 19 with u = 0, by hand.
+    assert point["priming_pressure_vented_Pa"] == pytest.approx(0.5417e6, rel=1e-3)
+    assert point["stall_pressure_paper_Pa"] == pytest.approx(0.381e6, rel=1e-3)
+    assert 0 < point["stall_uncertainty"] < 1e-3 * point["stall_pressure_Pa"]
+
+
+def test_a_failure_leaves_the_old_report(
+    write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "report.html").write_text("the old one")
+
+    def fail(*_: Any, **__: Any) -> Record:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(report_module, "collect_evidence", fail)
+    with pytest.raises(KeyboardInterrupt):
+        write(out)
+    assert (out / "report.html").read_text() == "the old one"
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+    assert [path.name for path in out.iterdir()] == ["report.html"]
+
+
+def test_a_file_in_the_way_is_refused(write: Write, tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("a file")
+    with pytest.raises(OSError, match="not a folder"):
+        write(tmp_path / "out")
+
+
+def test_heavy_results_are_kept_with_their_date(write: Write, first: Report, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    kept = next(case for case in first.evidence["verification"] if case["id"] == "coverage")
+    earlier = [
+        {**kept, "verdict": "passed", "date": "2029-02-03"},
+        {**kept, "verdict": "failed", "date": "2028-01-01"},
+        {**kept, "verdict": "inconclusive", "date": "2030-01-01", "scene_sha256": "0" * 64},
+    ]
+    (out / "evidence.json").write_text(json.dumps({"verification": earlier}))
+    evidence = write(out).evidence
+    found = next(case for case in evidence["verification"] if case["id"] == "coverage")
+    # The newest result on this very scene; the one on another scene is left alone.
+    assert (found["verdict"], found["date"]) == ("passed", "2029-02-03")
+    assert "2029-02-03" in (out / "report.html").read_text()
+
+
+def test_what_is_kept_is_heavy_and_dated(evidence: Record) -> None:
+    evidence["verification"][-1].update(verdict="passed")
+    (case,) = heavy_cases(evidence)
+    assert case["date"] == evidence["times"]["date"]
+    assert kept_document(evidence)["verification"] == [case]
+    assert heavy_cases(kept_document(evidence)) == [case]
+
+
+def test_an_evidence_file_that_is_none_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "evidence.json").write_text("{")
+    with pytest.raises(OSError, match=r"evidence\.json is not an evidence file"):
+        saved_cases(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("failed", "settled", "code"),
+    [
+        (False, (True, True), 0),
+        (False, (False, True), 0),
+        (False, (False, False), 1),
+        (True, (True, True), 1),
+    ],
+)
+def test_exit_codes(
+    whole: Record,
+    failed: bool,
+    settled: tuple[bool, bool],
+    code: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    runs = whole["closed_loop"]
+    loops = {law: runs[law] | {"settled": ok} for law, ok in zip(runs, settled, strict=True)}
+    cases = [
+        case | {"verdict": "failed"} if failed and case["kind"] == "code_verification" else case
+        for case in whole["verification"]
+    ]
+    finished = Report(
+        page=tmp_path / "report.html", evidence=whole | {"closed_loop": loops, "verification": cases}
+    )
+    monkeypatch.setattr(cli, "write_report", lambda *_, **__: finished)
+    assert cli.report(bundled_scene("liquid_ring_paper"), out=tmp_path) == code
+    told = capsys.readouterr()
+    assert told.out.strip() == str(finished.page)
+    assert "claims of the liquid-ring paper" in told.err
+
+
+def test_a_broken_scene_writes_nothing(tmp_path: Path) -> None:
+    (tmp_path / "bad.toml").write_text("[disc]\n")
+    with pytest.raises(SceneError):
+        cli.report(tmp_path / "bad.toml", out=tmp_path / "out")
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,91 @@
+"""The summary counts, chooses and compares; it never judges anew."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from ringbalance.reports.summary import (
+    CHECK_VERDICTS,
+    CLAIM_VERDICTS,
+    checks,
+    claims,
+    headlines,
+    key_numbers,
+    lead_sentence,
+    loop_rows,
+    loop_sentence,
+    tone,
+    verdict_counts,
+)
+from ringbalance.verification.verdicts import VOCABULARY
+
+Record = dict[str, Any]
+
+
+def test_every_verdict_has_a_colour_and_a_place() -> None:
+    assert set(CLAIM_VERDICTS) == {verdict.value for verdict in VOCABULARY["claim"]}
+    assert set(CHECK_VERDICTS) == {verdict.value for verdict in VOCABULARY["code_verification"]}
+    assert {tone(verdict) for verdict in CLAIM_VERDICTS} == {"good", "fair", "bad", "open", "idle"}
+
+
+def test_counts_add_up(evidence: Record) -> None:
+    counts = verdict_counts(claims(evidence), CLAIM_VERDICTS)
+    assert {item.verdict: item.count for item in counts} == {
+        "confirmed": 1,
+        "confirmed with correction": 1,
+        "refuted": 2,
+        "inconclusive": 1,
+        "not run": 1,
+    }
+    assert len(claims(evidence)) + len(checks(evidence)) == len(evidence["verification"])
+
+
+def test_the_lead_is_counted(evidence: Record) -> None:
+    told = lead_sentence(evidence)
+    assert "Of 6 claims of the liquid-ring paper 1 is confirmed" in told
+    assert "2 are refuted" in told
+    evidence["verification"][6]["verdict"] = "failed"
+    assert lead_sentence(evidence).endswith("0 passed.")
+
+
+def test_claims_stand_in_the_papers_order(evidence: Record) -> None:
+    evidence["verification"].reverse()
+    assert [case["number"] for case in claims(evidence)] == [1, 6, 9, 10, 11, 14]
+    assert [case["number"] for case in headlines(evidence)] == [6, 9, 10, 11]
+
+
+def test_without_marked_claims_those_that_fell_are_told(evidence: Record) -> None:
+    for case in evidence["verification"]:
+        case["headline"] = False
+    assert [case["number"] for case in headlines(evidence)] == [6, 9, 10]
+
+
+def test_numbers_come_with_their_bars(evidence: Record) -> None:
+    shown = {item.label: item for item in key_numbers(evidence)}
+    assert (shown["Lever arm λ"].value, shown["Lever arm λ"].half_width) == ("72.040", "±\u202f0.024")
+    assert shown["Lever arm λ"].unit == "mm"
+    assert shown["Drag coefficient k"].paper == "about 50"
+    assert shown["Velocity in the tube"].half_width == "±\u202f0.3"
+    assert all(item.half_width for item in shown.values())
+
+
+@pytest.mark.parametrize(
+    ("calibrated", "paper", "said"),
+    [
+        (True, True, "0.74 times the 4.60\u202fs"),
+        (False, True, "it does not settle"),
+        (True, False, "the paper’s it does not settle"),
+    ],
+)
+def test_the_loops_are_compared(evidence: Record, calibrated: bool, paper: bool, said: str) -> None:
+    for law, settled in (("calibrated", calibrated), ("paper", paper)):
+        evidence["closed_loop"][law].update(settled=settled)
+        if not settled:
+            evidence["closed_loop"][law]["settling_time_s"] = None
+    assert said.replace("it does", "the run does" if not calibrated else "it does") in loop_sentence(evidence)
+    rows = {row.label: row for row in loop_rows(evidence)}
+    assert (rows["Settling time"].calibrated == "does not settle") is not calibrated
+    assert rows["Gas operations"].calibrated == "6"
+    assert rows["Regime of the tube"].paper == "siphon"

@@ -105,12 +105,12 @@ def trial(disc: Disc, problem: str, order: int, size: float) -> Trial:
         The trial.
     """
     surface = paper_surface(disc) / disc.outer_radius
-    start = time.perf_counter()
+    start = time.process_time()
     mesh = ng.Mesh(geometry(disc).GenerateMesh(maxh=size))
     mesh.Curve(order)
-    meshed = time.perf_counter()
+    meshed = time.process_time()
     found, unknowns = solve(mesh, problem, order, surface)
-    solved = time.perf_counter()
+    solved = time.process_time()
     true, _ = _exact(problem, surface)
     points = 2 * order + 4
     error = ng.Integrate((found - true) ** 2, mesh, order=points)

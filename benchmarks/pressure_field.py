@@ -4,9 +4,9 @@
 
 Both solvers get the two problems of `pressure_problems`: the physical pressure, whose only error is the
 drawing of the arcs, and a made-up one that no element holds.  Both are judged by one number, the relative
-error in L2, and run on one thread; repeats of the two are interleaved and medians taken.  Each side may use
-any of its meshes (NGSolve: and orders); at each target the fastest that reaches it counts.  Without NGSolve
-(the extra `bench`) our side comes out alone, and says so.
+error in L2. Times are processor times on one thread, medians over interleaved repeats.  Each side may use any
+of its meshes (NGSolve: and orders); at each target the fastest that reaches it counts.  Without NGSolve (the
+extra `bench`) our side comes out alone, and says so.
 """
 
 # ruff: noqa: E402 - numpy reads the number of threads when it is imported
@@ -59,11 +59,11 @@ def our_trial(disc: Disc, problem: str, cells: tuple[int, ...]) -> Trial:
     Returns:
         The trial.
     """
-    start = time.perf_counter()
+    start = time.process_time()
     chamber = chamber_mesh(disc=disc, surface_radius=paper_surface(disc), cells=cells)
-    meshed = time.perf_counter()
+    meshed = time.process_time()
     solution = solve_pressure(chamber=chamber, problem=right_hand_sides(problem, disc))
-    solved = time.perf_counter()
+    solved = time.process_time()
     return Trial(
         problem=problem,
         solver="ringbalance",
@@ -205,7 +205,7 @@ def show(result: dict[str, Any], console: Console) -> None:
     if result["ngsolve"] is None:
         console.print("NGSolve is not installed (extra `bench`): one side only.")
     for problem, rows in result["equal_error"].items():
-        table = Table(title=f"{problem}: time to a given error, ms (unknowns in brackets)")
+        table = Table(title=f"{problem}: processor time to a given error, ms (nodes in brackets)")
         for heading in ("error <=", "ringbalance", "error", "solve", "all"):
             table.add_column(heading)
         for heading in ("NGSolve", "error", "solve", "all", "ratio solve", "ratio all"):
@@ -215,8 +215,9 @@ def show(result: dict[str, Any], console: Console) -> None:
             sides = [*_cell(row["ringbalance"]), *_cell(row["ngsolve"])]
             table.add_row(f"{row['target']:.1e} {row['kind']}", *sides, *ratios)
         console.print(table)
-    table = Table(title="growth of the physical problem (seconds, peak of memory of the process)")
-    for heading in ("cells", "unknowns", "iterations", "residual", "error", "mesh", "solve", "MB"):
+    table = Table(title="growth of the physical problem (processor seconds on one thread, peak of memory of
+    the process)") for heading in ("cells", "unknowns", "iterations", "residual", "error", "mesh", "solve",
+    "MB"):
         table.add_column(heading)
     for row in result["growth"]:
         numbers = [f"{row[key]:.2g}" for key in ("relative_residual", "error")]

@@ -36,8 +36,9 @@ class Trial:
     error: float
     """Of the pressure, relative, in L2."""
     mesh_seconds: float
+    """Processor time on one thread, which other load on the machine disturbs less than the clock."""
     solve_seconds: float
-    """Assembly and solution."""
+    """Of assembly and solution, likewise."""
 
 
 def paper_disc() -> Disc:

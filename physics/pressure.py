@@ -149,12 +149,11 @@ def solve_pressure(
     pressure[surface] = problem.surface_pressure(places(chamber)[:, surface])
     free = chamber.grid[1:].ravel()
     rows = discrete.matrix[free]
-    corners = int(np.prod([n + 1 for n in chamber.cells[1:]]))
     linear = solve_linear(
         rows[:, free],
         discrete.load[free] - rows @ pressure,
         dimension=chamber.dimension,
-        prolongation=lambda: linear_prolongation(chamber.cells)[surface.size :, corners:],
+        prolongation=lambda: linear_prolongation(chamber, pinned_surface=True),
         direct_limit=direct_limit,
     )
     pressure[free] = linear.values

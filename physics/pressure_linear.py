@@ -9,9 +9,10 @@ import numpy as np
 import numpy.typing as npt
 import pyamg
 from pyamg.relaxation.smoothing import change_smoothers
-from scipy.sparse import csr_matrix, diags_array, kron, vstack
+from scipy.sparse import csr_matrix, diags_array, eye_array, kron, vstack
 from scipy.sparse.linalg import LinearOperator, cg, splu
 
+from ringbalance.mesh.chamber import ChamberMesh
 from ringbalance.physics.results import Statistics, Status, StatusCode
 
 FloatArray = npt.NDArray[np.float64]
@@ -47,9 +48,8 @@ def solve_linear(
         matrix: A, symmetric positive definite.
         right: b, shape (unknowns,).
         dimension: of the mesh behind the matrix, 2 or 3; decides where factorisation ends.
-        prolongation: gives, when multigrid asks for it, the interpolation from linear to quadratic elements,
-            the rows and columns of `linear_prolongation` that belong to free nodes; None lets multigrid find
-            its own coarse levels.
+        prolongation: gives, when multigrid asks for it, the interpolation that `linear_prolongation` makes;
+            None lets multigrid find its own coarse levels.
         direct_limit: unknowns up to which to factorise; default 100 000 in two dimensions, 20 000 in three.
 
     Returns:
@@ -70,20 +70,41 @@ def solve_linear(
     return LinearSolution(values=values, status=_status(residual), statistics=statistics)
 
 
-def linear_prolongation(cells: tuple[int, ...]) -> csr_matrix:
-    """Interpolation from the corners of a structured chamber mesh to all its nodes.
+def linear_prolongation(chamber: ChamberMesh, *, pinned_surface: bool) -> csr_matrix:
+    """Interpolation to the free nodes from those that linear elements on the same mesh would have.
+
+    Only axes along which cells are short become linear: along a long axis neighbours are coupled too weakly
+    for sweeps to smooth, and coarsening there would cost more steps than it saves.
 
     Args:
-        cells: of the mesh along each axis.
+        chamber: the mesh.
+        pinned_surface: True when all nodes of the free surface are fixed, False when the last node alone is.
 
     Returns:
-        Matrix with a row for every node and a column for every corner, both in the order of
-        `ChamberMesh.grid`; the free surface comes first in either.
+        Matrix with a row for every free node, in the order of `ChamberMesh.grid`.
     """
-    total = _halfway(cells[0])
-    for count in cells[1:]:
-        total = kron(total, _halfway(count), format="csr")
-    return csr_matrix(total)
+    factors = [
+        _halfway(n) if short else csr_matrix(eye_array(2 * n + 1))
+        for n, short in zip(chamber.cells, _short_axes(chamber), strict=True)
+    ]
+    if pinned_surface:
+        factors[0] = factors[0][1:, 1:]
+    total = factors[0]
+    for factor in factors[1:]:
+        total = kron(total, factor, format="csr")
+    return csr_matrix(total if pinned_surface else total[:-1, :-1])
+
+
+def _short_axes(chamber: ChamberMesh) -> list[bool]:
+    """Axes along which cells are at most eight times as long as along the shortest, in the middle of the
+    mesh."""
+    places = chamber.mesh.doflocs[:, chamber.grid]
+    lengths = []
+    for axis, count in enumerate(chamber.cells):
+        line = tuple(slice(None) if k == axis else n for k, n in enumerate(chamber.cells))
+        steps = np.linalg.norm(np.diff(places[(slice(None), *line)], axis=1), axis=0)
+        lengths.append(float(steps.sum()) / count)
+    return [length <= 8 * min(lengths) for length in lengths]
 
 
 def _halfway(cells: int) -> csr_matrix:
@@ -136,7 +157,8 @@ def _hierarchy(matrix: csr_matrix, prolongation: csr_matrix | None) -> pyamg.mul
     hierarchy = pyamg.smoothed_aggregation_solver(
         coarse,
         symmetry="symmetric",
-        smooth=("jacobi", {"omega": 4.0 / 3.0, "weighting": "local"}),
+        strength=("symmetric", {"theta": 0.1}),
+        smooth=("energy", {"krylov": "cg", "maxiter": 2}),
         max_coarse=500,
     )
     if prolongation is not None:

@@ -270,7 +270,7 @@ def _free_pressure(chamber: ChamberMesh, liquid: RotatingLiquid) -> FloatArray:
         discrete.matrix[free][:, free],
         load[free],
         dimension=chamber.dimension,
-        prolongation=lambda: linear_prolongation(chamber.cells)[:-1, :-1],
+        prolongation=lambda: linear_prolongation(chamber, pinned_surface=False),
     )
     pressure = np.zeros(load.size)
     pressure[free] = linear.values

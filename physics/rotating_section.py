@@ -168,5 +168,12 @@ def solve_section_without_inertia(*, system: FlowSystem, rotation_reynolds: floa
 
 
 def friction_ratio(solution: FlowSolution) -> float:
-    """F = G/32, the pressure gradient over that of the tube at rest at the same flow rate."""
+    """F = G/32, the pressure gradient over that of the tube at rest at the same flow rate.
+
+    Args:
+        solution: of the section, made dimensionless with bore and mean velocity.
+
+    Returns:
+        F, dimensionless.
+    """
     return solution.driving_gradient / POISEUILLE_GRADIENT

@@ -126,8 +126,8 @@ def mesh_table(quantities: RingQuantities, name: str, unit: str, index: int) -> 
     Args:
         quantities: of the ring.
         name: "liquid_volume", "wall_pressure", "moment" or "moment_per_volume".
-        index: of the fill ratio.
         unit: SI.
+        index: of the fill ratio.
 
     Returns:
         Convergence, coarse to fine.

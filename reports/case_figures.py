@@ -105,7 +105,7 @@ def _with_gaps(values: list[float | None], unit: DisplayUnit) -> FloatArray:
 
 
 def _label(name: str, unit: str) -> str:
-    return f"{name} in {unit}" if unit not in {"", "1"} else name
+    return f"{name} in {unit}" if name and unit not in {"", "1"} else name or unit
 
 
 def _series_plot(name: str, series: Record) -> Drawing:
@@ -130,7 +130,7 @@ def _series_plot(name: str, series: Record) -> Drawing:
             logarithmic(axes, "x")
             logarithmic(axes, "y")
         axes.set_xlabel(_label(typeset(series["x"]["name"]), x_unit.symbol))
-        axes.set_ylabel(_label(told if len(told) < _LONGEST_LABEL else "value", unit.symbol))
+        axes.set_ylabel(_label(told if len(told) < _LONGEST_LABEL else "", unit.symbol))
         legend_above(figure, axes, columns=2)
 
     names = typeset(", ".join(curve["name"] for curve in curves))

@@ -8,7 +8,7 @@ from ringbalance.reports.case_figures import order_plot, series_plots
 from ringbalance.reports.equations import equation_svg
 from ringbalance.reports.numbers import MISSING, PLUS_MINUS, THIN_SPACE, number, percent, short, with_unit
 from ringbalance.reports.prose import typeset
-from ringbalance.reports.units import display_unit, shown, shown_apart
+from ringbalance.reports.units import display_unit, given, shown, shown_apart
 
 Record = dict[str, Any]
 
@@ -65,11 +65,11 @@ def _criterion(quantity: Record) -> str:
     unit = quantity.get("unit") or "1"
     bound = {"at_most": "at most", "at_least": "at least"}.get(metric)
     if bound:
-        return f"{bound} {shown(limit, unit, digits=3)}"
+        return f"{bound} {given(limit, unit)}"
     if metric in _RELATIVE_METRICS:
         share = f"{short(100 * limit)}{THIN_SPACE}%"
         return f"within {share}" if metric == "relative" else f"within ±, and ± ≤ {share}"
-    return f"within {shown(limit, unit, digits=2)}"
+    return f"within {given(limit, unit)}"
 
 
 def quantity_row(quantity: Record) -> Record:
@@ -87,12 +87,20 @@ def quantity_row(quantity: Record) -> Record:
     return {
         "name": typeset(quantity.get("title") or quantity["name"]),
         "why": typeset(quantity.get("why") or ""),
-        "value": shown(quantity.get("value"), unit, half_width),
+        "value": _value(quantity, half_width),
         "reference": shown(quantity.get("reference"), unit, quantity.get("reference_uncertainty"), digits=4),
         "error": shown(quantity.get("error"), unit, quantity.get("uncertainty"), digits=2),
         "limit": _criterion(quantity),
         "verdict": quantity.get("verdict") or "not run",
     }
+
+
+def _value(quantity: Record, half_width: float | None) -> str:
+    """What was found; a count has no digits behind the point."""
+    unit, value = quantity.get("unit") or "1", quantity.get("value")
+    if value is None or quantity.get("basis") != "count":
+        return shown(value, unit, half_width)
+    return short(value, digits=6 if float(value).is_integer() else 3)
 
 
 def sequence_view(sequence: Record) -> Record:
@@ -219,19 +227,27 @@ def _in_brief(case: Record) -> Record:
     if quantity is None:
         return dict.fromkeys(("paper", "found", "half_width"), MISSING) | {"what": ""}
     unit = quantity.get("unit") or "1"
-    value, half_width = quantity.get("value"), quantity.get("uncertainty")
     paper = _criterion(quantity) if quantity.get("reference") is None else shown(quantity["reference"], unit)
-    rung = display_unit(unit, value)
-    found = (
-        shown(value, unit) if not half_width else _without_half_width(shown_apart(value, unit, half_width))
-    )
-    width = with_unit(number(None if half_width is None else half_width * rung.factor, digits=2), rung.symbol)
-    return {"paper": paper, "found": found, "half_width": width, "what": typeset(quantity.get("title") or "")}
+    found, half_width = _apart(quantity, unit)
+    return {
+        "paper": paper,
+        "found": found,
+        "half_width": half_width,
+        "what": typeset(quantity.get("title") or ""),
+    }
 
 
-def _without_half_width(parts: tuple[str, str]) -> str:
-    value = parts[0].partition(PLUS_MINUS)[0]
-    return with_unit(value, parts[1]) if not value.startswith("(") else with_unit(*parts)
+def _apart(quantity: Record, unit: str) -> tuple[str, str]:
+    """Value and half-width of the comparison in one unit, to the same decimal place where that is short."""
+    value, half_width = quantity.get("value"), quantity.get("uncertainty")
+    if value is None or not half_width:
+        return _value(quantity, None), MISSING
+    text, symbol = shown_apart(value, unit, half_width)
+    first, _, second = text.partition(PLUS_MINUS)
+    if first.startswith("("):
+        rung = display_unit(unit, value)
+        first, second = number(value * rung.factor), number(half_width * rung.factor, digits=2)
+    return with_unit(first, symbol), with_unit(second, symbol)
 
 
 def case_view(case: Record) -> Record:

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from ringbalance.reports import summary
 from ringbalance.reports.case_view import case_view
+from ringbalance.reports.consequence_view import consequence_view
 from ringbalance.reports.equations import equation_svg, equations
 from ringbalance.reports.figure_style import Drawing
 from ringbalance.reports.figures import page_figures
@@ -33,6 +34,7 @@ CONTENTS: Final = (
     ("tube", "The connecting tube"),
     ("law", "The flow law"),
     ("loop", "The closed loop"),
+    ("consequences", "What a wrong k costs"),
     ("claims", "Claims of the paper"),
     ("numerics", "Numerical verification"),
     ("models", "Models used, and why"),
@@ -68,10 +70,12 @@ def page_content(evidence: Record, *, pictures: Mapping[str, bytes] | None = Non
     ]
     checks = [case_view(case) for case in summary.checks(evidence)]
     figures = page_figures(evidence)
+    consequences = consequence_view(evidence.get("consequences"))
+    absent = () if consequences else ("consequences",)
     calibration, runs = evidence["calibration"], evidence["closed_loop"]
     context = {
         "scene": evidence["scene"],
-        "contents": [{"id": name, "title": title} for name, title in CONTENTS],
+        "contents": [{"id": name, "title": title} for name, title in CONTENTS if name not in absent],
         "stamp": _stamp(evidence),
         "summary": _summary(evidence, claims),
         "equations": _equations(),
@@ -81,6 +85,7 @@ def page_content(evidence: Record, *, pictures: Mapping[str, bytes] | None = Non
         "drag_at": drag_table(calibration["tube"], evidence["operating_point"]),
         "injections": operation_tables(runs.get("calibrated")),
         "loop_notes": loop_notes(runs),
+        "consequences": consequences,
         "claims": claims,
         "checks": checks,
         "order_plots": [case["order_plot"] for case in checks if case["order_plot"]],
@@ -90,7 +95,12 @@ def page_content(evidence: Record, *, pictures: Mapping[str, bytes] | None = Non
         "version_facts": version_facts(evidence),
         "product": f"ringbalance {evidence['versions']['ringbalance']}",
     }
-    return PageContent(context=context, drawings=tuple(_every_drawing(figures, [*claims, *checks])))
+    return PageContent(
+        context=context,
+        drawings=tuple(
+            _every_drawing({**figures, "gain_margin": (consequences or {}).get("figure")}, [*claims, *checks])
+        ),
+    )
 
 
 def _every_drawing(figures: Record, cases: list[Record]) -> list[Drawing]:

@@ -34,6 +34,7 @@ _UNITS: Final = {
     r"\bl/\(s\*bar\)": "l/(s\u202fbar)",
     r"\br_m\b": "rₘ",
     r"\br_p\b": "rₚ",
+    r"\*([A-Za-z][A-Za-z ]*)\*": r"\1",
     r" \+- ": " ± ",
     r" - ": " − ",
     r"'": "’",

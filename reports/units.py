@@ -43,6 +43,9 @@ _LADDERS: dict[str, tuple[DisplayUnit, ...]] = {
     "m^2/s": (DisplayUnit(symbol="mm²/s", factor=1e6),),
     "m/s^2": (DisplayUnit(symbol="m/s²", factor=1.0),),
     "m^3/(s Pa)": (DisplayUnit(symbol="m³/(s\u202fPa)", factor=1.0),),
+    "kg/m^2": (DisplayUnit(symbol="kg/m²", factor=1.0),),
+    "N": (DisplayUnit(symbol="N", factor=1.0),),
+    "N m": (DisplayUnit(symbol="N\u202fm", factor=1.0),),
     "1": (DisplayUnit(symbol="", factor=1.0),),
 }
 

@@ -1,0 +1,114 @@
+"""The section on what a wrong k costs says what the evidence says, and stays away where there is none."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+from ringbalance.reports import summary
+from ringbalance.reports.consequence_view import consequence_view
+from ringbalance.reports.render import render
+
+Record = dict[str, Any]
+
+
+def _gain(law: str, k: float, share: float) -> Record:
+    values = [k / 2, k, 2 * k]
+    return {
+        "law": law,
+        "drag_coefficient": k,
+        "velocity_m_s": 5.0,
+        "moment_per_transferred_mass_m": 0.073,
+        "slope_m_per_s": 7.5e-6,
+        "gain_per_operation": share,
+        "proportional_s_per_m": 0.08e6,
+        "overshoot_proportional_s_per_m": 0.08e6 / share,
+        "instability_proportional_s_per_m": 0.16e6 / share,
+        "over_drag_coefficient": {
+            "values": values,
+            "overshoot_gain": [0.03e6, 0.04e6, 0.05e6],
+            "instability_gain": [0.06e6, 0.08e6, 0.10e6],
+            "simulated_values": values,
+            "simulated_overshoot_gain": [0.03e6, None, 0.05e6],
+            "simulated_instability_gain": [0.06e6, 0.08e6, 0.10e6],
+        },
+    }
+
+
+def _ensemble(share: float) -> Record:
+    chance = {"value": share, "low": share / 2, "high": min(1.0, 2 * share)}
+    return {
+        "members": 500,
+        "probability": dict.fromkeys(("not_settled", "overshoot", "misadjustment"), chance),
+        "settling_time_s": {"quantiles": {"0.05": 3.1, "0.5": 4.2, "0.95": 5.3}},
+    }
+
+
+def _consequences() -> Record:
+    run = {
+        "title": "the calibrated law, same controller",
+        "proportional_s_per_m": 0.08e6,
+        "settled": False,
+        "settling_time_s": None,
+        "operations": 115,
+        "overshoots": 96,
+        "misadjustments": 2,
+    }
+    return {
+        "findings": ["one", "two", "three", "four"],
+        "notes": ["a note"],
+        "gain": [_gain("paper", 50.0, 0.6), _gain("calibrated", 3.5, 1.94)],
+        "runs": [run],
+        "ensembles": [_ensemble(0.1), _ensemble(0.4)],
+    }
+
+
+def test_every_number_is_the_evidences_own() -> None:
+    view = consequence_view(_consequences())
+    assert view is not None
+    assert view["gains"]["heads"] == ["the paper’s law", "the calibrated law"]
+    shares = next(row for row in view["gains"]["rows"] if row["label"].startswith("share"))
+    assert [cell.replace("\u202f", " ") for cell in shares["cells"]] == ["60.0 %", "194 %"]
+    assert view["runs"][0]["settled"] == "does not settle"
+    assert view["runs"][0]["overshoots"] == "96"
+    assert "4.2" in view["chances"]["rows"][-1]["cells"][0]
+    assert "40" in view["chances"]["rows"][1]["cells"][1]
+
+
+def test_a_gain_that_no_run_found_leaves_a_gap_in_the_figure() -> None:
+    view = consequence_view(_consequences())
+    assert view is not None
+    assert view["figure"].svg.count("<svg") == 1
+    assert "nan" not in view["figure"].svg.lower().replace("mountain", "")
+
+
+def test_the_page_has_the_section_only_with_its_evidence(evidence: Record) -> None:
+    without = render({key: value for key, value in evidence.items() if key != "consequences"})
+    assert "consequences-title" not in without
+    assert 'href="#consequences"' not in without
+    page = render({**evidence, "consequences": _consequences()})
+    assert page.count('href="#consequences"') == 1
+    assert "does not settle" in page
+    assert "gain-margin" in page
+
+
+def test_a_law_that_does_not_flow_leaves_its_tables_out() -> None:
+    found = {**_consequences(), "gain": [], "ensembles": []}
+    view = consequence_view(found)
+    assert view is not None
+    assert view["figure"] is None
+    assert view["chances"]["members"] == ""
+    assert consequence_view(None) is None
+
+
+def test_claims_judged_on_another_disc_are_told_apart(evidence: Record) -> None:
+    changed = copy.deepcopy(evidence)
+    for case in changed["verification"]:
+        case["scene_sha256"] = changed["scene"]["sha256"]
+    assert "judged on it, not on this one" not in summary.lead_sentence(changed)
+    marked = next(case for case in summary.claims(changed) if case in summary.headlines(changed))
+    marked["scene_sha256"] = "0" * 64
+    assert summary.elsewhere(marked, changed)
+    assert marked not in summary.headlines(changed)
+    assert "1 of them" in summary.lead_sentence(changed)
+    assert "Judged on the paper’s disc" in render(changed)

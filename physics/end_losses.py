@@ -5,7 +5,8 @@ velocity U, pressure over mu U/d:
 
     Re (u . grad) u = -grad p + lap u,   div u = 0
 
-Far away in the reservoir the surface is free of force at zero pressure; deep inside the tube the flow is
+Far away in the reservoir the surface is free of force at zero pressure (its side lets liquid through at right
+angles only, where a jet leaves the tube); deep inside the tube the flow is
 developed, so that p is a straight line of slope -32 there.  With that line carried on to the tube's end,
 
     K_ent  = 2 (p_reservoir - p_end)/(rho U^2)      (it contains the leaving stream's kinetic factor 2)
@@ -68,6 +69,8 @@ class EndMesh:
     """Share of a line's length that no cell exceeds, at two cells per fold."""
     tube_cell: float = 6.0
     """Longest cell along the tube, at two cells per fold."""
+    jet_cell: float = 6.0
+    """Longest cell along the axis of the reservoir, at two cells per fold."""
 
 
 def graded_line(*, length: float, longest: float, cells: EndMesh) -> FloatArray:
@@ -106,11 +109,12 @@ def end_mesh(*, cells: EndMesh, end: End) -> Any:
         tube).
     """
     sign = 1.0 if end == "entrance" else -1.0
-    out = _line(cells.reservoir, cells.longest_cell * cells.reservoir, cells)
+    longest = cells.longest_cell * cells.reservoir
+    outside = -sign * _line(cells.reservoir, min(cells.jet_cell, longest), cells)
     inside = sign * _line(cells.tube, min(cells.tube_cell, cells.longest_cell * cells.tube), cells)
     core = 0.5 - _line(0.5, cells.longest_cell * 0.5, cells)[::-1]
     core[0] = 0.0
-    outside, around = -sign * out, 0.5 + out
+    around = 0.5 + _line(cells.reservoir, longest, cells)
     patches = [
         tensor_patch(x=outside, y=core, sides={"east": "far", "south": "axis"}),
         tensor_patch(x=outside, y=around, sides={"east": "far", "west": "wall", "north": "side"}),
@@ -138,6 +142,9 @@ def end_system(*, cells: EndMesh, end: End) -> FlowSystem:
         Dirichlet(boundary="wall", component=1),
         Dirichlet(boundary="axis", component=1),
     ]
+    if end == "exit":
+        # The jet draws liquid in through the side; left free along it, that goes unstable near Re 1950.
+        conditions.append(Dirichlet(boundary="side", component=0))
     return flow_system(space=space, conditions=conditions)
 
 

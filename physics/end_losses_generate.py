@@ -33,15 +33,16 @@ REYNOLDS_SCALE, REYNOLDS_LIMIT = 5.0, 2000.0
 class EndSettings:
     """All that the table of end losses depends on."""
 
-    nodes: int = 20
+    nodes: int = 30
     """Reynolds numbers from 0 to the limit, evenly spaced in ln(1 + Re/5)."""
-    checks: tuple[int, ...] = (0, 3, 6, 9, 12, 15, 18)
+    checks: tuple[int, ...] = (0, 4, 8, 12, 16, 20, 24, 28)
     """Intervals between nodes with a further point half-way."""
     cells_per_fold: tuple[float, ...] = (1.8, 2.4, 3.2)
     edge_cell: float = 1e-4
     reservoir: float = 40.0
     entrance_tube: float = 300.0
     exit_tube: float = 6.0
+    exit_jet_cell: float = 2.0
     formal_order: float = 4.0
 
     def points(self) -> list[tuple[str, float]]:
@@ -70,6 +71,7 @@ class EndSettings:
             edge_cell=self.edge_cell,
             reservoir=self.reservoir,
             tube=self.entrance_tube if end == "entrance" else self.exit_tube,
+            jet_cell=6.0 if end == "entrance" else self.exit_jet_cell,
         )
 
 

@@ -221,7 +221,7 @@ def taylor_couette(
     )
 
 
-def cavity_flow(*, cells: int, reynolds: float, wall_ratio: float = 8.0) -> tuple[FlowSystem, FlowSolution]:
+def cavity_flow(*, cells: int, reynolds: float, wall_ratio: float = 4.0) -> tuple[FlowSystem, FlowSolution]:
     """Flow in a unit square under a lid that moves with u = 1, its cells refined towards the walls.
 
     Args:
@@ -237,7 +237,7 @@ def cavity_flow(*, cells: int, reynolds: float, wall_ratio: float = 8.0) -> tupl
     half = geometric_vertices(cells=cells // 2, ratio=wall_ratio) / 2
     line = with_midpoints(vertices=np.concatenate([half, 1 - half[-2::-1]]))
     sides = {"west": "wall", "east": "wall", "south": "wall", "north": "lid"}
-    mesh = patch_mesh(patches=[tensor_patch(x=line, y=line, sides=sides)], shape="triangle")
+    mesh = patch_mesh(patches=[tensor_patch(x=line, y=line, sides=sides)], shape="quad")
     conditions = [Dirichlet(boundary="lid", component=0, value=1.0), Dirichlet(boundary="lid", component=1)]
     conditions += [Dirichlet(boundary="wall", component=c) for c in (0, 1)]
     system = flow_system(space=taylor_hood(mesh=mesh), conditions=conditions, enclosed=True)

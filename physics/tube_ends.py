@@ -8,16 +8,17 @@ import numpy as np
 import numpy.typing as npt
 from fluids.fittings import entrance_distance, entrance_rounded, entrance_sharp
 
+from ringbalance.physics.end_losses_table import laminar_entrance_loss, laminar_exit_loss
 from ringbalance.physics.tube_friction import turbulent_share
 from ringbalance.scene.models import Tube
 
 FloatArray = npt.NDArray[np.float64]
 
-LAMINAR_ENTRY_EXCESS: Final = 0.28
-"""Loss while a laminar profile develops, beyond its kinetic energy; published values run from 0.2 to 0.33."""
 LAMINAR_ENTRY_LENGTH: Final = 0.056
 """Entry length of laminar flow in diameters per Re."""
 _CREEPING: Final = 6 * np.pi
+_OTHER_ENTRANCE: Final = 0.15
+"""Spread of the laminar loss of an entrance that is not sharp: published excesses run from 0.2 to 0.33."""
 
 
 def kinetic_factor(*, reynolds: npt.ArrayLike, critical_ratio: npt.ArrayLike = 1.0) -> FloatArray:
@@ -62,7 +63,8 @@ def entrance_loss(
 ) -> tuple[FloatArray, FloatArray]:
     """Entrance loss beyond the profile's kinetic energy, (p_reservoir - p_tube) 2/(rho u^2) - f L/d - alpha.
 
-    Laminar: 0.28 + 6 pi/Re, turbulent: the entrance's K, blended over the transition.
+    Laminar: K_ent - 2 of a sharp entrance by finite elements, turbulent: the entrance's K, blended over the
+    transition.
 
     Args:
         tube: the tube.
@@ -72,14 +74,16 @@ def entrance_loss(
     Returns:
         K and its 95 % half-width, of the broadcast shape.
 
-    Source: Shah and London, Laminar Flow Forced Convection in Ducts (1978), for developing flow; Dagan,
-        Weinbaum and Pfeffer, J. Fluid Mech. 115 (1982) 505, for Re -> 0 (both ends together 12 pi/Re).
+    Source: the table of `end_losses_table`; an entrance that is not sharp has the same laminar value with a
+        wider half-width.
     """
     re = np.asarray(reynolds, dtype=np.float64)
     turned = turbulent_share(reynolds=re, critical_ratio=critical_ratio)
     turbulent, half_width = turbulent_entrance_loss(tube=tube)
-    laminar = LAMINAR_ENTRY_EXCESS + _CREEPING / re
-    spread = (1 - turned) * (0.15 + 0.3 * _CREEPING / re) + turned * half_width
+    table = laminar_entrance_loss(reynolds=re)
+    laminar = table.value - 2
+    unlike = 0.0 if tube.entrance == "sharp" else _OTHER_ENTRANCE + 0.2 * _CREEPING / re
+    spread = (1 - turned) * (table.uncertainty + unlike) + turned * half_width
     gap = 2 * turned * (1 - turned) * (laminar - turbulent)
     return (1 - turned) * laminar + turned * turbulent, np.hypot(spread, gap)
 
@@ -87,7 +91,7 @@ def entrance_loss(
 def exit_loss(
     *, tube: Tube, reynolds: npt.ArrayLike, critical_ratio: npt.ArrayLike = 1.0
 ) -> tuple[FloatArray, FloatArray]:
-    """What a laminar exit adds to the "+1": the stream carries twice u^2/2 away, and 6 pi/Re when creeping.
+    """What a laminar exit adds to the "+1": 1 + K_exit, as the stream carries twice u^2/2 away.
 
     Turbulent it is zero, because there the "+1" is the whole exit loss.
 
@@ -99,11 +103,12 @@ def exit_loss(
     Returns:
         K and its 95 % half-width, of the broadcast shape.
 
-    Source: Poiseuille's profile, alpha = 2; Dagan, Weinbaum and Pfeffer, J. Fluid Mech. 115 (1982) 505.
+    Source: Poiseuille's profile, alpha = 2; K_exit from the table of `end_losses_table`.
     """
     re = np.asarray(reynolds, dtype=np.float64)
     turned = turbulent_share(reynolds=re, critical_ratio=critical_ratio)
     undeveloped = np.minimum(1.0, LAMINAR_ENTRY_LENGTH * re * tube.bore / tube.length)
-    spread = (1 - turned) * (0.05 + 0.3 * undeveloped + 0.3 * _CREEPING / re) + 0.06 * turned
+    table = laminar_exit_loss(reynolds=re)
+    spread = (1 - turned) * (table.uncertainty + 0.3 * undeveloped) + 0.06 * turned
     gap = 2 * turned * (1 - turned)
-    return (1 - turned) * (1 + _CREEPING / re), np.hypot(spread, gap)
+    return (1 - turned) * (1 + table.value), np.hypot(spread, gap)

@@ -1,0 +1,145 @@
+"""Laminar losses of the tube's ends: exact limits, fresh solutions against the table, its promises."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import cache
+from importlib import resources
+
+import numpy as np
+import pytest
+from fluids.fittings import entrance_sharp, exit_normal
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ringbalance.physics.end_losses import (
+    End,
+    EndMesh,
+    end_loss_times_reynolds,
+    end_system,
+    entry_length,
+    solve_end,
+)
+from ringbalance.physics.end_losses_generate import EndSettings, run_path
+from ringbalance.physics.end_losses_table import end_table, laminar_entrance_loss, laminar_exit_loss
+from ringbalance.physics.navier_stokes import FlowSolution, FlowSystem
+from ringbalance.physics.results import StatusCode
+
+
+def _cells(end: End) -> EndMesh:
+    return EndMesh(cells_per_fold=1.3, tube=40.0 if end == "entrance" else 6.0, tube_cell=2.0)
+
+
+@cache
+def _system(end: End) -> FlowSystem:
+    return end_system(cells=_cells(end), end=end)
+
+
+@cache
+def _creeping(end: End) -> FlowSolution:
+    return solve_end(system=_system(end), reynolds=0.0)
+
+
+def _loss(end: End, flow: FlowSolution, share: float = 0.9) -> float:
+    return end_loss_times_reynolds(
+        system=_system(end), solution=flow, end=end, cells=_cells(end), share=share
+    )
+
+
+def test_creeping_flow_is_reversible_and_near_the_orifice() -> None:
+    entrance, leaving = (_loss(end, _creeping(end)) for end in ("entrance", "exit"))
+    assert entrance == pytest.approx(leaving, rel=1e-5)
+    # A hole without length costs 12 pi/Re in all (Sampson 1891); a tube's two ends nearly the same
+    # (Dagan, Weinbaum and Pfeffer, J. Fluid Mech. 115 (1982) 505).
+    assert entrance + leaving == pytest.approx(12 * np.pi, rel=0.02)
+
+
+def test_developed_flow_does_not_care_where_the_pressure_is_taken() -> None:
+    flow = _creeping("entrance")
+    assert _loss("entrance", flow, 0.3) == pytest.approx(_loss("entrance", flow, 0.9), rel=1e-6)
+
+
+def test_entrance_loss_and_entry_length_at_reynolds_60() -> None:
+    flow = solve_end(system=_system("entrance"), reynolds=60.0, start=_creeping("entrance"))
+    assert flow.status.ok
+    found = laminar_entrance_loss(reynolds=60.0)
+    assert _loss("entrance", flow) / 60 == pytest.approx(float(found.value), rel=5e-3)
+    length = entry_length(system=_system("entrance"), solution=flow, cells=_cells("entrance"))
+    # 0.6/(1 + 0.035 Re) + 0.056 Re: Atkinson et al., cited by Shah and London (1978), for a uniform inflow.
+    assert length == pytest.approx(0.056 * 60 + 0.6 / (1 + 0.035 * 60), rel=0.25)
+
+
+def test_exit_loss_at_reynolds_7() -> None:
+    flow = solve_end(system=_system("exit"), reynolds=7.0, start=_creeping("exit"))
+    assert _loss("exit", flow) / 7 == pytest.approx(float(laminar_exit_loss(reynolds=7.0).value), abs=5e-3)
+
+
+def test_both_ends_cost_about_2_3_laminar_and_1_57_turbulent() -> None:
+    laminar = laminar_entrance_loss(reynolds=1000.0).value + laminar_exit_loss(reynolds=1000.0).value
+    assert float(laminar) == pytest.approx(2.3, abs=0.03)
+    assert entrance_sharp() + exit_normal() == pytest.approx(1.57, abs=0.01)
+
+
+def test_the_committed_table_is_whole_and_fine_enough() -> None:
+    path = resources.files("ringbalance.physics") / "data" / "end_losses.csv"
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    body = "".join(line for line in lines if not line.startswith("#"))
+    head = dict(line[2:].rstrip().split(": ", 1) for line in lines if line.startswith("#") and ": " in line)
+    assert head["data_sha256"] == hashlib.sha256(body.encode()).hexdigest()
+    for end in ("entrance", "exit"):
+        assert end_table(end).interpolation_error < 5e-3
+    reynolds = np.geomspace(1.0, 2000.0, 50)
+    assert np.all(
+        laminar_entrance_loss(reynolds=reynolds).uncertainty
+        < 0.01 * laminar_entrance_loss(reynolds=reynolds).value
+    )
+    assert np.all(laminar_exit_loss(reynolds=reynolds).uncertainty < 0.003 + 0.03 / reynolds)
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("end", ["entrance", "exit"])
+def test_the_table_comes_out_again(end: End) -> None:
+    settings = EndSettings()
+    points = [a for _, a in settings.points()]
+    found = run_path(end=end, level=0, settings=settings, points=points)
+    stored = [float(row["coarse"]) for row in end_table(end).rows]
+    np.testing.assert_allclose(found, stored, rtol=1e-5, atol=1e-4)
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize(("end", "reynolds"), [("entrance", 730.0), ("exit", 330.0)])
+def test_unseen_reynolds_numbers_in_a_larger_domain(end: End, reynolds: float) -> None:
+    cells = EndMesh(
+        cells_per_fold=2.2, reservoir=100.0, edge_cell=3e-5, tube=200.0 if end == "entrance" else 10.0
+    )
+    system, flow = end_system(cells=cells, end=end), None
+    for step in (0.0, 10.0, 40.0, 120.0, reynolds):
+        flow = solve_end(system=system, reynolds=step, start=flow)
+        assert flow.status.ok
+    found = end_loss_times_reynolds(system=system, solution=flow, end=end, cells=cells) / reynolds
+    table = (laminar_entrance_loss if end == "entrance" else laminar_exit_loss)(reynolds=reynolds)
+    assert found == pytest.approx(float(table.value), rel=0.01 if end == "entrance" else 0, abs=2e-3)
+
+
+@given(reynolds=st.floats(1e-3, 2000.0), growth=st.floats(1.01, 5.0))
+def test_losses_are_finite_and_the_entrance_falls_with_reynolds(reynolds: float, growth: float) -> None:
+    pair = [reynolds, min(growth * reynolds, 2000.0)]
+    entrance, leaving = laminar_entrance_loss(reynolds=pair), laminar_exit_loss(reynolds=pair)
+    assert entrance.status.ok
+    assert leaving.status.ok
+    assert entrance.value[0] >= entrance.value[1] - 2e-3
+    for estimate in (entrance, leaving):
+        assert np.all(np.isfinite(estimate.value))
+        assert np.all(estimate.uncertainty > 0)
+
+
+def test_above_the_table_the_answer_says_so() -> None:
+    found = laminar_entrance_loss(reynolds=[100.0, 5000.0])
+    assert found.status.code is StatusCode.OUT_OF_RANGE
+    assert found.uncertainty[1] > 0.25 > found.uncertainty[0]
+
+
+@pytest.mark.parametrize("bad", [0.0, -1.0, np.nan])
+def test_bad_reynolds_numbers_are_refused(bad: float) -> None:
+    with pytest.raises(ValueError, match="reynolds"):
+        laminar_exit_loss(reynolds=bad)

@@ -215,9 +215,8 @@ def show(result: dict[str, Any], console: Console) -> None:
             sides = [*_cell(row["ringbalance"]), *_cell(row["ngsolve"])]
             table.add_row(f"{row['target']:.1e} {row['kind']}", *sides, *ratios)
         console.print(table)
-    table = Table(title="growth of the physical problem (processor seconds on one thread, peak of memory of
-    the process)") for heading in ("cells", "unknowns", "iterations", "residual", "error", "mesh", "solve",
-    "MB"):
+    table = Table(title="growth of the physical problem (processor seconds, peak memory of the process)")
+    for heading in ("cells", "unknowns", "iterations", "residual", "error", "mesh", "solve", "MB"):
         table.add_column(heading)
     for row in result["growth"]:
         numbers = [f"{row[key]:.2g}" for key in ("relative_residual", "error")]

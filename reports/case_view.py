@@ -8,7 +8,7 @@ from ringbalance.reports.case_figures import order_plot, series_plots
 from ringbalance.reports.equations import equation_svg
 from ringbalance.reports.numbers import MISSING, PLUS_MINUS, THIN_SPACE, number, percent, short, with_unit
 from ringbalance.reports.prose import typeset
-from ringbalance.reports.units import display_unit, given, shown, shown_apart
+from ringbalance.reports.units import display_unit, given, shown
 
 Record = dict[str, Any]
 
@@ -226,28 +226,25 @@ def _in_brief(case: Record) -> Record:
     quantity = deciding_quantity(case)
     if quantity is None:
         return dict.fromkeys(("paper", "found", "half_width"), MISSING) | {"what": ""}
-    unit = quantity.get("unit") or "1"
-    paper = _criterion(quantity) if quantity.get("reference") is None else shown(quantity["reference"], unit)
-    found, half_width = _apart(quantity, unit)
+    unit, reference = quantity.get("unit") or "1", quantity.get("reference")
+    value, half_width = quantity.get("value"), quantity.get("uncertainty")
+    rung = display_unit(unit, value)
+    width = number(None if not half_width else half_width * rung.factor, digits=2)
     return {
-        "paper": paper,
-        "found": found,
-        "half_width": half_width,
+        "paper": _criterion(quantity) if reference is None else given(reference, unit, digits=4),
+        "found": _without_half_width(_value(quantity, quantity.get("value_uncertainty"))),
+        "half_width": with_unit(width, rung.symbol),
         "what": typeset(quantity.get("title") or ""),
     }
 
 
-def _apart(quantity: Record, unit: str) -> tuple[str, str]:
-    """Value and half-width of the comparison in one unit, to the same decimal place where that is short."""
-    value, half_width = quantity.get("value"), quantity.get("uncertainty")
-    if value is None or not half_width:
-        return _value(quantity, None), MISSING
-    text, symbol = shown_apart(value, unit, half_width)
-    first, _, second = text.partition(PLUS_MINUS)
-    if first.startswith("("):
-        rung = display_unit(unit, value)
-        first, second = number(value * rung.factor), number(half_width * rung.factor, digits=2)
-    return with_unit(first, symbol), with_unit(second, symbol)
+def _without_half_width(text: str) -> str:
+    """A value's text with the digits that its own half-width leaves standing, but without that half-width."""
+    value, sign, rest = text.partition(PLUS_MINUS)
+    if not sign:
+        return text
+    unit = rest.partition(")")[2] if text.startswith("(") else ""
+    return f"{value.removeprefix('(')}{unit}"
 
 
 def case_view(case: Record) -> Record:

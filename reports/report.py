@@ -90,7 +90,7 @@ def write_report(
             stop_drawing(drawing)
         _tell(progress, "page")
         evidence["times"]["total_s"] = round(time.perf_counter() - start, 1)
-        _write_page(evidence, stage)
+        evidence = _write_page(evidence, stage)
         move_into_place(stage, folder)
     return Report(page=folder / "report.html", evidence=evidence)
 
@@ -100,17 +100,19 @@ def _tell(progress: Progress | None, stage: str) -> None:
         progress(stage)
 
 
-def _write_page(evidence: Record, stage: Path) -> None:
-    """Evidence, figures and page; the page is made of the evidence as it will be read back."""
+def _write_page(evidence: Record, stage: Path) -> Record:
+    """Evidence, figures and page; the page is made of the evidence as it reads back from its file."""
     text = json.dumps(evidence, allow_nan=False, indent=1, ensure_ascii=False)
+    kept: Record = json.loads(text)
     (stage / "evidence.json").write_text(text + "\n", encoding="utf-8")
     figures = stage / "figures"
     names = [item[theme] for item in evidence["pictures"]["files"] for theme in ("light", "dark")]
     pictures = {name: (figures / name).read_bytes() for name in names}
-    content = page_content(json.loads(text), pictures=pictures)
+    content = page_content(kept, pictures=pictures)
     for drawing in content.drawings:
         (figures / f"{drawing.name}.svg").write_text(standalone(drawing), encoding="utf-8")
     (stage / "report.html").write_text(render_page(content), encoding="utf-8")
+    return kept
 
 
 @contextmanager

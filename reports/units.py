@@ -113,12 +113,13 @@ def shown_apart(
     return measured(value * rung.factor, width, digits=digits), rung.symbol
 
 
-def given(value: float | None, unit: str) -> str:
+def given(value: float | None, unit: str, *, digits: int = 6) -> str:
     """An SI quantity that was set, not found: as short as it may be.
 
     Args:
         value: in `unit`; None where there is none.
         unit: SI unit.
+        digits: most significant digits.
 
     Returns:
         Text, such as 0.7 MPa or 0.25.
@@ -127,4 +128,4 @@ def given(value: float | None, unit: str) -> str:
         ValueError: a value that is not finite.
     """
     rung = display_unit(unit, value)
-    return with_unit(short(None if value is None else value * rung.factor), rung.symbol)
+    return with_unit(short(None if value is None else value * rung.factor, digits=digits), rung.symbol)

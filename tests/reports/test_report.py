@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -10,10 +11,12 @@ from typing import Any
 
 import pytest
 
+from ringbalance.controller import find_consequences
 from ringbalance.reports import cli
 from ringbalance.reports import evidence as evidence_module
 from ringbalance.reports import report as report_module
 from ringbalance.reports.opengl import OpenGL
+from ringbalance.reports.page import page_content
 from ringbalance.reports.render import render
 from ringbalance.reports.report import Report, write_report
 from ringbalance.reports.saved import heavy_cases, kept_document, saved_cases
@@ -27,13 +30,20 @@ QUICK = ("gci_celik2008", "claim_01_volume", "coverage")
 
 @pytest.fixture(scope="module", autouse=True)
 def few_cases() -> Iterator[None]:
-    """Three cases instead of all: one check, one claim, one heavy."""
+    """Three cases instead of all, one check, one claim, one heavy; and consequences found once."""
 
     def run(**settings: Any) -> Any:
         return run_cases(QUICK, **{**settings, "workers": 1})
 
+    def consequences(*arguments: Any, **_: Any) -> Any:
+        if not found:
+            found.append(find_consequences(*arguments, members=20))
+        return found[0]
+
+    found: list[Any] = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(evidence_module, "run_cases", run)
+        patch.setattr(evidence_module, "find_consequences", consequences)
         yield
 
 
@@ -42,8 +52,9 @@ Write = Callable[[Path], Report]
 
 @pytest.fixture(scope="module")
 def write(paper_scene: Scene) -> Write:
-    """Writes a report of the paper's disc without pictures."""
-    return partial(write_report, paper_scene, scene_text="# a scene\n", opengl=NO_OPENGL)
+    """Writes a report of the paper's disc without pictures, its loop cut short."""
+    scene = dataclasses.replace(paper_scene, run=dataclasses.replace(paper_scene.run, time_limit=8.0))
+    return partial(write_report, scene, scene_text="# a scene\n", opengl=NO_OPENGL)
 
 
 @pytest.fixture(scope="module")
@@ -64,6 +75,16 @@ def test_everything_is_there(first: Report) -> None:
 def test_the_page_comes_from_the_evidence_file_alone(first: Report) -> None:
     evidence = json.loads((first.page.parent / "evidence.json").read_text())
     assert render(evidence) == first.page.read_text()
+
+
+def test_the_consequences_of_a_wrong_k_are_told(first: Report) -> None:
+    page, found = first.page.read_text(), first.evidence["consequences"]
+    assert 'href="#consequences"' in page
+    assert {drawing.name for drawing in page_content(first.evidence).drawings} >= {"gain-margin"}
+    assert (
+        len(found["runs"])
+        == page.count("<tr>", page.index("One run each"), page.index("Probabilities over")) - 1
+    )
 
 
 def test_without_opengl_the_page_says_so(first: Report) -> None:

@@ -2,8 +2,8 @@
 
     python tools/keep_evidence.py out/evidence.json
 
-Only heavy cases are kept, each with its date and the hash of its scene; a light report takes those whose scene
-is its own.
+Only heavy cases are kept, each with its date and the hash of its scene; a light report takes those whose
+scene is its own.
 """
 
 from __future__ import annotations

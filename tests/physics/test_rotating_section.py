@@ -7,6 +7,7 @@ import json
 from dataclasses import replace
 from functools import cache
 from importlib import resources
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ from ringbalance.physics.rotating_section import (
     solve_section,
     solve_section_without_inertia,
 )
-from ringbalance.physics.rotating_section_generate import settings_hash
+from ringbalance.physics.rotating_section_generate import columns, run_column, settings_hash
 from ringbalance.physics.rotating_section_grid import slow_first, table_settings
 from ringbalance.physics.rotating_section_table import (
     friction_table,
@@ -156,6 +157,19 @@ def test_points_of_the_table_come_out_again(a: int, b: int) -> None:
     row = next(r for r in table.rows if r["table"] == "slow" and (float(r["a"]), float(r["b"])) == place)
     kl, s = 300 * np.expm1(place[0]), place[1] / (1 - place[1])
     assert _followed(kl, s, 8) == pytest.approx(float(row["coarse"]), rel=2e-6)
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("index", range(len(columns(table_settings()))))
+def test_every_point_of_the_table_comes_out_again(index: int, tmp_path: Path) -> None:
+    settings, table = table_settings(), friction_table()
+    column = columns(settings)[index]
+    assert run_column(column=column, folder=tmp_path, settings=settings) == len(column.points)
+    assert run_column(column=column, folder=tmp_path, settings=settings) == 0
+    stored = [row for row in table.rows if row["table"] == column.table and float(row["b"]) == column.b]
+    found = [json.loads(path.read_text(encoding="utf-8")) for path in tmp_path.glob("*.json")]
+    expected = [[float(row[name]) for name in ("coarse", "medium", "fine")] for row in stored]
+    np.testing.assert_allclose(sorted(found), sorted(expected), rtol=1e-5)
 
 
 @pytest.mark.parametrize(("reynolds", "rotation"), [(173.0, 61.0), (40.0, 170.0), (600.0, 190.0)])

@@ -9,6 +9,7 @@ from __future__ import annotations
 import difflib
 import os
 import sys
+import traceback
 from collections.abc import Sequence
 
 from cyclopts import App, CycloptsError, Parameter, UnknownCommandError
@@ -72,6 +73,16 @@ def _usage_fault(error: CycloptsError) -> str:
     return f'unknown command "{word}"{guess} Commands: {", ".join(COMMANDS)}.'
 
 
+def _refusal(error: OSError) -> str:
+    if error.filename:
+        return f"{error.filename}: {error.strerror}"
+    if error.errno is None:
+        return str(error)
+    # The machine refused something that no file name stands for, such as a process or a full disk.
+    frame = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{error.strerror} (in {frame.name}, {frame.filename}, line {frame.lineno})"
+
+
 def _run(arguments: Sequence[str] | None) -> int:
     result = build_app()(arguments, exit_on_error=False, print_error=False)
     sys.stdout.flush()
@@ -89,9 +100,7 @@ def _run_guarded(arguments: Sequence[str] | None) -> int:
     except ringbalance.SceneError as error:
         _say(str(error))
     except OSError as error:
-        _say(
-            f"ringbalance: {error.filename}: {error.strerror}" if error.filename else f"ringbalance: {error}"
-        )
+        _say(f"ringbalance: {_refusal(error)}")
     return BAD_INPUT
 
 

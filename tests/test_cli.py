@@ -188,6 +188,13 @@ def test_an_unwritable_file_is_bad_input(
     assert "law.json" in capsys.readouterr().err
 
 
+def test_what_the_machine_refuses_is_told_with_its_place(
+    command: Callable[[BaseException | int], int], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert command(OSError(28, "No space left on device")) == 2
+    assert "No space left on device (in act" in capsys.readouterr().err
+
+
 def test_a_fault_of_the_program_is_not_hidden(command: Callable[[BaseException | int], int]) -> None:
     with pytest.raises(ZeroDivisionError):
         command(ZeroDivisionError())

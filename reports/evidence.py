@@ -218,9 +218,9 @@ def _threshold_uncertainties(point: Record, calibration: Calibration) -> Record:
 
 
 def _flow_law(scene: Scene, calibration: Calibration) -> Record:
-    """Both laws over the fill, at the scene's gas pressure and at one higher in the ratio of Fig. 4."""
-    ratio = paper_numbers.HIGH_PRESSURE / paper_numbers.LOW_PRESSURE
-    pressures = [scene.gas.pressure, scene.gas.pressure * ratio]
+    """Both laws over the fill, at the pressures of Fig. 4, or at the scene's own and at twice that."""
+    drawn = [paper_numbers.LOW_PRESSURE, paper_numbers.HIGH_PRESSURE]
+    pressures = drawn if scene.gas.pressure in drawn else [scene.gas.pressure, 2 * scene.gas.pressure]
     fill = np.linspace(0.0, scene.disc.max_fill_ratio, LAW_POINTS)
 
     def rows(law: FlowLaw) -> Record:

@@ -25,6 +25,12 @@ _TONES: Final = {
     "not run": "idle",
 }
 _LAWS: Final = ("calibrated", "paper")
+_RUNS: Final = {
+    "blocked": "is blocked",
+    "siphon": "runs as a full siphon",
+    "separated": "runs separated",
+    "reverse": "runs in reverse",
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -234,7 +240,7 @@ def _pressure_number(chamber: Record) -> KeyNumber:
 def _velocity_number(point: Record) -> KeyNumber:
     parts = shown_apart(point["velocity_m_s"], "m/s", point["velocity_uncertainty"], digits=3)
     said = f"{shown(point['velocity_paper_m_s'], 'm/s', digits=3)} by Eq. 19"
-    note = f"At {given(point['gas_pressure_Pa'], 'Pa')} and equal fills; the tube is {point['regime']}."
+    note = f"At {given(point['gas_pressure_Pa'], 'Pa')} and equal fills; the tube {_RUNS[point['regime']]}."
     return _key("Velocity in the tube", parts, said, note)
 
 

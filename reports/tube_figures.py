@@ -26,7 +26,7 @@ from ringbalance.reports.figure_style import (
     logarithmic,
 )
 from ringbalance.reports.numbers import measured, short
-from ringbalance.reports.units import given, shown
+from ringbalance.reports.units import given
 
 Record = dict[str, Any]
 FloatArray = npt.NDArray[np.float64]
@@ -102,7 +102,8 @@ def drag(tube: Record, point: Record, paper: Record) -> Drawing:
         legend_above(figure, axes, columns=4)
 
     ends = [measured(tube["k"][i], tube["k_uncertainty"][i]) for i in (0, -1)]
-    speeds = [shown(tube["velocity_m_s"][i], "m/s", digits=3) for i in (0, -1)]
+    speeds = [given(tube["velocity_m_s"][i], "m/s") for i in (0, -1)]
+    shaded = " Grey: transition." if "transitional" in tube["flow_state"] else ""
     return draw(
         name="drag",
         paint=paint,
@@ -111,7 +112,7 @@ def drag(tube: Record, point: Record, paper: Record) -> Drawing:
         alt=f"The drag coefficient is {ends[0]} at {speeds[0]} and {ends[1]} at {speeds[1]}; the paper has "
         f"{short(printed)} throughout.",
         caption=f"Drag coefficient over velocity and Reynolds number: {ends[0]} at {speeds[0]}, {ends[1]} at "
-        f"{speeds[1]}. The paper has one number, {short(printed)}. Grey: transition.",
+        f"{speeds[1]}. The paper has one number, {short(printed)}.{shaded}",
     )
 
 

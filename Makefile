@@ -44,6 +44,8 @@ bench: ## timed comparisons, in an environment of their own with every extra (hu
 	@sh tools/make_env.sh $(BENCH_VENV) requirements/lock-all.txt
 	@sh tools/make_ngsolve.sh "$(CURDIR)/$(BENCH_VENV)/bin/python"
 	$(BENCH_VENV)/bin/python benchmarks/pressure_field.py
+	$(BENCH_VENV)/bin/python benchmarks/tube_flow.py
+	$(BENCH_VENV)/bin/python benchmarks/closed_loop.py
 
 lock: env ## write the lock files anew from pyproject.toml (a change of dependencies only)
 	sh tools/make_lock.sh $(VENV)/bin/uv

@@ -19,6 +19,15 @@ from ringbalance.scene import Fault, SceneError, bundled_scene
 PAPER = str(bundled_scene("liquid_ring_paper"))
 LAUNCH = [sys.executable, "-c", "import sys; from ringbalance.cli import main; sys.exit(main())"]
 
+# A shell's background job is started with interrupts ignored, and its children inherit that.
+READY = """
+import signal, sys
+from ringbalance.cli import main
+signal.signal(signal.SIGINT, signal.default_int_handler)
+print("ready", flush=True)
+sys.exit(main())
+"""
+
 
 def run(*words: str | Path) -> subprocess.CompletedProcess[str]:
     """One command line in a process of its own."""
@@ -113,8 +122,7 @@ def test_a_file_where_a_folder_should_be(words: list[str], tmp_path: Path) -> No
 @pytest.mark.parametrize("delay", [0.2, 5.0])
 def test_an_interrupted_report_leaves_nothing_half_written(tmp_path: Path, delay: float) -> None:
     """Interrupted while modules are loaded, and in the middle of the work."""
-    ready = "import sys; from ringbalance.cli import main; print('ready', flush=True); sys.exit(main())"
-    command = [sys.executable, "-c", ready, "report", PAPER, "--out", str(tmp_path / "out")]
+    command = [sys.executable, "-c", READY, "report", PAPER, "--out", str(tmp_path / "out")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as child:
         assert child.stdout is not None
         child.stdout.readline()

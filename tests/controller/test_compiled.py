@@ -1,0 +1,76 @@
+"""Compiled functions: the same numbers as the plain ones, kept, and made anew when a source changes."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from ringbalance.controller.compiled import compiled
+
+
+def _sum_of_sines(values: np.ndarray[Any, np.dtype[np.float64]], factor: float) -> float:
+    total = 0.0
+    for value in values:
+        total += math.sin(factor * value)
+    return total
+
+
+def test_compiled_function_gives_the_plain_ones_bits() -> None:
+    values = np.linspace(-3.0, 7.0, 1001)
+    fast = compiled(_sum_of_sines)
+    assert fast(values, 1.7) == _sum_of_sines(values, 1.7)
+    assert cast(Any, fast).py_func is _sum_of_sines
+
+
+def test_division_by_zero_is_infinite_as_in_numpy() -> None:
+    def share(part: float, whole: float) -> float:
+        return part / whole
+
+    assert compiled(share)(1.0, 0.0) == math.inf
+
+
+PROGRAM = """
+import numba
+from numba.core import config
+from ringbalance.controller.compiled import compiled
+before = config.CACHE_DIR
+def twice(x):
+    return 2 * x
+fast = compiled(twice)
+assert fast(2.0) == 4.0
+assert config.CACHE_DIR == before
+print(fast._cache.cache_path if hasattr(fast, "_cache") and fast._cache else "")
+"""
+
+
+def _run(tmp_path: Path, **more: str) -> str:
+    script = tmp_path / "program.py"
+    script.write_text(PROGRAM)
+    done = subprocess.run(
+        [sys.executable, str(script)],
+        env={**os.environ, **more},
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=120,
+    )
+    return done.stdout.strip()
+
+
+def test_compiled_functions_are_kept_in_the_users_folder(tmp_path: Path) -> None:
+    home = tmp_path / "kept"
+    folder = _run(tmp_path, NUMBA_CACHE_DIR=str(home))
+    assert folder.startswith(str(home / "ringbalance"))
+    assert list(home.rglob("*.nbi")), "nothing was kept"
+
+
+def test_a_folder_that_cannot_be_written_is_no_obstacle(tmp_path: Path) -> None:
+    blocked = tmp_path / "file"
+    blocked.write_text("not a folder")
+    assert str(blocked) not in _run(tmp_path, NUMBA_CACHE_DIR=str(blocked))

@@ -100,7 +100,7 @@ def tube_loss(
     return TubeLoss(
         velocity=u,
         reynolds=state.reynolds,
-        rotation_reynolds=state.rotation_reynolds,
+        rotation_reynolds=float(state.rotation_reynolds),
         k=_estimate(state, parts, bool(np.any(outside))),
         terms=MappingProxyType(dict(state.terms)),
         uncertainty_parts=MappingProxyType(dict(parts)),

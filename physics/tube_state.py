@@ -29,9 +29,9 @@ class TubeState:
 
     reynolds: FloatArray
     """Re."""
-    rotation_reynolds: float
+    rotation_reynolds: FloatArray
     """R_Om."""
-    critical_ratio: float
+    critical_ratio: FloatArray
     """Critical Re over the straight tube's."""
     straight_friction: FloatArray
     """f without rotation."""
@@ -68,11 +68,33 @@ def tube_state(*, tube: Tube, liquid: Liquid, angular_velocity: float, velocity:
     Source: the sources of the terms stand with them.
     """
     nu = liquid.kinematic_viscosity
-    re = reynolds_number(velocity=velocity, bore=tube.bore, kinematic_viscosity=nu)
-    rotation = rotation_reynolds_number(
-        angular_velocity=angular_velocity, bore=tube.bore, kinematic_viscosity=nu
+    return tube_state_at(
+        tube=tube,
+        reynolds=reynolds_number(velocity=velocity, bore=tube.bore, kinematic_viscosity=nu),
+        rotation_reynolds=rotation_reynolds_number(
+            angular_velocity=angular_velocity, bore=tube.bore, kinematic_viscosity=nu
+        ),
     )
-    critical = float(critical_reynolds(rotation_reynolds=rotation) / STRAIGHT_CRITICAL_REYNOLDS)
+
+
+def tube_state_at(*, tube: Tube, reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike) -> TubeState:
+    """Evaluate every term of k from the two numbers that it depends on, for many liquids at once.
+
+    Args:
+        tube: the tube.
+        reynolds: Re, any shape, positive.
+        rotation_reynolds: R_Om, any shape that broadcasts to that of `reynolds`.
+
+    Returns:
+        TubeState, arrays of the shape of `reynolds`.
+
+    Raises:
+        ValueError: arcs longer than the tube.
+
+    Source: the sources of the terms stand with them.
+    """
+    re, rotation = (np.asarray(v, dtype=np.float64) for v in (reynolds, rotation_reynolds))
+    critical = critical_reynolds(rotation_reynolds=rotation) / STRAIGHT_CRITICAL_REYNOLDS
     rough = tube.roughness / tube.bore
     straight = friction_factor(reynolds=re, relative_roughness=rough)
     turning = friction_factor(
@@ -98,7 +120,7 @@ def tube_state(*, tube: Tube, liquid: Liquid, angular_velocity: float, velocity:
 def _terms(
     tube: Tube,
     re: FloatArray,
-    critical: float,
+    critical: FloatArray,
     straight: FloatArray,
     turning: FloatArray,
     bends: tuple[FloatArray, ...],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -50,11 +50,28 @@ def uncertainty_parts(
 
     Source: ASME V&V 20-2009, input uncertainty by sensitivity; model spreads stand with the correlations.
     """
-    model = {} if tube.drag_coefficient is not None else _model_parts(tube, state)
-    return model | _input_parts(tube, liquid, angular_velocity, velocity, state, inputs)
+    model = {} if tube.drag_coefficient is not None else model_parts(tube=tube, state=state)
+
+    def k_of(t: Tube, q: Liquid, w: float) -> FloatArray:
+        return tube_state(tube=t, liquid=q, angular_velocity=w, velocity=velocity).k
+
+    return model | input_parts(
+        tube=tube, liquid=liquid, angular_velocity=angular_velocity, inputs=inputs, k_of=k_of, k=state.k
+    )
 
 
-def _model_parts(tube: Tube, state: TubeState) -> dict[str, FloatArray]:
+def model_parts(*, tube: Tube, state: TubeState) -> dict[str, FloatArray]:
+    """95 % half-widths of k by the correlations and tables themselves.
+
+    Args:
+        tube: the tube.
+        state: the terms of k.
+
+    Returns:
+        Half-width of k by cause, each the shape of the state's arrays.
+
+    Source: the spreads stand with the correlations.
+    """
     re, rough, ratio = state.reynolds, tube.roughness / tube.bore, state.critical_ratio
     straight = straight_length(tube=tube) / tube.bore
     lam = rotating_friction_ratio(reynolds=re, rotation_reynolds=state.rotation_reynolds)
@@ -75,7 +92,7 @@ def _model_parts(tube: Tube, state: TubeState) -> dict[str, FloatArray]:
     )
     ends = (end(tube=tube, reynolds=re, critical_ratio=ratio)[1] for end in (entrance_loss, exit_loss))
     laminar = 1 - turbulent_share(reynolds=re, critical_ratio=ratio)
-    entry = min(1.0, state.rotation_reynolds**0.5 * tube.bore / tube.length)
+    entry = np.minimum(1.0, state.rotation_reynolds**0.5 * tube.bore / tube.length)
     return {
         "friction correlation": straight * friction,
         "rotation model": tube.length / tube.bore * (higher - state.rotating_friction),
@@ -85,27 +102,39 @@ def _model_parts(tube: Tube, state: TubeState) -> dict[str, FloatArray]:
     }
 
 
-def _input_parts(
+def input_parts(
+    *,
     tube: Tube,
     liquid: Liquid,
     angular_velocity: float,
-    velocity: FloatArray,
-    state: TubeState,
     inputs: tuple[InputUncertainty, ...],
+    k_of: Callable[[Tube, Liquid, float], FloatArray],
+    k: FloatArray,
 ) -> dict[str, FloatArray]:
-    stated = {i.quantity: i for i in inputs}
+    """95 % half-widths of k by what the scene leaves uncertain.
+
+    Args:
+        tube: the tube.
+        liquid: the liquid; its own viscosity uncertainty is used unless `inputs` has one.
+        angular_velocity: omega, rad/s.
+        inputs: 95 % half-widths of scene quantities.
+        k_of: k for another tube, liquid and omega.
+        k: that of these.
+
+    Returns:
+        Half-width of k by input, each the shape of `k`.
+
+    Source: ASME V&V 20-2009, input uncertainty by sensitivity.
+    """
 
     def effect(quantity: str, half_width: float) -> FloatArray:
         sides = (
             _shifted(tube, liquid, angular_velocity, quantity, sign * half_width) for sign in (-1.0, 1.0)
         )
-        changes = (
-            tube_state(tube=t, liquid=q, angular_velocity=w, velocity=velocity).k - state.k
-            for t, q, w in sides
-        )
-        return np.asarray(np.max(np.abs(np.array(list(changes))), axis=0), dtype=np.float64)
+        changes = [k_of(*side) - k for side in sides]
+        return np.asarray(np.max(np.abs(np.array(changes)), axis=0), dtype=np.float64)
 
-    widths = _half_widths(tube, liquid, angular_velocity, stated)
+    widths = _half_widths(tube, liquid, angular_velocity, {i.quantity: i for i in inputs})
     return {f"input: {name}": effect(name, width) for name, width in widths.items()}
 
 

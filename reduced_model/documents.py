@@ -176,4 +176,8 @@ def _operating_point(calibration: Calibration) -> dict[str, Any]:
         "priming_pressure_trapped_Pa": point.priming_trapped,
         "stall_pressure_Pa": point.stall,
         "stall_pressure_paper_Pa": point.stall_paper,
+        "hump_pressure_Pa": point.hump_pressure,
+        "cavity_pressure_Pa": point.cavity_pressure,
+        "cavitation_margin_Pa": point.cavitation_margin,
+        "cavitation_margin_uncertainty": point.cavitation_margin_uncertainty,
     }

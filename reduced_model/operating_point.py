@@ -12,6 +12,7 @@ from ringbalance.physics.tube_loss import tube_loss
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.flow_law import Regime
+from ringbalance.reduced_model.hump_profile import hump_profile
 from ringbalance.reduced_model.thresholds import priming_pressure, siphon_stall_pressure
 from ringbalance.scene.models import Scene
 
@@ -46,6 +47,14 @@ class OperatingPoint:
     """Gauge pressure at which a full siphon stalls with the driven chamber empty, Pa."""
     stall_paper: float
     """The same by Eq. 19."""
+    hump_pressure: float | None
+    """Pressure over the hump, gauge, Pa; None: no hump."""
+    cavity_pressure: float | None
+    """At which the column tears there, gauge, Pa."""
+    cavitation_margin: float | None
+    """Pressure over the hump of a full siphon, of a primed tube when blocked, less `cavity_pressure`, Pa."""
+    cavitation_margin_uncertainty: float | None
+    """95 % half-width, Pa."""
 
 
 def operating_point(*, scene: Scene, law: CalibratedLaw) -> OperatingPoint:
@@ -73,6 +82,7 @@ def operating_point(*, scene: Scene, law: CalibratedLaw) -> OperatingPoint:
             velocity=u,
             inputs=scene.uncertainty,
         )
+    hump = hump_profile(scene=scene, law=law, fill_ratio=x, opposite_fill_ratio=x, points=2)
     vented = priming_pressure(law=law, fill_ratio=0.0, hump_gas="vented")
     trapped = priming_pressure(law=law, fill_ratio=x, opposite_fill_ratio=x, hump_gas="trapped")
     return OperatingPoint(
@@ -93,4 +103,8 @@ def operating_point(*, scene: Scene, law: CalibratedLaw) -> OperatingPoint:
                 disc=scene.disc, density=scene.liquid.density, angular_velocity=scene.rotor.speed
             )
         ),
+        hump_pressure=hump.hump_pressure,
+        cavity_pressure=hump.cavity_pressure,
+        cavitation_margin=hump.cavitation_margin,
+        cavitation_margin_uncertainty=hump.cavitation_margin_uncertainty,
     )

@@ -98,6 +98,8 @@ def _summary_rows(calibration: Calibration) -> Iterator[tuple[str, str]]:
             f"{_mpa(point.priming_vented)} vented, driven chamber empty; "
             f"{_mpa(point.priming_trapped)} trapped, equal fills",
         )
+    if point.cavitation_margin is not None:
+        yield "cavitation margin", _margin_text(point)
     if not chamber.status.ok:
         yield "note", chamber.status.text
 
@@ -108,6 +110,15 @@ def _point_text(point: OperatingPoint) -> str:
         needed = [p for p in (point.priming_vented, point.stall) if p is not None]
         return f"{where}: blocked; raise gas.pressure towards {_mpa(max(needed))}"
     return f"{where}: {point.regime.label}, {point.velocity:.2f} ± {point.velocity_uncertainty:.2f} m/s"
+
+
+def _margin_text(point: OperatingPoint) -> str:
+    """How far a full siphon's pressure over the hump is from tearing there."""
+    margin, width = point.cavitation_margin or 0.0, point.cavitation_margin_uncertainty or 0.0
+    told = "the column holds over the hump" if margin > 0 else "a full siphon would tear over the hump"
+    if abs(margin) < width:
+        told += ", within its uncertainty either way"
+    return f"{margin / 1e6:+.3f} ± {width / 1e6:.3f} MPa above {_mpa(point.cavity_pressure)}: {told}"
 
 
 def _chamber_table(calibration: Calibration) -> Table:

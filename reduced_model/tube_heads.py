@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -12,6 +12,7 @@ from ringbalance.physics.tube_loss import TubeLoss, tube_loss
 from ringbalance.physics.tube_state import tube_state, upstream_loss
 from ringbalance.reduced_model.hermite import HermiteTable
 from ringbalance.reduced_model.hermite_fit import refined_table, table_from_samples
+from ringbalance.reduced_model.hump_path import reversed_tube
 from ringbalance.scene.models import Scene, Tube
 
 FloatArray = npt.NDArray[np.float64]
@@ -71,7 +72,7 @@ def tube_heads(scene: Scene) -> TubeHeads:
     Source: definition of k; the hump's energy balance with the profile's kinetic-energy factor alpha.
     """
     start, stop = (float(v) for v in np.log(TABLE_VELOCITIES))
-    tube, returning = scene.tube, _reversed(scene.tube)
+    tube, returning = scene.tube, reversed_tube(scene.tube)
     wanted = [(tube, False)]
     if tube.hump_radius is not None:
         wanted += [(tube, True), (returning, True)]
@@ -88,10 +89,6 @@ def tube_heads(scene: Scene) -> TubeHeads:
         hump_spread=table_from_samples(start=start, stop=stop, value=hump_spread),
         interpolation_error=max(errors),
     )
-
-
-def _reversed(tube: Tube) -> Tube:
-    return replace(tube, hump_position=1 - tube.hump_position, bends=tube.bends[::-1])
 
 
 def _loss(scene: Scene, velocity: FloatArray) -> TubeLoss:

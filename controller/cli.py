@@ -18,6 +18,7 @@ from ringbalance.reduced_model.model import BalancerModel
 from ringbalance.reduced_model.paper_law import paper_model
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import liquid_ring_scene
 
 SETTLED = 0
 NOT_SETTLED = 1
@@ -37,7 +38,7 @@ def simulate(scene: Path, *, law: str = "calibrated", json: bool = False) -> int
     Raises:
         SceneError: a scene or a law that cannot be used.
     """
-    told = load_scene(scene)
+    told = liquid_ring_scene(load_scene(scene))
     progress = Console(stderr=True)
     with progress.status(f"flow law: {law} ..."):
         model = _model(told, law)

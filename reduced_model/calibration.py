@@ -21,6 +21,7 @@ from ringbalance.reduced_model.operating_point import OperatingPoint, operating_
 from ringbalance.reduced_model.paper_law import PaperLaw, paper_law
 from ringbalance.reduced_model.tube_heads import tube_heads
 from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -59,7 +60,7 @@ class Calibration:
         return balancer_model(self.flow_law)
 
 
-def calibrate(scene: Scene) -> Calibration:
+def calibrate(scene: AnyScene) -> Calibration:
     """Calibrate a scene's balancer: lambda, k(u) and the flow law, with uncertainties.
 
     Args:
@@ -69,11 +70,12 @@ def calibrate(scene: Scene) -> Calibration:
         Calibration.
 
     Raises:
-        SceneError: a rotor too slow for the liquid to form a ring.
+        SceneError: a rotor too slow for the liquid to form a ring, or a balancer without liquid.
         ValueError: a tube whose bends do not fit into its length.
 
     Source: finite elements for the chamber, correlations for the tube; see the parts.
     """
+    scene = liquid_ring_scene(scene)
     check_ring(scene)
     chamber, heads = calibrate_chamber(scene), tube_heads(scene)
     law = calibrated_law(scene=scene, chamber=chamber, heads=heads)

@@ -15,6 +15,7 @@ from ringbalance.reduced_model.flow_law import Flow, Regime
 from ringbalance.reduced_model.model import BalancerModel, balancer_model
 from ringbalance.reduced_model.storage import save_record
 from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -161,7 +162,7 @@ class PaperLaw:
         }
 
 
-def paper_law(scene: Scene) -> PaperLaw:
+def paper_law(scene: AnyScene) -> PaperLaw:
     """The paper's flow law for a scene, with k = 50 unless the scene fixes it.
 
     Args:
@@ -170,8 +171,12 @@ def paper_law(scene: Scene) -> PaperLaw:
     Returns:
         PaperLaw.
 
+    Raises:
+        SceneError: a balancer without liquid.
+
     Source: Eqs. 4 and 19; lambda = 72 mm.
     """
+    scene = liquid_ring_scene(scene)
     volume = paper.chamber_volume_paper(disc=scene.disc)
     drag = scene.tube.drag_coefficient
     return PaperLaw(

@@ -14,7 +14,7 @@ from ringbalance.reports.evidence import Level, Progress
 from ringbalance.reports.pictures import finish_drawing, start_drawing, stop_drawing, write_fields
 from ringbalance.reports.report import Report, move_into_place, staging, write_report
 from ringbalance.reports.summary import lead_sentence, loop_sentence
-from ringbalance.scene import load_scene
+from ringbalance.scene import liquid_ring_scene, load_scene
 
 DONE: Final = 0
 NOT_SOUND: Final = 1
@@ -67,7 +67,7 @@ def plot(scene: Path, *, out: Path = Path("out")) -> int:
         SceneError: a scene that cannot be used; nothing is written.
         OSError: the folder cannot be written.
     """
-    told = load_scene(scene)
+    told = liquid_ring_scene(load_scene(scene))
     console = Console(stderr=True)
     with staging(out) as stage, _stages(console) as progress:
         progress("pressure fields")

@@ -19,7 +19,7 @@ from ringbalance.reports.page import page_content
 from ringbalance.reports.pictures import finish_drawing, start_drawing, stop_drawing, write_fields
 from ringbalance.reports.render import render_page
 from ringbalance.reports.saved import saved_cases
-from ringbalance.scene import Scene
+from ringbalance.scene import AnyScene, liquid_ring_scene
 
 Record = dict[str, Any]
 
@@ -47,7 +47,7 @@ class Report:
 
 
 def write_report(
-    scene: Scene,
+    scene: AnyScene,
     out: Path | str,
     *,
     level: Level = "light",
@@ -71,9 +71,11 @@ def write_report(
         The report.
 
     Raises:
-        SceneError: a scene that cannot be calibrated or simulated; nothing is written.
+        SceneError: a scene that cannot be calibrated or simulated, or a balancer without liquid; nothing is
+            written.
         OSError: the folder cannot be written, or holds an evidence.json that is none.
     """
+    scene = liquid_ring_scene(scene)
     folder, start = Path(out), time.perf_counter()
     saved = saved_cases(folder)
     with staging(folder) as stage:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from ringbalance.controller import Simulation
 from ringbalance.controller import simulate as run_closed_loop
 from ringbalance.reduced_model import CompleteLaw, balancer_model, calibrate
-from ringbalance.scene import Scene
+from ringbalance.scene import AnyScene, liquid_ring_scene
 
 
-def simulate(scene: Scene, *, flow_law: CompleteLaw | None = None) -> Simulation:
+def simulate(scene: AnyScene, *, flow_law: CompleteLaw | None = None) -> Simulation:
     """One closed-loop run of a scene's rotor under a flow law.
 
     Args:
@@ -20,7 +20,8 @@ def simulate(scene: Scene, *, flow_law: CompleteLaw | None = None) -> Simulation
         Simulation.
 
     Raises:
-        SceneError: a rotor too slow for the liquid to form a ring.
+        SceneError: a rotor too slow for the liquid to form a ring, or a balancer without liquid.
     """
-    law = calibrate(scene).flow_law if flow_law is None else flow_law
-    return run_closed_loop(scene, balancer_model(law))
+    told = liquid_ring_scene(scene)
+    law = calibrate(told).flow_law if flow_law is None else flow_law
+    return run_closed_loop(told, balancer_model(law))

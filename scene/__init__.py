@@ -1,21 +1,27 @@
 """Scene files: from TOML with units to frozen, validated, SI-only records, or every fault at once."""
 
 from ringbalance.scene.describe import Row, scene_fault, scene_table
+from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.files import write_whole
 from ringbalance.scene.liquids import KnownLiquid, known_liquids, liquid_at
 from ringbalance.scene.loader import bundled_scene, load_scene, scene_from
 from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import AnyScene, eccentric_scene, liquid_ring_scene
 
 __all__ = [
+    "AnyScene",
+    "EccentricScene",
     "Fault",
     "KnownLiquid",
     "Row",
     "Scene",
     "SceneError",
     "bundled_scene",
+    "eccentric_scene",
     "known_liquids",
     "liquid_at",
+    "liquid_ring_scene",
     "load_scene",
     "scene_fault",
     "scene_from",

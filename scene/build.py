@@ -41,31 +41,41 @@ def built(reading: Reading, *, source: str, sha256: str) -> Scene:
     bends = tuple(Bend(angle=bend.angle, radius=bend.radius) for bend in values["tube.bends"])
     return Scene(
         name=values["name"],
-        disc=_record(Disc, reading, "disc"),
-        liquid=_record(Liquid, reading, "liquid"),
-        tube=_record(Tube, reading, "tube", bends=bends),
-        gas=_record(Gas, reading, "gas"),
-        environment=_record(Environment, reading, "environment"),
-        rotor=_record(
+        disc=record(Disc, reading, "disc"),
+        liquid=record(Liquid, reading, "liquid"),
+        tube=record(Tube, reading, "tube", bends=bends),
+        gas=record(Gas, reading, "gas"),
+        environment=record(Environment, reading, "environment"),
+        rotor=record(
             Rotor,
             reading,
             "rotor",
             initial_amplitude=vibration.amplitude,
             initial_phase=vibration.phase,
         ),
-        sensor=_record(Sensor, reading, "sensor"),
-        controller=_record(ControllerSettings, reading, "controller"),
+        sensor=record(Sensor, reading, "sensor"),
+        controller=record(ControllerSettings, reading, "controller"),
         uncertainty=_uncertainty(reading),
-        run=_record(RunSettings, reading, "run"),
+        run=record(RunSettings, reading, "run"),
         tolerance=values["accuracy.tolerance"],
         source=source,
         sha256=sha256,
-        defaulted=_defaulted(reading),
+        defaulted=defaulted(reading),
     )
 
 
-def _record(kind: type[Record], reading: Reading, table: str, **others: Any) -> Record:
-    """Fill a record from the table whose keys its fields are named after; an absent key is None."""
+def record(kind: type[Record], reading: Reading, table: str, **others: Any) -> Record:
+    """Fill a record from the table whose keys its fields are named after; an absent key is None.
+
+    Args:
+        kind: the record.
+        reading: complete and without faults.
+        table: name of the table.
+        others: fields that are no keys, or need more than their key's value.
+
+    Returns:
+        The record.
+    """
     names = [field.name for field in fields(kind)]  # type: ignore[arg-type]
     values = {name: reading.values.get(f"{table}.{name}") for name in names}
     return kind(**{**values, **others})
@@ -80,8 +90,15 @@ def _uncertainty(reading: Reading) -> tuple[InputUncertainty, ...]:
     )
 
 
-def _defaulted(reading: Reading) -> tuple[str, ...]:
-    """Paths whose value is a default; what was looked up for a known liquid is none."""
+def defaulted(reading: Reading) -> tuple[str, ...]:
+    """List the paths whose value is a default; what was looked up for a known liquid is none.
+
+    Args:
+        reading: complete and without faults.
+
+    Returns:
+        Paths, "table.key".
+    """
     return tuple(
         path for path in reading.values if not reading.given(path) and not path.startswith("liquid.")
     )

@@ -120,12 +120,21 @@ def cross_faults(reading: Reading) -> tuple[Fault, ...]:
     Returns:
         One fault for each that fails.
     """
-    return (*_failed_checks(reading), *_spread_faults(reading))
+    return (*failed_checks(reading, CHECKS), *_spread_faults(reading))
 
 
-def _failed_checks(reading: Reading) -> Iterator[Fault]:
+def failed_checks(reading: Reading, checks: tuple[Check, ...]) -> Iterator[Fault]:
+    """Run some cross-checks, each as far as its values are known.
+
+    Args:
+        reading: what is known of the file, defaults included.
+        checks: in order; a check comes after those whose failure makes it pointless.
+
+    Yields:
+        One fault for each that fails.
+    """
     failed: set[Callable[..., Finding | None]] = set()
-    for check in CHECKS:
+    for check in checks:
         if not reading.known(*check.needs) or not check.when(reading) or failed & set(check.moot):
             continue
         finding = check.rule(*(reading.values[path] for path in check.needs))

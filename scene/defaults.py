@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Any
@@ -16,9 +16,13 @@ _NEARLY_WHOLE = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Derived:
+class Derived:
+    """A default that follows from other values."""
+
     path: str
+    """Of the value, "table.key"."""
     needs: tuple[str, ...]
+    """Paths of the rule's arguments."""
     rule: Callable[..., Any]
     """From the values of `needs`; None when there is no default in this case."""
 
@@ -54,21 +58,21 @@ def trial_sequence(chambers: int) -> tuple[str, ...]:
 
 
 _RULES = (
-    _Derived(path="disc.chambers", needs=("disc.central_angle",), rule=even_number_of_chambers),
-    _Derived(path="disc.initial_fill", needs=("disc.max_fill_ratio",), rule=lambda share: share / 2),
-    _Derived(path="tube.port_radius", needs=("disc.outer_radius",), rule=lambda radius: radius),
-    _Derived(
+    Derived(path="disc.chambers", needs=("disc.central_angle",), rule=even_number_of_chambers),
+    Derived(path="disc.initial_fill", needs=("disc.max_fill_ratio",), rule=lambda share: share / 2),
+    Derived(path="tube.port_radius", needs=("disc.outer_radius",), rule=lambda radius: radius),
+    Derived(
         path="tube.entrance_radius",
         needs=("tube.entrance",),
         rule=lambda entrance: None if entrance == "rounded" else 0.0,
     ),
-    _Derived(
+    Derived(
         path="controller.assumed_influence_coefficient",
         needs=("rotor.influence_coefficient",),
         rule=lambda coefficient: coefficient,
     ),
-    _Derived(path="controller.assumed_lag_angle", needs=("rotor.lag_angle",), rule=lambda angle: angle),
-    _Derived(path="controller.sequence", needs=("disc.chambers",), rule=trial_sequence),
+    Derived(path="controller.assumed_lag_angle", needs=("rotor.lag_angle",), rule=lambda angle: angle),
+    Derived(path="controller.sequence", needs=("disc.chambers",), rule=trial_sequence),
 )
 
 
@@ -81,13 +85,27 @@ def completed(reading: Reading) -> Reading:
     Returns:
         The same with more values; what could not be read stays unknown.
     """
+    reading = filled_in(reading, _RULES)
+    return reading.adding(_decreed_length(reading))
+
+
+def filled_in(reading: Reading, rules: Iterable[Derived]) -> Reading:
+    """Fill in the name and some defaults that follow from other values, as far as those are known.
+
+    Args:
+        reading: what the file says.
+        rules: in an order in which each finds what it needs.
+
+    Returns:
+        The same with more values.
+    """
     if reading.lacks("name"):
         reading = reading.adding({"name": PurePath(reading.file).stem or "scene"})
-    for derived in _RULES:
+    for derived in rules:
         if reading.lacks(derived.path) and reading.known(*derived.needs):
             result = derived.rule(*(reading.values[path] for path in derived.needs))
             reading = reading.adding({} if result is None else {derived.path: result})
-    return reading.adding(_decreed_length(reading))
+    return reading
 
 
 def _decreed_length(reading: Reading) -> Mapping[str, float]:

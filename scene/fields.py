@@ -224,6 +224,50 @@ def seed_number() -> Reader:
     return Reader(read=read, allowed=allowed, summary=allowed)
 
 
+def each_of(reader: Reader, *, count: int, example: str) -> Reader:
+    """Read a list of a fixed number of values of one sort.
+
+    Args:
+        reader: of one value.
+        count: how many there must be.
+        example: the list as one would write it.
+
+    Returns:
+        A reader of lists; its values are tuples.
+    """
+    allowed = f"a list of {count} such as {example}; each {reader.allowed}"
+
+    def read(value: object) -> tuple[Any, ...]:
+        if not isinstance(value, list) or len(value) != count:
+            raise FieldError(f"it is not a list of {count}", allowed)
+        return tuple(_entry(item, place) for place, item in enumerate(value, start=1))
+
+    def _entry(item: object, place: int) -> Any:
+        try:
+            return reader.read(item)
+        except FieldError as error:
+            raise FieldError(f"entry {place}: {error.problem}", error.allowed) from error
+
+    return Reader(read=read, allowed=allowed, summary=f"a list of {count}, each {reader.summary}")
+
+
+def teeth_number() -> Reader:
+    """Read the number of teeth of a gear.
+
+    Returns:
+        A reader of whole numbers.
+    """
+    allowed = "a whole number from 1 to 100000"
+
+    def read(value: object) -> int:
+        count = _whole(value, allowed)
+        if not 1 <= count <= 100000:
+            raise FieldError("it must lie from 1 to 100000", allowed)
+        return count
+
+    return Reader(read=read, allowed=allowed, summary=allowed)
+
+
 def choice(*options: str) -> Reader:
     """Read one of a few words.
 

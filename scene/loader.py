@@ -13,17 +13,19 @@ from typing import Any
 from ringbalance.scene.build import built
 from ringbalance.scene.checks import cross_faults
 from ringbalance.scene.defaults import completed
-from ringbalance.scene.faults import Fault, SceneError, did_you_mean, toml_text
-from ringbalance.scene.models import Scene
-from ringbalance.scene.reading import TABLES, read_document
+from ringbalance.scene.eccentric import built_eccentric, read_eccentric
+from ringbalance.scene.eccentric_schema import EccentricTables
+from ringbalance.scene.faults import Fault, SceneError, closest, did_you_mean, toml_text
+from ringbalance.scene.narrowing import AnyScene
+from ringbalance.scene.reading import Reading, Schema, read_document, table_names
 from ringbalance.scene.requirements import missing_faults
-from ringbalance.scene.schema import SceneTables
+from ringbalance.scene.schema import BALANCERS
 from ringbalance.scene.working_liquid import with_liquid
 
 _LARGEST_FILE = 2**20
 
 
-def load_scene(path: str | PathLike[str]) -> Scene:
+def load_scene(path: str | PathLike[str]) -> AnyScene:
     """Read a scene file (TOML), with its units, defaults and cross-checks.
 
     Args:
@@ -40,7 +42,7 @@ def load_scene(path: str | PathLike[str]) -> Scene:
     return scene_from(content=_content(name, file), file=file)
 
 
-def scene_from(*, content: bytes, file: str) -> Scene:
+def scene_from(*, content: bytes, file: str) -> AnyScene:
     """Make a scene from the bytes of a scene file.
 
     Args:
@@ -54,15 +56,28 @@ def scene_from(*, content: bytes, file: str) -> Scene:
         SceneError: anything in it is wrong; all of it is said at once.
     """
     document = _document(content, file)
-    if document.get("balancer") == "eccentric_mass":
-        problem = "this version does not handle driven eccentric masses"
-        raise SceneError([_whole(file, problem, '"liquid_ring"', key="balancer", value='"eccentric_mass"')])
+    reading, found = _READ[_kind(document)](document, file=file)
+    if found:
+        raise SceneError(sorted(found, key=lambda fault: _place(fault, reading.schema)))
+    source, sha256 = PurePath(file).name, hashlib.sha256(content).hexdigest()
+    if reading.schema is EccentricTables:
+        return built_eccentric(reading, source=source, sha256=sha256)
+    return built(reading, source=source, sha256=sha256)
+
+
+def _read_liquid_ring(document: Mapping[str, Any], *, file: str) -> tuple[Reading, tuple[Fault, ...]]:
     reading, faults = read_document(document, file=file)
     reading, liquid_faults = with_liquid(completed(reading))
-    found = (*faults, *missing_faults(reading), *liquid_faults, *cross_faults(reading))
-    if found:
-        raise SceneError(sorted(found, key=_place))
-    return built(reading, source=PurePath(file).name, sha256=hashlib.sha256(content).hexdigest())
+    return reading, (*faults, *missing_faults(reading), *liquid_faults, *cross_faults(reading))
+
+
+_READ = {"liquid_ring": _read_liquid_ring, "eccentric_mass": read_eccentric}
+
+
+def _kind(document: Mapping[str, Any]) -> str:
+    """The kind of balancer that the file names, or was meant to name."""
+    word = document.get("balancer")
+    return (closest(word, BALANCERS) if isinstance(word, str) else "") or BALANCERS[0]
 
 
 def bundled_scene(name: str) -> Path:
@@ -86,13 +101,13 @@ def bundled_scene(name: str) -> Path:
     return folder / f"{stem}.toml"
 
 
-def _place(fault: Fault) -> tuple[int, int]:
+def _place(fault: Fault, schema: Schema) -> tuple[int, int]:
     """Faults stand in the order of the reference of the scene file; what it does not know comes last."""
-    tables = ("", *TABLES)
+    tables = ("", *table_names(schema))
     table = tables.index(fault.table) if fault.table in tables else len(tables)
-    model: Any = SceneTables if not fault.table else None
-    if fault.table in TABLES:
-        model = SceneTables.model_fields[fault.table].annotation
+    model: Any = schema if not fault.table else None
+    if fault.table in tables[1:]:
+        model = schema.model_fields[fault.table].annotation
     keys = list(model.model_fields) if model is not None else []
     key = fault.key.split("[")[0].split(".")[0]
     return table, keys.index(key) if key in keys else len(keys)

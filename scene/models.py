@@ -232,3 +232,8 @@ class Scene:
     """Of the scene file's bytes."""
     defaulted: tuple[str, ...] = ()
     """Paths such as "rotor.lag_angle" whose value is a default, because the file does not give it."""
+
+    @property
+    def balancer(self) -> Literal["liquid_ring"]:
+        """Kind of balancer, as the scene file names it."""
+        return "liquid_ring"

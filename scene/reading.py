@@ -7,16 +7,31 @@ from dataclasses import dataclass, replace
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from ringbalance.scene.faults import MISSING, Fault, closest, did_you_mean, toml_key, toml_text
 from ringbalance.scene.fields import Reader
-from ringbalance.scene.schema import SceneTables, presence_of
+from ringbalance.scene.presence import note_of, presence_of
+from ringbalance.scene.schema import SceneTables
 
-TABLES: tuple[str, ...] = tuple(
-    name for name, field in SceneTables.model_fields.items() if field.default_factory is not None
-)
-"""Names of the tables of a scene file, in the order of the reference."""
+Schema = type[BaseModel]
+
+
+def table_names(schema: Schema) -> tuple[str, ...]:
+    """Names of the tables of a kind of scene file.
+
+    Args:
+        schema: all of its tables.
+
+    Returns:
+        The names, in the order of the reference.
+    """
+    return tuple(name for name, field in schema.model_fields.items() if field.default_factory is not None)
+
+
+TABLES: tuple[str, ...] = table_names(SceneTables)
+"""Names of the tables of a liquid-ring scene."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,6 +46,8 @@ class Reading:
     """SI values by path, defaults included; absent are keys that do not apply or could not be read."""
     broken: frozenset[str]
     """Paths, and names of whole tables, that stand in the file but could not be read."""
+    schema: Schema = SceneTables
+    """What such a file can hold."""
 
     def adding(self, values: Mapping[str, Any]) -> Reading:
         """Copy with more values.
@@ -104,35 +121,39 @@ class Reading:
         return f"{toml_text(self.values[path])} (SI, by default)" if self.known(path) else MISSING
 
 
-def read_document(document: Mapping[str, Any], *, file: str) -> tuple[Reading, tuple[Fault, ...]]:
+def read_document(
+    document: Mapping[str, Any], *, file: str, schema: Schema = SceneTables
+) -> tuple[Reading, tuple[Fault, ...]]:
     """Hold a document against the schema.
 
     Args:
         document: as TOML has it.
         file: name of the file, for the faults.
+        schema: what such a file can hold.
 
     Returns:
         What could be read, and a fault for each value, key or table that could not.
     """
-    tables, details = _validated(document)
+    tables, details = _validated(document, schema)
     if tables is None:
         # Without what is at fault the document passes, so that the rest of it can still be cross-checked.
-        tables, _ = _validated(_without(document, [detail["loc"] for detail in details]))
+        tables, _ = _validated(_without(document, [detail["loc"] for detail in details]), schema)
     if tables is None:
         raise RuntimeError("a scene without its faulty keys must pass the schema")
-    broken = frozenset(_paths(details, document))
+    broken = frozenset(_paths(details, document, schema))
     values = {
         path: value
-        for path, value in _flat(tables)
+        for path, value in _flat(tables, schema)
         if value is not None and not {path, path.split(".")[0]} & broken
     }
-    reading = Reading(file=file, document=document, values=values, broken=broken)
-    return reading, tuple(_fault(detail, file) for detail in _told(details))
+    reading = Reading(file=file, document=document, values=values, broken=broken, schema=schema)
+    return reading, tuple(_fault(detail, file, schema) for detail in _told(details, schema))
 
 
-def _told(details: list[ErrorDetails]) -> list[ErrorDetails]:
+def _told(details: list[ErrorDetails], schema: Schema) -> list[ErrorDetails]:
     """All but the missing keys that a misspelt one was meant for."""
-    meant = {_meant(detail["loc"], False) for detail in details if detail["type"] == "extra_forbidden"}
+    unknown = [detail["loc"] for detail in details if detail["type"] == "extra_forbidden"]
+    meant = {_meant(place, False, schema) for place in unknown}
     return [
         detail
         for detail in details
@@ -140,22 +161,22 @@ def _told(details: list[ErrorDetails]) -> list[ErrorDetails]:
     ]
 
 
-def _paths(details: list[ErrorDetails], document: Mapping[str, Any]) -> Iterator[str]:
+def _paths(details: list[ErrorDetails], document: Mapping[str, Any], schema: Schema) -> Iterator[str]:
     """Paths at fault, and those that were meant by a misspelt or misplaced key: neither is missing."""
     for detail in details:
         place = detail["loc"]
         yield ".".join(map(str, place[:2]))
         if detail["type"] == "extra_forbidden" and len(place) <= 2:
-            meant = _meant(place, isinstance(detail["input"], Mapping))
+            meant = _meant(place, isinstance(detail["input"], Mapping), schema)
             table, _, key = meant.rpartition(".")
             content = document.get(table, {}) if table else document
             if meant and not (isinstance(content, Mapping) and key in content):
                 yield meant
 
 
-def _validated(document: Mapping[str, Any]) -> tuple[SceneTables | None, list[ErrorDetails]]:
+def _validated(document: Mapping[str, Any], schema: Schema) -> tuple[BaseModel | None, list[ErrorDetails]]:
     try:
-        return SceneTables.model_validate(document), []
+        return schema.model_validate(document), []
     except ValidationError as error:
         return None, error.errors(include_url=False)
 
@@ -172,25 +193,25 @@ def _without(document: Mapping[str, Any], places: list[tuple[int | str, ...]]) -
     }
 
 
-def _flat(tables: SceneTables) -> Iterator[tuple[str, Any]]:
-    for name in SceneTables.model_fields:
+def _flat(tables: BaseModel, schema: Schema) -> Iterator[tuple[str, Any]]:
+    for name in schema.model_fields:
         content = getattr(tables, name)
-        if name in TABLES:
+        if name in table_names(schema):
             yield from ((f"{name}.{key}", getattr(content, key)) for key in type(content).model_fields)
         else:
             yield name, content
 
 
-def _fault(detail: ErrorDetails, file: str) -> Fault:
-    place = detail["loc"]
-    is_table = str(place[0]) in TABLES or (len(place) == 1 and isinstance(detail["input"], Mapping))
+def _fault(detail: ErrorDetails, file: str, schema: Schema) -> Fault:
+    place, tables = detail["loc"], table_names(schema)
+    is_table = str(place[0]) in tables or (len(place) == 1 and isinstance(detail["input"], Mapping))
     table, keys = (str(place[0]), place[1:]) if is_table else ("", place)
-    problem, allowed = _said(detail)
+    problem, allowed = _said(detail, schema)
     value = MISSING if detail["type"] == "missing" else toml_text(detail["input"])
     unknown_table = not keys and detail["type"] == "extra_forbidden"
     return Fault(
         file=file,
-        table=table if table in TABLES else toml_key(table) if table else "",
+        table=table if table in tables else toml_key(table) if table else "",
         key=_key_text(keys),
         value="" if unknown_table else value,
         problem=problem,
@@ -206,22 +227,24 @@ def _key_text(keys: tuple[int | str, ...]) -> str:
     return text
 
 
-def _said(detail: ErrorDetails) -> tuple[str, str]:
+def _said(detail: ErrorDetails, schema: Schema) -> tuple[str, str]:
     place = detail["loc"]
     if detail["type"] == "scene_field":
         return detail["ctx"]["problem"], detail["ctx"]["allowed"]
     if detail["type"] == "extra_forbidden":
-        return _unknown(place, isinstance(detail["input"], Mapping))
+        return _unknown(place, isinstance(detail["input"], Mapping), schema)
     if detail["type"] == "missing":
-        return "it is needed here", allowed_at(place)
-    if place == ("tube", "bends"):
-        return "it is not a list", '[{ angle = "90 deg", radius = "3 mm" }, ...]'
-    return "it is not a table", f"a table with {', '.join(_keys_at(place))}"
+        return "it is needed here", allowed_at(place, schema)
+    listed = "" if isinstance(place[-1], int) else note_of(_field_at(place, schema), "list")
+    if listed:
+        return "it is not a list", listed
+    return "it is not a table", f"a table with {', '.join(_keys_at(place, schema))}"
 
 
-def _unknown(place: tuple[int | str, ...], is_table: bool) -> tuple[str, str]:
-    kind, known = ("table", list(TABLES)) if len(place) == 1 and is_table else ("key", _keys_at(place[:-1]))
-    meant = _meant(place, is_table)
+def _unknown(place: tuple[int | str, ...], is_table: bool, schema: Schema) -> tuple[str, str]:
+    whole = len(place) == 1 and is_table
+    kind, known = ("table", list(table_names(schema))) if whole else ("key", _keys_at(place[:-1], schema))
+    meant = _meant(place, is_table, schema)
     table, _, key = meant.rpartition(".")
     hint = ""
     if meant and key == place[-1]:
@@ -231,60 +254,70 @@ def _unknown(place: tuple[int | str, ...], is_table: bool) -> tuple[str, str]:
     return f"unknown {kind}{hint}", ", ".join(known)
 
 
-def _meant(place: tuple[int | str, ...], is_table: bool) -> str:
+def _meant(place: tuple[int | str, ...], is_table: bool, schema: Schema) -> str:
     """Path that an unknown key or table was probably meant for; empty when there is none."""
-    word = str(place[-1])
+    word, tables = str(place[-1]), table_names(schema)
     if len(place) == 1 and is_table:
-        return closest(word, TABLES)
+        return closest(word, tables)
     if place[0] != "uncertainty" and len(place) <= 2:
-        homes = [("",), *((table,) for table in TABLES)]
+        homes = [("",), *((table,) for table in tables)]
         for (table,) in homes:
-            if word in _keys_at((table,) if table else ()) and word not in TABLES:
+            if word in _keys_at((table,) if table else (), schema) and word not in tables:
                 return f"{table}.{word}" if table else word
-    near = closest(word, _keys_at(place[:-1]))
+    near = closest(word, _keys_at(place[:-1], schema))
     return ".".join([*map(str, place[:-1]), near]) if near else ""
 
 
-def allowed_at(place: tuple[int | str, ...]) -> str:
+def allowed_at(place: tuple[int | str, ...], schema: Schema = SceneTables) -> str:
     """Say what a key of the schema takes.
 
     Args:
         place: table, key and so on.
+        schema: all tables of the kind of scene.
 
     Returns:
         Such as 'a length above 0, such as "44.5 mm", in m, cm, mm, um, nm, in'.
     """
-    model = _model_at(place[:-1])
-    readers = (each for each in model.model_fields[str(place[-1])].metadata if isinstance(each, Reader))
-    return next((reader.allowed for reader in readers), "")
+    field = _field_at(place, schema)
+    readers = (each for each in field.metadata if isinstance(each, Reader))
+    return next((reader.allowed for reader in readers), note_of(field, "list"))
 
 
-def presence_at(path: str) -> str:
+def presence_at(path: str, schema: Schema = SceneTables) -> str:
     """Tell how a key of the schema may be absent.
 
     Args:
         path: "table.key".
+        schema: all tables of the kind of scene.
 
     Returns:
         As `presence_of`.
     """
-    table, _, key = path.rpartition(".")
-    return presence_of(_model_at((table,)).model_fields[key])
+    return presence_of(_field_at(tuple(path.split(".")), schema))
 
 
-def _keys_at(place: tuple[int | str, ...]) -> list[str]:
+def _field_at(place: tuple[int | str, ...], schema: Schema) -> FieldInfo:
+    return _model_at(place[:-1], schema).model_fields[str(place[-1])]
+
+
+def _keys_at(place: tuple[int | str, ...], schema: Schema) -> list[str]:
     """Keys that the schema has in the table at a place."""
-    return list(_model_at(place).model_fields)
+    return list(_model_at(place, schema).model_fields)
 
 
-def _model_at(place: tuple[int | str, ...]) -> type[BaseModel]:
-    model: type[BaseModel] = SceneTables
+def _model_at(place: tuple[int | str, ...], schema: Schema) -> Schema:
+    model = schema
     for step in place:
         if isinstance(step, str):
             model = _model_of(model.model_fields[step].annotation)
     return model
 
 
-def _model_of(annotation: Any) -> type[BaseModel]:
-    inner = (annotation, *get_args(annotation))
+def _model_of(annotation: Any) -> Schema:
+    """The table inside an annotation such as `tuple[BendTable, ...] | None`."""
+    inner = (
+        annotation,
+        *get_args(annotation),
+        *(each for part in get_args(annotation) for each in get_args(part)),
+    )
     return next(each for each in inner if isinstance(each, type) and issubclass(each, BaseModel))

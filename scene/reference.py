@@ -2,39 +2,58 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from ringbalance.scene.dimensions import DIMENSIONS
+from ringbalance.scene.eccentric_schema import EccentricTables, SpeedPointTable
 from ringbalance.scene.faults import toml_text
 from ringbalance.scene.fields import Reader
 from ringbalance.scene.liquids import known_liquids
-from ringbalance.scene.reading import TABLES
-from ringbalance.scene.schema import BendTable, SceneTables, VibrationTable, presence_of
+from ringbalance.scene.presence import note_of, presence_of
+from ringbalance.scene.reading import Schema, table_names
+from ringbalance.scene.schema import BendTable, SceneTables, VibrationTable
 from ringbalance.scene.units import unit_names
 
 _HEAD = "| key | takes | when left out | meaning |\n|---|---|---|---|"
 
 
 def key_reference() -> str:
-    """Write one Markdown table of keys for each table of a scene file.
+    """Write one Markdown table of keys for each table of a liquid-ring scene.
 
     Returns:
         Headings and tables, in the order of the schema.
     """
-    top = [name for name in SceneTables.model_fields if name not in TABLES]
-    parts = ["### At the top of the file", _HEAD, *(_row(SceneTables, key) for key in top)]
-    for table in TABLES:
-        field = SceneTables.model_fields[table]
+    inner: dict[str, Schema] = {
+        "[tube] bends, each entry": BendTable,
+        "[rotor] initial_vibration": VibrationTable,
+    }
+    return _reference(SceneTables, "At the top of the file", inner)
+
+
+def eccentric_key_reference() -> str:
+    """Write one Markdown table of keys for each table of a scene with driven eccentric masses.
+
+    Returns:
+        Headings and tables, in the order of the schema.
+    """
+    title = "At the top of a file with driven masses"
+    return _reference(EccentricTables, title, {"[rotor] speed_profile, each entry": SpeedPointTable})
+
+
+def _reference(schema: Schema, title: str, nested: Mapping[str, Schema]) -> str:
+    tables = table_names(schema)
+    top = [name for name in schema.model_fields if name not in tables]
+    parts = [f"### {title}", _HEAD, *(_row(schema, key) for key in top)]
+    for table in tables:
+        field = schema.model_fields[table]
         model: Any = field.annotation
         parts += [f"\n### [{table}]", f"{_sentence(field.description)}\n", _HEAD]
         parts += [_row(model, key) for key in model.model_fields]
-    for name, inner in (
-        ("[tube] bends, each entry", BendTable),
-        ("[rotor] initial_vibration", VibrationTable),
-    ):
+    for name, inner in nested.items():
         parts += [f"\n### {name}", _HEAD, *(_row(inner, key) for key in inner.model_fields)]
     return "\n".join(parts)
 
@@ -79,12 +98,11 @@ def _takes(field: FieldInfo) -> str:
     reader = next((each for each in field.metadata if isinstance(each, Reader)), None)
     if reader is not None:
         return reader.summary
-    return "a list of tables" if field.default == () else "a table"
+    return "a list of tables" if note_of(field, "list") else "a table"
 
 
 def _absence(field: FieldInfo) -> str:
-    presence, extra = presence_of(field), field.json_schema_extra
-    rule = str(extra.get("rule", "")) if isinstance(extra, dict) else ""
+    presence, rule = presence_of(field), note_of(field, "rule")
     if presence in ("needed", ""):
         return "**needed**"
     if presence == "standard" and not rule:

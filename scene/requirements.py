@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from typing import Any
 
 from ringbalance.scene.faults import MISSING, Fault
-from ringbalance.scene.reading import TABLES, Reading, allowed_at
-from ringbalance.scene.schema import SceneTables, presence_of
+from ringbalance.scene.presence import presence_of
+from ringbalance.scene.reading import Reading, Schema, allowed_at, table_names
+from ringbalance.scene.schema import SceneTables
 
 
 def missing_faults(reading: Reading) -> tuple[Fault, ...]:
@@ -19,25 +20,27 @@ def missing_faults(reading: Reading) -> tuple[Fault, ...]:
     Returns:
         One fault for each missing key; one for a whole table that is missing.
     """
-    return (*_always_needed(reading), *_needed_by_others(reading))
+    liquid_ring = _needed_by_others(reading) if reading.schema is SceneTables else ()
+    return (*_always_needed(reading), *liquid_ring)
 
 
-def needed_keys(table: str) -> tuple[str, ...]:
+def needed_keys(table: str, schema: Schema = SceneTables) -> tuple[str, ...]:
     """Keys that a table must have in every scene.
 
     Args:
         table: its name.
+        schema: all tables of the kind of scene.
 
     Returns:
         The keys, in order.
     """
-    model: Any = SceneTables.model_fields[table].annotation
+    model: Any = schema.model_fields[table].annotation
     return tuple(key for key, field in model.model_fields.items() if presence_of(field) == "needed")
 
 
 def _always_needed(reading: Reading) -> Iterator[Fault]:
-    for table in TABLES:
-        keys = needed_keys(table)
+    for table in table_names(reading.schema):
+        keys = needed_keys(table, reading.schema)
         if not keys and table != "liquid":
             continue
         if reading.given(table):
@@ -61,7 +64,7 @@ def _missing_table(reading: Reading, table: str, keys: tuple[str, ...]) -> Fault
 
 
 def _missing(reading: Reading, path: str, problem: str = "every scene needs it") -> Fault:
-    return reading.fault(path, problem=problem, allowed=allowed_at(tuple(path.split("."))))
+    return reading.fault(path, problem=problem, allowed=allowed_at(tuple(path.split(".")), reading.schema))
 
 
 def _needed_by_others(reading: Reading) -> Iterator[Fault]:

@@ -35,6 +35,8 @@ _SPELLINGS = MappingProxyType(
         "⋅": "*",
         "×": "*",
         "−": "-",
+        "Ω": "ohm",
+        "\u2126": "ohm",
     }
 )
 

@@ -10,7 +10,7 @@ from functools import lru_cache, partial
 from multiprocessing import get_context
 from typing import Literal
 
-from ringbalance.scene import bundled_scene, load_scene
+from ringbalance.scene import AnyScene, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.verification.case import NEEDS_REFERENCE, CaseDefinition, Mutation, Quantity
 from ringbalance.verification.catalogue import case_code, load_case, load_cases
@@ -29,7 +29,7 @@ def paper_scene() -> Scene:
     Returns:
         The bundled scene.
     """
-    return load_scene(bundled_scene(PAPER_SCENE))
+    return liquid_ring_scene(load_scene(bundled_scene(PAPER_SCENE)))
 
 
 def run_case(case_id: str, *, scene: Scene, level: Level = "light", defect: str | None = None) -> CaseResult:
@@ -243,7 +243,7 @@ def _run_whole(case_id: str, *, scene: Scene, level: Level, mutations: bool) -> 
 def run_cases(
     case_ids: Sequence[str] = (),
     *,
-    scene: Scene,
+    scene: AnyScene,
     level: Level = "light",
     mutations: bool = False,
     workers: int = 1,
@@ -264,7 +264,9 @@ def run_cases(
 
     Raises:
         KeyError: an unknown case.
+        SceneError: a balancer without liquid.
     """
+    scene = liquid_ring_scene(scene)
     wanted = tuple(case_ids) or tuple(definition.id for definition in load_cases())
     for case_id in wanted:
         load_case(case_id)

@@ -176,7 +176,7 @@ SINGLE: dict[str, Broken] = {
         "controller.limit", "0.01 um", "drowns in the sensor's noise", "above 0.01 um"
     ),
     "gain of zero": _one("controller.proportional", "0 s/um", "above 0", "s/um"),
-    "gain upside down": _one("controller.proportional", "0.08 um/s", "not a unit of gain", "s/um"),
+    "gain upside down": _one("controller.proportional", "0.08 um/s", "a unit of velocity, not of gain", "s/um"),
     "integral time below zero": _one("controller.integral_time", "-1 s", "above 0", "a time above 0"),
     "gas times crossed": _one(
         "controller.minimum_gas_time", "6 s", "shorter than maximum_gas_time (5 s)", "below 5 s"
@@ -216,7 +216,6 @@ SINGLE: dict[str, Broken] = {
     "empty name": _one("name", "", "empty, too long or not printable", "text on one line"),
     "number as a name": _one("name", 7, "not text", "text on one line"),
     "unknown balancer": _one("balancer", "liquid_rings", 'did you mean "liquid_ring"', '"liquid_ring"'),
-    "driven masses": _one("balancer", "eccentric_mass", "this version does not handle", '"liquid_ring"'),
     "needed key missing": _one("disc.axial_width", REMOVED, "every scene needs it", "a length above 0"),
     "needed pressure missing": _one("gas.pressure", REMOVED, "every scene needs it", "a pressure"),
     "misspelt key": Broken(
@@ -277,7 +276,7 @@ SEVERAL: dict[str, Broken] = {
     "schema and cross-check together": Broken(
         {"disc.axial_width": "62 kg", "tube.hump_radius": "50 mm", "controller.limit": "0.005 um"},
         (
-            Expected("disc", "axial_width", '"62 kg"', "not a unit of length", "mm"),
+            Expected("disc", "axial_width", '"62 kg"', "a unit of mass, not of length", "mm"),
             Expected("tube", "hump_radius", '"50 mm"', "hump lies outside", "44.5 mm"),
             Expected("controller", "limit", '"0.005 um"', "drowns", "above 0.01 um"),
         ),

@@ -20,6 +20,8 @@ from ringbalance.scene.uncertain import UNCERTAIN, nominal_value, with_value
 
 Load = Callable[[Mapping[str, Any]], Scene]
 BUNDLED = ("liquid_ring_paper", "silicone_oil_100cst", "perfluorinated_oil", "six_chamber")
+DRIVEN = ("eccentric_mass_paper", "washing_machine")
+"""Tested in test_eccentric_scene.py."""
 
 
 def _message(path: Path) -> str:
@@ -101,7 +103,9 @@ def test_bundled_scenes(name: str) -> None:
 
 
 def test_every_scene_file_is_tested() -> None:
-    assert sorted(BUNDLED) == sorted(path.stem for path in bundled_scene(BUNDLED[0]).parent.glob("*.toml"))
+    assert sorted((*BUNDLED, *DRIVEN)) == sorted(
+        path.stem for path in bundled_scene(BUNDLED[0]).parent.glob("*.toml")
+    )
 
 
 def test_bundled_scene_by_file_name_and_unknown() -> None:

@@ -1,0 +1,54 @@
+"""A scene of either kind, and the way from it to the kind that a function needs."""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+from ringbalance.scene.eccentric_models import EccentricScene
+from ringbalance.scene.faults import Fault, SceneError
+from ringbalance.scene.models import Scene
+
+AnyScene: TypeAlias = Scene | EccentricScene
+
+
+def liquid_ring_scene(scene: AnyScene) -> Scene:
+    """Take a scene whose balancer is a liquid ring.
+
+    Args:
+        scene: of any kind.
+
+    Returns:
+        The same scene.
+
+    Raises:
+        SceneError: it has another balancer.
+    """
+    if isinstance(scene, Scene):
+        return scene
+    problem = "this needs the disc, liquid, tube and gas of a liquid-ring balancer"
+    raise _wrong_kind(scene, problem, 'a scene with balancer = "liquid_ring"; simulate and compare take both')
+
+
+def eccentric_scene(scene: AnyScene) -> EccentricScene:
+    """Take a scene whose balancer is two driven eccentric masses.
+
+    Args:
+        scene: of any kind.
+
+    Returns:
+        The same scene.
+
+    Raises:
+        SceneError: it has another balancer.
+    """
+    if isinstance(scene, EccentricScene):
+        return scene
+    problem = "this needs the rotor, masses and motor of driven eccentric masses"
+    allowed = 'a scene with balancer = "eccentric_mass"; simulate and compare take both'
+    raise _wrong_kind(scene, problem, allowed)
+
+
+def _wrong_kind(scene: AnyScene, problem: str, allowed: str) -> SceneError:
+    value = f'"{scene.balancer}"'
+    fault = Fault(file=scene.source, table="", key="balancer", value=value, problem=problem, allowed=allowed)
+    return SceneError([fault])

@@ -1,0 +1,245 @@
+"""Sloshing of the ring against exact waves, an independent spectral solution, and limits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import quad_vec
+from scipy.linalg import eigvals
+
+from ringbalance.mesh.geometry import surface_radius
+from ringbalance.physics.results import StatusCode
+from ringbalance.physics.sloshing import resonant_fills, sloshing_modes
+from ringbalance.physics.sloshing_response import sloshing_response
+from ringbalance.scene.models import Disc, Scene
+
+FloatArray = npt.NDArray[np.float64]
+
+OMEGA = 10_000 * np.pi / 30
+
+
+@pytest.fixture(scope="module")
+def disc(paper_scene: Scene) -> Disc:
+    return paper_scene.disc
+
+
+def bare(disc: Disc, angle: float) -> Disc:
+    """A chamber without plates, for which waves are sums of cosines of the angle."""
+    chambers = 2 * int(np.pi / angle + 1e-9)
+    return replace(disc, plate_thickness=0.0, central_angle=angle, chambers=max(2, chambers))
+
+
+class Spectral:
+    """phi = sum B_n cosh(k rho)/sinh(k H) cos(k angle'), rho = ln(R2/r): the potential, not the stream."""
+
+    def __init__(self, *, angle: float, depth: float, terms: int) -> None:
+        n = np.arange(1, terms + 1)
+        self.angle, self.k = angle, np.pi * n / angle
+        self.mass = np.diag(1 / np.tanh(self.k * depth)) * angle / 2
+        self.spring = np.diag(self.k) * angle / 2
+        rows, columns = np.meshgrid(n, n, indexing="ij")
+        odd = (rows + columns) % 2 == 1
+        gap = np.where(odd, columns**2 - rows**2, 1)
+        # Integral of cos(m ...) sin(n ...) over the surface: rows m, columns n.
+        self.mixed = np.where(odd, angle / np.pi * 2 * columns / gap, 0.0)
+
+    def frequencies(self, count: int) -> FloatArray:
+        n = len(self.k)
+        zero, one = np.zeros((n, n)), np.eye(n)
+        left = np.block([[zero, one], [self.spring, -2j * self.mixed]])
+        right = np.block([[one, zero], [zero, self.mass]])
+        s = eigvals(left, right)
+        real = s[np.abs(s.imag) < 1e-6 * np.abs(s)].real
+        return np.asarray(np.sort(real[real > 0])[:count])
+
+    def moments(self, s: float) -> tuple[float, float]:
+        """Swing of the first moment under G = exp(i angle), and that of a surface that follows at once."""
+        half = self.angle / 2
+
+        def rows(angle: float) -> npt.NDArray[np.complex128]:
+            return np.asarray(np.exp(1j * angle) * np.cos(self.k * (angle + half)))
+
+        load = quad_vec(rows, -half, half, epsabs=1e-12)[0]
+        matrix = s**2 * self.mass - self.spring + 2j * s * self.mixed
+        swings = [np.linalg.solve(m, -1j * s * load) * self.k for m in (matrix, -self.spring.astype(complex))]
+        both = [np.hypot(abs(load.real @ q), abs(load.imag @ q)) for q in swings]
+        return float(both[0]), float(both[1])
+
+
+@pytest.mark.parametrize(("angle", "fill"), [(90.0, 0.25), (90.0, 0.5), (60.0, 0.1), (150.0, 0.4)])
+def test_frequencies_match_an_independent_spectral_solution(disc: Disc, angle: float, fill: float) -> None:
+    chamber = bare(disc, np.radians(angle))
+    found = sloshing_modes(disc=chamber, fill_ratio=fill, modes=4)
+    depth = float(np.log(disc.outer_radius / found.surface_radius[0]))
+    exact = Spectral(angle=np.radians(angle), depth=depth, terms=160).frequencies(4)
+    assert found.frequency_ratio.value[0] == pytest.approx(exact, rel=1e-4)
+    assert np.all(
+        np.abs(found.frequency_ratio.value[0] - exact) < found.frequency_ratio.uncertainty[0] + 2e-6
+    )
+
+
+def test_without_coriolis_force_waves_have_their_exact_frequencies(disc: Disc) -> None:
+    chamber = bare(disc, np.pi / 2)
+    found = sloshing_modes(disc=chamber, fill_ratio=[0.05, 0.5, 1.0], modes=3, coriolis_factor=0.0)
+    k = 2.0 * np.arange(1, 4)
+    depth = np.log(disc.outer_radius / found.surface_radius)[:, None]
+    exact = np.sqrt(k * np.tanh(k * depth))
+    assert np.all(np.abs(found.frequency_ratio.value - exact) <= found.frequency_ratio.uncertainty)
+    assert found.frequency_ratio.value == pytest.approx(exact, rel=3e-4)
+
+
+def test_frequencies_converge_at_fourth_order(disc: Disc) -> None:
+    chamber = bare(disc, np.pi / 2)
+    k = 2.0
+    exact = np.sqrt(k * np.tanh(k * np.log(disc.outer_radius / surface_radius(disc=chamber, fill_ratio=0.5))))
+    errors = []
+    for n in (2, 4, 8):
+        cells = tuple((n * m, 3 * n * m) for m in (4, 2, 1))
+        value = sloshing_modes(disc=chamber, fill_ratio=0.5, modes=1, coriolis_factor=0.0, cells=cells)
+        errors.append(abs(float(value.frequency_ratio.value[0, 0]) - exact))
+    orders = np.log2(np.divide(errors[:-1], errors[1:]))
+    assert np.all(np.abs(orders - 4) < 0.3)
+    assert errors[-1] < 1e-9
+
+
+def test_a_thin_film_has_shallow_water_waves(disc: Disc) -> None:
+    """s = k sqrt(depth): the Coriolis force does nothing at leading order in a long shallow channel."""
+    found = sloshing_modes(disc=disc, fill_ratio=1e-6, modes=3)
+    a = found.surface_radius[0]
+    length = disc.central_angle - 2 * np.arcsin(disc.plate_thickness / disc.outer_radius)
+    shallow = np.pi * np.arange(1, 4) / length * np.sqrt(np.log(disc.outer_radius / a))
+    assert found.frequency_ratio.value[0] == pytest.approx(shallow, rel=1e-4)
+
+
+def test_plates_raise_the_frequencies_and_the_fill_does_too(disc: Disc) -> None:
+    fills = np.linspace(0.02, 1.0, 6)
+    with_plates = sloshing_modes(disc=disc, fill_ratio=fills, modes=3).frequency_ratio.value
+    without = sloshing_modes(disc=replace(disc, plate_thickness=0.0), fill_ratio=fills, modes=3)
+    assert np.all(np.diff(with_plates, axis=0) > 0)
+    assert np.all(with_plates > without.frequency_ratio.value)
+
+
+def test_resonant_fills_have_a_mode_at_the_speed(disc: Disc) -> None:
+    fills = resonant_fills(disc=disc, modes=4)
+    assert [mode for mode, _ in fills] == [2, 3, 4]
+    for mode, fill in fills:
+        ratios = sloshing_modes(disc=disc, fill_ratio=fill, modes=4).frequency_ratio.value[0]
+        assert ratios[mode - 1] == pytest.approx(1.0, abs=1e-4)
+
+
+@pytest.mark.parametrize("s", [0.3, 1.0, 1.7])
+def test_forced_swing_matches_the_spectral_one(disc: Disc, s: float) -> None:
+    chamber = bare(disc, np.pi / 2)
+    found = sloshing_response(
+        disc=chamber,
+        fill_ratio=0.3,
+        angular_velocity=OMEGA,
+        kinematic_viscosity=0.0,
+        gravity=9.81,
+        frequency_ratio=s,
+    )
+    depth = float(np.log(disc.outer_radius / found.surface_radius[0]))
+    swing, still = Spectral(angle=np.pi / 2, depth=depth, terms=160).moments(s)
+    assert found.amplification.value[0] == pytest.approx(swing / still, rel=1e-4)
+    assert found.damped_share[0] == 1.0
+
+
+def test_slow_forcing_only_tilts_the_surface(disc: Disc) -> None:
+    found = sloshing_response(
+        disc=disc,
+        fill_ratio=[0.1, 0.5],
+        angular_velocity=OMEGA,
+        kinematic_viscosity=0.0,
+        gravity=9.81,
+        frequency_ratio=1e-6,
+    )
+    assert found.amplification.value == pytest.approx(1.0, abs=1e-6)
+    half = disc.central_angle / 2 - np.arcsin(disc.plate_thickness / found.surface_radius)
+    # At the edge gravity along the chamber counts as cos(angle) less its mean, across as sin(angle).
+    highest = 9.81 / OMEGA**2 * np.hypot(np.sin(half) / half - np.cos(half), np.sin(half))
+    assert found.surface_amplitude.value == pytest.approx(highest, rel=0.005)
+
+
+def test_viscosity_limits_the_peak_and_nothing_else(disc: Disc) -> None:
+    # The third mode: even ones hardly feel gravity.
+    peak = dict(resonant_fills(disc=disc, modes=3))[3]
+    swings = []
+    for viscosity in (1e-6, 1e-5, 1e-4):
+        found = sloshing_response(
+            disc=disc,
+            fill_ratio=[peak, 0.25],
+            angular_velocity=OMEGA,
+            kinematic_viscosity=viscosity,
+            gravity=9.81,
+        )
+        swings.append(found.surface_amplitude.value)
+    at_peak, beside = np.array(swings).T
+    # At resonance the waves fall with the root of the viscosity, beside it hardly.
+    assert at_peak[0] / at_peak[1] == pytest.approx(np.sqrt(10), rel=0.2)
+    assert beside[0] / beside[1] == pytest.approx(1.0, abs=0.03)
+
+
+def test_waves_that_are_not_small_and_a_ring_that_is_not_there_are_said(disc: Disc) -> None:
+    def status(rpm: float) -> StatusCode:
+        return sloshing_response(
+            disc=disc,
+            fill_ratio=0.14,
+            angular_velocity=rpm * np.pi / 30,
+            kinematic_viscosity=1e-6,
+            gravity=9.81,
+        ).status.code
+
+    assert [status(rpm) for rpm in (100, 500, 20_000)] == [
+        StatusCode.NO_RING,
+        StatusCode.OUT_OF_RANGE,
+        StatusCode.OK,
+    ]
+
+
+@settings(max_examples=10, deadline=None, derandomize=True)
+@given(
+    fill=st.floats(1e-6, 1.0),
+    angle=st.floats(10.0, 175.0),
+    thickness=st.floats(0.0, 0.9),
+    inner=st.floats(0.05, 0.95),
+)
+def test_any_chamber_has_positive_rising_frequencies(
+    disc: Disc, fill: float, angle: float, thickness: float, inner: float
+) -> None:
+    theta = np.radians(angle)
+    radius = inner * disc.outer_radius
+    strip = thickness * radius * np.sin(min(theta / 2, np.pi / 2))
+    chamber = replace(disc, inner_radius=radius, central_angle=theta, chambers=2, plate_thickness=strip)
+    found = sloshing_modes(disc=chamber, fill_ratio=fill, modes=3, cells=((8, 24), (4, 12), (2, 6)))
+    ratios = found.frequency_ratio.value[0]
+    assert np.all(np.isfinite(ratios))
+    assert np.all(ratios > 0)
+    assert np.all(np.diff(ratios) > 0)
+
+
+@pytest.mark.parametrize("fill", [0.0, -0.1, 1.1, np.nan])
+def test_a_fill_without_a_ring_is_refused(disc: Disc, fill: float) -> None:
+    with pytest.raises(ValueError, match="fill_ratio"):
+        sloshing_modes(disc=disc, fill_ratio=fill)
+    with pytest.raises(ValueError, match="fill_ratio"):
+        sloshing_response(
+            disc=disc, fill_ratio=fill, angular_velocity=OMEGA, kinematic_viscosity=1e-6, gravity=9.81
+        )
+
+
+def test_nonsense_is_refused(disc: Disc) -> None:
+    with pytest.raises(ValueError, match="mode"):
+        sloshing_modes(disc=disc, fill_ratio=0.2, modes=0)
+    with pytest.raises(ValueError, match="three meshes"):
+        sloshing_modes(disc=disc, fill_ratio=0.2, cells=((8, 24), (4, 12)))
+    with pytest.raises(ValueError, match="highest"):
+        resonant_fills(disc=disc, highest=1.5)
+    with pytest.raises(ValueError, match="angular_velocity"):
+        sloshing_response(
+            disc=disc, fill_ratio=0.2, angular_velocity=0.0, kinematic_viscosity=1e-6, gravity=9.81
+        )

@@ -1,0 +1,167 @@
+"""Fields to draw: they carry the flow rate, keep their symmetry and walls, and agree with the tables."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ringbalance.physics import (
+    entrance_flow,
+    exit_flow,
+    laminar_entrance_loss,
+    laminar_exit_loss,
+    rotating_friction_ratio,
+    section_flow,
+)
+from ringbalance.physics.flow_fields import LARGEST_KL, LARGEST_ROTATION, EndFlow, SectionFlow
+from ringbalance.physics.results import StatusCode
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def _areas(flow: SectionFlow | EndFlow) -> FloatArray:
+    (x0, y0), (x1, y1), (x2, y2) = (flow.points[:, flow.triangles[:, i]] for i in range(3))
+    return np.asarray(((x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)) / 2, dtype=np.float64)
+
+
+def _mean(flow: SectionFlow, values: FloatArray) -> float:
+    """Mean over the section, by straight triangles."""
+    areas = _areas(flow)
+    return float(areas @ values[flow.triangles].mean(axis=1) / areas.sum())
+
+
+@pytest.mark.parametrize(("re", "rotation"), [(150.0, 47.0), (1e-3, 100.0), (200.0, 0.0), (700.0, 700.0)])
+def test_the_section_agrees_with_the_table(re: float, rotation: float) -> None:
+    flow = section_flow(reynolds=re, rotation_reynolds=rotation)
+    expected = rotating_friction_ratio(reynolds=re, rotation_reynolds=rotation).value
+    assert flow.status.ok
+    assert (flow.reynolds, flow.rotation_reynolds) == (re, pytest.approx(rotation))
+    assert flow.friction_ratio == pytest.approx(float(expected), rel=2e-3)
+    assert _mean(flow, flow.axial_velocity) == pytest.approx(1.0, rel=0.02)
+    assert _areas(flow).sum() == pytest.approx(np.pi / 4, rel=0.003)
+    assert np.all(_areas(flow) > 0)
+
+
+def test_the_section_is_symmetric_and_still_at_the_wall() -> None:
+    flow = section_flow(reynolds=150.0, rotation_reynolds=47.0)
+    order, mirrored = (np.lexsort(np.round(p, 9)) for p in (flow.points, flow.points * [[1.0], [-1.0]]))
+    assert np.allclose(flow.points[:, order], (flow.points * [[1.0], [-1.0]])[:, mirrored])
+    assert np.array_equal(flow.axial_velocity[order], flow.axial_velocity[mirrored])
+    assert np.allclose(flow.velocity[1][order], -flow.velocity[1][mirrored])
+    assert np.allclose(flow.stream_function[order], -flow.stream_function[mirrored])
+    wall = np.hypot(*flow.points) > 0.5 - 1e-9
+    assert np.all(flow.axial_velocity[wall] == 0.0)
+    assert np.all(flow.velocity[:, wall] == 0.0)
+    assert np.all(flow.stream_function[wall] == 0.0)
+
+
+def test_the_sections_vortices_turn_as_the_coriolis_force_has_them() -> None:
+    # Liquid faster than the mean is driven against y = z cross x, and returns along the walls.
+    flow = section_flow(reynolds=150.0, rotation_reynolds=47.0)
+    assert _mean(flow, flow.axial_velocity * flow.velocity[0]) < -0.02
+    assert abs(_mean(flow, flow.velocity[0])) < 1e-3
+    assert _mean(flow, flow.axial_velocity * flow.points[0]) < -0.01
+
+
+def test_the_sections_stream_function_has_its_velocity_as_slope() -> None:
+    flow = section_flow(reynolds=150.0, rotation_reynolds=47.0)
+    on_axis = np.flatnonzero((np.abs(flow.points[1]) < 1e-12) & (np.abs(flow.points[0]) < 0.2))
+    for node in on_axis[::5]:
+        near = np.flatnonzero(np.hypot(*(flow.points - flow.points[:, [node]])) < 0.06)
+        dy, dz = flow.points[:, near] - flow.points[:, [node]]
+        terms = np.stack([np.ones_like(dy), dy, dz, dy**2, dy * dz, dz**2, dz**3], axis=1)
+        slopes = np.linalg.lstsq(terms, flow.stream_function[near], rcond=None)[0]
+        assert slopes[2] == pytest.approx(flow.velocity[0, node], rel=0.02)
+
+
+def test_a_section_at_rest_is_poiseuilles() -> None:
+    flow = section_flow(reynolds=300.0, rotation_reynolds=0.0)
+    assert np.allclose(flow.axial_velocity, 2 * (1 - 4 * (flow.points**2).sum(axis=0)), atol=1e-4)
+    assert np.abs(flow.velocity).max() < 1e-12
+
+
+@pytest.mark.parametrize(("re", "rotation"), [(7500.0, 2356.0), (1e6, 1e6), (1.0, 1e7)])
+def test_beyond_the_range_the_nearest_section_is_given_and_said(re: float, rotation: float) -> None:
+    flow = section_flow(reynolds=re, rotation_reynolds=rotation)
+    assert flow.status.code is StatusCode.OUT_OF_RANGE
+    assert flow.rotation_reynolds / flow.reynolds == pytest.approx(rotation / re)
+    assert flow.reynolds * flow.rotation_reynolds <= LARGEST_KL * (1 + 1e-9)
+    assert flow.rotation_reynolds <= LARGEST_ROTATION * (1 + 1e-9)
+    table = rotating_friction_ratio(reynolds=flow.reynolds, rotation_reynolds=flow.rotation_reynolds)
+    assert flow.friction_ratio == pytest.approx(float(table.value), rel=3e-3)
+
+
+def _pressure_on_axis(flow: EndFlow, x: float) -> float:
+    axis = np.flatnonzero(flow.points[1] == 0.0)
+    order = axis[np.argsort(flow.points[0, axis])]
+    return float(np.interp(x, flow.points[0, order], flow.pressure[order]))
+
+
+def _wall(flow: EndFlow, inside: float) -> npt.NDArray[np.bool_]:
+    """Nodes on the tube's wall and on the plane it ends in; `inside` is the sign of x in the tube."""
+    x, r = flow.points
+    return np.asarray((np.abs(x) < 1e-12) & (r >= 0.5) | (x * inside > 0) & (np.abs(r - 0.5) < 1e-12))
+
+
+@pytest.mark.parametrize("re", [1.0, 5.0])
+def test_the_ends_have_the_tables_losses(re: float) -> None:
+    # So slow that flow is developed at the edge of the picture.
+    entrance, leaving = entrance_flow(reynolds=re), exit_flow(reynolds=re)
+    k = -(_pressure_on_axis(entrance, 4.0) + 64 * 4.0 / re)
+    assert k == pytest.approx(float(laminar_entrance_loss(reynolds=re).value), rel=0.02)
+    k = _pressure_on_axis(leaving, -1.5) - 64 * 1.5 / re
+    assert k == pytest.approx(float(laminar_exit_loss(reynolds=re).value), rel=0.03)
+
+
+@pytest.mark.parametrize("re", [1.0, 200.0])
+def test_the_ends_carry_the_flow_and_are_still_at_the_wall(re: float) -> None:
+    for flow, inside in ((entrance_flow(reynolds=re), 1.0), (exit_flow(reynolds=re), -1.0)):
+        assert flow.status.ok
+        assert np.all(_areas(flow) > 0)
+        wall, axis = _wall(flow, inside), flow.points[1] == 0.0
+        assert np.all(flow.speed[wall] == 0.0)
+        assert np.allclose(flow.stream_function[wall], 1 / 8)
+        assert np.all(flow.stream_function[axis] == 0.0)
+        assert np.all(flow.velocity[1, axis] == 0.0)
+        assert np.allclose(flow.speed, np.hypot(*flow.velocity))
+
+
+def test_the_ends_velocity_carries_the_flow_rate() -> None:
+    for flow, inside in ((entrance_flow(reynolds=200.0), 1.0), (exit_flow(reynolds=200.0), -1.0)):
+        stations = [x for x in np.unique(flow.points[0]) if x * inside > 0.3]
+        assert len(stations) > 5
+        for x in stations:
+            column = np.flatnonzero(flow.points[0] == x)
+            r, order = np.sort(flow.points[1, column]), column[np.argsort(flow.points[1, column])]
+            through = np.trapezoid(flow.velocity[0, order] * r, r)
+            assert through == pytest.approx(1 / 8, rel=0.02)
+
+
+@settings(max_examples=4, deadline=None, derandomize=True)
+@given(st.floats(min_value=-3.0, max_value=3.3))
+def test_any_laminar_end_is_found(decade: float) -> None:
+    for flow in (entrance_flow(reynolds=10**decade), exit_flow(reynolds=10**decade)):
+        assert flow.status.ok
+        assert np.all(np.isfinite(flow.pressure))
+        assert 1.4 < flow.speed.max() < 2.05
+
+
+def test_beyond_the_range_the_ends_say_so() -> None:
+    flow = exit_flow(reynolds=1e5)
+    assert flow.status.code is StatusCode.OUT_OF_RANGE
+    assert flow.reynolds == 2000.0
+
+
+@pytest.mark.parametrize("bad", [0.0, -1.0, np.nan, np.inf])
+def test_bad_arguments_are_refused(bad: float) -> None:
+    for make in (entrance_flow, exit_flow):
+        with pytest.raises(ValueError, match="reynolds"):
+            make(reynolds=bad)
+    with pytest.raises(ValueError, match="reynolds"):
+        section_flow(reynolds=bad, rotation_reynolds=1.0)
+    if bad != 0.0:
+        with pytest.raises(ValueError, match="rotation_reynolds"):
+            section_flow(reynolds=1.0, rotation_reynolds=bad)

@@ -104,7 +104,7 @@ def tube_loss(
         k=_estimate(state, parts, bool(np.any(outside))),
         terms=MappingProxyType(dict(state.terms)),
         uncertainty_parts=MappingProxyType(dict(parts)),
-        flow_state=_flow_state(state),
+        flow_state=flow_states(state),
         in_range=np.asarray(~outside),
         range_notes=MappingProxyType(dict(notes)),
         upstream_k=upstream_loss(tube=tube, state=state),
@@ -124,7 +124,17 @@ def _estimate(state: TubeState, parts: Mapping[str, FloatArray], stretched: bool
     )
 
 
-def _flow_state(state: TubeState) -> npt.NDArray[np.str_]:
+def flow_states(state: TubeState) -> npt.NDArray[np.str_]:
+    """Laminar, transitional or turbulent, by the critical Re of the turning tube.
+
+    Args:
+        state: the terms of k.
+
+    Returns:
+        Values of `FlowState`, the shape of the state's arrays.
+
+    Source: `critical_reynolds`.
+    """
     critical = state.critical_ratio * STRAIGHT_CRITICAL_REYNOLDS
     turbulent = state.critical_ratio * FULLY_TURBULENT_REYNOLDS
     return np.select(

@@ -4,6 +4,7 @@ from ringbalance.reduced_model.apparent_drag import ApparentDrag, apparent_drag
 from ringbalance.reduced_model.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.calibration import Calibration, calibrate
 from ringbalance.reduced_model.documents import calibration_document
+from ringbalance.reduced_model.drag_map import DragMap, drag_contour, drag_map, liquid_verdicts
 from ringbalance.reduced_model.flow_law import Flow, FlowLaw, Regime
 from ringbalance.reduced_model.gravity import check_ring
 from ringbalance.reduced_model.hump_profile import HumpProfile, hump_profile
@@ -19,6 +20,7 @@ __all__ = [
     "CalibratedLaw",
     "Calibration",
     "CompleteLaw",
+    "DragMap",
     "Flow",
     "FlowLaw",
     "HumpProfile",
@@ -31,6 +33,9 @@ __all__ = [
     "calibrate",
     "calibration_document",
     "check_ring",
+    "drag_contour",
+    "drag_map",
+    "liquid_verdicts",
     "hump_profile",
     "load_law",
     "load_model",

@@ -1,0 +1,256 @@
+"""The map of k over bore and viscosity, held against the calibrated law and `tube_loss` point by point."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ringbalance.physics.tube_loss import tube_loss
+from ringbalance.reduced_model.calibration import Calibration
+from ringbalance.reduced_model.drag_map import (
+    LiquidVerdicts,
+    drag_contour,
+    drag_map,
+    liquid_verdicts,
+    velocity_errors,
+)
+from ringbalance.reduced_model.flow_law import Regime
+from ringbalance.reduced_model.tube_heads import tube_heads
+from ringbalance.scene.liquids import liquid_at
+from ringbalance.scene.models import InputUncertainty, Scene
+
+POINTS = [(0.3e-3, 1e-6), (0.9e-3, 3e-7), (1.5e-3, 5e-5), (2.4e-3, 6e-6), (4.1e-3, 2.2e-4)]
+
+
+@pytest.fixture(scope="module")
+def calibration(table_1_calibration: Calibration) -> Calibration:
+    """Of Table 1's disc."""
+    return table_1_calibration
+
+
+def with_scene(calibration: Calibration, scene: Scene) -> Calibration:
+    """The same chamber with another tube, gas or set of uncertain inputs."""
+    return replace(calibration, scene=scene)
+
+
+def moved(scene: Scene, bore: float, viscosity: float) -> Scene:
+    """The scene with another bore and an exactly known viscosity."""
+    liquid = replace(scene.liquid, kinematic_viscosity=viscosity, viscosity_uncertainty=0.0)
+    return replace(scene, tube=replace(scene.tube, bore=bore), liquid=liquid)
+
+
+@pytest.mark.parametrize(("bore", "viscosity"), POINTS)
+def test_a_point_is_what_law_and_tube_loss_say(
+    calibration: Calibration, bore: float, viscosity: float
+) -> None:
+    found = drag_map(calibration=calibration, bore=[bore], kinematic_viscosity=[viscosity]).point
+    scene = moved(calibration.scene, bore, viscosity)
+    law = replace(calibration.flow_law, heads=tube_heads(scene))
+    x = law.max_fill_ratio / 2
+    flow = law.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=scene.gas.pressure)
+    loss = tube_loss(
+        tube=scene.tube, liquid=scene.liquid, angular_velocity=scene.rotor.speed, velocity=flow.velocity
+    )
+    assert found.regime[0, 0] == flow.regime
+    assert found.velocity[0, 0] == pytest.approx(float(flow.velocity), rel=1e-8)
+    assert found.k[0, 0] == pytest.approx(float(loss.k.value), rel=1e-8)
+    assert found.k_uncertainty[0, 0] == pytest.approx(float(loss.k.uncertainty), rel=1e-8)
+    # The law interpolates its half-widths between 257 velocities.
+    assert found.velocity_uncertainty[0, 0] == pytest.approx(float(flow.uncertainty), rel=3e-2)
+    assert found.in_range[0, 0] == loss.in_range
+    assert found.flow_state[0, 0] == loss.flow_state
+
+
+def test_stated_inputs_spread_k_as_they_do_in_tube_loss(calibration: Calibration) -> None:
+    stated = tuple(
+        InputUncertainty(quantity=name, half_width=0.05, relative=True)
+        for name in ("length", "speed", "roughness", "bore")
+    )
+    scene = replace(calibration.scene, uncertainty=stated)
+    found = drag_map(
+        calibration=with_scene(calibration, scene), bore=[1.2e-3], kinematic_viscosity=[2e-6]
+    ).point
+    at = moved(scene, 1.2e-3, 2e-6)
+    loss = tube_loss(
+        tube=at.tube,
+        liquid=at.liquid,
+        angular_velocity=at.rotor.speed,
+        velocity=found.velocity[0, 0],
+        # The bore is a coordinate of the map.
+        inputs=stated[:3],
+    )
+    assert found.k_uncertainty[0, 0] == pytest.approx(float(loss.k.uncertainty), rel=1e-9)
+
+
+def test_the_contour_is_really_at_fifty(calibration: Calibration) -> None:
+    nu, bore = drag_contour(drag_map=drag_map(calibration=calibration))
+    assert nu.size > 20
+    for one, d in zip(nu[::7], bore[::7], strict=True):
+        point = drag_map(calibration=calibration, bore=[d], kinematic_viscosity=[one]).point
+        assert point.k[0, 0] == pytest.approx(50, rel=2e-3)
+
+
+def test_where_the_apparent_k_is_fifty_eq_19_has_the_velocity(calibration: Calibration) -> None:
+    found = drag_map(calibration=calibration)
+    nu, bore = drag_contour(drag_map=found, apparent=True)
+    one = drag_map(calibration=calibration, bore=[bore[10]], kinematic_viscosity=[nu[10]])
+    assert one.velocity_error[0, 0] == pytest.approx(0, abs=2e-3)
+    np.testing.assert_allclose(
+        found.velocity_error, np.sqrt((found.point.apparent_k + 1) / 51) - 1, rtol=1e-10, atol=1e-12
+    )
+
+
+def test_torn_columns_look_like_more_drag(calibration: Calibration) -> None:
+    point = drag_map(calibration=calibration).point
+    torn = point.regime == Regime.SEPARATED
+    assert np.any(torn)
+    assert np.any(~torn)
+    assert np.all(point.apparent_k[torn] > point.k[torn])
+    np.testing.assert_allclose(point.apparent_k[~torn], point.k[~torn], rtol=1e-9)
+
+
+@pytest.mark.parametrize(("bore", "viscosity"), [(1.5e-3, 5e-5), (0.4e-3, 4e-6)])
+def test_a_wrong_loss_moves_the_operating_point_as_the_half_width_says(
+    calibration: Calibration, bore: float, viscosity: float
+) -> None:
+    # A loss that is too small by 0.01 throughout shifts k by less or more than that, since u moves, too.
+    def at(extra: float) -> tuple[float, float, float]:
+        tube = replace(calibration.scene.tube, extra_loss=extra)
+        calm = replace(calibration.scene, tube=tube)
+        law = replace(calibration.flow_law, inputs=replace(calibration.flow_law.inputs, relative_density=0.0))
+        point = drag_map(
+            calibration=replace(calibration, scene=calm, flow_law=law),
+            bore=[bore],
+            kinematic_viscosity=[viscosity],
+        ).point
+        return tuple(float(v[0, 0]) for v in (point.k, point.k_uncertainty, point.k_point_uncertainty))  # type: ignore[return-value]
+
+    low, high, middle = at(0.99), at(1.01), at(1.0)
+    assert (high[0] - low[0]) / 0.02 == pytest.approx(middle[2] / middle[1], rel=1e-3)
+
+
+def test_the_default_map_holds_the_scene(calibration: Calibration) -> None:
+    found = drag_map(calibration=calibration)
+    tube, liquid = calibration.scene.tube, calibration.scene.liquid
+    assert found.bore[0] < tube.bore < found.bore[-1]
+    assert found.kinematic_viscosity[0] < liquid.kinematic_viscosity < found.kinematic_viscosity[-1]
+    assert np.all(np.isfinite(found.point.k))
+    assert np.all(found.point.k[0] > found.point.k[20])
+
+
+def test_k_by_decree_is_lifted(calibration: Calibration) -> None:
+    scene = calibration.scene
+    decreed = replace(scene, tube=replace(scene.tube, drag_coefficient=50.0))
+    grid = {"bore": [1e-3, 2e-3], "kinematic_viscosity": [1e-6, 1e-4]}
+    plain = drag_map(calibration=calibration, **grid)  # type: ignore[arg-type]
+    lifted = drag_map(calibration=with_scene(calibration, decreed), **grid)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(plain.point.k, lifted.point.k)
+
+
+def test_without_a_hump_every_point_is_a_siphon(calibration: Calibration) -> None:
+    law = calibration.flow_law
+    straight = replace(calibration, flow_law=replace(law, path=replace(law.path, hump_pressure=None)))
+    point = drag_map(calibration=straight).point
+    assert np.all(point.regime == Regime.SIPHON)
+    np.testing.assert_allclose(point.apparent_k, point.k, rtol=1e-9)
+
+
+def test_a_gas_that_drives_nothing_maps_nothing(calibration: Calibration) -> None:
+    scene = replace(calibration.scene, gas=replace(calibration.scene.gas, pressure=0.0))
+    found = drag_map(calibration=with_scene(calibration, scene))
+    assert not np.any(found.point.runs)
+    assert np.all(found.point.regime == Regime.BLOCKED)
+    assert np.all(found.point.k == 0)
+    assert drag_contour(drag_map=found)[0].size == 0
+
+
+BAD = [
+    ({"bore": [0.0, 1e-3]}, "bore must be a row of positive"),
+    ({"bore": [np.nan]}, "bore must be a row of positive"),
+    ({"bore": []}, "bore must be a row of positive"),
+    ({"bore": 1e-3}, "bore must be a row of positive"),
+    ({"bore": [2e-3, 1e-3]}, "bore must rise"),
+    ({"kinematic_viscosity": [-1e-6]}, "kinematic_viscosity must be a row of positive"),
+    ({"kinematic_viscosity": [1e-6, 1e-6]}, "kinematic_viscosity must rise"),
+]
+
+
+@pytest.mark.parametrize(("given", "told"), BAD)
+def test_bad_axes_are_refused(calibration: Calibration, given: dict[str, object], told: str) -> None:
+    with pytest.raises(ValueError, match=told):
+        drag_map(calibration=calibration, **given)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("k", [0.0, -1.0, np.nan, np.inf])
+def test_a_contour_of_no_k_is_refused(calibration: Calibration, k: float) -> None:
+    found = drag_map(calibration=calibration, bore=[1e-3], kinematic_viscosity=[1e-6])
+    with pytest.raises(ValueError, match="k must be positive"):
+        drag_contour(drag_map=found, k=k)
+
+
+@pytest.fixture(scope="module")
+def verdicts(calibration: Calibration) -> LiquidVerdicts:
+    return liquid_verdicts(calibration=calibration)
+
+
+def test_the_scenes_liquid_comes_first_and_agrees_with_the_calibration(
+    calibration: Calibration, verdicts: LiquidVerdicts
+) -> None:
+    point = calibration.operating_point
+    assert verdicts.liquids[0] == calibration.scene.liquid
+    assert point.k is not None
+    assert verdicts.at_scene.velocity[0] == pytest.approx(point.velocity, rel=1e-8)
+    assert verdicts.at_scene.k[0] == pytest.approx(point.k, rel=1e-8)
+    assert verdicts.at_scene.k_uncertainty[0] == pytest.approx(point.k_uncertainty, rel=1e-8)
+    assert verdicts.at_scene.velocity_uncertainty[0] == pytest.approx(point.velocity_uncertainty, rel=1e-4)
+
+
+def test_every_known_liquid_is_there_once(verdicts: LiquidVerdicts) -> None:
+    names = [liquid.name for liquid in verdicts.liquids]
+    assert len(set(names)) == len(names) >= 9
+
+
+def test_a_dense_liquid_starts_at_just_its_starting_pressure(
+    calibration: Calibration, verdicts: LiquidVerdicts
+) -> None:
+    gallium = liquid_at(name="gallium", temperature=303.15)
+    index = [liquid.name for liquid in verdicts.liquids].index("gallium")
+    start = float(verdicts.starting_pressure[index])
+    assert verdicts.at_scene.regime[index] == Regime.BLOCKED
+    for factor, flows in ((0.999, False), (1.001, True)):
+        gas = replace(calibration.scene.gas, pressure=factor * start)
+        asked = with_scene(calibration, replace(calibration.scene, gas=gas))
+        found = liquid_verdicts(calibration=asked, liquids=[gallium])
+        assert bool(found.at_scene.regime[1] != Regime.BLOCKED) is flows
+
+
+def test_equal_heads_make_equal_flow_whatever_the_density(calibration: Calibration) -> None:
+    own, ambient = calibration.scene.liquid, calibration.scene.gas.ambient_pressure
+    light = replace(
+        own,
+        name="light",
+        density=own.density / 2,
+        vapour_pressure=(own.vapour_pressure - ambient) / 2 + ambient,
+    )
+    found = liquid_verdicts(calibration=calibration, liquids=[light]).at_equal_head
+    for values in (found.velocity, found.k, found.apparent_k):
+        assert values[1] == pytest.approx(values[0], rel=1e-9)
+
+
+def test_the_bore_for_fifty_has_fifty(calibration: Calibration, verdicts: LiquidVerdicts) -> None:
+    index = [liquid.name for liquid in verdicts.liquids].index("silicone oil 50 cSt")
+    tube = replace(calibration.scene.tube, bore=float(verdicts.bore_for_paper[index]))
+    asked = with_scene(calibration, replace(calibration.scene, tube=tube))
+    found = liquid_verdicts(calibration=asked, liquids=[verdicts.liquids[index]])
+    assert found.at_equal_head.k[1] == pytest.approx(50, rel=2e-3)
+
+
+def test_the_papers_velocity_is_off_by_the_root_of_the_drags(verdicts: LiquidVerdicts) -> None:
+    at_scene, equal = velocity_errors(verdicts=verdicts)
+    runs = verdicts.at_scene.runs
+    expected = np.sqrt((verdicts.at_scene.apparent_k + 1) / 51) - 1
+    np.testing.assert_allclose(at_scene[runs], expected[runs], rtol=1e-10)
+    assert np.all(at_scene[~runs] == 0)
+    assert np.all(np.isfinite(equal))

@@ -41,7 +41,9 @@ from ringbalance.verification.cases.integrator_orders import case as integrator_
 from ringbalance.verification.cases.manufactured_2d import case as manufactured_2d
 from ringbalance.verification.cases.manufactured_3d import case as manufactured_3d
 from ringbalance.verification.cases.manufactured_flow import case as manufactured_flow
+from ringbalance.verification.cases.mixing_length import case as mixing_length
 from ringbalance.verification.cases.rotating_section import case as rotating_section
+from ringbalance.verification.cases.sloshing import case as sloshing
 from ringbalance.verification.evidence import CaseCode
 
 _CODE: Mapping[str, CaseCode] = {
@@ -52,11 +54,13 @@ _CODE: Mapping[str, CaseCode] = {
     "conservation": conservation,
     "manufactured_flow": manufactured_flow,
     "rotating_section": rotating_section,
+    "sloshing": sloshing,
     "gci_celik2008": gci_celik2008,
     "gci_behaviour": gci_behaviour,
     "independent_routes": independent_routes,
     "integrator_orders": integrator_orders,
     "friction_blend": friction_blend,
+    "mixing_length": mixing_length,
     "coverage": coverage,
     "claim_01_volume": claim_01_volume,
     "claim_02_ring_radius": claim_02_ring_radius,

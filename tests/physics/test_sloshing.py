@@ -5,20 +5,20 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.integrate import quad_vec
-from scipy.linalg import eigvals
 
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.results import StatusCode
 from ringbalance.physics.sloshing import resonant_fills, sloshing_modes
 from ringbalance.physics.sloshing_response import sloshing_response
 from ringbalance.scene.models import Disc, Scene
-
-FloatArray = npt.NDArray[np.float64]
+from ringbalance.verification.sloshing_exact import (
+    cosine_amplification,
+    cosine_frequencies,
+    cosine_waves,
+)
 
 OMEGA = 10_000 * np.pi / 30
 
@@ -34,49 +34,12 @@ def bare(disc: Disc, angle: float) -> Disc:
     return replace(disc, plate_thickness=0.0, central_angle=angle, chambers=max(2, chambers))
 
 
-class Spectral:
-    """phi = sum B_n cosh(k rho)/sinh(k H) cos(k angle'), rho = ln(R2/r): the potential, not the stream."""
-
-    def __init__(self, *, angle: float, depth: float, terms: int) -> None:
-        n = np.arange(1, terms + 1)
-        self.angle, self.k = angle, np.pi * n / angle
-        self.mass = np.diag(1 / np.tanh(self.k * depth)) * angle / 2
-        self.spring = np.diag(self.k) * angle / 2
-        rows, columns = np.meshgrid(n, n, indexing="ij")
-        odd = (rows + columns) % 2 == 1
-        gap = np.where(odd, columns**2 - rows**2, 1)
-        # Integral of cos(m ...) sin(n ...) over the surface: rows m, columns n.
-        self.mixed = np.where(odd, angle / np.pi * 2 * columns / gap, 0.0)
-
-    def frequencies(self, count: int) -> FloatArray:
-        n = len(self.k)
-        zero, one = np.zeros((n, n)), np.eye(n)
-        left = np.block([[zero, one], [self.spring, -2j * self.mixed]])
-        right = np.block([[one, zero], [zero, self.mass]])
-        s = eigvals(left, right)
-        real = s[np.abs(s.imag) < 1e-6 * np.abs(s)].real
-        return np.asarray(np.sort(real[real > 0])[:count])
-
-    def moments(self, s: float) -> tuple[float, float]:
-        """Swing of the first moment under G = exp(i angle), and that of a surface that follows at once."""
-        half = self.angle / 2
-
-        def rows(angle: float) -> npt.NDArray[np.complex128]:
-            return np.asarray(np.exp(1j * angle) * np.cos(self.k * (angle + half)))
-
-        load = quad_vec(rows, -half, half, epsabs=1e-12)[0]
-        matrix = s**2 * self.mass - self.spring + 2j * s * self.mixed
-        swings = [np.linalg.solve(m, -1j * s * load) * self.k for m in (matrix, -self.spring.astype(complex))]
-        both = [np.hypot(abs(load.real @ q), abs(load.imag @ q)) for q in swings]
-        return float(both[0]), float(both[1])
-
-
 @pytest.mark.parametrize(("angle", "fill"), [(90.0, 0.25), (90.0, 0.5), (60.0, 0.1), (150.0, 0.4)])
 def test_frequencies_match_an_independent_spectral_solution(disc: Disc, angle: float, fill: float) -> None:
     chamber = bare(disc, np.radians(angle))
     found = sloshing_modes(disc=chamber, fill_ratio=fill, modes=4)
     depth = float(np.log(disc.outer_radius / found.surface_radius[0]))
-    exact = Spectral(angle=np.radians(angle), depth=depth, terms=160).frequencies(4)
+    exact = cosine_frequencies(cosine_waves(central_angle=np.radians(angle), depth=depth), modes=4)
     assert found.frequency_ratio.value[0] == pytest.approx(exact, rel=1e-4)
     assert np.all(
         np.abs(found.frequency_ratio.value[0] - exact) < found.frequency_ratio.uncertainty[0] + 2e-6
@@ -144,8 +107,9 @@ def test_forced_swing_matches_the_spectral_one(disc: Disc, s: float) -> None:
         frequency_ratio=s,
     )
     depth = float(np.log(disc.outer_radius / found.surface_radius[0]))
-    swing, still = Spectral(angle=np.pi / 2, depth=depth, terms=160).moments(s)
-    assert found.amplification.value[0] == pytest.approx(swing / still, rel=1e-4)
+    waves = cosine_waves(central_angle=np.pi / 2, depth=depth)
+    exact = cosine_amplification(waves, frequency_ratio=s)
+    assert found.amplification.value[0] == pytest.approx(exact, rel=1e-4)
     assert found.damped_share[0] == 1.0
 
 

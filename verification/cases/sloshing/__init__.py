@@ -1,0 +1,1 @@
+"""Waves on the ring in one chamber against exact and spectral ones."""

@@ -1,0 +1,150 @@
+"""Natural frequencies of the ring against exact waves and sums of cosines, and the fills to avoid."""
+
+# ruff: noqa: ARG001 - every case answers to one interface
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.physics.sloshing import resonant_fills, sloshing_modes
+from ringbalance.physics.sloshing_response import sloshing_response
+from ringbalance.scene.models import Disc, Scene
+from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
+from ringbalance.verification.sloshing_exact import (
+    cosine_amplification,
+    cosine_frequencies,
+    cosine_waves,
+)
+
+FloatArray = npt.NDArray[np.float64]
+
+_MODES: Final = 4
+_FILLS: Final = (0.1, 0.25, 0.5)
+_POINTS: Final = {"light": 13, "heavy": 49}
+_COARSE: Final = ((8, 24), (4, 12), (2, 6))
+"""Meshes of the figures: three digits."""
+_CORIOLIS: Final = {"coriolis_off_by_a_percent": 1.01}
+
+
+def reference(scene: Scene) -> Mapping[str, Reference]:
+    """No references: deviations are judged by their size.
+
+    Args:
+        scene: not used.
+
+    Returns:
+        Nothing.
+    """
+    return {}
+
+
+def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Deviations on a bare chamber, then the frequencies and swings of the scene's own.
+
+    Args:
+        scene: the scene.
+        level: "heavy" draws more fills.
+        defect: "coriolis_off_by_a_percent" or "forcing_backwards".
+
+    Returns:
+        Evidence.
+    """
+    bare = replace(scene.disc, plate_thickness=0.0)
+    depths = _depths(bare)
+    fills = np.linspace(0.02, 1.0, _POINTS[level]) * scene.disc.max_fill_ratio
+    ratios = sloshing_modes(
+        disc=scene.disc, fill_ratio=fills, modes=_MODES, cells=_COARSE
+    ).frequency_ratio.value
+    swings = _swings(scene, fills)
+    met = dict(resonant_fills(disc=scene.disc, modes=_MODES))
+    return Evidence(
+        found={
+            "still": Found(value=_still_deviation(bare, depths)),
+            "frequencies": Found(value=_frequency_deviation(bare, depths, _CORIOLIS.get(defect or "", 1.0))),
+            "forced": Found(value=_forced_deviation(bare, depths, backwards=defect == "forcing_backwards")),
+        },
+        numbers={
+            "first": float(ratios[-1, 0]),
+            "third": met.get(3, 0.0),
+            "double": float(np.interp(2.0, swings[fills > 0.2], fills[fills > 0.2])),
+            "equal": float(_swings(scene, np.array([scene.disc.initial_fill]))[0]),
+        },
+        series=(_frequencies_figure(fills, ratios), _swings_figure(fills, swings)),
+    )
+
+
+def _depths(disc: Disc) -> FloatArray:
+    radii = sloshing_modes(disc=disc, fill_ratio=_FILLS, modes=1).surface_radius
+    return np.asarray(np.log(disc.outer_radius / radii), dtype=np.float64)
+
+
+def _still_deviation(disc: Disc, depths: FloatArray) -> float:
+    found = sloshing_modes(disc=disc, fill_ratio=_FILLS, modes=_MODES, coriolis_factor=0.0)
+    k = np.pi / disc.central_angle * np.arange(1, _MODES + 1)
+    exact = np.sqrt(k * np.tanh(np.outer(depths, k)))
+    return float(np.abs(found.frequency_ratio.value / exact - 1).max())
+
+
+def _frequency_deviation(disc: Disc, depths: FloatArray, factor: float) -> float:
+    found = sloshing_modes(disc=disc, fill_ratio=_FILLS, modes=_MODES, coriolis_factor=factor)
+    exact = np.array(
+        [
+            cosine_frequencies(cosine_waves(central_angle=disc.central_angle, depth=float(h)), modes=_MODES)
+            for h in depths
+        ]
+    )
+    return float(np.abs(found.frequency_ratio.value / exact - 1).max())
+
+
+def _forced_deviation(disc: Disc, depths: FloatArray, *, backwards: bool) -> float:
+    """Turning gravity backwards is the same as turning the Coriolis force of the reference round."""
+    found = sloshing_response(
+        disc=disc, fill_ratio=_FILLS, angular_velocity=1.0, kinematic_viscosity=0.0, gravity=0.0
+    )
+    exact = []
+    for depth in depths:
+        waves = cosine_waves(central_angle=disc.central_angle, depth=float(depth))
+        turned = replace(waves, mixed=-waves.mixed) if backwards else waves
+        exact.append(cosine_amplification(turned, frequency_ratio=1.0))
+    return float(np.abs(found.amplification.value / np.array(exact) - 1).max())
+
+
+def _swings(scene: Scene, fills: FloatArray) -> FloatArray:
+    response = sloshing_response(
+        disc=scene.disc,
+        fill_ratio=fills,
+        angular_velocity=scene.rotor.speed,
+        kinematic_viscosity=scene.liquid.kinematic_viscosity,
+        gravity=scene.environment.gravity,
+        cells=_COARSE,
+    )
+    return response.amplification.value
+
+
+def _frequencies_figure(fills: FloatArray, ratios: FloatArray) -> Series:
+    return Series(
+        name="natural frequencies over the speed",
+        x=Axis(name="fill ratio", unit="1", values=fills),
+        y=(
+            *(
+                Curve(name=f"mode {n + 1}", unit="1", values=np.array(column))
+                for n, column in enumerate(ratios.T)
+            ),
+            Curve(name="gravity, once a turn", unit="1", values=np.ones_like(fills), style="reference"),
+        ),
+    )
+
+
+def _swings_figure(fills: FloatArray, swings: FloatArray) -> Series:
+    return Series(
+        name="swing of the moment over that of a surface that follows gravity at once",
+        x=Axis(name="fill ratio", unit="1", values=fills),
+        y=(
+            Curve(name="with inertia and Coriolis force", unit="1", values=swings),
+            Curve(name="quasi-static", unit="1", values=np.ones_like(fills), style="reference"),
+        ),
+    )

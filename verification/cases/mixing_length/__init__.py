@@ -1,0 +1,1 @@
+"""The friction formula beside a mixing-length solution: text, computation and data."""

@@ -1,0 +1,178 @@
+"""The friction formula beside a mixing-length solution, on smooth and on sand-rough walls."""
+
+# ruff: noqa: ARG001 - every case answers to one interface
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+from scipy.integrate import quad
+
+from ringbalance.physics.mixing_length import MixingLength, mixing_length, mixing_length_flow
+from ringbalance.physics.tube_friction import friction_factor, friction_uncertainty
+from ringbalance.scene.models import Scene
+from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
+from ringbalance.verification.published import read_rows
+
+FloatArray = npt.NDArray[np.float64]
+Friction = Callable[[FloatArray, FloatArray], FloatArray]
+
+_CLOSURES: Final = MappingProxyType(
+    {
+        None: MixingLength(),
+        "karman_too_small": MixingLength(karman=0.36),
+        "undamped": MixingLength(damping=None),
+        "sand_ignored": MixingLength(rough=False),
+    }
+)
+_EVEN: Final = {"light": (1e5, 1e6), "heavy": (1e5, 1.5e5, 2e5, 3e5, 5e5, 7e5, 1e6)}
+_LOW: Final = (3e3, 1e4)
+_HIGH: Final = 1e5
+_MEASURED: Final = {"light": 5, "heavy": 1}
+"""Every which measured point is taken."""
+_CELLS: Final = {"light": 48, "heavy": 128}
+_FULLY_ROUGH: Final = 70.0
+"""ks+ above which the wall is fully rough."""
+_BETWEEN: Final = (3.0, 40.0)
+"""ks+ between smooth and fully rough."""
+_SHOWN: Final = 126.0
+"""R/ks of the figure."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Points:
+    """Friction factors over Re and wall."""
+
+    reynolds: FloatArray
+    roughness: FloatArray
+    """ks/d."""
+    friction: FloatArray
+    """Darcy."""
+
+
+def reference(scene: Scene) -> Mapping[str, Reference]:
+    """None: deviations are judged against limits.
+
+    Args:
+        scene: not used.
+
+    Returns:
+        Nothing.
+    """
+    return {}
+
+
+def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Friction by mixing length against a quadrature, the formula and the measurements.
+
+    Args:
+        scene: not used.
+        level: "heavy" takes every measured point and a finer line.
+        defect: "karman_too_small", "undamped" or "sand_ignored".
+
+    Returns:
+        Evidence.
+    """
+    closure, cells = _CLOSURES[defect], _CELLS[level]
+
+    def by_length(reynolds: FloatArray, roughness: FloatArray) -> FloatArray:
+        flows = (
+            mixing_length_flow(reynolds=re, relative_roughness=e, closure=closure, cells=cells)
+            for re, e in zip(reynolds, roughness, strict=True)
+        )
+        return np.array([flow.friction_factor for flow in flows])
+
+    stride = _MEASURED[level]
+    sand, smooth = _sand(stride), _smooth(stride)
+    even = np.array(_LOW + _EVEN[level])
+    apart = by_length(even, np.zeros_like(even)) / _formula(even, np.zeros_like(even)) - 1
+    measured = by_length(smooth.reynolds, smooth.roughness) / smooth.friction - 1
+    wall, formula = (f(sand.reynolds, sand.roughness) / sand.friction - 1 for f in (by_length, _formula))
+    grain = sand.reynolds * np.sqrt(sand.friction / 8) * sand.roughness
+    between = (grain > _BETWEEN[0]) & (grain < _BETWEEN[1])
+    return Evidence(
+        found={
+            "quadrature": Found(value=_quadrature_gap(closure, cells)),
+            "smooth": Found(value=float(np.max(np.abs(apart[even >= _HIGH])))),
+            "between": Found(value=float(np.mean(np.abs(wall[between])))),
+        },
+        numbers={
+            "low": float(np.max(np.abs(apart[even < _HIGH]))),
+            "measured": float(np.max(np.abs(measured))),
+            "formula_between": float(np.mean(formula[between])),
+            "formula_worst": float(np.max(formula[between])),
+            "bar": float(np.max(_bar(sand)[between])),
+            "rough": float(np.max(np.abs(wall[grain > _FULLY_ROUGH]))),
+            "formula_rough": float(np.max(np.abs(formula[grain > _FULLY_ROUGH]))),
+        },
+        series=(_figure(by_length),),
+    )
+
+
+def _quadrature_gap(closure: MixingLength, cells: int) -> float:
+    """Friction factor at Re = 1e5 against the integral of the slope 2 tau/(1 + sqrt(1 + 4 l^2 tau))."""
+    flow = mixing_length_flow(reynolds=_HIGH, closure=closure, cells=cells)
+    radius = flow.friction_reynolds
+
+    def flux(y: float) -> float:
+        squared = float(mixing_length(wall_distance=y, radius=radius, closure=closure)) ** 2
+        tau = 1 - y / radius
+        return 2 * tau / (1 + math.sqrt(1 + 4 * squared * tau)) * (radius - y) ** 2
+
+    cuts = [0.0, 5.0, 30.0, 200.0, radius]
+    parts = (float(quad(flux, a, b, epsrel=1e-10)[0]) for a, b in itertools.pairwise(cuts))
+    bulk = sum(parts) / radius**2
+    return abs(flow.friction_factor / (8 / bulk**2) - 1)
+
+
+def _formula(reynolds: FloatArray, roughness: FloatArray) -> FloatArray:
+    pairs = zip(reynolds, roughness, strict=True)
+    return np.array([float(friction_factor(reynolds=re, relative_roughness=e)) for re, e in pairs])
+
+
+def _bar(points: _Points) -> FloatArray:
+    """The formula's half-width over the measured value."""
+    pairs = zip(points.reynolds, points.roughness, strict=True)
+    bars = [float(friction_uncertainty(reynolds=re, relative_roughness=e)) for re, e in pairs]
+    return np.array(bars) / points.friction
+
+
+def _smooth(stride: int) -> _Points:
+    rows = read_rows("mixing_length", "mckeon2004_oregon_smooth.csv")
+    rows = tuple(row for row in rows if float(row["Re"]) >= _HIGH)[::-stride]
+    reynolds = np.array([float(row["Re"]) for row in rows])
+    friction = np.array([float(row["f_darcy"]) for row in rows])
+    return _Points(reynolds=reynolds, roughness=np.zeros_like(reynolds), friction=friction)
+
+
+def _sand(stride: int) -> _Points:
+    rows = read_rows("mixing_length", "nikuradse1933_rough.csv")[::stride]
+    return _Points(
+        reynolds=np.array([float(row["Re"]) for row in rows]),
+        roughness=np.array([0.5 / float(row["R_over_ks"]) for row in rows]),
+        friction=np.array([float(row["f_darcy"]) for row in rows]),
+    )
+
+
+def _figure(by_length: Friction) -> Series:
+    """One sand over Re, where formula and measurements part."""
+    sand = _sand(1)
+    shown = np.isclose(sand.roughness, 0.5 / _SHOWN)
+    reynolds, roughness = sand.reynolds[shown], sand.roughness[shown]
+    one = _Points(reynolds=reynolds, roughness=roughness, friction=_formula(reynolds, roughness))
+    return Series(
+        name=f"friction factor on sand of R/ks = {_SHOWN:.0f}",
+        x=Axis(name="Reynolds number", unit="1", values=reynolds),
+        y=(
+            Curve(name="formula", unit="1", values=one.friction, uncertainty=_bar(one) * one.friction),
+            Curve(name="mixing length", unit="1", values=by_length(reynolds, roughness), style="paper"),
+            Curve(name="Nikuradse (1933)", unit="1", values=sand.friction[shown], style="reference"),
+        ),
+        log=True,
+    )

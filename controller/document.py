@@ -41,6 +41,7 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         "fill_ratio": {letter: fill.tolist() for letter, fill in simulation.fill_ratio.items()},
         "overshoots": simulation.overshoots,
         "misadjustments": simulation.misadjustments,
+        "energy_J": simulation.energy,
         "noise_floor_m": simulation.noise_floor,
         "samples": _samples(simulation.samples),
         "models_used": [asdict(term) for term in simulation.terms],
@@ -58,6 +59,7 @@ def _injection(injection: Injection) -> dict[str, Any]:
         "event": operation.event.value,
         "fill_before": operation.fill_before,
         "fill_after": operation.fill_after,
+        "energy_J": operation.energy,
     }
 
 

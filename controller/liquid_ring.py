@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
+from ringbalance.controller.dynamic_motion import Dynamics, Motion, Record, Switch
+from ringbalance.controller.dynamic_passage import pass_time
 from ringbalance.controller.transfer import Drive, Event, Integrator, Transfer
 from ringbalance.reduced_model.flow_law import Regime
 from ringbalance.reduced_model.model import BalancerModel
@@ -32,6 +34,8 @@ class PairState:
     """Whether the connecting tube holds a continuous column."""
     driven_first: bool = True
     """Whether the last gas went into the chamber on the positive side."""
+    motion: Motion = field(default_factory=Motion)
+    """Velocity, gas and valves, where the plant models them; at rest otherwise."""
 
     @property
     def opposite_fill(self) -> float:
@@ -54,22 +58,29 @@ class DiscState:
         first = tuple(pair.fill for pair in self.pairs)
         return first + tuple(pair.opposite_fill for pair in self.pairs)
 
+    @property
+    def rests(self) -> bool:
+        """Whether no liquid can move until a valve is told to open."""
+        return not any(pair.primed for pair in self.pairs) and all(p.motion.rests for p in self.pairs)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Operation:
-    """What one open valve did."""
+    """What one command to one valve did: by its closing or, where terms are modelled, by the next sample."""
 
     chamber: int
     """Index of the driven chamber."""
     duration: float
-    """s."""
+    """Commanded, s."""
     fill_before: float
-    """x of the driven chamber when the valve opened."""
+    """x of the driven chamber at the command."""
     fill_after: float
-    """x of the driven chamber when the valve closed."""
+    """x of the driven chamber when the valve closed; with terms modelled, at the next sample."""
     regime_start: Regime
     regime_end: Regime
     event: Event
+    energy: float
+    """Work of the driven chamber's gas against the surroundings, integral of (p - ambient) dV, J."""
 
     @property
     def moved(self) -> bool:
@@ -102,6 +113,8 @@ class LiquidRing:
     gas_pressure: float
     """Gauge, Pa, in a chamber while its valve is open."""
     integrator: Integrator
+    dynamics: Dynamics | None = None
+    """Terms that the flow law does not know; None: none of them is modelled."""
 
     def advance(
         self, state: DiscState, *, gas_times: Mapping[int, float], duration: float, points: int
@@ -123,8 +136,9 @@ class LiquidRing:
         spaced = duration * np.arange(1, points + 1) / points
         instants = np.unique(np.concatenate([spaced, np.fromiter(gas_times.values(), dtype=np.float64)]))
         half = self.chambers // 2
+        carry = self._pair if self.dynamics is None else self._moving_pair
         paths = [
-            self._pair(pair, index, _open_valve(gas_times, index, index + half), instants)
+            carry(pair, index, _open_valve(gas_times, index, index + half), instants)
             for index, pair in enumerate(state.pairs)
         ]
         operations = [path.operation for path in paths if path.operation is not None]
@@ -156,6 +170,7 @@ class LiquidRing:
             regime_start=transfer.regime_start,
             regime_end=transfer.regime_end,
             event=transfer.event,
+            energy=self.gas_pressure * self.model.chamber_volume * (before - float(transfer.fill[-1])),
         )
         fill = np.concatenate([_first_fill(pair, transfer, first=first), off.fill])
         return replace(off, fill=fill, operation=operation)
@@ -169,6 +184,66 @@ class LiquidRing:
         after = _moved(pair, transfer, first=first)
         fill = _first_fill(pair, transfer, first=first)
         return _Path(state=after, fill=fill, operation=None, drift=abs(after.fill - pair.fill))
+
+    def _moving_pair(self, pair: PairState, index: int, valve: _Valve | None, instants: FloatArray) -> _Path:
+        """Fill, velocity, gas and valves as one system; a command is added to what is under way."""
+        if self.dynamics is None:
+            raise ValueError("this plant has no terms to carry through time")
+        begun = pair if valve is None else self._commanded(pair, valve, index)
+        passage = pass_time(
+            self.dynamics,
+            fill=begun.fill,
+            total=begun.total,
+            primed=begun.primed,
+            motion=begun.motion,
+            instants=instants,
+        )
+        after = replace(begun, fill=passage.fill, primed=passage.primed, motion=passage.motion)
+        operation = None if valve is None else self._operation(after, valve)
+        return _Path(state=after, fill=passage.fills, operation=operation, drift=passage.ran_back)
+
+    def _commanded(self, pair: PairState, valve: _Valve, index: int) -> PairState:
+        """The valve opens and closes a lag after it is told to."""
+        lag = 0.0 if self.dynamics is None else self.dynamics.valve_lag
+        side = int(valve.chamber != index)
+        switches = (
+            Switch(after=lag, chamber=side, opens=True),
+            Switch(after=lag + valve.duration, chamber=side, opens=False),
+        )
+        motion = replace(
+            pair.motion,
+            pending=tuple(sorted((*pair.motion.pending, *switches), key=lambda switch: switch.after)),
+            record=Record(chamber=side, fill=pair.opposite_fill if side else pair.fill),
+        )
+        return replace(pair, motion=motion, driven_first=side == 0)
+
+    def _operation(self, pair: PairState, valve: _Valve) -> Operation:
+        record = pair.motion.record
+        return Operation(
+            chamber=valve.chamber,
+            duration=valve.duration,
+            fill_before=record.fill,
+            fill_after=pair.opposite_fill if record.chamber else pair.fill,
+            regime_start=record.regime_start,
+            regime_end=record.regime_end,
+            event=record.event,
+            energy=record.work,
+        )
+
+    def concluded(self, state: DiscState, operation: Operation) -> Operation:
+        """What a pair's last command has done by now, its tail included.
+
+        Args:
+            state: the disc now.
+            operation: of the last command to its pair, as first returned.
+
+        Returns:
+            Operation; the same where no term is modelled.
+        """
+        if self.dynamics is None:
+            return operation
+        pair = state.pairs[operation.chamber % (self.chambers // 2)]
+        return self._operation(pair, _Valve(chamber=operation.chamber, duration=operation.duration))
 
     def _drive(self, pair: PairState, *, first: bool, gas_pressure: float) -> Drive:
         return Drive(

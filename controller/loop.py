@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+import math
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
@@ -20,7 +21,7 @@ from ringbalance.controller.quadrature import quadrature
 from ringbalance.controller.rotor import chamber_letters, disc_unbalance, vibration
 from ringbalance.controller.sensor import Sensor, noisy_sensor
 from ringbalance.controller.simulation import Injection, Outcome, Sample, Simulation
-from ringbalance.controller.terms import terms
+from ringbalance.controller.terms import Choice, choices, dynamics_of, terms
 from ringbalance.controller.transfer import Integrator
 from ringbalance.reduced_model.gravity import check_ring
 from ringbalance.reduced_model.model import BalancerModel, CompleteLaw, balancer_model
@@ -34,6 +35,9 @@ GAS_POINTS: Final = 8
 """Instants recorded within one command's gas time."""
 DRIFT_POINTS: Final = 4
 """Instants recorded within a wait during which liquid may run back."""
+TAIL_POINTS: Final = 12
+"""The same where terms are modelled, so that an operation goes on after its valve has closed."""
+RUNGE_KUTTA: Final = "runge_kutta"
 MAX_SAMPLES: Final = 100_000
 IDLE_OPERATIONS: Final = 3
 """Commands in a row, beyond one for each chamber, whose longest injection may move nothing."""
@@ -48,6 +52,7 @@ def simulate(
     integrator: Integrator | None = None,
     sensor: Sensor | None = None,
     progress: Progress | None = None,
+    modelled: Collection[str] | None = None,
 ) -> Simulation:
     """One closed-loop run of a scene under a balancer model.
 
@@ -59,10 +64,12 @@ def simulate(
         model: flow law and moments of the balancer.
         flow_law: in place of `model`, a law that carries its own moments and volumes.
         controller: the algorithm; default the one that the scene names.
-        integrator: how operations are carried through time; default the closed form when the law has one,
-            else the quadrature.
+        integrator: how operations are carried through time by the flow law alone; default the closed form
+            when the law has one, else the quadrature.  With one given no further term is modelled.
         sensor: what the controller sees; default the scene's noise from the scene's seed.
         progress: called once per sample; None for silence.
+        modelled: of "tube inertia", "gas filling" and "valve lag" those to model; default those whose
+            estimated contribution is above the scene's tolerance.
 
     Returns:
         Simulation; its status says how the run ended and what to do next.
@@ -70,21 +77,28 @@ def simulate(
     Raises:
         SceneError: an algorithm that this program does not have, a rotor too slow to form a ring, or a model
             made for another disc.
-        ValueError: both a model and a flow law, or neither.
+        ValueError: both a model and a flow law, or neither; terms to model beside an integrator, or ones
+            that the scene or the law gives no numbers for.
 
     Source: section 5 and Fig. 5 of the liquid-ring paper.
     """
     check_ring(scene)
     balancer = _one_of(model, flow_law)
     check_fit(scene, balancer)
-    chosen = integrator or (closed_form if has_closed_form(balancer.flow) else quadrature)
+    if modelled and integrator is not None:
+        raise ValueError("an integrator carries the flow law alone: give it, or terms to model")
+    quasi_steady = integrator or (closed_form if has_closed_form(balancer.flow) else quadrature)
+    asked = () if integrator is not None else modelled
+    chosen = choices(scene=scene, model=balancer, asked=asked)
+    dynamics = dynamics_of(scene=scene, model=balancer, chosen=chosen)
     run = _Run(
         scene=scene,
         plant=LiquidRing(
             model=balancer,
             chambers=scene.disc.chambers,
             gas_pressure=scene.gas.pressure,
-            integrator=chosen,
+            integrator=quasi_steady,
+            dynamics=dynamics,
         ),
         controller=controller or controller_of(scene, balancer),
         sensor=sensor or noisy_sensor(sensor=scene.sensor, seed=scene.run.seed),
@@ -92,7 +106,8 @@ def simulate(
         state=initial_state(disc=scene.disc),
     )
     cause = run.go(progress or _silent)
-    return _record(run, cause, integrator=getattr(chosen, "__name__", "custom"))
+    name = getattr(quasi_steady, "__name__", "custom") if dynamics is None else RUNGE_KUTTA
+    return _record(run, cause, integrator=name, chosen=chosen)
 
 
 def _one_of(model: BalancerModel | None, flow_law: CompleteLaw | None) -> BalancerModel:
@@ -153,7 +168,6 @@ class _Run:
             if cause is not None:
                 return cause
             self._gas(command)
-            self._wait()
         return Cause.SAMPLES
 
     def _vibration(self) -> complex:
@@ -174,7 +188,7 @@ class _Run:
             return Cause.RISING
         if self.idle >= IDLE_OPERATIONS + self.plant.chambers:
             return Cause.IDLE
-        if command.resting and self.exact and not any(pair.primed for pair in self.state.pairs):
+        if command.resting and self.exact and self.state.rests:
             return Cause.AT_REST
         return Cause.TIME if self.remaining <= 0 else None
 
@@ -186,8 +200,9 @@ class _Run:
         return spare < 0 or (spare == 0 and higher)
 
     def _gas(self, command: Command) -> None:
-        """All valves of a command open together; the stretch ends when the last one has closed."""
+        """All valves of a command open together; after the last one has closed the loop waits."""
         if not command.valves:
+            self._wait()
             return
         gas_times = {valve.chamber: min(valve.duration, self.remaining) for valve in command.valves}
         advance = self.plant.advance(
@@ -200,16 +215,30 @@ class _Run:
         ]
         before = self._vibration()
         self._pass(advance)
-        change = abs(self._vibration() - before)
         self.operated = True
+        if self.plant.dynamics is not None:
+            self._wait()
+            self._conclude(len(advance.operations))
+        change = abs(self._vibration() - before)
         # Noise keeps opening the other valve a little; what counts is the one that should do the work.
-        working = longest(advance.operations).moved or change > self.scene.controller.limit
+        done = [injection.operation for injection in self.injections[-len(advance.operations) :]]
+        working = longest(done).moved or change > self.scene.controller.limit
         self.idle = 0 if working else self.idle + 1
+        if self.plant.dynamics is None:
+            self._wait()
+
+    def _conclude(self, count: int) -> None:
+        """The last command's injections with what they have done until now."""
+        for place in range(len(self.injections) - count, len(self.injections)):
+            injection = self.injections[place]
+            done = self.plant.concluded(self.state, injection.operation)
+            self.injections[place] = replace(injection, operation=done)
 
     def _wait(self) -> None:
         duration = min(self.scene.controller.period, self.remaining)
         if duration > 0:
-            points = DRIFT_POINTS if any(pair.primed for pair in self.state.pairs) else 1
+            points = 1 if self.state.rests else DRIFT_POINTS
+            points = points if self.plant.dynamics is None else TAIL_POINTS
             self._pass(self.plant.advance(self.state, gas_times={}, duration=duration, points=points))
 
     def _pass(self, advance: Advance) -> None:
@@ -226,7 +255,7 @@ class _Run:
         self.fills.append(fill_ratio)
 
 
-def _record(run: _Run, cause: Cause, *, integrator: str) -> Simulation:
+def _record(run: _Run, cause: Cause, *, integrator: str, chosen: tuple[Choice, ...]) -> Simulation:
     """Judge a finished run and freeze it."""
     time, fills = np.concatenate(run.times), np.concatenate(run.fills, axis=1)
     moment = disc_unbalance(moment=run.plant.model.moment, fill_ratio=fills)
@@ -234,7 +263,6 @@ def _record(run: _Run, cause: Cause, *, integrator: str) -> Simulation:
     facts = _facts(run, cause, time, np.abs(seen))
     outcome = outcome_of(facts)
     settled = outcome is Outcome.SETTLED
-    gas_times = [injection.operation.duration for injection in run.injections]
     return Simulation(
         balancer="liquid_ring",
         law=run.plant.model.name,
@@ -253,7 +281,8 @@ def _record(run: _Run, cause: Cause, *, integrator: str) -> Simulation:
         misadjustments=misadjustments(run.samples, floor=run.floor),
         noise_floor=run.floor,
         limit=run.scene.controller.limit,
-        terms=terms(scene=run.scene, model=run.plant.model, integrator=integrator, gas_times=gas_times),
+        energy=math.fsum(injection.operation.energy for injection in facts.injections),
+        terms=terms(scene=run.scene, model=run.plant.model, integrator=integrator, chosen=chosen),
     )
 
 

@@ -57,6 +57,7 @@ def _parts(simulation: Simulation) -> Iterable[RenderableType]:
     yield _amplitude(simulation)
     if simulation.injections:
         yield _injections(simulation.injections)
+    yield _terms(simulation)
 
 
 def _summary(simulation: Simulation) -> Table:
@@ -71,6 +72,7 @@ def _summary(simulation: Simulation) -> Table:
         ("amplitude", f"{_um(simulation.amplitude[0])} -> {_um(simulation.amplitude[-1])}"),
         ("limit", _um(simulation.limit)),
         ("gas time", f"{_gas_time(simulation):.3f} s in {len(simulation.injections)} injections"),
+        ("gas energy", f"{simulation.energy:.4g} J"),
         ("overshoots", str(simulation.overshoots)),
         ("misadjustments", str(simulation.misadjustments)),
         ("fill ratios", "  ".join(f"{letter} {fill:.4f}" for letter, fill in last.items())),
@@ -109,6 +111,15 @@ def _injections(injections: tuple[Injection, ...]) -> Table:
         )
     if len(injections) > MOST_INJECTIONS:
         table.caption = f"and {len(injections) - MOST_INJECTIONS} more: see --json"
+    return table
+
+
+def _terms(simulation: Simulation) -> Table:
+    table = Table(title="terms", title_justify="left")
+    for name in ("term", "model", "why"):
+        table.add_column(name)
+    for term in simulation.terms:
+        table.add_row(term.term, term.model, term.why)
     return table
 
 

@@ -88,5 +88,7 @@ class Simulation:
     """m."""
     limit: float
     """m."""
+    energy: float
+    """Work of the driving gas against the surroundings over all injections, J."""
     terms: tuple[Term, ...]
     """Physical terms modelled and left out."""

@@ -1,22 +1,112 @@
-"""Which physical terms a run holds, which it leaves out, and what leaving them out is worth."""
+"""Which physical terms a run models beyond its flow law, which it leaves out, and why.
+
+Each is estimated before the run, as a share of a first operation's gas time; the scene's tolerance decides.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from typing import Final
 
-from ringbalance.reduced_model.ladder import LEFT_OUT, Term
+from ringbalance.controller.dynamic_column import column_of
+from ringbalance.controller.dynamic_gas import HEAT_CAPACITY_RATIO, VENTED, GasLine
+from ringbalance.controller.dynamic_motion import Dynamics
+from ringbalance.reduced_model.ladder import LEFT_OUT, NOT_MODELLED, Term
 from ringbalance.reduced_model.model import BalancerModel
-from ringbalance.reduced_model.transients import REFERENCE_PRESSURE, REFERENCE_TEMPERATURE
-from ringbalance.scene.models import Scene
+from ringbalance.reduced_model.paper_law import PaperLaw
+from ringbalance.reduced_model.transients import REFERENCE_PRESSURE, REFERENCE_TEMPERATURE, pulse_time
+from ringbalance.scene.models import Gas, Scene
 
 NO_PRESSURE: Final = 1.0
 """Gauge, Pa, below which there is no gas drive to speak of."""
+INERTIA: Final = "tube inertia"
+FILLING: Final = "gas filling"
+LAG: Final = "valve lag"
+MODELS: Final = {
+    INERTIA: "rho L du/dt of the liquid in the tube",
+    FILLING: "ISO 6358, isothermal",
+    LAG: "pure delay",
+}
+"""The terms that a run can model, and how."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """One term, before the run."""
+
+    term: str
+    time: float | None
+    """What it costs of an operation, s; None where the scene gives no basis for an estimate."""
+    share: float | None
+    """`time` over a first operation's gas time."""
+    modelled: bool
+    why: str
+
+
+def choices(
+    *, scene: Scene, model: BalancerModel, asked: Collection[str] | None = None
+) -> tuple[Choice, ...]:
+    """Decide which terms to model.
+
+    Args:
+        scene: the scene; its tolerance decides.
+        model: the balancer; a law that gives no forces can carry none of the terms.
+        asked: names of the terms to model instead, whatever the tolerance; None: as the tolerance asks.
+
+    Returns:
+        One choice for each term.
+
+    Raises:
+        ValueError: a term that is not known, or that the scene or the law gives no numbers for.
+    """
+    times = {
+        INERTIA: inertia_time(scene=scene, model=model),
+        FILLING: filling_time(scene=scene, model=model),
+        LAG: scene.gas.valve_lag,
+    }
+    for term in asked or ():
+        if term not in times:
+            raise ValueError(f"no term {term!r}; there are {', '.join(MODELS)}")
+        if times[term] is None or column_of(law=model.flow, tube=scene.tube) is None:
+            raise ValueError(f"{term} cannot be modelled: the scene or the law gives no numbers for it")
+    return tuple(_choice(scene, model, term, time, asked) for term, time in times.items())
+
+
+def dynamics_of(*, scene: Scene, model: BalancerModel, chosen: Sequence[Choice]) -> Dynamics | None:
+    """The plant's terms as chosen.
+
+    Args:
+        scene: the scene.
+        model: the balancer.
+        chosen: of `choices`.
+
+    Returns:
+        Dynamics; None when no term is modelled.
+    """
+    names = {choice.term for choice in chosen if choice.modelled}
+    line = _line(scene.gas) if FILLING in names else None
+    gas_off = 0.0 if line is None else VENTED * scene.gas.ambient_pressure
+    column = column_of(law=model.flow, tube=scene.tube, gas_off=gas_off)
+    if not names or column is None:
+        return None
+    return Dynamics(
+        column=column,
+        inertia=INERTIA in names,
+        line=line,
+        valve_lag=(scene.gas.valve_lag or 0.0) if LAG in names else 0.0,
+        gas_pressure=scene.gas.pressure,
+        ambient_pressure=scene.gas.ambient_pressure,
+        dead_volume=scene.gas.dead_volume or 0.0,
+        tube_area=model.tube_area,
+        chamber_volume=model.chamber_volume,
+        max_fill_ratio=model.flow.max_fill_ratio,
+    )
 
 
 def terms(
-    *, scene: Scene, model: BalancerModel, integrator: str, gas_times: Sequence[float]
+    *, scene: Scene, model: BalancerModel, integrator: str, chosen: Sequence[Choice]
 ) -> tuple[Term, ...]:
     """The terms of a run.
 
@@ -24,23 +114,23 @@ def terms(
         scene: the scene.
         model: the balancer.
         integrator: name of the integrator.
-        gas_times: s, of every injection of the run.
+        chosen: of `choices`.
 
     Returns:
-        Terms, those modelled first.
+        Terms.
     """
-    mean = math.fsum(gas_times) / len(gas_times) if gas_times else None
+    exact = "exact for this law" if integrator == "closed_form" else "holds for any law, with events"
+    carried = "fill, velocity and gas as one system" if any(c.modelled for c in chosen) else exact
     return (
         Term(term="tube flow", model=model.name, why="the law asked for", estimated_contribution=None),
         Term(
             term="operation in time",
             model=integrator.replace("_", " "),
-            why="exact for this law" if integrator == "closed_form" else "holds for any law, with events",
+            why=carried,
             estimated_contribution=None,
         ),
-        _left_out("tube inertia", inertia_time(scene=scene, model=model), mean),
-        _left_out("gas filling", filling_time(scene=scene, model=model), mean),
-        _left_out("valve lag", scene.gas.valve_lag, mean),
+        *(_term(choice) for choice in chosen),
+        _held(scene, model),
     )
 
 
@@ -65,7 +155,7 @@ def inertia_time(*, scene: Scene, model: BalancerModel) -> float | None:
 
 
 def filling_time(*, scene: Scene, model: BalancerModel) -> float | None:
-    """Time in which choked flow fills a chamber at level fills, t = V_gas p/(C p_1 p_0) sqrt(T/T_0).
+    """Time in which choked flow fills a chamber at level fills, t = V_gas p/(C p_1 p_0) sqrt(T_0/T).
 
     Args:
         scene: the scene.
@@ -74,8 +164,8 @@ def filling_time(*, scene: Scene, model: BalancerModel) -> float | None:
     Returns:
         s; None when the scene gives no conductance.
 
-    Source: ISO 6358-1, volume flow at reference conditions C p_1 sqrt(T_0/T), with the upstream pressure p_1
-        taken as the chamber's final one and p_0 = 100 kPa.
+    Source: ISO 6358-1, mass flow C rho_0 p_1 sqrt(T_0/T), with the supply's pressure p_1 and p_0 = 100 kPa;
+        isothermal gas.
     """
     gas = scene.gas
     if gas.conductance is None:
@@ -86,12 +176,76 @@ def filling_time(*, scene: Scene, model: BalancerModel) -> float | None:
     return volume * gas.pressure * warm / (gas.conductance * upstream * REFERENCE_PRESSURE)
 
 
-def _left_out(term: str, time: float | None, mean: float | None) -> Term:
+def _line(gas: Gas) -> GasLine | None:
+    if gas.conductance is None or gas.critical_ratio is None:
+        return None
+    return GasLine(
+        supply_pressure=gas.pressure + gas.ambient_pressure,
+        ambient_pressure=gas.ambient_pressure,
+        temperature=gas.temperature,
+        conductance=gas.conductance,
+        critical_ratio=gas.critical_ratio,
+    )
+
+
+def _choice(
+    scene: Scene, model: BalancerModel, term: str, time: float | None, asked: Collection[str] | None
+) -> Choice:
     if time is None:
-        why = "the scene gives no basis for an estimate"
-    elif mean is None:
-        why = f"costs about {time * 1e3:.3g} ms of an operation; there was none"
-    else:
-        why = f"costs about {time * 1e3:.3g} ms of an operation of {mean * 1e3:.3g} ms on average"
-    share = None if time is None or mean is None else time / mean
-    return Term(term=term, model=LEFT_OUT, why=why, estimated_contribution=share)
+        told = "the scene gives no basis for an estimate"
+        return Choice(term=term, time=None, share=None, modelled=False, why=told)
+    pulse = pulse_time(scene)
+    share = time / pulse
+    above = share > scene.tolerance
+    told = (
+        f"costs about {time * 1e3:.3g} ms of a first gas time of {pulse * 1e3:.3g} ms; "
+        f"{_against(share, scene.tolerance)}"
+    )
+    if asked is not None:
+        return Choice(
+            term=term, time=time, share=share, modelled=term in asked, why=f"{told}; the caller's choice"
+        )
+    reason = _out_of_reach(term, model, scene)
+    modelled = above and not reason
+    more = f"; {reason}" if above and reason else _told_more(term, time) if modelled else ""
+    return Choice(term=term, time=time, share=share, modelled=modelled, why=told + more)
+
+
+def _against(share: float, tolerance: float) -> str:
+    side = "above" if share > tolerance else "below"
+    return f"{100 * share:.2g} % is {side} the tolerance of {100 * tolerance:.2g} %"
+
+
+def _out_of_reach(term: str, model: BalancerModel, scene: Scene) -> str:
+    """Why a term cannot be modelled under a law; empty when it can."""
+    if column_of(law=model.flow, tube=scene.tube) is None:
+        return "this law gives velocities and no forces"
+    if term == INERTIA and isinstance(model.flow, PaperLaw):
+        return "the paper's law has no mass in the tube"
+    return ""
+
+
+def _told_more(term: str, time: float) -> str:
+    if term != FILLING:
+        return ""
+    sooner = 1e3 * time * (1 - 1 / HEAT_CAPACITY_RATIO)
+    return f"; without heat from the walls it would take up to {sooner:.3g} ms less"
+
+
+def _term(choice: Choice) -> Term:
+    model = MODELS[choice.term] if choice.modelled else LEFT_OUT
+    if not choice.modelled and "; this law" in choice.why:
+        model = NOT_MODELLED
+    return Term(term=choice.term, model=model, why=choice.why, estimated_contribution=choice.share)
+
+
+def _held(scene: Scene, model: BalancerModel) -> Term:
+    """Liquid that fills the tube only while it flows."""
+    share = model.tube_area * scene.tube.length / (model.chamber_volume * scene.disc.initial_fill)
+    above = share > scene.tolerance
+    return Term(
+        term="liquid held in the tube",
+        model=NOT_MODELLED if above else LEFT_OUT,
+        why=f"at most S L over a chamber's liquid at the start; {_against(share, scene.tolerance)}",
+        estimated_contribution=share,
+    )

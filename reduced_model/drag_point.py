@@ -62,6 +62,8 @@ class DragPoint:
     """Whether a primed tube flows: only there have the numbers a meaning."""
     torn: BoolArray
     """Whether that flow is separated; where `regime` is blocked, of the primed tube."""
+    tearing: FloatArray
+    """ln of the full siphon's velocity over that of a torn column: positive where torn; without a hump -1."""
     velocity: FloatArray
     """u, m/s; where blocked, that of a primed tube."""
     velocity_uncertainty: FloatArray
@@ -114,7 +116,8 @@ def drag_point(*, scene: Scene, law: CalibratedLaw, tube: Tube, charge: Charge) 
     Source: Eqs. 13 to 18 of the liquid-ring paper, extended to the tube's hump; as `directed_flow`.
     """
     drive = _drive(law, charge)
-    speed, torn = _velocity(scene, tube, charge, drive)
+    speed, tearing = _velocity(scene, tube, charge, drive)
+    torn = np.asarray(drive.runs & (tearing > 0))
     shown = np.where(drive.runs, speed, 1.0)
     state = _state(scene, tube, charge, shown)
     parts = _parts(scene, tube, charge, shown, state)
@@ -132,6 +135,7 @@ def drag_point(*, scene: Scene, law: CalibratedLaw, tube: Tube, charge: Charge) 
         regime=np.asarray(np.where(drive.starts, flows, Regime.BLOCKED), dtype=np.int64),
         runs=drive.runs,
         torn=torn,
+        tearing=kept(tearing),
         velocity=kept(speed),
         velocity_uncertainty=kept(of_velocity),
         k=kept(k),
@@ -203,8 +207,8 @@ def _torn_factor(tube: Tube, state: TubeState) -> FloatArray:
     return np.asarray(state.kinetic_factor + upstream_loss(tube=tube, state=state), dtype=np.float64)
 
 
-def _velocity(scene: Scene, tube: Tube, charge: Charge, drive: _Drive) -> tuple[FloatArray, BoolArray]:
-    """The smaller of siphon and torn velocity, and whether it is the torn one."""
+def _velocity(scene: Scene, tube: Tube, charge: Charge, drive: _Drive) -> tuple[FloatArray, FloatArray]:
+    """The smaller of siphon and torn velocity, and how much larger the siphon's is, as a logarithm."""
 
     def solved(head: FloatArray, factor: Callable[[Tube, TubeState], FloatArray]) -> FloatArray:
         def log_head(log_u: FloatArray) -> FloatArray:
@@ -216,9 +220,9 @@ def _velocity(scene: Scene, tube: Tube, charge: Charge, drive: _Drive) -> tuple[
 
     siphon = solved(drive.siphon, _siphon_factor)
     if drive.torn is None:
-        return siphon, np.zeros_like(drive.runs)
+        return siphon, np.full(siphon.shape, -1.0)
     torn = solved(drive.torn, _torn_factor)
-    return np.minimum(siphon, torn), np.asarray(drive.runs & (torn < siphon))
+    return np.minimum(siphon, torn), np.log(siphon / torn)
 
 
 def _inverse(function: Callable[[FloatArray], FloatArray], wanted: FloatArray) -> FloatArray:

@@ -10,9 +10,10 @@ from typing import Final
 
 from rich.console import Console
 
-from ringbalance.reports.evidence import Level, Progress
+from ringbalance.reports.evidence import Progress
 from ringbalance.reports.pictures import finish_drawing, start_drawing, stop_drawing, write_fields
 from ringbalance.reports.report import Report, move_into_place, staging, write_report
+from ringbalance.reports.section import Level
 from ringbalance.reports.summary import lead_sentence, loop_sentence
 from ringbalance.scene import liquid_ring_scene, load_scene
 

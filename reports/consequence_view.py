@@ -20,6 +20,7 @@ from ringbalance.reports.figure_style import (
 )
 from ringbalance.reports.numbers import MISSING, number, percent, short
 from ringbalance.reports.prose import typeset
+from ringbalance.reports.section import Section
 from ringbalance.reports.units import shown
 
 Record = dict[str, Any]
@@ -159,3 +160,10 @@ def gain_margin(gain: Record) -> Drawing:
         caption="How much gain the loop bears, over the drag coefficient the tube really has. Lines: one "
         "operation takes away once and twice the residual. Dots: by simulation.",
     )
+
+
+SECTION: Final = Section(
+    name="consequences",
+    title="What a wrong k costs",
+    view=lambda evidence: consequence_view(evidence.get("consequences")),
+)

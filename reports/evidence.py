@@ -12,7 +12,7 @@ from dataclasses import asdict
 from datetime import date
 from importlib.metadata import PackageNotFoundError, version
 from types import MappingProxyType
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import numpy as np
 
@@ -28,13 +28,14 @@ from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.flow_law import FlowLaw, Regime
 from ringbalance.reduced_model.paper_law import paper_model
 from ringbalance.reports.fields import chamber_field, mesh_record, pressure_profile
+from ringbalance.reports.section import Level, Work
+from ringbalance.reports.sections import collected
 from ringbalance.scene import Scene, scene_table
 from ringbalance.verification import paper_numbers
 from ringbalance.verification.document import merge_saved, results_document
 from ringbalance.verification.runner import run_cases
 
 Record = dict[str, Any]
-Level = Literal["light", "heavy"]
 Progress = Callable[[str], None]
 
 FORMAT: Final = 1
@@ -93,6 +94,8 @@ def collect_evidence(
     runs = _closed_loop(scene, calibration)
     tell("consequences")
     consequences = consequences_document(find_consequences(scene, calibration.model, members=MEMBERS[level]))
+    tell("sections")
+    sections = collected(Work(scene=scene, calibration=calibration, level=level))
     tell("verification")
     cases = _verification(scene, level, saved, workers, tell)
     return {
@@ -109,6 +112,7 @@ def collect_evidence(
         "flow_law": _flow_law(scene, calibration),
         "closed_loop": runs,
         "consequences": consequences,
+        **sections,
         "verification": cases,
         "pictures": {"drawn": False, "text": "The 3-D pictures were not asked for.", "files": []},
         "times": {"date": date.today().isoformat()},

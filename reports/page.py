@@ -5,11 +5,10 @@ from __future__ import annotations
 import base64
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 from ringbalance.reports import summary
 from ringbalance.reports.case_view import case_view
-from ringbalance.reports.consequence_view import consequence_view
 from ringbalance.reports.equations import equation_svg, equations
 from ringbalance.reports.figure_style import Drawing
 from ringbalance.reports.figures import page_figures
@@ -23,23 +22,9 @@ from ringbalance.reports.page_tables import (
     scene_groups,
     version_facts,
 )
+from ringbalance.reports.sections import drawings_in, viewed
 
 Record = dict[str, Any]
-
-CONTENTS: Final = (
-    ("summary", "In short"),
-    ("disc", "The disc and its liquid"),
-    ("pressure", "Pressure of the liquid"),
-    ("moment", "Balancing moment and λ"),
-    ("tube", "The connecting tube"),
-    ("law", "The flow law"),
-    ("loop", "The closed loop"),
-    ("consequences", "What a wrong k costs"),
-    ("claims", "Claims of the paper"),
-    ("numerics", "Numerical verification"),
-    ("models", "Models used, and why"),
-    ("scene", "Scene and provenance"),
-)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,12 +55,11 @@ def page_content(evidence: Record, *, pictures: Mapping[str, bytes] | None = Non
     ]
     checks = [case_view(case) for case in summary.checks(evidence)]
     figures = page_figures(evidence)
-    consequences = consequence_view(evidence.get("consequences"))
-    absent = () if consequences else ("consequences",)
+    sections = viewed(evidence)
     calibration, runs = evidence["calibration"], evidence["closed_loop"]
     context = {
         "scene": evidence["scene"],
-        "contents": [{"id": name, "title": title} for name, title in CONTENTS if name not in absent],
+        "sections": sections,
         "stamp": _stamp(evidence),
         "summary": _summary(evidence, claims),
         "equations": _equations(),
@@ -85,7 +69,6 @@ def page_content(evidence: Record, *, pictures: Mapping[str, bytes] | None = Non
         "drag_at": drag_table(calibration["tube"], evidence["operating_point"]),
         "injections": operation_tables(runs.get("calibrated")),
         "loop_notes": loop_notes(runs),
-        "consequences": consequences,
         "claims": claims,
         "checks": checks,
         "order_plots": [case["order_plot"] for case in checks if case["order_plot"]],
@@ -95,21 +78,12 @@ def page_content(evidence: Record, *, pictures: Mapping[str, bytes] | None = Non
         "version_facts": version_facts(evidence),
         "product": f"ringbalance {evidence['versions']['ringbalance']}",
     }
-    return PageContent(
-        context=context,
-        drawings=tuple(
-            _every_drawing({**figures, "gain_margin": (consequences or {}).get("figure")}, [*claims, *checks])
-        ),
-    )
+    drawings = drawings_in([figures, sections, *(_own_drawings(case) for case in (*claims, *checks))])
+    return PageContent(context=context, drawings=tuple(drawings))
 
 
-def _every_drawing(figures: Record, cases: list[Record]) -> list[Drawing]:
-    found: list[Drawing] = []
-    for entry in figures.values():
-        found.extend(entry if isinstance(entry, list) else [entry] if entry else [])
-    for case in cases:
-        found.extend([*([case["order_plot"]] if case["order_plot"] else []), *case["drawings"]])
-    return found
+def _own_drawings(case: Record) -> list[Record]:
+    return [case["order_plot"], *case["drawings"]]
 
 
 def _stamp(evidence: Record) -> list[Record]:
@@ -149,7 +123,7 @@ def _data_address(content: bytes) -> str:
 
 def _pictures(record: Record, contents: Mapping[str, bytes]) -> Record:
     """Pictures by name, with their bytes; one that lacks a variant is left out."""
-    shown_pictures: Record = {"text": record["text"], "disc": None, "pressure": None}
+    shown_pictures: Record = {"text": record["text"], "disc": None, "pressure": None, "tube": None}
     for item in record["files"]:
         if item["light"] in contents and item["dark"] in contents:
             variants = {key: _data_address(contents[item[key]]) for key in ("light", "dark")}

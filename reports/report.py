@@ -12,13 +12,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ringbalance.reports.evidence import Level, Progress, collect_evidence
+from ringbalance.reports.evidence import Progress, collect_evidence
 from ringbalance.reports.figure_style import standalone
 from ringbalance.reports.opengl import OpenGL
 from ringbalance.reports.page import page_content
 from ringbalance.reports.pictures import finish_drawing, start_drawing, stop_drawing, write_fields
 from ringbalance.reports.render import render_page
 from ringbalance.reports.saved import saved_cases
+from ringbalance.reports.section import Level
 from ringbalance.scene import AnyScene, liquid_ring_scene
 
 Record = dict[str, Any]

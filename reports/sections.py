@@ -1,0 +1,76 @@
+"""The sections of the report in the page's order.
+
+A new one is a module with its `SECTION`, a template of its name, and a line in `SECTIONS`.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from ringbalance.reports import consequence_view, fifty
+from ringbalance.reports.figure_style import Drawing
+from ringbalance.reports.section import Record, Section, Work
+
+SECTIONS: Final[tuple[Section, ...]] = (
+    Section(name="summary", title="In short"),
+    Section(name="disc", title="The disc and its liquid"),
+    Section(name="pressure", title="Pressure of the liquid"),
+    Section(name="moment", title="Balancing moment and λ"),
+    Section(name="tube", title="The connecting tube"),
+    Section(name="law", title="The flow law"),
+    fifty.SECTION,
+    Section(name="loop", title="The closed loop"),
+    consequence_view.SECTION,
+    Section(name="claims", title="Claims of the paper"),
+    Section(name="numerics", title="Numerical verification"),
+    Section(name="models", title="Models used, and why"),
+    Section(name="scene", title="Scene and provenance"),
+)
+
+
+def collected(work: Work) -> Record:
+    """The evidence of every section that has some of its own.
+
+    Args:
+        work: scene, calibration and level.
+
+    Returns:
+        Records by section name.
+    """
+    found = {section.name: section.collect(work) for section in SECTIONS}
+    return {name: record for name, record in found.items() if record is not None}
+
+
+def viewed(evidence: Record) -> list[Record]:
+    """What each section shows, in the page's order, without those that have nothing to show.
+
+    Args:
+        evidence: the document of `collect_evidence`.
+
+    Returns:
+        `name`, `title`, `template` and `view` of each.
+    """
+    views = [(section, section.view(evidence)) for section in SECTIONS]
+    return [
+        {"name": s.name, "title": s.title, "template": s.template, "view": view}
+        for s, view in views
+        if view is not None
+    ]
+
+
+def drawings_in(content: Any) -> list[Drawing]:
+    """Every drawing within nested records and lists, in their order.
+
+    Args:
+        content: of a view.
+
+    Returns:
+        Drawings.
+    """
+    if isinstance(content, Drawing):
+        return [content]
+    if isinstance(content, dict):
+        return [drawing for value in content.values() for drawing in drawings_in(value)]
+    if isinstance(content, list | tuple):
+        return [drawing for value in content for drawing in drawings_in(value)]
+    return []

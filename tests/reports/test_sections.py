@@ -1,0 +1,102 @@
+"""Sections of the report: one list makes contents, page, evidence and figure files."""
+
+from __future__ import annotations
+
+import json
+import re
+from importlib.resources import files
+from typing import Any
+
+import pytest
+
+from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reports import fifty
+from ringbalance.reports.figure_style import Drawing
+from ringbalance.reports.render import render
+from ringbalance.reports.section import Section, Work
+from ringbalance.reports.sections import SECTIONS, drawings_in, viewed
+from ringbalance.scene.models import Scene
+
+Record = dict[str, Any]
+
+
+def test_every_section_has_its_template_and_nothing_else_lies_there() -> None:
+    folder = files("ringbalance.reports").joinpath("templates")
+    present = {item.name for item in folder.iterdir() if item.name.endswith(".html")}
+    assert present == {section.template for section in SECTIONS} | {"report.html", "macros.html"}
+
+
+def test_every_template_is_the_section_of_its_name() -> None:
+    for section in SECTIONS:
+        text = files("ringbalance.reports").joinpath("templates", section.template).read_text()
+        assert re.match(rf'<section id="{section.name}"', text), section.name
+
+
+def test_the_contents_follow_the_list(page: str, whole: Record) -> None:
+    links = re.findall(r'<li><a href="#(\w+)">', page)
+    assert links == [entry["name"] for entry in viewed(whole)]
+    assert links[0] == "summary"
+    places = [page.index(f'<section id="{name}"') for name in links]
+    assert places == sorted(places)
+
+
+def test_a_section_without_evidence_stays_away(page: str) -> None:
+    assert 'id="fifty"' not in page
+
+
+def test_drawings_are_found_however_deep() -> None:
+    one, two = (Drawing(name=name, svg="", alt="", caption="") for name in "ab")
+    assert drawings_in({"x": [one, {"y": (two, None, "text")}], "z": 3}) == [one, two]
+
+
+def test_a_plain_section_needs_no_functions() -> None:
+    plain = Section(name="plain", title="Plain")
+    assert plain.template == "plain.html"
+    assert plain.view({}) == {}
+
+
+@pytest.fixture(scope="module")
+def work(paper_scene: Scene) -> Work:
+    return Work(scene=paper_scene, calibration=calibrate(paper_scene), level="light")
+
+
+def with_section(evidence: Record, name: str, record: Record | None) -> Record:
+    """The evidence as it reads back from its file."""
+    return {**evidence, name: json.loads(json.dumps(record, allow_nan=False))}
+
+
+@pytest.fixture(scope="module")
+def fifty_record(work: Work) -> Record:
+    return fifty.collect(work)
+
+
+def test_the_page_on_fifty_says_what_the_map_says(evidence: Record, fifty_record: Record) -> None:
+    view = fifty.view(with_section(evidence, "fifty", fifty_record))
+    assert view is not None
+    rows = {row["name"]: row for row in view["rows"]}
+    assert rows["water"]["verdict"] == "too high"
+    assert rows["silicone oil 100 cSt"]["verdict"] == "too low"
+    assert rows["gallium"]["needs"]
+    assert {drawing.name for drawing in drawings_in(view)} == {"fifty-map", "fifty-apparent"}
+    page = render(with_section(evidence, "fifty", fifty_record))
+    assert page.count('href="#fifty"') == 1
+    assert "gallium needs" in page
+
+
+def test_where_nothing_flows_the_page_says_so(evidence: Record, fifty_record: Record) -> None:
+    dry = json.loads(json.dumps(fifty_record))
+    dry["map"]["runs"] = False
+    dry["apparent"] = None
+    for record in dry["liquids"]:
+        record["runs"] = False
+    view = fifty.view({**evidence, "fifty": dry})
+    assert view is not None
+    assert view["map"] is None
+    assert {row["verdict"] for row in view["rows"]} == {"nothing flows"}
+    assert "there is no map to draw" in render({**evidence, "fifty": dry})
+
+
+def test_the_velocity_decides_whether_fifty_is_right() -> None:
+    record = {"runs": True, "velocity_m_s": 5.0, "velocity_uncertainty": 0.5}
+    for paper, verdict in ((5.4, "right"), (4.6, "right"), (5.6, "too low"), (4.4, "too high")):
+        assert fifty.verdict_on_fifty({**record, "velocity_paper_m_s": paper}) == verdict

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from fluids.friction import helical_turbulent_fd_Mori_Nakayama
 from numpy.polynomial import chebyshev
 from scipy.linalg import solve, toeplitz
 
 from ringbalance.physics.tube_rotation import (
     critical_reynolds,
+    curved_friction_ratio,
     rotating_friction_ratio,
     rotation_in_range,
     turbulent_friction_ratio,
@@ -182,6 +184,30 @@ def test_literature_turbulent_formula_of_ito_and_nanbu() -> None:
         assert float(found.value) == pytest.approx(expected, rel=1e-3)
     below = turbulent_friction_ratio(reynolds=1e5, rotation_reynolds=10.0)
     assert float(below.value) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_literature_curved_tube_of_mori_and_nakayama() -> None:
+    re, ratio_of_diameters = 2e4, 0.05
+    published = helical_turbulent_fd_Mori_Nakayama(re, 1.0, 1 / ratio_of_diameters)
+    found = float(curved_friction_ratio(curvature_number=re * ratio_of_diameters**2))
+    assert found == pytest.approx(published / (0.3164 * re**-0.25), rel=1e-9)
+
+
+def test_turbulent_half_width_reaches_from_no_effect_to_the_curved_tube() -> None:
+    re, kt = 2e4, np.geomspace(0.01, 1e6, 60)
+    found = turbulent_friction_ratio(reynolds=re, rotation_reynolds=np.sqrt(kt * re))
+    low, high = found.value - found.uncertainty, found.value + found.uncertainty
+    for other in (
+        1.0,
+        curved_friction_ratio(curvature_number=kt),
+        curved_friction_ratio(curvature_number=kt / 4),
+    ):
+        assert np.all((low <= other + 1e-12) & (high >= other - 1e-12))
+    # The recalled formula lies near the analogy, which shares nothing with it but the physics.
+    strong = kt > 10
+    assert np.max(np.abs(found.value / curved_friction_ratio(curvature_number=kt / 4) - 1)[strong]) < 0.06
+    assert np.max((found.uncertainty / (found.value - 1))[strong]) < 1.5
+    assert float(turbulent_friction_ratio(reynolds=1e4, rotation_reynolds=0.0).uncertainty) == 0.0
 
 
 def test_range_ends_where_the_solutions_end() -> None:

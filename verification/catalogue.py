@@ -31,6 +31,7 @@ from ringbalance.verification.cases.claim_19_denser_liquid import case as claim_
 from ringbalance.verification.cases.claim_20_rectangular_element import case as claim_20_rectangular_element
 from ringbalance.verification.cases.conservation import case as conservation
 from ringbalance.verification.cases.coverage import case as coverage
+from ringbalance.verification.cases.extremes import case as extremes
 from ringbalance.verification.cases.friction_blend import case as friction_blend
 from ringbalance.verification.cases.gci_behaviour import case as gci_behaviour
 from ringbalance.verification.cases.gci_celik2008 import case as gci_celik2008
@@ -62,6 +63,7 @@ _CODE: Mapping[str, CaseCode] = {
     "friction_blend": friction_blend,
     "mixing_length": mixing_length,
     "coverage": coverage,
+    "extremes": extremes,
     "claim_01_volume": claim_01_volume,
     "claim_02_ring_radius": claim_02_ring_radius,
     "claim_03_chamber_moment": claim_03_chamber_moment,

@@ -1,0 +1,191 @@
+"""The extremes: the designed set, the scene files of its points, and a judgement that can fail."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ringbalance.scene import bundled_scene
+from ringbalance.scene.loader import scene_from
+from ringbalance.scene.models import Scene
+from ringbalance.verification import extremes_design, extremes_point
+from ringbalance.verification.extremes import Size, broken, extremes_document, find_extremes
+from ringbalance.verification.extremes_axes import AXES, axis_of, toml_bytes, varied
+from ringbalance.verification.extremes_design import CHUNK, Base, Point, design, judge, judged
+from ringbalance.verification.extremes_maps import Sweep
+from ringbalance.verification.extremes_point import Defect, Ending, Judgement, judge_point
+
+
+@pytest.fixture(scope="module")
+def document() -> dict[str, Any]:
+    text = bundled_scene("liquid_ring_paper").read_text(encoding="utf-8")
+    found = tomllib.loads(text)
+    found["run"]["time_limit"] = "3 s"
+    return found
+
+
+@pytest.fixture(scope="module")
+def base(document: dict[str, Any]) -> Base:
+    return Base(document=document, file="disc.toml")
+
+
+def made(document: dict[str, Any], scene: Scene, **values: float) -> Scene:
+    found = scene_from(content=toml_bytes(varied(document, scene=scene, values=values)), file="disc.toml")
+    assert isinstance(found, Scene)
+    return found
+
+
+def test_a_document_survives_the_way_through_a_file(document: dict[str, Any]) -> None:
+    assert tomllib.loads(toml_bytes(document).decode()) == document
+
+
+def test_the_designed_set_is_reproducible_and_grows_at_its_end() -> None:
+    assert design(count=30, seed=1) == design(count=100, seed=1)[:30]
+    assert design(count=30, seed=1) != design(count=30, seed=2)
+
+
+def test_the_designed_set_reaches_both_ends_of_every_axis() -> None:
+    points = design(count=2000, seed=1)
+    for axis in AXES:
+        shares = np.array(
+            [axis.share(p[axis.name]) if axis.low or axis.spacing == "linear" else 0 for p in points]
+        )
+        assert shares.min() >= -1e-12
+        assert shares.max() <= 1 + 1e-12
+        assert shares.min() < 0.05
+        assert shares.max() > 0.95
+
+
+def test_each_axis_sets_what_it_says(document: dict[str, Any], paper_scene: Scene) -> None:
+    scene = made(
+        document,
+        paper_scene,
+        speed=3000.0,
+        fill=0.4,
+        angle=100.0,
+        plate=0.25,
+        viscosity=2e-5,
+        bore=2.0,
+        roughness=0.01,
+        pressure=1.5,
+        gain=0.5,
+        noise=0.1,
+        period=0.7,
+        tolerance=1e-3,
+    )
+    closing = paper_scene.disc.inner_radius * np.sin(np.radians(50))
+    column = 1000 * scene.rotor.speed**2 * (44.5e-3**2 - 31.5e-3**2) / 2
+    assert scene.rotor.speed == pytest.approx(100 * np.pi)
+    assert (scene.disc.max_fill_ratio, scene.disc.initial_fill, scene.disc.chambers) == (0.4, 0.2, 2)
+    assert scene.disc.central_angle == pytest.approx(np.radians(100))
+    assert scene.disc.plate_thickness == pytest.approx(0.25 * closing)
+    assert scene.liquid.kinematic_viscosity == pytest.approx(2e-5)
+    assert scene.liquid.density == pytest.approx(paper_scene.liquid.density)
+    assert (scene.tube.bore, scene.tube.roughness) == (pytest.approx(2e-3), pytest.approx(2e-5))
+    assert scene.gas.pressure == pytest.approx(1.5 * column)
+    assert scene.controller.proportional == pytest.approx(0.5 * paper_scene.controller.proportional)
+    assert scene.sensor.amplitude_noise == pytest.approx(0.1 * paper_scene.controller.limit)
+    assert (scene.controller.period, scene.tolerance) == (pytest.approx(0.7), pytest.approx(1e-3))
+
+
+def test_the_papers_scene_is_solved(document: dict[str, Any]) -> None:
+    found = judge_point(document)
+    assert found.ending is Ending.SOLVED
+    assert found.violations == ()
+    assert 0 < found.worst_ratio <= 1
+    assert 0 < found.residual < 1e-10
+
+
+def test_a_rotor_without_a_ring_is_refused_by_name(document: dict[str, Any], paper_scene: Scene) -> None:
+    found = judge_point(varied(document, scene=paper_scene, values={"speed": 10.0}))
+    assert found.ending is Ending.REFUSED
+    assert "[rotor] speed" in found.text
+    assert found.violations == ()
+
+
+def test_half_widths_too_small_and_lost_liquid_are_noticed(document: dict[str, Any]) -> None:
+    narrow = judge_point(document, defect=Defect(width_factor=0.01))
+    leaking = judge_point(document, defect=Defect(leak=1e-6))
+    assert narrow.ending is leaking.ending is Ending.BROKEN
+    assert "half-width" in narrow.violations[0]
+    assert "not conserved" in leaking.violations[0]
+
+
+def test_an_exception_is_a_finding(document: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: object) -> None:
+        raise ZeroDivisionError("by accident")
+
+    monkeypatch.setattr(extremes_point, "calibrate", fails)
+    found = judge_point(document)
+    assert found.ending is Ending.BROKEN
+    assert found.violations == ("exception ZeroDivisionError: by accident",)
+
+
+@pytest.fixture
+def counting(monkeypatch: pytest.MonkeyPatch) -> list[Point]:
+    """Replaces the judgement by one that takes no time and remembers its points."""
+    seen: list[Point] = []
+
+    def quick(_: Base, point: Point) -> Judgement:
+        seen.append(point)
+        good = 300 < point.get("speed", 1000.0) < 2e4
+        return Judgement(ending=Ending.SOLVED if good else Ending.REFUSED, text="" if good else "too fast")
+
+    monkeypatch.setattr(extremes_design, "judge", quick)
+    return seen
+
+
+def test_an_interrupted_set_goes_on_where_it_stopped(
+    base: Base, tmp_path: Path, counting: list[Point]
+) -> None:
+    points, kept = design(count=3 * CHUNK, seed=1), tmp_path / "kept.json"
+    first = judged(base, points[: 2 * CHUNK], kept=kept)
+    whole = judged(base, points, kept=kept)
+    assert len(counting) == 3 * CHUNK
+    assert whole[: 2 * CHUNK] == first
+    assert judged(base, points) == whole
+
+
+def test_judgements_of_another_scene_are_not_taken(base: Base, tmp_path: Path, counting: list[Point]) -> None:
+    points, kept = design(count=CHUNK, seed=1), tmp_path / "kept.json"
+    judged(base, points, kept=kept)
+    judged(replace(base, document={**base.document, "name": "another"}), points, kept=kept)
+    assert len(counting) == 2 * CHUNK
+
+
+def test_everything_is_told(base: Base, counting: list[Point]) -> None:
+    size = Size(points=10, sweep=5, grid=3)
+    found = find_extremes(base, size=size)
+    told = extremes_document(found)
+    assert len(counting) == told["judged"] == 10 + 5 * len(AXES) + 9 * len(found.maps)
+    assert broken(found) == 0
+    assert sum(told["endings"].values()) == told["judged"]
+    json.dumps(told, allow_nan=False)
+
+
+@pytest.mark.usefixtures("counting")
+def test_a_sweep_tells_where_answers_end(base: Base) -> None:
+    found = find_extremes(base, size=Size(points=1, sweep=11, grid=2)).sweeps[0]
+    assert isinstance(found, Sweep)
+    speeds = axis_of("speed").at(np.linspace(0, 1, 11))
+    inside = speeds[(speeds > 300) & (speeds < 2e4)]
+    assert found.solved() == (pytest.approx(inside[0]), pytest.approx(inside[-1]))
+    assert found.beyond() == ("too fast",)
+
+
+@pytest.mark.heavy
+def test_two_workers_find_what_one_finds(base: Base) -> None:
+    points = design(count=2 * CHUNK, seed=3)
+    assert judged(base, points, workers=2) == judged(base, points)
+
+
+def test_a_few_designed_points_hold(base: Base) -> None:
+    for point in design(count=4, seed=1):
+        found = judge(base, point)
+        assert found.violations == (), (found.text, dict(point))

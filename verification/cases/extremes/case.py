@@ -1,0 +1,111 @@
+"""The designed set, the axes and the maps of the extremes; a heavy run."""
+
+# ruff: noqa: ARG001 - every case answers to one interface
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from typing import Final
+
+from ringbalance.scene import bundled_scene
+from ringbalance.scene.models import Scene
+from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table
+from ringbalance.verification.extremes import (
+    SIZES,
+    Extremes,
+    Size,
+    broken,
+    counted,
+    find_extremes,
+)
+from ringbalance.verification.extremes_design import Base
+from ringbalance.verification.extremes_maps import StabilityMap
+from ringbalance.verification.extremes_point import SOUND, Defect, Ending
+
+_DEFECTS: Final = {
+    None: SOUND,
+    "half_widths_hundredth": Defect(width_factor=0.01),
+    "liquid_lost": Defect(leak=1e-6),
+}
+_FEW: Final = Size(points=40, sweep=2, grid=2)
+"""Enough for a mutation to show."""
+_WORKERS: Final = 2
+_PAPER: Final = "liquid_ring_paper"
+_NUMBERS: Final = {
+    "solved": Ending.SOLVED,
+    "wide": Ending.WIDE,
+    "status": Ending.STATUS,
+    "refused": Ending.REFUSED,
+}
+
+
+def reference(scene: Scene) -> Mapping[str, Reference]:
+    """No references: what must hold is its own.
+
+    Args:
+        scene: not used.
+
+    Returns:
+        Nothing.
+    """
+    return {}
+
+
+def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Judge every point.
+
+    Args:
+        scene: not used: the paper's file is varied.
+        level: "light" takes a few points.
+        defect: "half_widths_hundredth" or "liquid_lost".
+
+    Returns:
+        Evidence.
+    """
+    document = tomllib.loads(bundled_scene(_PAPER).read_text(encoding="utf-8"))
+    base = Base(document=document, file=f"{_PAPER}.toml", defect=_DEFECTS[defect])
+    found = find_extremes(base, size=SIZES[level] if defect is None else _FEW, workers=_WORKERS)
+    everything = found.everything
+    endings = counted(everything)
+    worst = max(j.worst_ratio for j in everything)
+    return Evidence(
+        found={"broken": Found(value=float(broken(found))), "worst": Found(value=worst)},
+        numbers={
+            "judged": float(len(everything)),
+            "points": float(len(found.points)),
+            "residual": max(j.residual for j in everything),
+            "worst": worst,
+            **{name: float(endings[str(ending)]) for name, ending in _NUMBERS.items()},
+        },
+        tables=(_axes_table(found), *(_map_table(item) for item in found.maps)),
+    )
+
+
+def _axes_table(found: Extremes) -> Table:
+    answered = [sweep.solved() or (0.0, 0.0) for sweep in found.sweeps]
+    return Table(
+        name="axes",
+        columns={
+            "axis": [sweep.axis.title for sweep in found.sweeps],
+            "unit": [sweep.axis.unit for sweep in found.sweeps],
+            "tried from": [sweep.axis.low for sweep in found.sweeps],
+            "tried to": [sweep.axis.high for sweep in found.sweeps],
+            "answered from": [low for low, _ in answered],
+            "answered to": [high for _, high in answered],
+            "beyond": ["; ".join(sweep.beyond()) for sweep in found.sweeps],
+        },
+    )
+
+
+def _map_table(item: StabilityMap) -> Table:
+    places = [(x, y) for y in item.y_values for x in item.x_values]
+    return Table(
+        name=f"map of {item.x.name} and {item.y.name}",
+        columns={
+            item.x.name: [float(x) for x, _ in places],
+            item.y.name: [float(y) for _, y in places],
+            "ending": [str(j.ending) for j in item.judgements],
+            "loop": [j.loop for j in item.judgements],
+        },
+        units={item.x.name: item.x.unit, item.y.name: item.y.unit},
+    )

@@ -2,8 +2,9 @@
 
 States are x of chamber 0, the velocity u out of it, pressure and content (m R) of the gas in chambers 0 and
 1, and the work of either gas.  x of chamber 1 is total - x, here as everywhere, so liquid is conserved.
-The liquid either rests or moves in one direction; what changes that ends a step: the column comes to rest or
-begins to move, tears, a chamber empties or is full, the level leaves the port, a valve moves.
+The liquid either rests or moves in one direction; what changes that ends a step: the column comes to rest,
+begins to move, tears or closes at the hump, a chamber empties or is full, its level leaves the port, or a
+valve moves.
 """
 
 from __future__ import annotations
@@ -95,6 +96,7 @@ class _Run:
         self.length = FIRST_STEP
         self.steps = 0
         self.ran_back = 0.0
+        self.torn = self._separated(self.state)
 
     def _gas_states(self, fill: float, motion: Motion) -> list[float]:
         """Pressure and content of either gas."""
@@ -198,6 +200,7 @@ class _Run:
             last = False
         self._ran_back(float(end[0] - self.state[0]))
         self.state = end
+        self.torn = self._separated(end)
         self.time = stop if last else self.time + length
 
     def _first_change(self, end: FloatArray, length: float) -> tuple[FloatArray, float]:
@@ -210,7 +213,6 @@ class _Run:
                 high, end = middle, found
             else:
                 low = middle
-        self.length = FIRST_STEP
         return end, high * length
 
     def _ran_back(self, change: float) -> None:
@@ -230,7 +232,9 @@ class _Run:
         return self.dynamics.column.steady(fills, gases, primed=primed)
 
     def _changes(self, state: FloatArray) -> bool:
-        return self._ends(state) is not None if self.direction else self._begins(state)
+        if not self.direction:
+            return self._begins(state)
+        return self._ends(state) is not None or self._separated(state) != self.torn
 
     def _begins(self, state: FloatArray) -> bool:
         """Whether resting liquid starts to flow, or its column tears."""
@@ -290,6 +294,7 @@ class _Run:
         if self.direction:
             self.primed = True
             self.length = FIRST_STEP
+            self.torn = self._separated(self.state)
             self._note(Event.NONE, self.direction)
 
     def _stop(self, event: Event) -> None:
@@ -304,6 +309,7 @@ class _Run:
         self.primed = not gone and self._found(self.state, primed=True).primed
         self.state[1] = 0.0
         self.direction = 0
+        self.length = FIRST_STEP
 
     def _flip(self) -> None:
         """The next pending valve moves."""
@@ -348,13 +354,16 @@ class _Run:
             self.record = replace(self.record, regime_end=self._regime())
 
     def _regime(self) -> Regime:
-        fills, gases = self._seen(self.state)
-        column = self.dynamics.column
-        if self.direction == 0 or self.direction != (1 if self.record.chamber == 0 else -1):
+        if self.direction != (1 if self.record.chamber == 0 else -1):
             return Regime.REVERSE
+        return Regime.SEPARATED if self._separated(self.state) else Regime.SIPHON
+
+    def _separated(self, state: FloatArray) -> bool:
+        """Whether moving liquid is torn at the hump."""
+        if not self.direction:
+            return False
+        fills, gases = self._seen(state)
+        column, speed = self.dynamics.column, max(float(state[1]) * self.direction, 0.0)
         if self.dynamics.inertia:
-            speed = abs(float(self.state[1]))
-            torn = column.separated(fills, gases, speed=speed, direction=self.direction)
-        else:
-            torn = column.steady(fills, gases, primed=True).separated
-        return Regime.SEPARATED if torn else Regime.SIPHON
+            return column.separated(fills, gases, speed=speed, direction=self.direction)
+        return column.steady(fills, gases, primed=True).separated

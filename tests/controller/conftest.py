@@ -11,7 +11,11 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from ringbalance.controller.dynamic_motion import Dynamics, Motion, Switch
+from ringbalance.controller.dynamic_passage import Passage, pass_time
+from ringbalance.controller.terms import choices, dynamics_of
 from ringbalance.controller.transfer import Drive
+from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.flow_law import Flow, Regime
 from ringbalance.reduced_model.model import BalancerModel
 from ringbalance.reduced_model.paper_law import paper_model
@@ -153,5 +157,41 @@ def drive_by(laws: Mapping[str, FunctionLaw]) -> Callable[..., Drive]:
     def make(name: str, **changes: Any) -> Drive:
         base = Drive(law=laws[name], fill=0.25, total=0.5, exchange_rate=0.02, gas_pressure=1e5, primed=False)
         return replace(base, **changes)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def calibrated(scene: models.Scene) -> BalancerModel:
+    """The same disc by its calibrated law, with the hump at 31.5 mm."""
+    return calibrate(scene).model
+
+
+@pytest.fixture(scope="session")
+def plant(scene: models.Scene) -> Callable[..., Dynamics]:
+    """Terms of a plant for a balancer, with changes to the scene's gas and tube."""
+
+    def make(model: BalancerModel, *terms: str, length: float | None = None, **gas: Any) -> Dynamics:
+        tube = replace(scene.tube, length=length or scene.tube.length)
+        own = replace(scene, tube=tube, gas=replace(scene.gas, **gas))
+        found = dynamics_of(scene=own, model=model, chosen=choices(scene=own, model=model, asked=terms))
+        assert found is not None
+        return found
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def pulse() -> Callable[..., Passage]:
+    """One opening of the valve of chamber 0 on a pair with half of a chamber's liquid."""
+
+    def make(
+        dynamics: Dynamics, duration: float, instants: FloatArray, *, fill: float = 0.25, **state: Any
+    ) -> Passage:
+        lag = dynamics.valve_lag
+        opens = Switch(after=lag, chamber=0, opens=True)
+        closes = Switch(after=lag + duration, chamber=0, opens=False)
+        given = {"motion": Motion(pending=(opens, closes)), "primed": False} | state
+        return pass_time(dynamics, fill=fill, total=0.5, instants=instants, **given)
 
     return make

@@ -1,0 +1,322 @@
+"""Whole operations with moving liquid, filling gas and late valves, and how their tails run on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy.integrate import solve_ivp
+
+from ringbalance.controller.dynamic_column import Column, column_of
+from ringbalance.controller.dynamic_motion import Dynamics
+from ringbalance.controller.dynamic_passage import Passage, pass_time
+from ringbalance.controller.dynamic_steps import step
+from ringbalance.controller.liquid_ring import LiquidRing, initial_state
+from ringbalance.controller.loop import simulate
+from ringbalance.controller.quadrature import quadrature
+from ringbalance.controller.transfer import Event
+from ringbalance.reduced_model.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.flow_law import Regime
+from ringbalance.reduced_model.model import BalancerModel
+from ringbalance.scene.models import Gas, Scene
+
+FloatArray = npt.NDArray[np.float64]
+Plant = Callable[..., Dynamics]
+Pulse = Callable[..., Passage]
+AMBIENT = 101325.0
+PIPED = {"conductance": 1e-8, "critical_ratio": 0.3}
+
+
+# --- lag, order, limits ---
+
+
+@pytest.mark.parametrize("law", ["paper", "calibrated"])
+def test_a_lag_is_an_exact_delay(
+    law: str, model: BalancerModel, calibrated: BalancerModel, plant: Plant, scene: Scene
+) -> None:
+    own = model if law == "paper" else calibrated
+    ring = LiquidRing(model=own, chambers=4, gas_pressure=0.7e6, integrator=quadrature)
+    start = initial_state(disc=scene.disc)
+    prompt = ring.advance(start, gas_times={0: 0.3}, duration=0.3, points=30)
+    late = replace(ring, dynamics=plant(own, "valve lag", valve_lag=0.04))
+    begun = late.advance(start, gas_times={0: 0.3}, duration=0.3, points=30)
+    found = late.advance(begun.state, gas_times={}, duration=0.04, points=4)
+    shifted = np.concatenate([begun.fill_ratio, found.fill_ratio], axis=1)
+    assert np.all(shifted[:, :4] == 0.25)
+    assert shifted[:, 4:] == pytest.approx(prompt.fill_ratio, abs=1e-11)
+    operation = late.concluded(found.state, begun.operations[0])
+    assert operation.fill_after == pytest.approx(prompt.operations[0].fill_after, abs=1e-11)
+    assert operation.energy == pytest.approx(prompt.operations[0].energy, rel=1e-9)
+    assert operation.regime_start is prompt.operations[0].regime_start
+    assert found.state.rests
+
+
+def test_the_step_is_of_order_five() -> None:
+    def rates(state: FloatArray) -> list[float]:
+        return [float(state[1]), -math.sin(float(state[0]))]
+
+    exact = solve_ivp(lambda _, y: rates(y), (0.0, 2.0), [1.0, 0.0], method="DOP853", rtol=1e-13, atol=1e-14)
+    errors = []
+    for count in (20, 40, 80):
+        state = np.array([1.0, 0.0])
+        for _ in range(count):
+            state, estimate = step(rates, state, 2.0 / count)
+        errors.append(float(np.abs(state - exact.y[:, -1]).max()))
+        assert float(np.abs(estimate).max()) > errors[-1] / count
+    orders = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
+    assert orders == pytest.approx(5.0, abs=0.25)
+    assert errors[-1] < 1e-9
+
+
+@pytest.mark.parametrize("term", ["tube inertia", "gas filling", "valve lag"])
+def test_a_vanishing_term_leaves_the_quasi_steady_operation(
+    term: str, calibrated: BalancerModel, plant: Plant, pulse: Pulse
+) -> None:
+    """First order in the tube's length, in 1/C and in the lag."""
+    still = 0.25 - pulse(plant(calibrated, "valve lag", valve_lag=0.0), 0.2, np.array([0.1])).fill
+
+    def found(small: float) -> float:
+        if term == "tube inertia":
+            own = plant(calibrated, term, length=0.12 * small)
+        elif term == "gas filling":
+            own = plant(calibrated, term, conductance=1e-8 / small, critical_ratio=0.3)
+        else:
+            own = plant(calibrated, term, valve_lag=0.02 * small)
+        return 0.25 - pulse(own, 0.2, np.array([0.1])).fill
+
+    gaps = [still - found(small) for small in (0.4, 0.2, 0.1)]
+    assert gaps[-1] > 0
+    rates = np.log2(np.array(gaps[:-1]) / np.array(gaps[1:]))
+    assert rates == pytest.approx(1.0, abs=0.12)
+    assert gaps[-1] < 0.05 * still
+
+
+# --- everything together, against an independent solver ---
+
+
+class Independent:
+    """The same pair written down again, from the law's own arrays, for scipy's solvers."""
+
+    def __init__(self, model: BalancerModel, gas: Gas, *, length: float, share: float) -> None:
+        assert isinstance(model.flow, CalibratedLaw)
+        self.law, self.gas, self.length, self.share = model.flow, gas, length, share
+        self.model = model
+
+    def level(self, x: float) -> float:
+        return float(self.law.wall_pressure(x))
+
+    def phi(self, up: float, down: float) -> float:
+        b = self.gas.critical_ratio or 0.0
+        r = down / up
+        if r <= b:
+            return 1.0
+        if r <= 0.999:
+            return math.sqrt(1 - ((r - b) / (1 - b)) ** 2)
+        return math.sqrt(1 - ((0.999 - b) / (1 - b)) ** 2) * (1 - r) / 1e-3
+
+    def gas_flow(self, p: float, outside: float) -> float:
+        """p V per time into a chamber at p, isothermal."""
+        c = (self.gas.conductance or 0.0) * 1e5 * math.sqrt(self.gas.temperature / 293.15)
+        return c * outside * self.phi(outside, p) if outside > p else -c * p * self.phi(p, outside)
+
+    def push(self, x: float, u: float, p: float, q: float) -> float:
+        """du/dt: a full column first; if its hump would be below the vapour pressure, the torn one."""
+        law, rho = self.law, self.law.density
+        assert law.heads.hump_head is not None
+        assert law.path.hump_pressure is not None
+        hump = self.share * self.length
+        log_u = math.log(max(u, 1e-12))
+        whole = rho * math.exp(float(law.heads.head(log_u)))
+        upper = rho * math.exp(float(law.heads.hump_head(log_u)))
+        full = (p - q + self.level(x) - self.level(0.5 - x) - whole) / (rho * self.length)
+        over = p - AMBIENT + self.level(x) - law.path.hump_pressure - upper
+        if over - rho * hump * full >= law.path.vapour_pressure:
+            return full
+        return (over - law.path.vapour_pressure) / (rho * hump)
+
+    def rates(self, y: FloatArray, *, opened: bool, moving: bool) -> list[float]:
+        x, u, p, q, _ = y
+        u = max(u, 0.0) if moving else 0.0
+        flow = self.model.tube_area * u
+        first = (1 - x) * self.model.chamber_volume + (self.gas.dead_volume or 0.0)
+        second = (0.5 + x) * self.model.chamber_volume + (self.gas.dead_volume or 0.0)
+        outside = self.gas.pressure + AMBIENT if opened else AMBIENT
+        return [
+            -flow / self.model.chamber_volume,
+            self.push(x, u, p, q) if moving else 0.0,
+            (self.gas_flow(p, outside) - p * flow) / first,
+            (self.gas_flow(q, AMBIENT) + q * flow) / second,
+            (p - AMBIENT) * flow,
+        ]
+
+    def starts(self, y: FloatArray) -> float:
+        assert self.law.path.hump_pressure is not None
+        return float(y[2] - y[3] + self.level(y[0]) - self.law.path.hump_pressure)
+
+    def run(self, y: FloatArray, end: float, *, opened: bool, moving: bool) -> tuple[FloatArray, bool, float]:
+        """To the end, or to the first change; state, whether it moves, and the time spent."""
+
+        def change(_: float, state: FloatArray) -> float:
+            return float(state[1]) + 1e-9 if moving else self.starts(state)
+
+        change.terminal = True  # type: ignore[attr-defined]
+        change.direction = -1.0 if moving else 1.0  # type: ignore[attr-defined]
+        found = solve_ivp(
+            lambda _, state: self.rates(state, opened=opened, moving=moving),
+            (0.0, end),
+            y,
+            method="Radau",
+            rtol=1e-9,
+            atol=[1e-11, 1e-8, 1e-3, 1e-3, 1e-7],
+            events=change,
+        )
+        state = found.y[:, -1]
+        ended = found.t_events[0].size > 0
+        if ended and moving:
+            state[1] = 0.0
+        return state, moving != ended, float(found.t[-1])
+
+
+@pytest.mark.parametrize(("duration", "conductance"), [(0.06, 1e-8), (0.2, 3e-9)])
+def test_an_operation_with_all_terms_against_scipy(
+    scene: Scene, calibrated: BalancerModel, plant: Plant, duration: float, conductance: float, pulse: Pulse
+) -> None:
+    asked = {"conductance": conductance, "critical_ratio": 0.35, "dead_volume": 3e-6, "valve_lag": 0.01}
+    terms = ("tube inertia", "gas filling", "valve lag")
+    own = plant(calibrated, *terms, **asked)
+    known = Independent(calibrated, replace(scene.gas, **asked), length=0.12, share=0.5)
+    y, moving, stops = np.array([0.25, 0.0, AMBIENT, AMBIENT, 0.0]), False, []
+    fills, clock = [], 0.01
+    for opened, stop in ((True, 0.01 + duration), (False, 0.01 + duration + 0.15)):
+        while clock < stop - 1e-12:
+            y, now, spent = known.run(y, stop - clock, opened=opened, moving=moving)
+            clock += spent
+            if now != moving:
+                stops.append(clock)
+            moving = now
+        fills.append(y[0])
+    assert len(stops) == 2
+    instants = np.array([stops[0], 0.01 + duration, stops[1], 0.01 + duration + 0.15])
+    found = pulse(own, duration, instants)
+    assert found.fills[[1, 3]] == pytest.approx(np.array(fills), abs=1e-6)
+    assert found.fills[0] == 0.25
+    # The flow begins and ends at the same times: a microsecond to either side is told apart.
+    assert pulse(own, duration, np.array([stops[0] - 1e-6])).motion.velocity == 0
+    assert pulse(own, duration, np.array([stops[0] + 1e-6])).motion.velocity > 0
+    assert pulse(own, duration, np.array([stops[1] - 2e-6])).motion.velocity > 0
+    assert pulse(own, duration, np.array([stops[1] + 2e-6])).motion.velocity == 0
+    work = found.motion.record.work
+    assert work == pytest.approx(y[4], rel=1e-5)
+
+
+# --- how an operation's tail runs on ---
+
+
+def test_a_stretch_may_be_cut_anywhere(calibrated: BalancerModel, plant: Plant, pulse: Pulse) -> None:
+    own = plant(calibrated, "tube inertia", "gas filling", "valve lag", valve_lag=0.007, **PIPED)
+    whole = pulse(own, 0.05, np.array([0.4]))
+    for cut in (0.003, 0.03, 0.0572, 0.08):
+        first = pulse(own, 0.05, np.array([cut]))
+        second = pass_time(
+            own,
+            fill=first.fill,
+            total=0.5,
+            primed=first.primed,
+            motion=first.motion,
+            instants=np.array([0.4 - cut]),
+        )
+        assert second.fill == pytest.approx(whole.fill, abs=1e-9)
+        assert second.motion.record.work == pytest.approx(whole.motion.record.work, rel=1e-6)
+
+
+def test_what_stops_the_flow_is_told(calibrated: BalancerModel, plant: Plant, pulse: Pulse) -> None:
+    own = plant(calibrated, "tube inertia")
+    empty = pulse(own, 3.0, np.array([3.2]))
+    assert (empty.motion.record.event, empty.fill, empty.primed) == (Event.EMPTY, 0.0, False)
+    weak = pulse(replace(own, gas_pressure=0.3e6), 0.5, np.array([0.6]))
+    assert (weak.motion.record.event, weak.fill) == (Event.BLOCKED, 0.25)
+    again = pulse(own, 0.5, np.array([0.6]), fill=0.0)
+    assert (again.motion.record.event, again.fill) == (Event.EMPTY, 0.0)
+    short = pulse(own, 0.05, np.array([0.3]))
+    assert short.motion.record.event is Event.NONE
+    assert short.motion.rests
+    assert short.motion.record.regime_end in {Regime.SEPARATED, Regime.SIPHON}
+
+
+def test_the_opposite_chamber_can_be_full(model: BalancerModel, plant: Plant, pulse: Pulse) -> None:
+    own = replace(plant(model, "tube inertia"), max_fill_ratio=0.3)
+    found = pulse(own, 3.0, np.array([3.2]), fill=0.25)
+    assert (found.motion.record.event, found.fill) == (Event.FULL, pytest.approx(0.2, abs=1e-15))
+
+
+def test_work_bounds_the_integrators_steps(
+    calibrated: BalancerModel, plant: Plant, monkeypatch: pytest.MonkeyPatch, pulse: Pulse
+) -> None:
+    monkeypatch.setattr("ringbalance.controller.dynamic_passage.MAX_STEPS", 20)
+    found = pulse(plant(calibrated, "tube inertia", "gas filling", **PIPED), 0.5, np.array([0.6]))
+    assert found.motion.record.event is Event.UNFINISHED
+    assert 0 <= found.fill <= 0.5
+
+
+# --- in the loop ---
+
+
+def test_the_controller_commands_and_the_plant_follows(scene: Scene, calibrated: BalancerModel) -> None:
+    gas = replace(scene.gas, conductance=1e-8, critical_ratio=0.3, valve_lag=0.02)
+    slow = replace(
+        scene,
+        gas=gas,
+        controller=replace(scene.controller, kind="law_based"),
+        run=replace(scene.run, time_limit=4.0),
+    )
+    run = simulate(slow, calibrated)
+    assert {
+        t.term for t in run.terms if t.term in {"gas filling", "valve lag"} and t.model != "left out"
+    } == {
+        "gas filling",
+        "valve lag",
+    }
+    quiet = simulate(slow, calibrated, modelled=())
+    assert run.injections[0].operation.duration == quiet.injections[0].operation.duration
+    # The period runs from the commanded end, whatever the plant still does.
+    longest = max(i.operation.duration for i in run.injections if i.time == 0)
+    assert run.samples[1].time == pytest.approx(longest + 0.5)
+    first = run.injections[0]
+    at = int(np.flatnonzero(run.time == run.samples[1].time)[0])
+    assert run.fill_ratio[first.chamber][at] == first.operation.fill_after
+    opened = (run.time > 0) & (run.time <= 0.02)
+    assert np.all(run.fill_ratio[first.chamber][opened] == 0.25)
+
+
+def test_short_trials_settle_with_moving_liquid(scene: Scene, calibrated: BalancerModel) -> None:
+    trial = replace(
+        scene,
+        controller=replace(scene.controller, kind="trial", short_step=0.002, minimum_gas_time=0.001),
+        run=replace(scene.run, time_limit=6.0),
+    )
+    run = simulate(trial, calibrated)
+    assert run.integrator == "runge_kutta"
+    assert {t.term: t.model for t in run.terms}["tube inertia"].startswith("rho L du/dt")
+    assert run.status
+    fills = np.array(list(run.fill_ratio.values()))
+    assert fills[:2] + fills[2:] == pytest.approx(0.5, abs=1e-15)
+
+
+def test_energy_is_pressure_times_displaced_volume(scene: Scene, model: BalancerModel) -> None:
+    run = simulate(scene, model)
+    for injection in run.injections:
+        done = injection.operation
+        volume = (done.fill_before - done.fill_after) * model.chamber_volume
+        assert done.energy == pytest.approx(0.7e6 * volume, rel=1e-12)
+    assert run.energy == pytest.approx(math.fsum(i.operation.energy for i in run.injections))
+
+
+def test_a_column_is_only_made_for_laws_with_forces(scene: Scene, laws: Any) -> None:
+    assert column_of(law=laws["constant"], tube=scene.tube) is None
+    assert isinstance(column_of(law=calibrate(scene).flow_law, tube=scene.tube), Column)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ringbalance.reports.chamber_figures import moment, pressure_error, pressure_profile, transfer_lambda
-from ringbalance.reports.loop_figures import amplitude, early_amplitude, early_time, fill_ratios
+from ringbalance.reports.loop_figures import amplitude, early_amplitude, early_time, fill_ratios, regimes
 from ringbalance.reports.tube_figures import drag, drag_terms, flow_laws
 
 Record = dict[str, Any]
@@ -31,5 +31,6 @@ def page_figures(evidence: Record) -> Record:
         "flow_laws": flow_laws(evidence["flow_law"]),
         "amplitude": amplitude(runs, evidence["limit_m"]) if runs else None,
         "early_amplitude": early_amplitude(runs, evidence["limit_m"]) if runs else None,
+        "regimes": regimes(runs["calibrated"]) if "calibrated" in runs else None,
         "fill_ratios": fill_ratios(runs["calibrated"], early_time(runs)) if "calibrated" in runs else None,
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any, Final
 
 import numpy as np
@@ -21,6 +22,7 @@ from ringbalance.reports.figure_style import (
     legend_above,
     logarithmic,
 )
+from ringbalance.reports.hump_figures import REGIME_COLOURS
 from ringbalance.reports.units import shown
 
 Record = dict[str, Any]
@@ -142,6 +144,64 @@ def early_amplitude(runs: Record, limit: float) -> Drawing:
         alt=f"Vibration amplitude in the first {shown(until, 's', digits=2)}, under both laws.",
         caption=f"The first {shown(until, 's', digits=2)}, while liquid moves. A line that falls "
         "and rises again within one operation has passed its target.",
+    )
+
+
+def regimes(run: Record) -> Drawing | None:
+    """The regime of the tube in every gas operation under the calibrated law, by chamber and time.
+
+    Args:
+        run: a simulation document, SI.
+
+    Returns:
+        The figure; None for a run without operations.
+    """
+    operations = run["injections"]
+    if not operations:
+        return None
+    letters = list(run["fill_ratio"])
+    last = max(item["time_s"] + item["duration_s"] for item in operations)
+    least = 0.006 * last
+    named: set[str] = set()
+
+    def bar(axes: Axes, item: Record, regime: str, share: tuple[float, float]) -> None:
+        width = max(item["duration_s"], least)
+        axes.barh(
+            letters.index(item["chamber"]),
+            width * (share[1] - share[0]),
+            left=item["time_s"] + width * share[0],
+            height=0.55,
+            color=REGIME_COLOURS[regime],
+            linewidth=0,
+            label=None if regime in named else regime,
+        )
+        named.add(regime)
+
+    def paint(figure: Figure, axes: Axes) -> None:
+        for item in operations:
+            end = item.get("regime_end") or item["regime"]
+            parts = [(item["regime"], (0.0, 1.0))]
+            if end != item["regime"]:
+                parts = [(item["regime"], (0.0, 0.5)), (end, (0.5, 1.0))]
+            for regime, share in parts:
+                bar(axes, item, regime, share)
+        axes.set_yticks(range(len(letters)), letters)
+        axes.set_ylim(len(letters) - 0.5, -0.5)
+        axes.set_xlim(0, 1.02 * (last + least))
+        axes.set_xlabel("time in s")
+        axes.set_ylabel("gas into chamber")
+        legend_above(figure, axes, columns=4)
+
+    counts = Counter(item["regime"] for item in operations)
+    told = ", ".join(f"{count} {name}" for name, count in sorted(counts.items()))
+    return draw(
+        name="loop-regimes",
+        paint=paint,
+        wide=True,
+        height=1.5 + 0.2 * len(letters),
+        alt=f"Regime of the tube in each of {len(operations)} gas operations: {told} at their start.",
+        caption=f"Regime of the tube in each gas operation under the calibrated law; at their start: {told}. "
+        "A bar of two colours changed on the way. Short operations are drawn wider than they were.",
     )
 
 

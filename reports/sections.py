@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from ringbalance.reports import consequence_view, fifty
+from ringbalance.reports import consequence_view, fifty, hump
 from ringbalance.reports.figure_style import Drawing
 from ringbalance.reports.section import Record, Section, Work
 
@@ -18,6 +18,7 @@ SECTIONS: Final[tuple[Section, ...]] = (
     Section(name="moment", title="Balancing moment and λ"),
     Section(name="tube", title="The connecting tube"),
     Section(name="law", title="The flow law"),
+    hump.SECTION,
     fifty.SECTION,
     Section(name="loop", title="The closed loop"),
     consequence_view.SECTION,

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from importlib.resources import files
 from typing import Any
 
 import pytest
 
 from ringbalance.reduced_model.calibration import calibrate
-from ringbalance.reports import fifty
+from ringbalance.reports import fifty, hump
 from ringbalance.reports.figure_style import Drawing
 from ringbalance.reports.render import render
 from ringbalance.reports.section import Section, Work
@@ -100,3 +101,46 @@ def test_the_velocity_decides_whether_fifty_is_right() -> None:
     record = {"runs": True, "velocity_m_s": 5.0, "velocity_uncertainty": 0.5}
     for paper, verdict in ((5.4, "right"), (4.6, "right"), (5.6, "too low"), (4.4, "too high")):
         assert fifty.verdict_on_fifty({**record, "velocity_paper_m_s": paper}) == verdict
+
+
+@pytest.fixture(scope="module")
+def hump_record(work: Work) -> Record:
+    record = hump.collect(work)
+    assert record is not None
+    return record
+
+
+def test_every_regime_that_is_found_is_drawn(evidence: Record, hump_record: Record) -> None:
+    states = {state["regime"]: state for state in hump_record["states"]}
+    assert set(states) == {"siphon", "separated", "blocked"}
+    assert hump_record["absent"] == ["reverse"]
+    assert states["siphon"]["margin_Pa"] > 0 > states["separated"]["margin_Pa"]
+    view = hump.view(with_section(evidence, "hump", hump_record))
+    assert view is not None
+    columns = {row["regime"]: row["column"] for row in view["rows"]}
+    assert (columns["siphon"], columns["separated"]) == ("holds", "tears")
+    assert view["absent"] == "reverse"
+    assert 'id="hump"' in render(with_section(evidence, "hump", hump_record))
+
+
+def test_a_margin_within_its_half_width_tells_nothing(evidence: Record, hump_record: Record) -> None:
+    record = json.loads(json.dumps(hump_record))
+    record["states"][0]["margin_uncertainty_Pa"] = 2 * record["states"][0]["margin_Pa"]
+    view = hump.view({**evidence, "hump": record})
+    assert view is not None
+    assert view["rows"][0]["column"] == "cannot be told"
+
+
+def test_a_tube_without_a_hump_has_no_such_section(evidence: Record, work: Work) -> None:
+    straight = replace(work, scene=replace(work.scene, tube=replace(work.scene.tube, hump_radius=None)))
+    assert hump.collect(straight) is None
+    assert hump.view(evidence) is None
+
+
+def test_the_figures_of_sections_carry_no_colour_of_their_own(
+    evidence: Record, fifty_record: Record, hump_record: Record
+) -> None:
+    views = [fifty.view({**evidence, "fifty": fifty_record}), hump.view({**evidence, "hump": hump_record})]
+    for drawing in drawings_in(views):
+        bare = re.sub(r'(href="|url\()#[^")]+', "", drawing.svg)
+        assert not re.search(r"#[0-9a-fA-F]{3,8}\b(?![-\w])|\bblack\b|\bwhite\b|rgb\(", bare), drawing.name

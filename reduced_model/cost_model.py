@@ -1,0 +1,104 @@
+"""What a rung costs: counted work times committed seconds per unit; a choice never hangs on a clock."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.resources import files
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import nnls
+
+from ringbalance.reduced_model.rungs import Rung, Work
+
+FloatArray = npt.NDArray[np.float64]
+
+RESOURCE: Final = "cost_model.json"
+
+
+@dataclass(frozen=True, kw_only=True)
+class CostModel:
+    """Seconds per unit of counted work on the machine that it was fitted on."""
+
+    seconds: Mapping[str, float]
+    """By kind of work."""
+    fitted_on: str
+    """How the numbers came about."""
+
+    def cost(self, work: Work) -> float:
+        """Cost of some work.
+
+        Args:
+            work: counts by kind.
+
+        Returns:
+            s of the reference machine.
+
+        Raises:
+            ValueError: a kind of work that this model does not know.
+        """
+        unknown = sorted(set(work) - set(self.seconds))
+        if unknown:
+            raise ValueError(f"the cost model knows no work of kind {unknown[0]!r}: fit it again")
+        return float(sum(self.seconds[kind] * count for kind, count in work.items()))
+
+    def of_rung(self, rung: Rung, *, points: int) -> float:
+        """Cost of a rung at a number of points, the tables that it needs included.
+
+        Args:
+            rung: the rung.
+            points: how many.
+
+        Returns:
+            s of the reference machine.
+        """
+        return self.cost(rung.fixed_work) + points * self.cost(rung.work)
+
+
+@lru_cache(maxsize=1)
+def committed_costs() -> CostModel:
+    """The cost model that choices rest on, the same on every machine.
+
+    Returns:
+        CostModel.
+
+    Source: least squares over measured runs of every rung, by `ringbalance trade --refit`.
+    """
+    text = files("ringbalance.reduced_model").joinpath("data", RESOURCE).read_text(encoding="utf-8")
+    record = json.loads(text)
+    return CostModel(seconds=dict(record["seconds"]), fitted_on=record["fitted_on"])
+
+
+def fitted_costs(*, works: Sequence[Work], seconds: Sequence[float], fitted_on: str) -> CostModel:
+    """Fit seconds per unit of work to measured times, each run weighted by its own time.
+
+    Minimises sum (cost/seconds - 1)^2 with no negative coefficient.
+
+    Args:
+        works: counts of each run.
+        seconds: measured, s, above zero, one per run.
+        fitted_on: how the times came about.
+
+    Returns:
+        CostModel.
+
+    Raises:
+        ValueError: as many times as runs are needed, at least one, all above zero.
+
+    Source: Lawson and Hanson (1974), non-negative least squares.
+    """
+    if not works or len(works) != len(seconds) or min(seconds) <= 0:
+        raise ValueError("one time above zero is needed for each run, and at least one run")
+    kinds = sorted({kind for work in works for kind in work})
+    rows = np.array([[work.get(kind, 0.0) for kind in kinds] for work in works])
+    scaled = rows / np.asarray(seconds)[:, None]
+    sizes = np.maximum(np.linalg.norm(scaled, axis=0), 1e-300)
+    found, _ = nnls(scaled / sizes, np.ones(len(works)))
+    return CostModel(
+        seconds={kind: float(value) for kind, value in zip(kinds, found / sizes, strict=True)},
+        fitted_on=fitted_on,
+    )

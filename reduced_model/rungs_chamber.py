@@ -1,0 +1,310 @@
+"""The ladders of a chamber: wall pressure, moment and lambda, from formulas to finite elements."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.mesh.chamber import default_cells
+from ringbalance.mesh.geometry import surface_radius
+from ringbalance.physics.results import Status, StatusCode
+from ringbalance.physics.sloshing_response import SMALL
+from ringbalance.reduced_model.chamber_terms import (
+    COARSE_MESH,
+    FINE_MESH,
+    HIGHER,
+    MEAN,
+    PLATES,
+    RIPPLE,
+    SLOSHING,
+    amplification,
+    capillary_share,
+    chamber_contributions,
+    mesh_error,
+)
+from ringbalance.reduced_model.chamber_values import (
+    ChamberValues,
+    by_closed_form,
+    by_elements,
+    by_paper,
+    by_quadrature,
+    by_series,
+    sloshing_meshes,
+    with_sloshing,
+)
+from ringbalance.reduced_model.rungs import Contribution, Ladder, Rung, Work
+from ringbalance.reduced_model.tilted_ring import POINTS, RADIAL_POINTS, TiltedRing, tilted_ring, turn_samples
+from ringbalance.scene.models import Scene
+
+FloatArray = npt.NDArray[np.float64]
+
+FILLS: Final = (0.2, 0.5, 1.0)
+"""Fill ratios at which the ladders are judged, as shares of max_fill_ratio."""
+_SWING_MESH: Final = 2e-3
+"""Discretisation error of the amplification near resonance, relative, on the safe side."""
+GRAVITY_SWEEPS: Final = 5
+"""Solves that one tilted surface takes, about."""
+
+Solver = Callable[[Scene, float], ChamberValues]
+Memo = dict[tuple[str, int], ChamberValues]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Kind:
+    """A rung of both ladders."""
+
+    name: str
+    models: Mapping[str, str]
+    lacks: tuple[str, ...]
+    solver: Solver
+    work: Work
+
+
+def chamber_fills(scene: Scene) -> FloatArray:
+    """Fill ratios of the ladders' points: those of `FILLS` at which gravity leaves a closed ring.
+
+    Args:
+        scene: the scene.
+
+    Returns:
+        x, shape (n,); empty where there is none.
+    """
+    fills = scene.disc.max_fill_ratio * np.array(FILLS)
+    return fills[_tilted(scene, tuple(float(x) for x in fills)).closed]
+
+
+def chamber_ladders(scene: Scene) -> tuple[Ladder, Ladder]:
+    """The ladders of wall pressure and of moment with lambda.
+
+    Args:
+        scene: the scene; a ring must exist.
+
+    Returns:
+        Wall pressure; moment and lambda.  Without a fill at which the ring is closed they have no points, and
+        their status says so.
+
+    Source: the formulas stand with the rungs.
+    """
+    fills = chamber_fills(scene)
+    kinds = _kinds(scene)
+    status = _status(scene, fills)
+    terms = chamber_contributions(scene, fills)
+    floor = mesh_error(scene, default_cells(disc=scene.disc)[1])
+    capillary = capillary_share(scene, fills)
+    swing = _swing_uncertainty(scene, fills, terms)
+    memo: Memo = {}
+    labels = tuple(f"fill ratio {x:.3g}" for x in fills)
+    check = tuple(sorted({0, fills.size // 2, fills.size - 1})) if fills.size else ()
+
+    def ladder(quantity: str, title: str, values: tuple[str, ...], part: str) -> Ladder:
+        return Ladder(
+            quantity=quantity,
+            title=title,
+            values=values,
+            points=labels,
+            check=check,
+            relative_to="each",
+            contributions=terms[part],
+            rungs=tuple(_rung(scene, fills, kind, part, memo) for kind in kinds),
+            top_uncertainty=float(np.sqrt(floor**2 + capillary[part] ** 2 + swing[part] ** 2)),
+            top_uncertainty_from=(
+                f"grid convergence, about {floor:.1e}; surface tension, which no rung holds, up to "
+                f"{capillary[part]:.1e}; waves beyond linear sloshing, about {swing[part]:.1e}"
+            ),
+            status=status,
+        )
+
+    pressure = ("mean over a turn, Pa", "largest over a turn, Pa")
+    moment = ("mean over a turn, kg m", "largest over a turn, kg m", "lambda of added liquid, m")
+    return (
+        ladder("wall_pressure", "wall pressure", pressure, "pressures"),
+        ladder("moment", "moment and lambda", moment, "moments"),
+    )
+
+
+def _swing_uncertainty(
+    scene: Scene, fills: FloatArray, terms: Mapping[str, Mapping[str, Contribution]]
+) -> Mapping[str, float]:
+    """What linear sloshing leaves open: its square, and for the pressure the moment's factor it borrows."""
+    factor = max((amplification(scene, float(x)) for x in fills), default=1.0)
+    if scene.environment.shaft == "vertical":
+        return {"pressures": 0.0, "moments": 0.0}
+
+    def of(part: str, term: str) -> float:
+        return terms[part][term].value or 0.0
+
+    # The square of a wave's height, and the meshes of the swinging liquid.
+    waves = (of("pressures", RIPPLE) * factor) ** 2
+    return {
+        "pressures": waves + of("pressures", SLOSHING),
+        "moments": waves + _SWING_MESH * of("moments", SLOSHING),
+    }
+
+
+def _status(scene: Scene, fills: FloatArray) -> Status:
+    if fills.size == len(FILLS):
+        return _waves(scene, fills)
+    lowest = f"above a fill ratio of {fills[0]:.3g} only" if fills.size else "at no fill of this scene"
+    return Status(
+        code=StatusCode.NO_RING if fills.size == 0 else StatusCode.OUT_OF_RANGE,
+        text=(
+            f"gravity leaves a closed ring {lowest}: elsewhere liquid runs along the wall every turn and no "
+            "rung describes it; turn faster or fill more"
+        ),
+    )
+
+
+def _waves(scene: Scene, fills: FloatArray) -> Status:
+    """Whether the swinging surface stays small against the ring's depth, by the estimate of its swing."""
+    if scene.environment.shaft == "vertical":
+        return Status()
+    length = scene.environment.gravity / scene.rotor.speed**2
+    depth = scene.disc.outer_radius - surface_radius(disc=scene.disc, fill_ratio=fills)
+    swing = np.array([amplification(scene, float(x)) for x in fills]) * length / depth
+    worst = int(np.argmax(swing))
+    if swing[worst] <= SMALL:
+        return Status()
+    return Status(
+        code=StatusCode.OUT_OF_RANGE,
+        text=(
+            f"at a fill ratio of {fills[worst]:.3g} waves would reach about {swing[worst]:.2g} of the ring's "
+            "depth, too high for linear sloshing, the highest rung: avoid that fill, or turn faster"
+        ),
+    )
+
+
+def _rung(scene: Scene, fills: FloatArray, kind: _Kind, part: str, memo: Memo) -> Rung:
+    def solve(point: int) -> FloatArray:
+        key = (kind.name, point)
+        if key not in memo:
+            memo[key] = kind.solver(scene, float(fills[point]))
+        return memo[key].pressures() if part == "pressures" else memo[key].moments()
+
+    return Rung(
+        name=kind.name,
+        models=kind.models,
+        leaves_out=frozenset(kind.lacks),
+        work=kind.work,
+        solve=solve,
+        fresh=lambda point: kind.solver(scene, float(fills[point])),
+    )
+
+
+def _kinds(scene: Scene) -> tuple[_Kind, ...]:
+    pull = (RIPPLE, MEAN, HIGHER, SLOSHING)
+    plain = (
+        _kind("the paper's formula", "none", "left out", (PLATES, *pull), by_paper, formula=4),
+        _kind("closed form", "exact", "left out", pull, by_closed_form, formula=30),
+    )
+    meshes = tuple(_mesh_kind(scene, cells, heavy=False) for cells in _meshes(scene, 2))
+    solid = _mesh_kind(scene, _meshes(scene, 3)[0], heavy=False)
+    if scene.environment.gravity == 0:
+        return (*plain, *meshes[:1], solid, meshes[1])
+    turns = _turns(scene)
+    swing = () if scene.environment.shaft == "vertical" else (SLOSHING,)
+    gravity = (
+        _kind(
+            "closed form, gravity to second order",
+            "exact",
+            "second order",
+            (HIGHER, *swing),
+            by_series,
+            formula=60,
+        ),
+        _kind(
+            "quadrature, gravity to all orders",
+            "exact",
+            "all orders",
+            swing,
+            by_quadrature,
+            quadrature=turns * POINTS * RADIAL_POINTS,
+            formula=60,
+        ),
+    )
+    dimension = 3 if scene.environment.shaft == "vertical" else 2
+    tilted = tuple(_mesh_kind(scene, cells, heavy=True) for cells in _meshes(scene, dimension))
+    quasi_static = (*plain, *gravity, *meshes, solid, *tilted)
+    if not swing:
+        return quasi_static
+    return (*quasi_static, _swinging(scene, gravity[-1]), _swinging(scene, tilted[-1]))
+
+
+def _swinging(scene: Scene, still: _Kind) -> _Kind:
+    """A quasi-static rung with its ripples as the swinging liquid makes them."""
+    sides = sum(float(angular) ** 3 for _, angular in sloshing_meshes(scene))
+    return _Kind(
+        name=f"{still.name}, sloshing",
+        models={
+            **still.models,
+            "sloshing": "1x response with Coriolis force and wall layers, finite elements",
+        },
+        lacks=tuple(term for term in still.lacks if term != SLOSHING),
+        solver=partial(with_sloshing, still=still.solver),
+        work={**still.work, "sloshing": sides},
+    )
+
+
+def _kind(
+    name: str, plates: str, gravity: str, lacks: tuple[str, ...], solver: Solver, **work: float
+) -> _Kind:
+    models = {"plates": plates, "gravity": gravity, "solution": name}
+    return _Kind(name=name, models=models, lacks=lacks, solver=solver, work=work)
+
+
+def _turns(scene: Scene) -> int:
+    if scene.environment.shaft == "vertical":
+        return 1
+    return turn_samples(
+        disc=scene.disc, angular_velocity=scene.rotor.speed, gravity=scene.environment.gravity
+    )
+
+
+def _meshes(scene: Scene, dimension: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Coarse and fine."""
+    fine = default_cells(disc=scene.disc, dimension=dimension)
+    coarse = tuple(max(4, n // 2) for n in fine)
+    return coarse, fine
+
+
+def _mesh_kind(scene: Scene, cells: tuple[int, ...], *, heavy: bool) -> _Kind:
+    """Finite elements on a mesh and two coarser ones; with gravity when `heavy`."""
+    fine = cells == default_cells(disc=scene.disc, dimension=len(cells))
+    swing = () if scene.environment.shaft == "vertical" or scene.environment.gravity == 0 else (SLOSHING,)
+    lacks = (FINE_MESH if fine else COARSE_MESH, *swing, *(() if heavy else (RIPPLE, MEAN, HIGHER)))
+    solves = _mesh_turns(scene) * GRAVITY_SWEEPS if heavy else 1
+    unknowns = sum(float(np.prod([2 * (n // k) + 1 for n in cells])) for k in (1, 2, 4))
+    named = " x ".join(str(n) for n in cells)
+    held = ", with gravity" if heavy else ""
+    kind = f"unknown_{len(cells)}d"
+    return _Kind(
+        name=f"{len(cells)}-D finite elements, {named} cells{held}",
+        models={"plates": "exact", "gravity": "all orders" if heavy else "left out", "solution": named},
+        lacks=lacks,
+        solver=partial(by_elements, cells=cells, gravity=heavy),
+        work={"solve": 3.0 * solves, kind: unknowns * solves},
+    )
+
+
+def _mesh_turns(scene: Scene) -> int:
+    """Angles of gravity that the finite elements take for a mean within 1e-8."""
+    if scene.environment.shaft == "vertical":
+        return 1
+    tilt = scene.environment.gravity / (scene.rotor.speed**2 * scene.disc.inner_radius)
+    return 2 * max(2, int(np.ceil(np.log(1e-8) / np.log(min(tilt, 0.3)) / 2)))
+
+
+@lru_cache(maxsize=64)
+def _tilted(scene: Scene, fills: tuple[float, ...]) -> TiltedRing:
+    return tilted_ring(
+        disc=scene.disc,
+        density=scene.liquid.density,
+        angular_velocity=scene.rotor.speed,
+        gravity=scene.environment.gravity,
+        shaft=scene.environment.shaft,
+        fill_ratio=np.array(fills),
+    )

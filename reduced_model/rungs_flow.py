@@ -1,0 +1,261 @@
+"""The ladders of the tube: k, and the velocity for given fills and gas pressure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.physics.tube_loss import tube_loss
+from ringbalance.reduced_model.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.law_rungs import (
+    CLOSED,
+    EQ_12,
+    QUADRATURE,
+    REGIMES,
+    SERIES,
+    SIPHON,
+    LawModels,
+    law_of,
+    law_work,
+    levels_available,
+)
+from ringbalance.reduced_model.loss_rungs import (
+    CONSTANT,
+    CORRELATIONS,
+    FORMULAS,
+    LOSSES,
+    ROTATING,
+    TABLES,
+    loss_at,
+)
+from ringbalance.reduced_model.rungs import Ladder, Rung
+from ringbalance.reduced_model.tube_terms import (
+    GRAVITY,
+    HUMP,
+    LEVEL,
+    LOSS,
+    ROTATION,
+    SHARES,
+    TABLE,
+    flow_contributions,
+    flow_estimate,
+    loss_contributions,
+)
+from ringbalance.scene.models import Scene
+
+FloatArray = npt.NDArray[np.float64]
+
+VELOCITY_FACTORS: Final = (0.25, 0.5, 1.0, 2.0)
+"""Velocities at which k is judged, over the one estimated at equal fills."""
+LACKS_LOSS: Final[Mapping[str, tuple[str, ...]]] = {
+    CONSTANT: (LOSS, ROTATION, TABLE),
+    CORRELATIONS: (ROTATION, TABLE),
+    ROTATING: (TABLE,),
+    TABLES: (),
+}
+LACKS_LEVEL: Final[Mapping[str, tuple[str, ...]]] = {
+    EQ_12: (LEVEL, GRAVITY),
+    CLOSED: (GRAVITY,),
+    SERIES: (),
+    QUADRATURE: (),
+}
+
+
+class LawBook:
+    """Laws of one scene by their models, each made once."""
+
+    def __init__(self, scene: Scene, base: CalibratedLaw) -> None:
+        """Start with no law made.
+
+        Args:
+            scene: the scene.
+            base: of `base_law`.
+        """
+        self.scene = scene
+        self.base = base
+        self._made: dict[LawModels, CalibratedLaw] = {}
+
+    def law(self, models: LawModels) -> CalibratedLaw:
+        """The law of some models.
+
+        Args:
+            models: of the law.
+
+        Returns:
+            CalibratedLaw.
+        """
+        if models not in self._made:
+            self._made[models] = law_of(self.scene, models, base=self.base)
+        return self._made[models]
+
+    def forget(self) -> None:
+        """Make every law anew when it is next asked for, so that its making can be timed."""
+        self._made.clear()
+
+
+def k_ladder(scene: Scene) -> Ladder:
+    """The ladder of the tube's loss, as k + 1, which is what heads know.
+
+    Args:
+        scene: the scene.
+
+    Returns:
+        Ladder.
+
+    Source: `loss_rungs`.
+    """
+    centre = flow_estimate(scene).velocity or 1.0
+    velocities = centre * np.array(VELOCITY_FACTORS)
+
+    def solve(point: int, *, loss: str) -> FloatArray:
+        return np.array([float(loss_at(scene, loss=loss, velocity=velocities[point]).k) + 1])
+
+    width = _k_uncertainty(scene, velocities)
+    return Ladder(
+        quantity="k",
+        title="k",
+        values=("k + 1",),
+        points=tuple(f"{u:.3g} m/s" for u in velocities),
+        check=(0, 2, 3),
+        relative_to="each",
+        contributions=loss_contributions(scene),
+        rungs=tuple(
+            Rung(
+                name=loss,
+                models={"loss of the tube": loss},
+                leaves_out=frozenset(LACKS_LOSS[loss]),
+                work={"formula": float(FORMULAS[loss])},
+                solve=partial(solve, loss=loss),
+            )
+            for loss in LOSSES
+        ),
+        top_uncertainty=width,
+        top_uncertainty_from="correlations, tables, roughness and viscosity, as `calibrate` has them",
+    )
+
+
+def _k_uncertainty(scene: Scene, velocities: FloatArray) -> float:
+    found = tube_loss(
+        tube=scene.tube,
+        liquid=scene.liquid,
+        angular_velocity=scene.rotor.speed,
+        velocity=velocities,
+        inputs=scene.uncertainty,
+    )
+    return float(np.max(found.k.uncertainty / (found.k.value + 1)))
+
+
+def flow_models(scene: Scene) -> tuple[LawModels, ...]:
+    """All laws that a scene may be given, the highest last.
+
+    Args:
+        scene: the scene.
+
+    Returns:
+        Every level with every loss, with the hump's regimes where the scene has a hump and without.
+    """
+    regimes = (SIPHON, REGIMES) if scene.tube.hump_radius is not None else (SIPHON,)
+    losses = LOSSES if scene.tube.drag_coefficient is None else (CONSTANT,)
+    return tuple(
+        LawModels(level=level, loss=loss, regimes=regime)
+        for level in levels_available(scene)
+        for loss in losses
+        for regime in regimes
+    )
+
+
+def lacks(models: LawModels, *, hump: bool) -> frozenset[str]:
+    """What a law leaves out.
+
+    Args:
+        models: of the law.
+        hump: whether the scene has one.
+
+    Returns:
+        Names of contributions.
+    """
+    torn = (HUMP,) if hump and models.regimes == SIPHON else ()
+    return frozenset((*LACKS_LEVEL[models.level], *LACKS_LOSS[models.loss], *torn))
+
+
+def velocity_ladder(scene: Scene, *, book: LawBook) -> Ladder:
+    """The ladder of the velocity under the scene's gas pressure, from an empty tube, over the fills.
+
+    Args:
+        scene: the scene.
+        book: its laws.
+
+    Returns:
+        Ladder.
+
+    Source: `law_rungs`.
+    """
+    largest, pressure = scene.disc.max_fill_ratio, scene.gas.pressure
+    fills = largest * np.array(SHARES)
+
+    def solve(point: int, *, models: LawModels) -> FloatArray:
+        x = fills[point]
+        flow = book.law(models).evaluate(fill_ratio=x, opposite_fill_ratio=largest - x, gas_pressure=pressure)
+        return np.array([float(flow.velocity)])
+
+    hump = scene.tube.hump_radius is not None
+    return Ladder(
+        quantity="velocity",
+        title="velocity in the tube",
+        values=("m/s, out of the driven chamber",),
+        points=tuple(f"fill ratio {x:.3g}" for x in fills),
+        check=(0, 2, 4),
+        relative_to="largest",
+        contributions=flow_contributions(scene),
+        rungs=tuple(
+            Rung(
+                name=law_name(models, hump=hump),
+                models=models.named(),
+                leaves_out=lacks(models, hump=hump),
+                work={"law": 1.0},
+                fixed_work=law_work(scene, models),
+                solve=partial(solve, models=models),
+            )
+            for models in flow_models(scene)
+        ),
+        top_uncertainty=velocity_uncertainty(scene, book),
+        top_uncertainty_from="half of k's, and what drives the flow, as `calibrate` has them",
+    )
+
+
+def law_name(models: LawModels, *, hump: bool) -> str:
+    """Short name of a law's models.
+
+    Args:
+        models: of the law.
+        hump: whether the scene has one.
+
+    Returns:
+        Name.
+    """
+    parts = [models.loss, models.level]
+    if hump:
+        parts.append("hump" if models.regimes == REGIMES else "no hump")
+    return "; ".join(parts)
+
+
+def velocity_uncertainty(scene: Scene, book: LawBook) -> float:
+    """Relative half-width of the base law's velocity at equal fills; zero where nothing flows.
+
+    Args:
+        scene: the scene.
+        book: its laws.
+
+    Returns:
+        Relative half-width.
+    """
+    x = scene.disc.max_fill_ratio / 2
+    flow = book.base.evaluate(
+        fill_ratio=x, opposite_fill_ratio=x, gas_pressure=scene.gas.pressure, primed=True
+    )
+    speed = abs(float(flow.velocity))
+    return float(flow.uncertainty) / speed if speed else 0.0

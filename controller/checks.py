@@ -1,7 +1,8 @@
-"""Whether a balancer model and a scene are about one disc."""
+"""Whether a balancer model and a scene are about one disc, and whether a scene can be run at all."""
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 from ringbalance.mesh.geometry import chamber_volume
@@ -9,6 +10,7 @@ from ringbalance.reduced_model.model import BalancerModel
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.models import Scene
+from ringbalance.scene.working_rules import period_covers_lag
 
 VOLUME_TOLERANCE: Final = 0.05
 """Relative: a flat-strip volume or an input's spread passes, another disc does not."""
@@ -27,6 +29,70 @@ def check_fit(scene: Scene, model: BalancerModel) -> None:
     faults = [*_fill_faults(scene, model), *_volume_faults(scene, model)]
     if faults:
         raise SceneError(faults)
+
+
+def check_settings(scene: Scene) -> None:
+    """Refuse settings that a loaded scene cannot have, but one changed in Python can.
+
+    Args:
+        scene: the scene.
+
+    Raises:
+        SceneError: a gain, limit, time or pressure that is not a number, zero or negative where that has no
+            meaning, or a period shorter than the valve's lag.
+    """
+    faults = [
+        scene_fault(scene=scene, table=table, key=key, problem=problem, allowed=allowed)
+        for (table, key), value in _numbers(scene).items()
+        for problem, allowed in _problems(value, positive=(table, key) in _POSITIVE)
+    ]
+    lag = scene.gas.valve_lag
+    if lag is not None and scene.controller.period < lag:
+        found = period_covers_lag(scene.controller.period, lag)
+        if found is not None:
+            faults.append(
+                scene_fault(
+                    scene=scene,
+                    table="controller",
+                    key="period",
+                    problem=found.problem,
+                    allowed=found.allowed,
+                )
+            )
+    if faults:
+        raise SceneError(faults)
+
+
+_POSITIVE: Final = {
+    ("rotor", "influence_coefficient"),
+    ("controller", "assumed_influence_coefficient"),
+    ("controller", "limit"),
+    ("controller", "period"),
+    ("controller", "proportional"),
+    ("controller", "integral_time"),
+    ("controller", "maximum_gas_time"),
+    ("run", "time_limit"),
+}
+_NOT_NEGATIVE: Final = {
+    ("rotor", "initial_amplitude"),
+    ("sensor", "amplitude_noise"),
+    ("sensor", "phase_noise"),
+    ("controller", "derivative_time"),
+    ("controller", "minimum_gas_time"),
+    ("gas", "pressure"),
+    ("gas", "valve_lag"),
+}
+
+
+def _numbers(scene: Scene) -> dict[tuple[str, str], float | None]:
+    return {(t, k): getattr(getattr(scene, t), k) for t, k in sorted(_POSITIVE | _NOT_NEGATIVE)}
+
+
+def _problems(value: float | None, *, positive: bool) -> list[tuple[str, str]]:
+    if value is None or (math.isfinite(value) and (value > 0 or (value == 0 and not positive))):
+        return []
+    allowed = "a number above 0" if positive else "a number of at least 0"
+    return [("it must be above 0" if positive else "it must be at least 0", allowed)]
 
 
 def _fill_faults(scene: Scene, model: BalancerModel) -> list[Fault]:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from ringbalance.controller.algorithm import Command, Controller, Measurement, usable
 from ringbalance.controller.algorithms import controller_of
-from ringbalance.controller.checks import check_fit
+from ringbalance.controller.checks import check_fit, check_settings
 from ringbalance.controller.closed_form import closed_form, has_closed_form
 from ringbalance.controller.judgement import misadjustments, noise_floor, overshoots, rose, settling_time
 from ringbalance.controller.liquid_ring import Advance, DiscState, LiquidRing, initial_state, longest
@@ -75,13 +75,14 @@ def simulate(
         Simulation; its status says how the run ended and what to do next.
 
     Raises:
-        SceneError: an algorithm that this program does not have, a rotor too slow to form a ring, or a model
-            made for another disc.
+        SceneError: an algorithm that this program does not have, settings without a meaning, a rotor too
+            slow to form a ring, or a model made for another disc.
         ValueError: both a model and a flow law, or neither; terms to model beside an integrator, or ones
             that the scene or the law gives no numbers for.
 
     Source: section 5 and Fig. 5 of the liquid-ring paper.
     """
+    check_settings(scene)
     check_ring(scene)
     balancer = _one_of(model, flow_law)
     check_fit(scene, balancer)

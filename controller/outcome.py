@@ -22,6 +22,10 @@ CONFIRMING_SAMPLES: Final = 5
 MANY_OVERSHOOTS: Final = 2
 NEARLY_EMPTY: Final = 1e-6
 """Fill ratio at which a chamber's last liquid is looked at."""
+LEAST_PRESSURE: Final = 1.0
+"""Gauge, Pa, at which the search for a pressure that starts a flow begins without one."""
+NO_SAMPLE: Final = "no usable sample"
+"""Reason that every algorithm gives for doing nothing on a dropped sample or a NaN."""
 
 
 class Cause(StrEnum):
@@ -108,8 +112,9 @@ def outcome_of(facts: Facts) -> Outcome:
     if facts.unreachable_amplitude > limit:
         return Outcome.CAPACITY_EXCEEDED
     if facts.last_command and not _longest(facts).operation.moved:
-        empty = _longest(facts).operation.event in {Event.EMPTY, Event.FULL}
-        return Outcome.CHAMBER_EMPTY if empty else Outcome.STALLED
+        if _longest(facts).operation.event in {Event.EMPTY, Event.FULL}:
+            return Outcome.CHAMBER_EMPTY
+        return Outcome.GAS_TIME_TOO_SHORT if _over_too_soon(facts) else Outcome.STALLED
     return Outcome.TOO_MANY_SAMPLES if facts.cause is Cause.SAMPLES else _out_of_time(facts)
 
 
@@ -117,7 +122,26 @@ def _longest(facts: Facts) -> Injection:
     return max(facts.last_command, key=lambda injection: injection.operation.duration)
 
 
+def _over_too_soon(facts: Facts) -> bool:
+    """Whether the gas would drive liquid, had it the time to fill the chamber."""
+    plant, done = facts.plant, _longest(facts).operation
+    if plant.dynamics is None:
+        return False
+    flow, total = plant.model.flow, facts.state.pairs[0].total
+    other = min(max(total - done.fill_after, 0.0), flow.max_fill_ratio)
+    found = flow.evaluate(
+        fill_ratio=done.fill_after, opposite_fill_ratio=other, gas_pressure=plant.gas_pressure
+    )
+    return bool(found.velocity > 0)
+
+
+def _unusable(facts: Facts) -> int:
+    return sum(sample.command.reason == NO_SAMPLE for sample in facts.samples)
+
+
 def _out_of_time(facts: Facts) -> Outcome:
+    if 2 * _unusable(facts) > len(facts.samples):
+        return Outcome.NO_SAMPLES
     if facts.drift > NOTICEABLE:
         return Outcome.DRIFTING
     if NOISE_DEVIATIONS * facts.scene.sensor.amplitude_noise > facts.scene.controller.limit:
@@ -177,7 +201,8 @@ def _stalled(facts: Facts) -> str:
 
     def needed(at: float, *, primed: bool) -> str:
         other = min(total - at, law.max_fill_ratio)
-        found = starting_pressure(law=law, fill=at, opposite_fill=other, primed=primed, above=pressure)
+        above = max(pressure, LEAST_PRESSURE)
+        found = starting_pressure(law=law, fill=at, opposite_fill=other, primed=primed, above=above)
         return "no pressure: its liquid has left the port" if found is None else f"{found / 1e6:.4g} MPa"
 
     return (
@@ -231,6 +256,13 @@ def _drifting(facts: Facts) -> str:
 
 
 def _too_short(facts: Facts) -> str:
+    if facts.last_command and not _longest(facts).operation.moved:
+        last = _longest(facts)
+        return (
+            f"{_not_settled(facts)}; {last.operation.duration * 1e3:.4g} ms of gas into chamber "
+            f"{last.chamber} are over before its pressure has pushed any liquid over: raise "
+            "controller.minimum_gas_time or controller.limit, or use a larger or faster valve"
+        )
     return (
         f"{_not_settled(facts)}; the commanded gas times have fallen below the valves' minimum of "
         f"{facts.scene.controller.minimum_gas_time * 1e3:.4g} ms: raise controller.proportional, lower "
@@ -242,6 +274,13 @@ def _noise(facts: Facts) -> str:
     return (
         f"{_not_settled(facts)}; the limit lies below {NOISE_DEVIATIONS:g} standard deviations of the sensor "
         f"({_um(facts.scene.sensor.amplitude_noise)}): raise controller.limit or average the sensor"
+    )
+
+
+def _no_samples(facts: Facts) -> str:
+    return (
+        f"{_not_settled(facts)}; {_unusable(facts)} of {len(facts.samples)} samples were dropped or not a "
+        "number, and no valve is opened on such a sample: check the vibration sensor and its phase reference"
     )
 
 
@@ -262,5 +301,6 @@ _TEXTS: Final[Mapping[Outcome, Callable[[Facts], str]]] = {
     Outcome.DRIFTING: _drifting,
     Outcome.GAS_TIME_TOO_SHORT: _too_short,
     Outcome.NOISE: _noise,
+    Outcome.NO_SAMPLES: _no_samples,
     Outcome.TOO_MANY_SAMPLES: _too_many,
 }

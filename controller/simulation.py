@@ -28,6 +28,7 @@ class Outcome(StrEnum):
     DRIFTING = "drifting"
     GAS_TIME_TOO_SHORT = "gas_time_too_short"
     NOISE = "noise"
+    NO_SAMPLES = "no_samples"
     TOO_MANY_SAMPLES = "too_many_samples"
 
 

@@ -1,9 +1,9 @@
 """Dry friction as a set-valued law: which masses are held, which slide, and which way.
 
-A mass that slides is braked by mu_f b (W + phi')^2.  A mass at rest on its track is held by whatever torque it
-takes, up to mu_f b W^2; beyond that it breaks away in the direction of the torque.  Since phi'' enters both
-masses' equations, two masses at rest are looked at together: the mass matrix is positive definite, so exactly
-one of the nine combinations of held, forwards and backwards is consistent.
+A mass that slides is braked by mu_f b (W + phi')^2.  A mass at rest on its track is held by whatever torque
+it takes, up to mu_f b W^2; beyond that it breaks away in the direction of the torque.  Since phi'' enters
+both masses' equations, two masses at rest are looked at together: the mass matrix is positive definite, so
+exactly one of the nine combinations of held, forwards and backwards is consistent.
 """
 
 from __future__ import annotations

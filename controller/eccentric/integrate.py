@@ -27,7 +27,7 @@ from ringbalance.controller.eccentric.friction import (
 from ringbalance.controller.eccentric.parameters import PlantParameters
 from ringbalance.controller.eccentric.plant import SIZE, Drive, drive_of, loads, write_derivative
 
-LONGEST: Final = 0.05
+LONGEST: Final = 0.1
 """Greatest product of a substep and the plant's fastest rate."""
 _STAGES: Final = 6
 _BISECTIONS: Final = 60
@@ -108,16 +108,17 @@ def _first_event(
 ) -> float:
     """Time just after the first event within a step; the state there is written."""
     before, after = 0.0, step
-    for _ in range(_BISECTIONS):
+    for trial in range(_BISECTIONS + 1):
         middle = 0.5 * (before + after)
-        if not before < middle < after:
+        last = trial == _BISECTIONS or not before < middle < after
+        time = after if last else middle
+        _smooth(parameters, state, speed, drive, motion, time, work, out)
+        if last:
             break
-        _smooth(parameters, state, speed, drive, motion, middle, work, out)
         if _broken(parameters, out, stuck, speed + drive.rate * middle, drive, motion):
             after = middle
         else:
             before = middle
-    _smooth(parameters, state, speed, drive, motion, after, work, out)
     for mass in range(2):
         if motion[mass] * out[6 + mass] < 0.0:
             out[6 + mass] = 0.0
@@ -150,7 +151,9 @@ def _advance(
         )
         if cut:
             done += _first_event(parameters, state, stuck, now, drive, motion, left, work, trial)
-        state[:] = trial
+        # An element at a time: numba compiles array assignment ten times as long.
+        for place in range(SIZE):
+            state[place] = trial[place]
         if not cut or done >= step:
             return
 

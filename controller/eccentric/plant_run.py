@@ -61,13 +61,13 @@ def run_steps(
     """
     count = commands.shape[0]
     states, flags = np.empty((count + 1, state.size)), np.empty((count + 1, 2), np.int64)
-    states[0] = state
-    flags[0] = stuck
-    for place in range(count):
-        speed, rate = speed_at(times, speeds, place * step)
-        states[place + 1], flags[place + 1] = plant_step(
-            parameters, states[place], flags[place], commands[place], speed, rate, step
-        )
+    for place in range(count + 1):
+        for entry in range(state.size):
+            states[place, entry] = state[entry]
+        flags[place, 0], flags[place, 1] = stuck[0], stuck[1]
+        if place < count:
+            speed, rate = speed_at(times, speeds, place * step)
+            state, stuck = plant_step(parameters, state, stuck, commands[place], speed, rate, step)
     return states, flags
 
 
@@ -95,5 +95,5 @@ def run_plant(scene: EccentricScene, *, commands: FloatArray | None = None, lock
         voltages,
         step,
     )
-    elapsed = step * np.arange(len(states))
+    elapsed: FloatArray = np.arange(len(states), dtype=np.float64) * step
     return PlantRun(elapsed, np.interp(elapsed, times, speeds), states, flags)

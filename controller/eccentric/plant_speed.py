@@ -55,7 +55,7 @@ def turned(times: FloatArray, speeds: FloatArray, time: float) -> float:
     Returns:
         rad, not wrapped.
     """
-    angle = speeds[0] * min(time, times[0])
+    angle: float = speeds[0] * min(time, times[0])
     for place in range(len(times) - 1):
         end = min(time, times[place + 1])
         if end > times[place]:
@@ -63,4 +63,5 @@ def turned(times: FloatArray, speeds: FloatArray, time: float) -> float:
             slope = (speeds[place + 1] - speeds[place]) / (times[place + 1] - times[place])
             length = end - times[place]
             angle += now * length + 0.5 * slope * length * length
-    return angle + speeds[-1] * max(0.0, time - times[-1])
+    angle += speeds[-1] * max(0.0, time - times[-1])
+    return angle

@@ -1,4 +1,4 @@
-"""The steady whirl with masses at rest on the track, in closed form, and what friction can hold against it."""
+"""The steady whirl with masses at rest on the track, in closed form, and what friction holds against it."""
 
 from __future__ import annotations
 
@@ -65,9 +65,9 @@ def steady_whirl(parameters: PlantParameters, speed: float, angles: Sequence[flo
 def holding_margin(parameters: PlantParameters, speed: float, angles: Sequence[float]) -> tuple[float, float]:
     """How far friction is from letting a mass go in a steady whirl, its drive switched off.
 
-    mu_f - |Im(z exp(-j phi_i))|: the whirl pulls at a mass with b W^2 times the rotor's displacement across the
-    mass's radius, friction holds with up to b W^2 mu_f, so the speed cancels and the friction arm itself is
-    the displacement that it holds against.
+    mu_f - |Im(z exp(-j phi_i))|: the whirl pulls at a mass with b W^2 times the rotor's displacement across
+    the mass's radius, friction holds with up to b W^2 mu_f, so the speed cancels and the friction arm itself
+    is the displacement that it holds against.
 
     Args:
         parameters: of the plant.

@@ -1,0 +1,301 @@
+"""The plant against an independent model in the fixed frame, closed forms, and its own order."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy.integrate import solve_ivp
+
+from ringbalance.controller.eccentric import integrate
+from ringbalance.controller.eccentric.friction import LOCKED, SLIDING, STUCK
+from ringbalance.controller.eccentric.motor import electrical_energy
+from ringbalance.controller.eccentric.parameters import PlantParameters, plant_parameters
+from ringbalance.controller.eccentric.plant import rest_state, stuck_flags
+from ringbalance.controller.eccentric.plant_run import run_plant, run_steps
+from ringbalance.controller.eccentric.plant_speed import profile_arrays, speed_at, turned
+from ringbalance.controller.eccentric.plant_whirl import influence, steady_whirl
+from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
+from ringbalance.scene.eccentric_models import SpeedPoint
+
+FloatArray = npt.NDArray[np.float64]
+RPM = math.pi / 30
+ANGLES = (0.3, 2.6)
+
+
+@pytest.fixture(scope="module")
+def scene() -> EccentricScene:
+    return eccentric_scene(load_scene(bundled_scene("eccentric_mass_paper")))
+
+
+@pytest.fixture(scope="module")
+def parameters(scene: EccentricScene) -> PlantParameters:
+    return plant_parameters(scene)
+
+
+def without_friction(parameters: PlantParameters) -> PlantParameters:
+    return parameters._replace(friction_arm_1=0.0, friction_arm_2=0.0)
+
+
+def fixed_frame_rates(
+    scene: EccentricScene, start: float, rate: float, arms: tuple[float, float]
+) -> Callable[[float, FloatArray, FloatArray], FloatArray]:
+    """Point masses pushed about in the fixed frame: nothing here knows of a turning frame.
+
+    Each mass m at R + r e(theta + phi) gives m J^T (J a + the part of its acceleration without unknowns),
+    J being its Jacobian with respect to (X, Y, phi_1, phi_2).  Friction acts as on masses that move forwards.
+    """
+    body, mass = scene.rotor, scene.masses
+    whole = np.diag([body.mass - scene.imbalance.mass] * 2 + [0.0, 0.0])
+    motor = scene.motor
+    ratio, drag = 40.0, motor.torque_constant * motor.back_emf_constant / motor.resistance
+    reflected = (motor.motor_inertia + motor.gear_inertia / 16) * ratio**2
+
+    def point(
+        matrix: FloatArray, force: FloatArray, m: float, r: float, angle: float, own: int, w: float
+    ) -> None:
+        turning = start_speed(w)
+        out = np.array([math.cos(angle), math.sin(angle)])
+        along = np.array([-out[1], out[0]])
+        jacobian = np.zeros((2, 4))
+        jacobian[0, 0] = jacobian[1, 1] = 1.0
+        if own:
+            jacobian[:, own] = r * along
+        matrix += m * jacobian.T @ jacobian
+        force -= m * jacobian.T @ (r * along * rate - r * out * turning**2)
+
+    speed = [start]
+
+    def start_speed(w: float) -> float:
+        return speed[0] + w
+
+    def rates(time: float, q: FloatArray, voltage: FloatArray) -> FloatArray:
+        speed[0] = start + rate * time
+        theta = start * time + rate * time**2 / 2
+        matrix, force = whole.copy(), np.zeros(4)
+        imbalance = scene.imbalance
+        point(matrix, force, imbalance.mass, imbalance.radius, theta + imbalance.phase, 0, 0.0)
+        for i in range(2):
+            w = q[6 + i]
+            point(matrix, force, mass.mass, mass.guide_radius, theta + q[2 + i], 2 + i, w)
+            matrix[2 + i, 2 + i] += reflected
+            friction = arms[i] * mass.mass * mass.guide_radius * (speed[0] + w) ** 2
+            torque = motor.torque_constant / motor.resistance * ratio * voltage[i]
+            force[2 + i] += torque - drag * ratio**2 * w - friction
+        force[:2] -= body.damping * q[4:6] + body.stiffness * q[:2]
+        return np.concatenate([q[4:], np.linalg.solve(matrix, force)])
+
+    return rates
+
+
+@pytest.mark.parametrize(
+    ("start", "rate", "arms"),
+    [(8.0, 1.5, (0.0, 0.0)), (8.0, 1.5, (0.01, 0.004)), (-3.0, 1.2, (0.0, 0.0)), (20.0, 0.0, (0.002, 0.006))],
+    ids=["through critical", "with friction", "through zero", "above critical"],
+)
+def test_against_the_fixed_frame(
+    start: float, rate: float, arms: tuple[float, float], scene: EccentricScene, parameters: PlantParameters
+) -> None:
+    """Moving masses under a speed ramp, from rest: 1e-9 m after 5 s, where gyroscopic faults would show."""
+    step, pieces = 1e-3, 5
+    voltages = np.array([[4.0, 3.0], [5.0, 2.5], [2.5, 4.5], [4.0, 4.0], [3.0, 5.0]])
+    given = parameters._replace(friction_arm_1=arms[0], friction_arm_2=arms[1])
+    times, speeds = np.array([0.0, 10.0]), np.array([start, start + 10 * rate])
+    commands = np.repeat(voltages, 1000, axis=0)
+    states, _ = run_steps(given, times, speeds, rest_state(ANGLES), stuck_flags(SLIDING), commands, step)
+    rates = fixed_frame_rates(scene, start, rate, arms)
+    q = np.array([0.0, 0.0, *ANGLES, 0.0, 0.0, 0.0, 0.0])
+    largest = 0.0
+    for piece in range(pieces):
+        found = solve_ivp(
+            rates, (piece, piece + 1), q, method="DOP853", rtol=3e-13, atol=1e-14, args=(voltages[piece],)
+        )
+        assert np.all(found.y[6:] >= 0), "the reference's friction is that of masses that move forwards"
+        q = found.y[:, -1]
+        theta = start * (piece + 1) + rate * (piece + 1) ** 2 / 2
+        here = states[1000 * (piece + 1)]
+        seen = complex(here[0], here[1]) * cmath.exp(1j * theta)
+        assert abs(seen - complex(q[0], q[1])) < 1e-9
+        assert np.abs(here[4:6] - q[2:4]).max() < 1e-9
+        largest = max(largest, abs(seen))
+    assert largest > 1e-3
+
+
+@pytest.mark.parametrize("fault", ["gyroscopic", "circulatory", "rate"])
+def test_the_comparison_would_see_a_fault(fault: str, parameters: PlantParameters) -> None:
+    """A sign turned in one term moves the rotor by far more than the tolerance, though it starts at rest."""
+    step, count = 1e-3, 2000
+    state, other = np.zeros(4), np.zeros(4)
+
+    def slope(z: FloatArray, time: float, wrong: bool) -> FloatArray:
+        speed, rate = 8.0 + 1.5 * time, 1.5
+        m, c, k = parameters.mass, parameters.damping, parameters.stiffness
+        signs = {
+            name: -1.0 if wrong and name == fault else 1.0 for name in ("gyroscopic", "circulatory", "rate")
+        }
+        force = parameters.unbalance * np.array([speed**2, -rate])
+        x, y, u, v = z
+        drag = c * np.array([u - signs["circulatory"] * speed * y, v + signs["circulatory"] * speed * x])
+        turn = 2 * speed * signs["gyroscopic"] * np.array([v, -u]) + signs["rate"] * rate * np.array([y, -x])
+        acceleration = (force - drag - k * z[:2]) / m + turn + speed**2 * z[:2]
+        return np.concatenate([z[2:], acceleration])
+
+    for place in range(count):
+        middle = (place + 0.5) * step
+        for z, wrong in ((state, False), (other, True)):
+            half = z + step / 2 * slope(z, place * step, wrong)
+            z += step * slope(half, middle, wrong)
+    assert np.abs(state - other)[:2].max() > 1e-4
+
+
+@pytest.mark.parametrize("rpm", [20, 60, 100, 125, 180, 400])
+def test_steady_whirl(rpm: float, parameters: PlantParameters) -> None:
+    """Masses locked at constant speed: after the transient the complex closed form, to 1e-9 of itself."""
+    speed = rpm * RPM
+    states, _ = run_steps(
+        parameters,
+        np.array([0.0]),
+        np.array([speed]),
+        rest_state(ANGLES),
+        stuck_flags(LOCKED),
+        np.zeros((3000, 2)),
+        1e-2,
+    )
+    expected = steady_whirl(parameters, speed, ANGLES)
+    found = complex(states[-1, 0], states[-1, 1])
+    assert abs(found - expected) < 1e-9 * abs(expected)
+
+
+def test_influence_is_the_textbook_response(parameters: PlantParameters) -> None:
+    """U W^2 / sqrt((K - M W^2)^2 + (C W)^2), in phase below the critical speed and opposite far above it."""
+    for speed in (1.0, 10.0, 13.66, 30.0, 1e4):
+        size = speed**2 / math.hypot(1000 - 5.36 * speed**2, 10 * speed)
+        assert abs(influence(parameters, speed)) == pytest.approx(size, rel=1e-12)
+    assert cmath.phase(influence(parameters, 0.1)) == pytest.approx(-0.001, abs=1e-5)
+    assert influence(parameters, 1e4) == pytest.approx(-1 / 5.36, rel=1e-3)
+    with pytest.raises(ValueError, match="no steady whirl"):
+        influence(parameters._replace(damping=0.0, mass=10.0, stiffness=1000.0), 10.0)
+
+
+def test_locked_run_up(scene: EccentricScene, parameters: PlantParameters) -> None:
+    """The peak of the paper's run-up without balancing, by an independent solution in the fixed frame."""
+    ramp = replace(scene, run=replace(scene.run, time_limit=60.0), sensor=replace(scene.sensor, step=2e-3))
+    corners = (SpeedPoint(time=0.0, speed=100 * RPM), SpeedPoint(time=130.0, speed=230 * RPM))
+    ramp = replace(ramp, rotor=replace(scene.rotor, speed_profile=corners))
+    run = run_plant(ramp, locked=True)
+    m, c, k, u = parameters.mass, parameters.damping, parameters.stiffness, parameters.unbalance
+
+    def rates(time: float, z: npt.NDArray[np.complex128]) -> npt.NDArray[np.complex128]:
+        speed, turn = (100 + time) * RPM, 100 * RPM * time + RPM * time**2 / 2
+        force = u * (speed**2 - 1j * RPM) * cmath.exp(1j * (turn + parameters.phase))
+        return np.array([z[1], (force - c * z[1] - k * z[0]) / m])
+
+    options = {"t_eval": run.time, "rtol": 1e-11, "atol": 1e-13}
+    found = solve_ivp(rates, (0, 60), np.zeros(2, complex), method="DOP853", **options)
+    amplitude = np.abs(found.y[0])
+    np.testing.assert_allclose(run.amplitude, amplitude, rtol=1e-7, atol=1e-9)
+    peak = int(run.amplitude.argmax())
+    # Damped and swept, the peak lies above sqrt(K_B / M) = 130.4 rpm; the paper reads 135 rpm off m_r alone.
+    assert run.speed[peak] / RPM > math.sqrt(k / m) / RPM == pytest.approx(130.4335, abs=1e-3)
+    assert run.amplitude[peak] == pytest.approx(0.0570, abs=2e-4)
+    assert run.speed[peak] / RPM == pytest.approx(133.1, abs=0.2)
+    assert math.sqrt(k / 5.0) / RPM == pytest.approx(135.05, abs=0.01)
+
+
+def test_the_order_is_five(parameters: PlantParameters) -> None:
+    """Errors of whole runs without events, in all of the state; coarse, so that no rounding shows."""
+    smooth = without_friction(parameters)
+
+    def end(step: float) -> FloatArray:
+        count = round(1.0 / step)
+        state = rest_state(ANGLES)
+        state[6:] = [1.0, -0.5]
+        work, trial = np.empty((7, 8)), np.empty(8)
+        from_plant = integrate.drive_of(smooth, np.array([1.0, -2.0]), 3.0)
+        for place in range(count):
+            stuck = stuck_flags(SLIDING)
+            integrate._advance(smooth, state, stuck, 12.0 + 3.0 * place * step, from_plant, step, work, trial)
+        return state
+
+    steps = np.array([1 / 80, 1 / 160, 1 / 320])
+    exact = end(1 / 6400)
+    errors = np.array([np.abs(end(step) - exact).max() for step in steps])
+    orders = np.log2(errors[:-1] / errors[1:])
+    assert np.all(np.abs(orders - 5) < 0.2), orders
+    assert errors[-1] < 2e-9
+
+
+def test_electrical_energy_is_the_integral_of_power(parameters: PlantParameters) -> None:
+    """Sum over steps of V i h, with i from the speed of the motor; and for a held mass V^2 / R."""
+    step, count = 1e-4, 5000
+    command = np.array([3.0, -2.0])
+    free = without_friction(parameters)
+    states, _ = run_steps(
+        free,
+        np.array([0.0]),
+        np.array([10.0]),
+        rest_state(ANGLES),
+        stuck_flags(SLIDING),
+        np.tile(command, (count, 1)),
+        step,
+    )
+    rates = 40.0 * states[:, 6:8]
+    power = (command * (command - 0.01 * rates) / 1.0).sum(axis=1)
+    total = np.sum((power[1:] + power[:-1]) / 2) * step
+    assert electrical_energy(free, states[0], states[-1], command, count * step) == pytest.approx(
+        total, rel=1e-6
+    )
+    held = rest_state(ANGLES)
+    assert electrical_energy(free, held, held, command, 2.0) == pytest.approx((9 + 4) * 2.0)
+    weak = free._replace(maximum_voltage=1.0)
+    assert electrical_energy(weak, held, held, command, 2.0) == pytest.approx(2 * 2.0)
+
+
+def test_motor_equations_by_shaft_and_gear(parameters: PlantParameters) -> None:
+    """A motor alone on a mass of its own: terminal speed V / (n K_m), time constant (J + J_add) / C_add."""
+    heavy = without_friction(parameters)._replace(mass=1e9, stiffness=1e12, unbalance=0.0)
+    states, _ = run_steps(
+        heavy,
+        np.array([0.0]),
+        np.array([0.0]),
+        rest_state((0.0, math.pi)),
+        stuck_flags(SLIDING),
+        np.tile([2.0, -2.0], (1000, 1)),
+        1e-3,
+    )
+    terminal = 2.0 / (40 * 0.01)
+    constant = (0.18 * 0.23**2 + (1e-6 + 1e-6 / 16) * 1600) / (0.01 * 0.01 * 1600)
+    time = np.arange(1001) * 1e-3
+    np.testing.assert_allclose(states[:, 6], terminal * -np.expm1(-time / constant), rtol=1e-8, atol=1e-9)
+    np.testing.assert_allclose(states[:, 7], -states[:, 6], rtol=1e-8, atol=1e-9)
+
+
+def test_speed_profile(scene: EccentricScene) -> None:
+    times, speeds = profile_arrays(scene.rotor)
+    low, high = 100 * RPM, 230 * RPM
+    assert speed_at(times, speeds, 60.0) == pytest.approx((low, 0.0))
+    assert speed_at(times, speeds, 120.0) == pytest.approx((low, RPM))
+    assert speed_at(times, speeds, 250.0) == pytest.approx((high, 0.0))
+    assert turned(times, speeds, 60.0) == pytest.approx(60 * low)
+    assert turned(times, speeds, 250.0) == pytest.approx(120 * low + 130 * (low + high) / 2)
+    assert turned(times, speeds, 260.0) == pytest.approx(turned(times, speeds, 250.0) + 10 * high)
+    late = np.array([2.0, 4.0]), np.array([3.0, 5.0])
+    assert turned(*late, 1.0) == pytest.approx(3.0)
+    assert turned(*late, 3.0) == pytest.approx(6.0 + 3.5)
+
+
+def test_python_and_compiled_agree(parameters: PlantParameters) -> None:
+    """The plain functions do the same to the last digits."""
+    state, stuck = rest_state(ANGLES), stuck_flags(STUCK)
+    command = np.array([2.0, -0.3])
+    for place in range(20):
+        given = (parameters, state, stuck, command, 12.0 + 0.01 * place, 2.0, 1e-2)
+        plain_state, plain_stuck = integrate.plant_step.py_func(*given)  # type: ignore[attr-defined]
+        state, stuck = integrate.plant_step(*given)
+        np.testing.assert_allclose(plain_state, state, rtol=1e-11, atol=1e-13)
+        np.testing.assert_array_equal(plain_stuck, stuck)

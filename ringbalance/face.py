@@ -2,26 +2,44 @@
 
 from __future__ import annotations
 
+from typing import overload
+
 from ringbalance.controller import Simulation
 from ringbalance.controller import simulate as run_closed_loop
+from ringbalance.controller.eccentric.run import simulate_eccentric
+from ringbalance.controller.eccentric.run_record import EccentricRun
 from ringbalance.reduced_model import CompleteLaw, balancer_model, calibrate
-from ringbalance.scene import AnyScene, liquid_ring_scene
+from ringbalance.scene import EccentricScene, Scene
 
 
-def simulate(scene: AnyScene, *, flow_law: CompleteLaw | None = None) -> Simulation:
-    """One closed-loop run of a scene's rotor under a flow law.
+@overload
+def simulate(scene: Scene, *, flow_law: CompleteLaw | None = None) -> Simulation: ...
+
+
+@overload
+def simulate(scene: EccentricScene, *, flow_law: None = None) -> EccentricRun: ...
+
+
+def simulate(
+    scene: Scene | EccentricScene, *, flow_law: CompleteLaw | None = None
+) -> Simulation | EccentricRun:
+    """One closed-loop run of a scene's rotor: under a flow law, or with two driven masses.
 
     Args:
-        scene: the scene.
+        scene: the scene, of either balancer.
         flow_law: the law, from `calibrate(scene).flow_law`, `paper_law(scene)` or `load_law(path)`;
-            default the calibrated law of the scene.
+            default the calibrated law of the scene.  Driven masses have none.
 
     Returns:
-        Simulation.
+        Simulation, or EccentricRun of a scene with driven masses.
 
     Raises:
-        SceneError: a rotor too slow for the liquid to form a ring, or a balancer without liquid.
+        SceneError: a rotor too slow for the liquid to form a ring.
+        ValueError: a flow law for driven masses.
     """
-    told = liquid_ring_scene(scene)
-    law = calibrate(told).flow_law if flow_law is None else flow_law
-    return run_closed_loop(told, balancer_model(law))
+    if isinstance(scene, EccentricScene):
+        if flow_law is not None:
+            raise ValueError("driven masses have no flow law: leave flow_law out")
+        return simulate_eccentric(scene)
+    law = calibrate(scene).flow_law if flow_law is None else flow_law
+    return run_closed_loop(scene, balancer_model(law))

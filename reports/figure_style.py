@@ -14,9 +14,8 @@ from html import escape
 from typing import Any, Final
 
 import matplotlib
-from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.colors import to_hex
+from matplotlib.colors import LinearSegmentedColormap, to_hex
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullLocator
 
@@ -50,9 +49,16 @@ _VARIABLES: Final = {
     SURFACE: "--fig-surface",
     **{shade: f"--fig-map-{step}" for step, shade in enumerate(MAP)},
 }
-# Viridis, in its lighter part on a dark page.
-_MAP_LIGHT: Final = tuple(to_hex(colormaps["viridis"](step / 11)) for step in range(12))
-_MAP_DARK: Final = tuple(to_hex(colormaps["viridis"](0.08 + 0.92 * step / 11)) for step in range(12))
+
+
+def _shades(low: str, middle: str, high: str) -> tuple[str, ...]:
+    """From one colour over another to a third; lines in the text's colour stand out on each."""
+    ramp = LinearSegmentedColormap.from_list("ramp", [low, middle, high])
+    return tuple(to_hex(ramp(step / (len(MAP) - 1))) for step in range(len(MAP)))
+
+
+_MAP_LIGHT: Final = _shades("#f1f5fa", "#a9c9ec", "#5597d6")
+_MAP_DARK: Final = _shades("#18202a", "#1d4a7c", "#3f83c9")
 LIGHT: Final = {
     "--fig-ink": "#1d2530",
     "--fig-muted": "#5b6675",

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from ringbalance.reports import consequence_view, fifty, hump
+from ringbalance.reports import consequence_view, extremes, fifty, hump, inside, sloshing
 from ringbalance.reports.figure_style import Drawing
 from ringbalance.reports.section import Record, Section, Work
 
@@ -16,7 +16,9 @@ SECTIONS: Final[tuple[Section, ...]] = (
     Section(name="disc", title="The disc and its liquid"),
     Section(name="pressure", title="Pressure of the liquid"),
     Section(name="moment", title="Balancing moment and λ"),
+    sloshing.SECTION,
     Section(name="tube", title="The connecting tube"),
+    inside.SECTION,
     Section(name="law", title="The flow law"),
     hump.SECTION,
     fifty.SECTION,
@@ -24,6 +26,7 @@ SECTIONS: Final[tuple[Section, ...]] = (
     consequence_view.SECTION,
     Section(name="claims", title="Claims of the paper"),
     Section(name="numerics", title="Numerical verification"),
+    extremes.SECTION,
     Section(name="models", title="Models used, and why"),
     Section(name="scene", title="Scene and provenance"),
 )

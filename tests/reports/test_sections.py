@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from ringbalance.reduced_model.calibration import calibrate
-from ringbalance.reports import fifty, hump
+from ringbalance.reports import fifty, hump, inside
 from ringbalance.reports.figure_style import Drawing
 from ringbalance.reports.render import render
 from ringbalance.reports.section import Section, Work
@@ -144,3 +144,51 @@ def test_the_figures_of_sections_carry_no_colour_of_their_own(
     for drawing in drawings_in(views):
         bare = re.sub(r'(href="|url\()#[^")]+', "", drawing.svg)
         assert not re.search(r"#[0-9a-fA-F]{3,8}\b(?![-\w])|\bblack\b|\bwhite\b|rgb\(", bare), drawing.name
+
+
+@pytest.fixture(scope="module")
+def inside_record(work: Work) -> Record:
+    record = inside.collect(work)
+    assert record is not None
+    return record
+
+
+def test_flow_that_is_not_laminar_is_not_passed_off_as_drawn(evidence: Record, inside_record: Record) -> None:
+    assert not inside_record["laminar"]
+    view = inside.view(with_section(evidence, "inside", inside_record))
+    assert view is not None
+    assert "the pattern, not the flow of this tube" in view["lead"]
+    names = [drawing.name for drawing in drawings_in(view)]
+    assert names == ["flow-section", "flow-entrance", "flow-exit"]
+    for drawing in drawings_in(view):
+        bare = re.sub(r'(href="|url\()#[^")]+', "", drawing.svg)
+        assert not re.search(r"#[0-9a-fA-F]{3,8}\b(?![-\w])", bare), drawing.name
+        assert len(drawing.svg) < 150_000
+
+
+def test_a_field_is_packed_to_four_digits() -> None:
+    assert inside.packed([[1.23456, 2e-7], [0.0, -3.0]]) == "1.235 2e-07 0 -3"
+
+
+def test_the_three_dimensional_check_tells_when_it_was_run(evidence: Record) -> None:
+    assert inside.three_dimensional_check(evidence) is None
+    case = {
+        "id": "bent_tube_3d",
+        "kind": "solution_verification",
+        "title": "The bent tube in three dimensions",
+        "verdict": "not run",
+        "status": "heavy: run with --level heavy",
+        "quantities": [],
+    }
+    check = inside.three_dimensional_check({**evidence, "verification": [case]})
+    assert check is not None
+    assert (check["when"], check["hash"]) == ("", "")
+    assert "heavy" in check["why_not_run"]
+    run = {**case, "verdict": "passed", "date": "2031-05-06", "scene_sha256": "ef" * 32}
+    run["quantities"] = [
+        {"name": "k", "unit": "1", "value": 12.3, "reference": 12.1, "uncertainty": 0.4, "verdict": "passed"}
+    ]
+    check = inside.three_dimensional_check({**evidence, "verification": [run]})
+    assert check is not None
+    assert (check["when"], check["hash"]) == ("2031-05-06", "efefefefefef")
+    assert "12.3" in check["result"]

@@ -1,15 +1,23 @@
-"""The closed loop: rotor, liquid-ring disc, control algorithms and the ways to carry an operation through."""
+"""The closed loop: rotor, liquid-ring disc, control algorithms and the ways to carry an operation through.
+
+What runs as compiled code is loaded when it is first asked for, because its compiler takes half a second.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
 
 from ringbalance.controller.algorithm import Command, Controller, Measurement, ValveCommand
 from ringbalance.controller.algorithms import controller_of
-from ringbalance.controller.consequences import Consequences, consequences_document, find_consequences
 from ringbalance.controller.document import simulation_document
-from ringbalance.controller.ensemble import Ensemble, ensemble_document, simulate_ensemble
 from ringbalance.controller.law_based import LawBased
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Injection, Outcome, Simulation
 from ringbalance.controller.target_vector import TargetVector
 from ringbalance.controller.trial import Trial
+
+if TYPE_CHECKING:
+    from ringbalance.controller.consequences import Consequences, consequences_document, find_consequences
+    from ringbalance.controller.ensemble import Ensemble, ensemble_document, simulate_ensemble
 
 __all__ = [
     "Command",
@@ -32,3 +40,18 @@ __all__ = [
     "simulate_ensemble",
     "simulation_document",
 ]
+
+_HOME = {
+    "Consequences": "ringbalance.controller.consequences",
+    "Ensemble": "ringbalance.controller.ensemble",
+    "consequences_document": "ringbalance.controller.consequences",
+    "ensemble_document": "ringbalance.controller.ensemble",
+    "find_consequences": "ringbalance.controller.consequences",
+    "simulate_ensemble": "ringbalance.controller.ensemble",
+}
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_HOME[name]), name)

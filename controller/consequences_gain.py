@@ -11,7 +11,8 @@ import numpy.typing as npt
 
 from ringbalance.controller.ensemble import simulate_members
 from ringbalance.controller.ensemble_members import Members, members_alike
-from ringbalance.controller.ensemble_transfer import PairTransfer, moment_table
+from ringbalance.controller.ensemble_moment import moment_table
+from ringbalance.controller.ensemble_transfer import PairTransfer
 from ringbalance.reduced_model.model import BalancerModel
 from ringbalance.scene.models import Scene
 
@@ -132,7 +133,7 @@ def _moment_per_fill(scene: Scene, model: BalancerModel) -> float:
     """|dM/dx| at equal fills with the total held, kg m."""
     table = moment_table(model=model, total=2 * scene.disc.initial_fill)
     x, step = scene.disc.initial_fill, SMALL_FILL
-    ends = table(np.array([x - step, x + step]))
+    ends = table.at(np.array([x - step, x + step]))
     return float(abs(ends[1] - ends[0])) / (2 * step)
 
 

@@ -19,11 +19,11 @@ from ringbalance.controller.ensemble_members import (
     Spread,
     drawn_members,
     members_alike,
-    noise_stream,
     spread_of,
 )
-from ringbalance.controller.ensemble_run import MemberRuns, run_members
+from ringbalance.controller.ensemble_run import EnsemblePlan, MemberRuns, ensemble_plan
 from ringbalance.controller.ensemble_transfer import PairTransfer, pair_transfer
+from ringbalance.controller.terms import choices
 from ringbalance.reduced_model.gravity import check_ring
 from ringbalance.reduced_model.model import BalancerModel, CompleteLaw, balancer_model
 from ringbalance.scene.describe import scene_fault
@@ -69,7 +69,9 @@ class Ensemble:
     """At least one misadjustment."""
     diverged: Probability
     drifted: Probability
-    """Stopped where liquid could run back with the gas off; counted as not settled."""
+    """Not settled, and liquid ran back with the gas off."""
+    left_out: tuple[str, ...]
+    """Terms that `simulate` models for this scene and an ensemble does not."""
     settling_quantiles: tuple[float, ...]
     """s, at `QUANTILES` of the members that settled; empty when none did."""
     mean_settling_time: float | None
@@ -98,8 +100,9 @@ def simulate_ensemble(
     """Distributions over n noisy runs of the target-vector algorithm under a flow law.
 
     Every member has its own speed of flow, moment, influence coefficient, lag angle and noise; the algorithm
-    keeps the beliefs and the gain of the scene.  The same seed gives the same numbers for any `workers`, and
-    a larger ensemble begins with the members of a smaller one.
+    keeps the beliefs and the gain of the scene.  The flow law alone drives the liquid, whatever other terms
+    the scene's tolerance asks a single run to model (`Ensemble.left_out`).  The same seed gives the same
+    numbers for any `workers`, and a larger ensemble begins with the members of a smaller one.
 
     Args:
         scene: the scene; its controller's `kind` is not looked at.
@@ -126,17 +129,21 @@ def simulate_ensemble(
     model = flow_law if isinstance(flow_law, BalancerModel) else balancer_model(flow_law)
     followed = ensemble_transfer(scene, model) if transfer is None else transfer
     widths = spread_of(scene, model) if spread is None else spread
+    plan = ensemble_plan(scene=scene, model=model, transfer=followed)
     tally = _Tally(time_limit=scene.run.time_limit)
 
     def run(block: int) -> MemberRuns:
-        members = drawn_members(scene, spread=widths, seed=seed, block=block)
-        return _block(scene, model, followed, members, seed=seed, block=block, size=n - block * BLOCK)
+        return _block(scene, plan, widths, seed=seed, block=block, size=n - block * BLOCK)
 
     for runs in _in_order(run, blocks=math.ceil(n / BLOCK), workers=workers):
         tally.add(runs)
         if progress is not None:
             progress(tally.members, n)
-    return tally.ensemble(law=model.name, seed=seed, spread=widths)
+    return tally.ensemble(law=model.name, seed=seed, spread=widths, left_out=_left_out(scene, model))
+
+
+def _left_out(scene: Scene, model: BalancerModel) -> tuple[str, ...]:
+    return tuple(choice.term for choice in choices(scene=scene, model=model) if choice.modelled)
 
 
 def simulate_members(
@@ -169,7 +176,7 @@ def simulate_members(
     if given.proportional.size > BLOCK:
         raise ValueError(f"at most {BLOCK} members at once")
     followed = ensemble_transfer(scene, model) if transfer is None else transfer
-    return _block(scene, model, followed, given, seed=seed, block=0, size=given.proportional.size)
+    return ensemble_plan(scene=scene, model=model, transfer=followed).run(given, seed=seed)
 
 
 def ensemble_transfer(scene: Scene, model: BalancerModel) -> PairTransfer:
@@ -198,31 +205,16 @@ def ensemble_transfer(scene: Scene, model: BalancerModel) -> PairTransfer:
             allowed=f"at least {longest / 50_000:.3g} s",
         )
         raise SceneError([fault])
-    return pair_transfer(
-        model=model, total=2 * scene.disc.initial_fill, gas_pressure=scene.gas.pressure, longest=longest
-    )
+    return pair_transfer(model=model, total=2 * scene.disc.initial_fill, gas_pressure=scene.gas.pressure)
 
 
 def _block(
-    scene: Scene,
-    model: BalancerModel,
-    transfer: PairTransfer,
-    members: Members,
-    *,
-    seed: int,
-    block: int,
-    size: int,
+    scene: Scene, plan: EnsemblePlan, widths: Spread, *, seed: int, block: int, size: int
 ) -> MemberRuns:
-    """The first `size` members of one block; its noise is drawn whole, so that members stay who they are."""
-    stream = noise_stream(seed=seed, block=block)
-    held = {name: values[:size] for name, values in vars(members).items()}
-    return run_members(
-        scene=scene,
-        model=model,
-        transfer=transfer,
-        members=Members(**held),
-        noise=lambda _: stream.standard_normal((2, BLOCK)),
-    )
+    """The first `size` members of one block."""
+    drawn = drawn_members(scene, spread=widths, seed=seed, block=block)
+    held = Members(**{name: values[:size] for name, values in vars(drawn).items()})
+    return plan.run(held, seed=seed, number=block * BLOCK)
 
 
 def _in_order(run: Callable[[int], MemberRuns], *, blocks: int, workers: int) -> Iterator[MemberRuns]:
@@ -262,7 +254,7 @@ class _Tally:
         for counts, found in ((self.overshoots, runs.overshoots), (self.misadjustments, runs.misadjustments)):
             counts += np.bincount(np.minimum(found, MOST_COUNTED), minlength=MOST_COUNTED + 1)
 
-    def ensemble(self, *, law: str, seed: int, spread: Spread) -> Ensemble:
+    def ensemble(self, *, law: str, seed: int, spread: Spread, left_out: tuple[str, ...]) -> Ensemble:
         """Freeze the counts."""
 
         def share(count: int) -> Probability:
@@ -279,6 +271,7 @@ class _Tally:
             misadjustment=share(self.members - int(self.misadjustments[0])),
             diverged=share(self.diverged),
             drifted=share(self.drifted),
+            left_out=left_out,
             settling_quantiles=self._quantiles(),
             mean_settling_time=self.time_sum / self.settled if self.settled else None,
             bin_width=self.width,
@@ -333,6 +326,7 @@ def ensemble_document(ensemble: Ensemble) -> dict[str, Any]:
         "members": ensemble.members,
         "seed": ensemble.seed,
         "spread_95": asdict(ensemble.spread),
+        "left_out": list(ensemble.left_out),
         "probability": {name: asdict(getattr(ensemble, name)) for name in shares},
         "settling_time_s": {
             "quantiles": dict(zip(map(str, QUANTILES), ensemble.settling_quantiles, strict=False)),

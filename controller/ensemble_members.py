@@ -1,4 +1,4 @@
-"""The members of an ensemble: what differs between them, and the noise that each of them sees."""
+"""The members of an ensemble: what differs between them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ringbalance.scene.uncertain import nominal_value
 FloatArray = npt.NDArray[np.float64]
 
 BLOCK: Final = 8192
-"""Members that are carried together and share a stream of random numbers."""
+"""Members that are drawn and carried together."""
 NORMAL_95: Final = 1.959963984540054
 """95 % half-width of a normal distribution in standard deviations."""
 PAPER_DRAG_SPREAD: Final = 0.1
@@ -104,19 +104,6 @@ def drawn_members(scene: Scene, *, spread: Spread, seed: int, block: int) -> Mem
         lag_angle=alike.lag_angle + spread.lag_angle * z[3],
         proportional=alike.proportional,
     )
-
-
-def noise_stream(*, seed: int, block: int) -> np.random.Generator:
-    """Noise of one block: each sample takes standard normal numbers of shape (2, BLOCK), amplitude first.
-
-    Args:
-        seed: of the ensemble.
-        block: its number.
-
-    Returns:
-        The generator.
-    """
-    return np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(block, 1)))
 
 
 def spread_of(scene: Scene, model: BalancerModel) -> Spread:

@@ -6,6 +6,8 @@ import json
 import subprocess
 import sys
 
+import pytest
+
 HEAVY = (
     "numpy",
     "scipy",
@@ -17,6 +19,7 @@ HEAVY = (
     "pydantic",
     "fluids",
     "meshio",
+    "numba",
 )
 REPORT = "import json, sys; sys.stderr.write(json.dumps(sorted(sys.modules)))"
 
@@ -35,6 +38,21 @@ def test_help_loads_nothing_heavy() -> None:
 
 def test_import_loads_nothing_heavy() -> None:
     assert loaded("import ringbalance\ndir(ringbalance)") & set(HEAVY) == set()
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import ringbalance as r\nr.calibrate(r.load_scene(r.bundled_scene('liquid_ring_paper')))",
+        "from ringbalance.cli import main\nassert main(['verify', '--list']) == 0",
+    ],
+)
+def test_what_simulates_no_crowd_loads_no_compiler(code: str) -> None:
+    assert "numba" not in loaded(code)
+
+
+def test_a_compiler_would_be_seen() -> None:
+    assert "numba" in loaded("import ringbalance.controller.ensemble")
 
 
 def test_a_heavy_start_would_be_seen() -> None:

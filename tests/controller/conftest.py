@@ -88,7 +88,13 @@ def levelling(x: FloatArray, y: FloatArray, p: FloatArray, _: Any) -> tuple[Any,
     return velocity, np.where(velocity >= 0, Regime.SIPHON, Regime.REVERSE)
 
 
+def restless(x: FloatArray, *_: Any) -> tuple[Any, Any]:
+    """u = 5 m/s in a regime that changes all the time."""
+    return np.full(x.shape, 5.0), np.where(np.sin(900 * x) > 0, Regime.SIPHON, Regime.SEPARATED)
+
+
 LAWS: Mapping[str, FunctionLaw] = {
+    "restless": FunctionLaw(function=restless),
     "constant": FunctionLaw(function=constant),
     "square_root": FunctionLaw(function=square_root),
     "proportional": FunctionLaw(function=proportional),

@@ -131,7 +131,7 @@ def test_no_flow_no_gain(scene: Scene, model: BalancerModel) -> None:
 def test_a_law_that_no_ensemble_can_follow_is_noted(
     noisy: Scene, model: BalancerModel, laws: Mapping[str, Any]
 ) -> None:
-    strange = replace(model, name="levelling", flow=laws["levelling"])
+    strange = replace(model, name="restless", flow=laws["restless"])
     record = find_consequences(noisy, strange, paper=model, members=20)
     assert [gain.law for gain in record.gains] == ["paper"]
     assert any("one by one" in note for note in record.notes)

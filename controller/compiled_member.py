@@ -1,0 +1,198 @@
+"""Whole closed-loop runs in plain numbers, member after member, each as `simulate` does one."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.controller.compiled import compiled
+from ringbalance.controller.compiled_disc import any_wet, move, note_settling, reset, vibration
+from ringbalance.controller.compiled_noise import noise_pair, uniform_radii
+from ringbalance.controller.compiled_pid import decide, forget
+from ringbalance.controller.compiled_records import Record
+
+FloatArray = npt.NDArray[np.float64]
+
+NOTICEABLE: Final = 1e-12
+"""As `liquid_ring.NOTICEABLE`."""
+GOES_ON: Final = 0
+RISING: Final = 1
+IDLE: Final = 2
+AT_REST: Final = 3
+TIME: Final = 4
+_CERTAIN: Final = 1 + 1e-9
+
+
+@compiled
+def run_members(shared: Record, runs: Any) -> None:
+    """Run members one after the other.
+
+    Args:
+        shared: of type `SHARED`.
+        runs: array of type `RUN`, with what differs between members; filled.
+    """
+    clock = np.zeros(shared.confirming)
+    for i in range(runs.size):
+        run = runs[i]
+        _start(shared, run)
+        while run.cause == GOES_ON and run.samples < shared.most_samples:
+            if run.calm:
+                _pass_calm(shared, run, clock)
+            if run.cause == GOES_ON and run.samples < shared.most_samples:
+                clock[run.samples % shared.confirming] = run.time
+                run.samples += 1
+                _sample(shared, run)
+                if run.cause == GOES_ON:
+                    _act(shared, run)
+        _judge(shared, run, clock[max(run.samples - shared.confirming, 0) % shared.confirming])
+
+
+@compiled
+def _pass_calm(shared: Record, run: Record, clock: FloatArray) -> None:
+    """Pass over samples that are below the limit however their noise turns out, while nothing moves.
+
+    A normal pair of radius r moves the amplitude by sigma r at the most, whatever its angle, and r follows
+    from one of two uniform numbers alone.
+    """
+    time, samples, slot = run.time, run.samples, run.samples % shared.confirming
+    even, odd = uniform_radii(shared, run.number, samples // 2)
+    while samples < shared.most_samples and (odd if samples & 1 else even) >= run.certain:
+        clock[slot] = time
+        samples += 1
+        slot = slot + 1 if slot + 1 < shared.confirming else 0
+        left = shared.time_limit - time
+        if left <= 0.0:
+            run.cause = TIME
+            break
+        time += min(shared.period, left)
+        if samples & 1 == 0:
+            even, odd = uniform_radii(shared, run.number, samples // 2)
+    if samples > run.samples:
+        forget(run)
+        run.phase_before = run.phase
+    run.time, run.samples = time, samples
+
+
+@compiled
+def _start(shared: Record, run: Record) -> None:
+    reset(shared, run)
+    forget(run)
+    _look(shared, run)
+    _expect(shared, run)
+    run.start, run.phase_before = run.amplitude, run.phase
+    run.since = 0.0 if run.amplitude <= shared.limit else math.inf
+
+
+@compiled
+def _look(shared: Record, run: Record) -> None:
+    """True vibration."""
+    run.real, run.imaginary = vibration(shared, run, False)
+    run.amplitude = math.hypot(run.real, run.imaginary)
+
+
+@compiled
+def _expect(shared: Record, run: Record) -> None:
+    """The phase, and the uniform number from which on noise cannot lift the amplitude above the limit."""
+    run.phase = math.atan2(run.imaginary, run.real)
+    room = shared.limit - run.amplitude
+    if room < 0.0:
+        run.certain = 2.0
+    elif shared.amplitude_noise == 0.0:
+        # Without any noise a resting run ends, which takes a sample in full.
+        run.certain = 0.0 if shared.phase_noise > 0.0 else 2.0
+    else:
+        run.certain = math.exp(-((room / shared.amplitude_noise) ** 2) / 2.0) * _CERTAIN
+
+
+@compiled
+def _sample(shared: Record, run: Record) -> None:
+    """One look at the vibration, one step of the controller, and whether the run ends here."""
+    amplitude_noise, phase_noise = noise_pair(shared, run.number, run.samples - 1)
+    run.seen_amplitude = abs(run.amplitude + shared.amplitude_noise * amplitude_noise)
+    run.seen_phase = run.phase + shared.phase_noise * phase_noise
+    _watch(shared, run)
+    decide(shared, run)
+    run.cause = _cause(shared, run)
+    run.phase_before = run.phase
+
+
+@compiled
+def _watch(shared: Record, run: Record) -> None:
+    """Overshoots, rises and misadjustments, as `judgement` counts them."""
+    if run.samples == 1:
+        run.first_seen = run.seen_amplitude
+    elif run.seen_amplitude > shared.limit:
+        # The sample before may have been passed over: its noise is made again.
+        noise = noise_pair(shared, run.number, run.samples - 2)[1]
+        before = run.phase_before + shared.phase_noise * noise
+        run.overshoots += 1 if math.cos(run.seen_phase - before) < 0.0 else 0
+    if run.operated:
+        higher = run.seen_amplitude - run.last_seen > shared.noise_floor
+        run.rises = run.rises + 1 if higher else 0
+        run.misadjustments += 1 if higher else 0
+    run.last_seen, run.operated = run.seen_amplitude, 0
+
+
+@compiled
+def _cause(shared: Record, run: Record) -> int:
+    """Why the loop stops cycling, in the order in which `simulate` looks."""
+    spare = shared.rises_tolerated - run.rises
+    if spare < 0 or (spare == 0 and run.last_seen - run.first_seen > shared.noise_floor):
+        return RISING
+    if run.idle >= shared.idle_tolerated:
+        return IDLE
+    exact = shared.amplitude_noise == 0.0 and shared.phase_noise == 0.0
+    if exact and run.seen_amplitude <= shared.limit and not any_wet(shared, run):
+        return AT_REST
+    return TIME if shared.time_limit - run.time <= 0.0 else GOES_ON
+
+
+@compiled
+def _act(shared: Record, run: Record) -> None:
+    """Gas, if a valve opens, and the wait until the next sample or the end."""
+    changed = run.pair >= 0
+    if changed:
+        _gas(shared, run)
+    length = max(min(shared.period, shared.time_limit - run.time), 0.0)
+    if length > 0.0 and any_wet(shared, run):
+        run.pair, run.other_pair, changed = -1, -1, True
+        move(shared, run, length)
+        _look(shared, run)
+        note_settling(shared, run, length, shared.drift_points)
+    run.time += length
+    if changed:
+        _expect(shared, run)
+    run.calm = 0 if run.operated or run.rises >= shared.rises_tolerated or any_wet(shared, run) else 1
+
+
+@compiled
+def _gas(shared: Record, run: Record) -> None:
+    """All valves of a command open together; pairs flow in parallel."""
+    both = run.other_pair >= 0
+    length = max(run.duration, run.other_duration) if both else run.duration
+    working = run.other_pair if both and run.other_duration > run.duration else run.pair
+    real, imaginary = run.real, run.imaginary
+    move(shared, run, length)
+    _look(shared, run)
+    note_settling(shared, run, length, shared.gas_points)
+    change = math.hypot(run.real - real, run.imaginary - imaginary)
+    moved = abs(run.fill[working] - run.fill_before[working]) > NOTICEABLE or change > shared.limit
+    run.idle = 0 if moved else run.idle + 1
+    run.time += length
+    run.operated = 1
+
+
+@compiled
+def _judge(shared: Record, run: Record, confirmed: float) -> None:
+    """As `outcome_of` does, from the time of the sample since which the amplitude must have stayed."""
+    if run.cause == AT_REST:
+        confirmed = run.time
+    run.settled = 1 if run.since <= confirmed else 0
+    run.settling_time = run.since if run.settled else math.inf
+    run.drifted = 1 if run.drift > NOTICEABLE and not run.settled else 0
+    higher = run.amplitude > run.start + shared.noise_floor
+    grown = run.cause == RISING or (run.cause == IDLE and higher)
+    run.diverged = 1 if grown and not run.settled and not run.drifted else 0

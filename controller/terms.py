@@ -69,7 +69,8 @@ def choices(
     for term in asked or ():
         if term not in times:
             raise ValueError(f"no term {term!r}; there are {', '.join(MODELS)}")
-        if times[term] is None or column_of(law=model.flow, tube=scene.tube) is None:
+        unknown = times[term] is None and term != INERTIA
+        if unknown or column_of(law=model.flow, tube=scene.tube) is None:
             raise ValueError(f"{term} cannot be modelled: the scene or the law gives no numbers for it")
     return tuple(_choice(scene, model, term, time, asked) for term, time in times.items())
 
@@ -193,7 +194,7 @@ def _choice(
 ) -> Choice:
     if time is None:
         told = "the scene gives no basis for an estimate"
-        return Choice(term=term, time=None, share=None, modelled=False, why=told)
+        return Choice(term=term, time=None, share=None, modelled=term in (asked or ()), why=told)
     pulse = pulse_time(scene)
     share = time / pulse
     above = share > scene.tolerance

@@ -17,6 +17,8 @@ REFERENCE_TEMPERATURE: Final = 293.15
 def pulse_time(scene: Scene) -> float:
     """A first operation's gas time: Kc times the initial amplitude, within the controller's limits.
 
+    Where that is zero, because nothing vibrates, it is the longest gas time.
+
     Args:
         scene: the scene.
 
@@ -29,7 +31,8 @@ def pulse_time(scene: Scene) -> float:
     wanted = control.proportional * scene.rotor.initial_amplitude
     if control.kind == "trial":
         wanted = control.first_trial
-    return min(max(wanted, control.minimum_gas_time), control.maximum_gas_time)
+    limited = min(max(wanted, control.minimum_gas_time), control.maximum_gas_time)
+    return limited if limited > 0 else control.maximum_gas_time
 
 
 def inertia_time(*, scene: Scene, point: OperatingPoint) -> float | None:

@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,8 @@ from ringbalance.reduced_model.paper_law import paper_model
 from ringbalance.scene.models import Scene
 
 DriveBy = Callable[..., Drive]
+NAMES = ("tube inertia", "gas filling", "valve lag")
+ASKED = [names for count in (1, 2, 3) for names in combinations(NAMES, count)]
 
 
 @st.composite
@@ -56,7 +59,7 @@ def scenes(draw: st.DrawFn, base: Scene) -> Scene:
         ),
         controller=replace(
             base.controller,
-            kind=draw(st.sampled_from(["target_vector", "trial"])),
+            kind=draw(st.sampled_from(["target_vector", "trial", "law_based"])),
             period=draw(number(0.01, 2.0)),
             proportional=draw(number(1e2, 1e7)),
             integral_time=draw(st.none() | number(0.1, 1e3)),
@@ -69,8 +72,24 @@ def scenes(draw: st.DrawFn, base: Scene) -> Scene:
     )
 
 
-def check(scene: Scene, model: BalancerModel) -> None:
-    run = simulate(scene, model)
+@st.composite
+def terms(draw: st.DrawFn, base: Scene) -> tuple[Scene, tuple[str, ...]]:
+    """A scene with any of the plant's terms, far beyond what anyone would build."""
+    gas = replace(
+        base.gas,
+        conductance=10.0 ** draw(st.floats(-11.0, -6.5)),
+        critical_ratio=draw(st.floats(0.01, 0.99)),
+        dead_volume=draw(st.sampled_from([0.0, 1e-6, 1e-3])),
+        valve_lag=draw(st.floats(0.0, base.controller.period)),
+        temperature=draw(st.floats(250.0, 400.0)),
+    )
+    asked = draw(st.sampled_from(ASKED))
+    tube = replace(base.tube, length=base.tube.length * draw(st.floats(0.5, 20.0)))
+    return replace(base, gas=gas, tube=tube), asked
+
+
+def check(scene: Scene, model: BalancerModel, modelled: tuple[str, ...] | None = None) -> None:
+    run = simulate(scene, model, modelled=modelled)
     fills = np.array(list(run.fill_ratio.values()))
     half = scene.disc.chambers // 2
     assert fills[:half] + fills[half:] == pytest.approx(2 * scene.disc.initial_fill, abs=1e-12)
@@ -80,6 +99,7 @@ def check(scene: Scene, model: BalancerModel) -> None:
     assert run.time[-1] <= scene.run.time_limit * (1 + 1e-12)
     assert run.status
     assert run.settled == (run.settling_time is not None)
+    assert math.isfinite(run.energy)
     json.dumps(simulation_document(run), allow_nan=False)
 
 
@@ -88,6 +108,27 @@ def check(scene: Scene, model: BalancerModel) -> None:
 def test_any_run_under_the_papers_law(data: st.DataObject, scene: Scene) -> None:
     drawn = data.draw(scenes(scene))
     check(drawn, paper_model(drawn))
+
+
+@given(data=st.data())
+@settings(max_examples=8)
+def test_any_run_with_any_terms_under_the_papers_law(data: st.DataObject, scene: Scene) -> None:
+    drawn, asked = data.draw(terms(data.draw(scenes(scene))))
+    law = paper_model(drawn)
+    check(drawn, law, asked)
+
+
+@given(data=st.data())
+@settings(max_examples=8)
+def test_any_run_with_any_terms_under_the_calibrated_law(
+    data: st.DataObject, scene: Scene, calibrated: BalancerModel
+) -> None:
+    drawn = data.draw(scenes(scene))
+    # The law is that of one disc at one speed and pressure; all else may be anything.
+    own = replace(drawn, disc=scene.disc, rotor=replace(drawn.rotor, speed=scene.rotor.speed))
+    own = replace(own, gas=scene.gas, tube=scene.tube)
+    changed, asked = data.draw(terms(own))
+    check(changed, calibrated, asked)
 
 
 @given(

@@ -296,6 +296,19 @@ def divergence_entries(space: FlowSpace, component: int) -> FloatArray:
     return space.coupling_pattern.assemble(entries)
 
 
+def pressure_mass_entries(space: FlowSpace) -> FloatArray:
+    """Assembled entries of integral(psi_i N_j), pressure against velocity shape functions.
+
+    Args:
+        space: the space.
+
+    Returns:
+        Entries in the order of `coupling_pattern`.
+    """
+    table = _outer(space.pressure_shape[None], space.shape[None])
+    return space.coupling_pattern.assemble(_contract(space.weights, table))
+
+
 def load_vector(space: FlowSpace, values: FloatArray) -> FloatArray:
     """Integral of a function against every velocity shape function.
 

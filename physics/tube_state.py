@@ -37,6 +37,8 @@ class TubeState:
     """f without rotation."""
     rotating_friction: FloatArray
     """f with rotation."""
+    laminar_ratio: FloatArray
+    """F, laminar friction with rotation over that without."""
     bends: tuple[FloatArray, ...]
     """K of each bend, in order along the path."""
     kinetic_factor: FloatArray
@@ -97,10 +99,11 @@ def tube_state_at(*, tube: Tube, reynolds: npt.ArrayLike, rotation_reynolds: npt
     critical = critical_reynolds(rotation_reynolds=rotation) / STRAIGHT_CRITICAL_REYNOLDS
     rough = tube.roughness / tube.bore
     straight = friction_factor(reynolds=re, relative_roughness=rough)
+    laminar = rotating_friction_ratio(reynolds=re, rotation_reynolds=rotation).value
     turning = friction_factor(
         reynolds=re,
         relative_roughness=rough,
-        laminar_ratio=rotating_friction_ratio(reynolds=re, rotation_reynolds=rotation).value,
+        laminar_ratio=laminar,
         turbulent_ratio=turbulent_friction_ratio(reynolds=re, rotation_reynolds=rotation).value,
         critical_ratio=critical,
     )
@@ -112,8 +115,9 @@ def tube_state_at(*, tube: Tube, reynolds: npt.ArrayLike, rotation_reynolds: npt
         straight_friction=straight,
         rotating_friction=turning,
         bends=bends,
-        kinetic_factor=kinetic_factor(reynolds=re, critical_ratio=critical),
-        terms=_terms(tube, re, critical, straight, turning, bends),
+        laminar_ratio=laminar,
+        kinetic_factor=kinetic_factor(reynolds=re, critical_ratio=critical, friction_ratio=laminar),
+        terms=_terms(tube, re, critical, laminar, straight, turning, bends),
     )
 
 
@@ -121,6 +125,7 @@ def _terms(
     tube: Tube,
     re: FloatArray,
     critical: FloatArray,
+    laminar: FloatArray,
     straight: FloatArray,
     turning: FloatArray,
     bends: tuple[FloatArray, ...],
@@ -133,7 +138,7 @@ def _terms(
         "friction": straight_length(tube=tube) / tube.bore * straight,
         "rotation": tube.length / tube.bore * (turning - straight),
         "bends": np.asarray(sum(bends, start=np.zeros(re.shape)), dtype=np.float64),
-        "exit": exit_loss(tube=tube, reynolds=re, critical_ratio=critical)[0],
+        "exit": exit_loss(tube=tube, reynolds=re, critical_ratio=critical, friction_ratio=laminar)[0],
         "extra": np.full(re.shape, tube.extra_loss),
     }
 

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.physics.tube_bends import bend_spread, straight_length
+from ringbalance.physics.tube_development import developing_length, development_spread
 from ringbalance.physics.tube_ends import entrance_loss, exit_loss
 from ringbalance.physics.tube_friction import friction_factor, friction_uncertainty, turbulent_share
 from ringbalance.physics.tube_rotation import rotating_friction_ratio, turbulent_friction_ratio
@@ -20,9 +21,6 @@ FloatArray = npt.NDArray[np.float64]
 
 ASSUMED_ROUGHNESS_SPREAD: Final = 0.5
 """Relative 95 % half-width of a roughness for which the scene states none."""
-ENTRY_SPREAD: Final = 0.3
-"""Relative 95 % half-width of the rotation term over the first sqrt(R_Om) diameters, where the secondary flow
-still develops; assigned."""
 TUBE_INPUTS: Final = ("bore", "length", "roughness", "extra_loss", "drag_coefficient")
 
 
@@ -90,13 +88,21 @@ def model_parts(*, tube: Tube, state: TubeState) -> dict[str, FloatArray]:
         turbulent_ratio=tur.value + tur.uncertainty,
         critical_ratio=ratio,
     )
-    ends = (end(tube=tube, reynolds=re, critical_ratio=ratio)[1] for end in (entrance_loss, exit_loss))
+    ends = (
+        entrance_loss(tube=tube, reynolds=re, critical_ratio=ratio)[1],
+        exit_loss(tube=tube, reynolds=re, critical_ratio=ratio, friction_ratio=lam.value)[1],
+    )
     laminar = 1 - turbulent_share(reynolds=re, critical_ratio=ratio)
-    entry = np.minimum(1.0, state.rotation_reynolds**0.5 * tube.bore / tube.length)
+    developing = developing_length(
+        reynolds=re, rotation_reynolds=state.rotation_reynolds, friction_ratio=lam.value
+    )
+    entry = development_spread(
+        length=tube.length, bore=tube.bore, developing=developing, rotation_loss=state.terms["rotation"]
+    )
     return {
         "friction correlation": straight * friction,
         "rotation model": tube.length / tube.bore * (higher - state.rotating_friction),
-        "rotation entry": ENTRY_SPREAD * entry * laminar * np.abs(state.terms["rotation"]),
+        "rotation entry": laminar * entry,
         "ends": np.sqrt(sum(e**2 for e in ends)),
         "bends": bend_spread(reynolds=re, critical_ratio=ratio) * state.terms["bends"],
     }

@@ -194,6 +194,12 @@ def with_sloshing(
     )
 
 
+def forget_solves() -> None:
+    """Do every solve anew when it is next asked for, so that it can be timed."""
+    elements_at.cache_clear()
+    sloshing_factor.cache_clear()
+
+
 def sloshing_meshes(scene: Scene) -> tuple[tuple[int, int], ...]:
     """Meshes on which the swinging liquid is solved, finest first: half as fine as for frequencies.
 

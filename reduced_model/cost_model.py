@@ -18,6 +18,8 @@ from ringbalance.reduced_model.rungs import Rung, Work
 FloatArray = npt.NDArray[np.float64]
 
 RESOURCE: Final = "cost_model.json"
+_PULL: Final = 0.3
+"""Root of the weight of one pull towards a prior."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,14 +68,16 @@ def committed_costs() -> CostModel:
     Returns:
         CostModel.
 
-    Source: least squares over measured runs of every rung, by `ringbalance trade --refit`.
+    Source: least squares over measured runs of every rung, by `ringbalance trade SCENE --save-costs FILE`.
     """
     text = files("ringbalance.reduced_model").joinpath("data", RESOURCE).read_text(encoding="utf-8")
     record = json.loads(text)
     return CostModel(seconds=dict(record["seconds"]), fitted_on=record["fitted_on"])
 
 
-def fitted_costs(*, works: Sequence[Work], seconds: Sequence[float], fitted_on: str) -> CostModel:
+def fitted_costs(
+    *, works: Sequence[Work], seconds: Sequence[float], fitted_on: str, prior: CostModel | None = None
+) -> CostModel:
     """Fit seconds per unit of work to measured times, each run weighted by its own time.
 
     Minimises sum (cost/seconds - 1)^2 with no negative coefficient.
@@ -82,6 +86,8 @@ def fitted_costs(*, works: Sequence[Work], seconds: Sequence[float], fitted_on: 
         works: counts of each run.
         seconds: measured, s, above zero, one per run.
         fitted_on: how the times came about.
+        prior: pulls each coefficient towards its own with the weight of a tenth of a run, so that a kind of
+            work that always comes with others is not lost; kinds without a run keep theirs.
 
     Returns:
         CostModel.
@@ -93,11 +99,15 @@ def fitted_costs(*, works: Sequence[Work], seconds: Sequence[float], fitted_on: 
     """
     if not works or len(works) != len(seconds) or min(seconds) <= 0:
         raise ValueError("one time above zero is needed for each run, and at least one run")
-    kinds = sorted({kind for work in works for kind in work})
+    known = {} if prior is None else {kind: value for kind, value in prior.seconds.items() if value > 0}
+    kinds = sorted({kind for work in works for kind in work} | set(known))
     rows = np.array([[work.get(kind, 0.0) for kind in kinds] for work in works])
     scaled = rows / np.asarray(seconds)[:, None]
+    pulls = np.diag([_PULL / known[kind] if kind in known else 0.0 for kind in kinds])
+    wanted = [*np.ones(len(works)), *(_PULL if kind in known else 0.0 for kind in kinds)]
+    scaled = np.vstack([scaled, pulls])
     sizes = np.maximum(np.linalg.norm(scaled, axis=0), 1e-300)
-    found, _ = nnls(scaled / sizes, np.ones(len(works)))
+    found, _ = nnls(scaled / sizes, np.array(wanted))
     return CostModel(
         seconds={kind: float(value) for kind, value in zip(kinds, found / sizes, strict=True)},
         fitted_on=fitted_on,

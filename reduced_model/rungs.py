@@ -50,6 +50,8 @@ class Rung:
     """From the number of a point to the quantity's values there, shape (m,); SI."""
     fresh: Callable[[int], object] | None = None
     """The same work done anew, where `solve` remembers; for timing."""
+    prepare: Callable[[], object] | None = None
+    """The fixed work done anew; for timing."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -34,6 +34,7 @@ from ringbalance.reduced_model.chamber_values import (
     by_paper,
     by_quadrature,
     by_series,
+    forget_solves,
     sloshing_meshes,
     with_sloshing,
 )
@@ -185,13 +186,17 @@ def _rung(scene: Scene, fills: FloatArray, kind: _Kind, part: str, memo: Memo) -
             memo[key] = kind.solver(scene, float(fills[point]))
         return memo[key].pressures() if part == "pressures" else memo[key].moments()
 
+    def fresh(point: int) -> ChamberValues:
+        forget_solves()
+        return kind.solver(scene, float(fills[point]))
+
     return Rung(
         name=kind.name,
         models=kind.models,
         leaves_out=frozenset(kind.lacks),
         work=kind.work,
         solve=solve,
-        fresh=lambda point: kind.solver(scene, float(fills[point])),
+        fresh=fresh,
     )
 
 

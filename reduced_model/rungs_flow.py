@@ -92,9 +92,17 @@ class LawBook:
             self._made[models] = law_of(self.scene, models, base=self.base)
         return self._made[models]
 
-    def forget(self) -> None:
-        """Make every law anew when it is next asked for, so that its making can be timed."""
-        self._made.clear()
+    def make(self, models: LawModels) -> CalibratedLaw:
+        """Make a law anew, so that its making can be timed.
+
+        Args:
+            models: of the law.
+
+        Returns:
+            CalibratedLaw.
+        """
+        self._made.pop(models, None)
+        return self.law(models)
 
 
 def k_ladder(scene: Scene) -> Ladder:
@@ -219,6 +227,7 @@ def velocity_ladder(scene: Scene, *, book: LawBook) -> Ladder:
                 work={"law": 1.0},
                 fixed_work=law_work(scene, models),
                 solve=partial(solve, models=models),
+                prepare=partial(book.make, models),
             )
             for models in flow_models(scene)
         ),

@@ -321,6 +321,7 @@ def _ladder(
                 work={kind: count * operations for kind, count in time.work.items()} | {"step": operations},
                 fixed_work={} if time.name == CLOSED_FORM else law_work(scene, law),
                 solve=partial(solve, law=law, time=time),
+                prepare=None if time.name == CLOSED_FORM else partial(book.make, law),
             )
             for law, time in sets
         ),

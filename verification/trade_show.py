@@ -1,0 +1,112 @@
+"""A trade study on the terminal: each ladder with its front, and the models for each tolerance."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from rich.console import Group, RenderableType
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from ringbalance.reduced_model.ladder_choice import Choice
+from ringbalance.reduced_model.scene_numbers import scene_numbers
+from ringbalance.verification.trade import TradeStudy
+from ringbalance.verification.trade_measure import Measured, Trade
+
+_MICRO, _MILLI = 1e-6, 1e-3
+
+
+def trade_view(study: TradeStudy) -> RenderableType:
+    """A study for people.
+
+    Args:
+        study: the study.
+
+    Returns:
+        What rich prints.
+    """
+    parts: list[RenderableType] = [Text(study.scene.name, style="bold"), _numbers(study), Text("")]
+    for trade in study.trades:
+        parts += [*_trade(trade, study.choices[trade.ladder.quantity]), Text("")]
+    parts.append(
+        Text(
+            f"cost: counted work by the committed model ({study.costs.fitted_on}); * on the Pareto front",
+            style="dim",
+        )
+    )
+    return Group(*parts)
+
+
+def _numbers(study: TradeStudy) -> Table:
+    table = Table(box=None, header_style="dim", padding=(0, 1))
+    for header in ("number", "value", "formula", "tells"):
+        table.add_column(header, justify="right" if header == "value" else "left")
+    for n in scene_numbers(study.scene):
+        table.add_row(n.name, "none" if n.value is None else f"{n.value:.3g}", Text(n.formula), n.tells)
+    return table
+
+
+def _trade(trade: Trade, choices: Sequence[Choice]) -> Iterator[RenderableType]:
+    ladder = trade.ladder
+    yield Text(ladder.title, style="bold")
+    if not ladder.status.ok:
+        yield Padding(Text(ladder.status.text, style="yellow"), (0, 0, 0, 2))
+    if not ladder.points:
+        return
+    yield _rungs(trade)
+    yield Padding(Text(f"knee: {trade.knee}"), (0, 0, 0, 2))
+    yield _chosen(choices)
+    own = choices[-1]
+    yield Padding(Text(f"at this scene's tolerance of {own.tolerance:.0e}:", style="dim"), (0, 0, 0, 2))
+    for reason in own.reasons:
+        yield Padding(Text(reason), (0, 0, 0, 4))
+
+
+def _rungs(trade: Trade) -> Table:
+    table = Table(box=None, header_style="dim", padding=(0, 1, 0, 2))
+    table.add_column("rung")
+    for header in ("error", "cost", "time", "memory"):
+        table.add_column(header, justify="right")
+    for found in sorted(trade.rungs, key=lambda m: m.cost):
+        table.add_row(
+            *_row(found, top=found.rung.name == trade.ladder.top.name, width=trade.ladder.top_uncertainty)
+        )
+    return table
+
+
+def _row(found: Measured, *, top: bool, width: float) -> tuple[Text | str, ...]:
+    mark = "* " if found.on_front else "  "
+    return (
+        Text(mark + found.rung.name, style="" if found.on_front else "dim"),
+        f"known to {width:.0e}" if top else f"{found.error:.1e}",
+        _seconds(found.cost),
+        "" if found.seconds is None else _seconds(found.seconds),
+        "" if found.memory is None else f"{found.memory / 1e6:.2g} MB",
+    )
+
+
+def _seconds(value: float) -> str:
+    if value < _MILLI:
+        return f"{value / _MICRO:.0f} µs"
+    return f"{value / _MILLI:.3g} ms" if value < 1 else f"{value:.3g} s"
+
+
+def _chosen(choices: Sequence[Choice]) -> Table:
+    table = Table(box=None, header_style="dim", padding=(0, 1, 0, 2))
+    table.add_column("tolerance", justify="right")
+    table.add_column("models")
+    table.add_column("cost", justify="right")
+    table.add_column("check")
+    for choice in choices[:-1]:
+        table.add_row(
+            f"{choice.tolerance:.0e}", Text(choice.rung.name), _seconds(choice.cost), _check(choice)
+        )
+    return table
+
+
+def _check(choice: Choice) -> str:
+    if choice.reference is None:
+        return "nothing to check"
+    word = "climbed" if choice.climbed else "held"
+    return f"{word}, {choice.measured or 0.0:.0e} left out"

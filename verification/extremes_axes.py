@@ -12,6 +12,7 @@ from typing import Any, Final, Literal
 import numpy as np
 import numpy.typing as npt
 
+from ringbalance.mesh.geometry import liquid_first_moment, surface_radius
 from ringbalance.scene.models import Scene
 
 FloatArray = npt.NDArray[np.float64]
@@ -145,6 +146,46 @@ def varied(document: Mapping[str, Any], *, scene: Scene, values: Mapping[str, fl
     return changed
 
 
+def fitted(
+    document: Mapping[str, Any], *, scene: Scene, made: Scene, values: Mapping[str, float]
+) -> Document:
+    """The document with vibration, limit, noise and gain that suit what its disc can balance.
+
+    Args:
+        document: of `varied`.
+        scene: the scene that was varied.
+        made: the scene that the document makes.
+        values: by axis.
+
+    Returns:
+        A new document, in which the loop has as much to do for its disc as in the scene that was varied.
+    """
+    changed = deepcopy(dict(document))
+    ratio = _capacity(made) / _capacity(scene)
+    before, control = scene.rotor.initial_amplitude, changed["controller"]
+    share = values.get("unbalance", before / _capacity(scene))
+    limit = ratio * scene.controller.limit
+    changed["rotor"]["initial_vibration"] = {
+        "amplitude": f"{share * _capacity(made)!r} m",
+        "phase": f"{math.degrees(scene.rotor.initial_phase)!r} deg",
+    }
+    control["limit"] = f"{limit!r} m"
+    control["fine_below"] = f"{ratio * scene.controller.fine_below!r} m"
+    control["proportional"] = f"{values.get('gain', 1.0) / ratio * scene.controller.proportional!r} s/m"
+    noise = values.get("noise", scene.sensor.amplitude_noise / scene.controller.limit)
+    changed["sensor"] = {**changed.get("sensor", {}), "amplitude_noise": f"{noise * limit!r} m"}
+    return changed
+
+
+def _capacity(scene: Scene) -> float:
+    """Vibration that all liquid of a pair in one chamber balances, m."""
+    a = surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio)
+    moment = (
+        scene.liquid.density * scene.disc.axial_width * liquid_first_moment(disc=scene.disc, surface_radius=a)
+    )
+    return float(scene.rotor.influence_coefficient * moment)
+
+
 def toml_bytes(document: Mapping[str, Any]) -> bytes:
     """A document as the bytes of a scene file.
 
@@ -223,15 +264,6 @@ def _set_pressure(document: Document, value: float, values: Mapping[str, float],
     document["gas"]["pressure"] = f"{value * column!r} Pa"
 
 
-def _set_gain(document: Document, value: float, scene: Scene) -> None:
-    document["controller"]["proportional"] = f"{value * scene.controller.proportional!r} s/m"
-
-
-def _set_noise(document: Document, value: float, scene: Scene) -> None:
-    amplitude = value * scene.controller.limit
-    document["sensor"] = {"amplitude_noise": f"{amplitude!r} m", "phase_noise": "0.5 deg"}
-
-
 def _set_period(document: Document, value: float, _: Scene) -> None:
     document["controller"]["period"] = f"{value!r} s"
 
@@ -241,7 +273,7 @@ def _set_tolerance(document: Document, value: float, _: Scene) -> None:
 
 
 def _later(_: Document, __: float, ___: Scene) -> None:
-    """The pressure follows the speed, whatever the order of the values."""
+    """What hangs on other values is set when those are known."""
 
 
 _SETTERS: Final = {
@@ -253,8 +285,9 @@ _SETTERS: Final = {
     "bore": _set_bore,
     "roughness": _set_roughness,
     "pressure": _later,
-    "gain": _set_gain,
-    "noise": _set_noise,
+    "unbalance": _later,
+    "gain": _later,
+    "noise": _later,
     "period": _set_period,
     "tolerance": _set_tolerance,
 }

@@ -14,11 +14,13 @@ from typing import Any, Final
 
 from scipy.stats import qmc
 
+from ringbalance.scene.faults import SceneError
 from ringbalance.scene.files import write_whole
 from ringbalance.scene.loader import scene_from
+from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.verification.extremes_axes import AXES, toml_bytes, varied
-from ringbalance.verification.extremes_point import SOUND, Defect, Ending, Judgement, judge_point
+from ringbalance.verification.extremes_axes import AXES, fitted, toml_bytes, varied
+from ringbalance.verification.extremes_point import SOUND, Defect, Ending, Judgement, judge_point, refusal
 
 Point = Mapping[str, float]
 Progress = Callable[[int, int], None]
@@ -77,12 +79,20 @@ def judge(base: Base, point: Point) -> Judgement:
     Returns:
         Judgement.
     """
-    scene = liquid_ring_scene(scene_from(content=toml_bytes(base.document), file=base.file))
+    scene = _made(base.document, base.file)
     document = varied(base.document, scene=scene, values=point)
     period = point.get("period", scene.controller.period)
     longest = max(PERIODS * period, 2 * scene.controller.maximum_gas_time)
     document["run"] = {**document.get("run", {}), "time_limit": f"{longest!r} s"}
+    try:
+        document = fitted(document, scene=scene, made=_made(document, base.file), values=point)
+    except SceneError as error:
+        return refusal(error)
     return judge_point(document, file=base.file, defect=base.defect)
+
+
+def _made(document: Mapping[str, Any], file: str) -> Scene:
+    return liquid_ring_scene(scene_from(content=toml_bytes(document), file=file))
 
 
 def judged(

@@ -91,7 +91,7 @@ def judge_point(
         calibration = calibrate(scene)
         run = simulate(scene, calibration.model)
     except SceneError as error:
-        return Judgement(ending=Ending.REFUSED, text=str(error), violations=tuple(_unclear(error)))
+        return refusal(error)
     except Exception as error:
         # Whatever it is: finding it is what this is for.
         text = f"{type(error).__name__}: {error}"
@@ -107,6 +107,18 @@ def judge_point(
         worst_ratio=ratio,
         loop=str(run.outcome),
     )
+
+
+def refusal(error: SceneError) -> Judgement:
+    """Judge a refusal: it has to name what is wrong.
+
+    Args:
+        error: as a user meets it.
+
+    Returns:
+        Judgement.
+    """
+    return Judgement(ending=Ending.REFUSED, text=str(error), violations=tuple(_unclear(error)))
 
 
 def _unclear(error: SceneError) -> Iterator[str]:

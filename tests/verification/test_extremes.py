@@ -15,8 +15,9 @@ from ringbalance.scene import bundled_scene
 from ringbalance.scene.loader import scene_from
 from ringbalance.scene.models import Scene
 from ringbalance.verification import extremes_design, extremes_point
+from ringbalance.verification.exact_chamber import exact_moment
 from ringbalance.verification.extremes import Size, broken, extremes_document, find_extremes
-from ringbalance.verification.extremes_axes import AXES, axis_of, toml_bytes, varied
+from ringbalance.verification.extremes_axes import AXES, axis_of, fitted, toml_bytes, varied
 from ringbalance.verification.extremes_design import CHUNK, Base, Point, design, judge, judged
 from ringbalance.verification.extremes_maps import Sweep
 from ringbalance.verification.extremes_point import Defect, Ending, Judgement, judge_point
@@ -74,8 +75,6 @@ def test_each_axis_sets_what_it_says(document: dict[str, Any], paper_scene: Scen
         bore=2.0,
         roughness=0.01,
         pressure=1.5,
-        gain=0.5,
-        noise=0.1,
         period=0.7,
         tolerance=1e-3,
     )
@@ -89,9 +88,28 @@ def test_each_axis_sets_what_it_says(document: dict[str, Any], paper_scene: Scen
     assert scene.liquid.density == pytest.approx(paper_scene.liquid.density)
     assert (scene.tube.bore, scene.tube.roughness) == (pytest.approx(2e-3), pytest.approx(2e-5))
     assert scene.gas.pressure == pytest.approx(1.5 * column)
-    assert scene.controller.proportional == pytest.approx(0.5 * paper_scene.controller.proportional)
-    assert scene.sensor.amplitude_noise == pytest.approx(0.1 * paper_scene.controller.limit)
     assert (scene.controller.period, scene.tolerance) == (pytest.approx(0.7), pytest.approx(1e-3))
+
+
+def test_the_loop_has_as_much_to_do_on_any_disc(document: dict[str, Any], paper_scene: Scene) -> None:
+    """Vibration, limit, noise and gain follow the largest moment of the disc."""
+    values = {"fill": 0.05, "unbalance": 0.5, "gain": 2.0, "noise": 0.1}
+    changed = varied(document, scene=paper_scene, values=values)
+    thin = made(document, paper_scene, **values)
+    found = scene_from(
+        content=toml_bytes(fitted(changed, scene=paper_scene, made=thin, values=values)), file="disc.toml"
+    )
+    assert isinstance(found, Scene)
+    moments = [
+        float(exact_moment(disc=s.disc, density=1000, fill_ratio=s.disc.max_fill_ratio))
+        for s in (thin, paper_scene)
+    ]
+    ratio = moments[0] / moments[1]
+    full = paper_scene.rotor.influence_coefficient * moments[0]
+    assert found.rotor.initial_amplitude == pytest.approx(0.5 * full)
+    assert found.controller.limit == pytest.approx(ratio * paper_scene.controller.limit)
+    assert found.controller.proportional == pytest.approx(2 * paper_scene.controller.proportional / ratio)
+    assert found.sensor.amplitude_noise == pytest.approx(0.1 * found.controller.limit)
 
 
 def test_the_papers_scene_is_solved(document: dict[str, Any]) -> None:

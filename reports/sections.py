@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from ringbalance.reports import consequence_view, extremes, fifty, hump, inside, sloshing
+from ringbalance.reports import consequence_view, extremes, fifty, hump, inside, paper_again, sloshing
 from ringbalance.reports.figure_style import Drawing
 from ringbalance.reports.section import Record, Section, Work
 
@@ -23,6 +23,7 @@ SECTIONS: Final[tuple[Section, ...]] = (
     hump.SECTION,
     fifty.SECTION,
     Section(name="loop", title="The closed loop"),
+    paper_again.SECTION,
     consequence_view.SECTION,
     Section(name="claims", title="Claims of the paper"),
     Section(name="numerics", title="Numerical verification"),

@@ -1,0 +1,143 @@
+"""The scene at its extremes: where answers end, and what is said beyond, from the heavy case `extremes`."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from ringbalance.reports.figure_style import FOUND, MUTED, PAPER, THIRD, Drawing, draw, logarithmic
+from ringbalance.reports.numbers import number
+from ringbalance.reports.prose import typeset
+from ringbalance.reports.section import Record, Section
+from ringbalance.verification.extremes_axes import Axis, axis_of
+from ringbalance.verification.extremes_point import Ending
+
+CASE: Final = "extremes"
+_MAP: Final = "map of "
+_COLOURS: Final = {
+    Ending.SOLVED: (FOUND, 0.55),
+    Ending.WIDE: (FOUND, 0.22),
+    Ending.STATUS: (THIRD, 0.5),
+    Ending.REFUSED: (MUTED, 0.18),
+    Ending.BROKEN: (PAPER, 1.0),
+}
+_SETTLED: Final = "settled"
+_LEGEND: Final = 0.42
+"""Inches above a map for its legend."""
+
+
+def view(evidence: Record) -> Record:
+    """Sentences, the table of axes and the maps.
+
+    Args:
+        evidence: the whole evidence.
+
+    Returns:
+        `ran`, and where it is true `text`, `stamp`, `rows` and `maps`.
+    """
+    case = next((c for c in evidence.get("verification", []) if c["id"] == CASE), None)
+    if case is None or not case.get("tables"):
+        return {"ran": False}
+    tables = {table["name"]: table["columns"] for table in case["tables"]}
+    return {
+        "ran": True,
+        "text": typeset(case.get("explanation", "")),
+        "date": case.get("date", ""),
+        "rows": _rows(tables["axes"]),
+        "maps": [_map(name, columns) for name, columns in tables.items() if name.startswith(_MAP)],
+    }
+
+
+def _rows(columns: Record) -> list[Record]:
+    rows = []
+    for index, title in enumerate(columns["axis"]):
+        unit = "" if columns["unit"][index] == "1" else f" {columns['unit'][index]}"
+
+        def span(kind: str, at: int = index, symbol: str = unit) -> str:
+            low, high = (float(columns[f"{kind} {end}"][at]) for end in ("from", "to"))
+            return f"{number(low, digits=2)} to {number(high, digits=2)}{symbol}"
+
+        rows.append(
+            {
+                "title": title,
+                "tried": span("tried"),
+                "answered": span("answered"),
+                "beyond": typeset(_shortened(str(columns["beyond"][index]))),
+            }
+        )
+    return rows
+
+
+def _shortened(text: str) -> str:
+    """The first message past an axis' end, without the name of a file that nobody has."""
+    first = text.split("; extremes")[0].split("\n")[0]
+    return first.split(".toml: ", 1)[-1] or "nothing: the whole range is answered"
+
+
+def _map(name: str, columns: Record) -> Drawing:
+    x, y = (axis_of(part) for part in name.removeprefix(_MAP).split(" and "))
+    xs, ys = (np.unique(np.asarray(columns[axis.name], dtype=np.float64)) for axis in (x, y))
+    shape = (ys.size, xs.size)
+    endings = np.asarray(columns["ending"], dtype=object).reshape(shape)
+    loops = np.asarray(columns["loop"], dtype=object).reshape(shape)
+
+    def paint(figure: Figure, axes: Axes) -> None:
+        edges_x, edges_y = _edges(x, xs), _edges(y, ys)
+        present = [ending for ending in Ending if np.any(endings == str(ending))]
+        for ending in present:
+            colour, strength = _COLOURS[ending]
+            for row, column in zip(*np.nonzero(endings == str(ending)), strict=True):
+                axes.fill_between(
+                    edges_x[column : column + 2],
+                    *edges_y[row : row + 2],
+                    color=colour,
+                    alpha=strength,
+                    linewidth=0,
+                )
+        rows, cols = np.nonzero(loops == _SETTLED)
+        axes.plot(xs[cols], ys[rows], ".", color=FOUND, markersize=2.5)
+        for axis, target, edges in (("x", x, edges_x), ("y", y, edges_y)):
+            if target.spacing == "log":
+                logarithmic(axes, axis)
+            getattr(axes, f"set_{axis}lim")(edges[0], edges[-1])
+        axes.grid(visible=False)
+        axes.set_xlabel(_label(x))
+        axes.set_ylabel(_label(y))
+        _legend(figure, axes, present)
+
+    return draw(
+        name=f"extremes-{x.name}-{y.name}",
+        paint=paint,
+        height=3.4,
+        alt=f"Where the program answers over {x.title} and {y.title}, and where it refuses with a message.",
+        caption=f"{x.title[0].upper()}{x.title[1:]} and {y.title}, all else as in the scene. "
+        "Dots: the loop settles.",
+    )
+
+
+def _edges(axis: Axis, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Edges of cells around the values, in the axis' own spacing."""
+    place = np.log(values) if axis.spacing == "log" else values
+    middle = (place[1:] + place[:-1]) / 2
+    ends = np.concatenate([[2 * place[0] - middle[0]], middle, [2 * place[-1] - middle[-1]]])
+    return np.exp(ends) if axis.spacing == "log" else ends
+
+
+def _label(axis: Axis) -> str:
+    return axis.title if axis.unit == "1" else f"{axis.title} in {axis.unit}"
+
+
+def _legend(figure: Figure, axes: Axes, present: list[Ending]) -> None:
+    handles = [Patch(color=_COLOURS[e][0], alpha=_COLOURS[e][1], linewidth=0, label=str(e)) for e in present]
+    figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0, 1), ncols=2, borderaxespad=0.0)
+    box, height = axes.get_position(), figure.get_figheight()
+    axes.set_position((box.x0, box.y0, box.width, 1 - box.y0 - _LEGEND / height))
+
+
+SECTION: Final = Section(name="extremes", title="At the extremes", view=view)
+"""Shown also where it was not run, to say how it is."""

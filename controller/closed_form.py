@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, cast, runtime_checkable
 
 import numpy as np
 
@@ -13,15 +13,16 @@ from ringbalance.controller.transfer import (
     FloatArray,
     Transfer,
     checked_instants,
-    finished,
-    still,
 )
 from ringbalance.reduced_model.flow_law import FlowLaw, Regime
 
 
 @runtime_checkable
 class LinearSquaredVelocity(Protocol):
-    """A flow law with u^2 = a (p + b (x_A - x_C)) wherever it flows."""
+    """A flow law with u^2 = a (p + b (x_A - x_C)), a full siphon while that and p are positive.
+
+    Otherwise it is blocked, with no column in the tube.
+    """
 
     @property
     def velocity_squared_per_pressure(self) -> float:
@@ -43,7 +44,7 @@ def has_closed_form(law: FlowLaw) -> bool:
     Returns:
         True when it offers the two coefficients of `LinearSquaredVelocity`.
     """
-    return isinstance(law, LinearSquaredVelocity)
+    return hasattr(law, "velocity_squared_per_pressure") and hasattr(law, "pressure_per_fill_difference")
 
 
 def closed_form(drive: Drive, instants: FloatArray) -> Transfer:
@@ -65,27 +66,64 @@ def closed_form(drive: Drive, instants: FloatArray) -> Transfer:
     Source: Eqs. 19 and 20 of the liquid-ring paper in the limit of small segments.
     """
     law = drive.law
-    if not isinstance(law, LinearSquaredVelocity):
-        raise ValueError(f"the law {drive.law.name!r} has no closed form: use the quadrature")
+    if not has_closed_form(law):
+        raise ValueError(f"the law {law.name!r} has no closed form: use the quadrature")
     t = checked_instants(instants)
-    before = drive.flow(drive.fill, primed=drive.primed)
-    u0, regime = float(before.velocity), Regime(int(before.regime))
+    line = _line(drive)
+    u0 = _velocity(drive, line, drive.fill)
     if u0 <= 0:
-        return still(drive, t, flow=before)
-    deceleration = law.velocity_squared_per_pressure * law.pressure_per_fill_difference * drive.exchange_rate
-    end, event = _end(drive, u0, deceleration)
+        return _blocked(drive, t)
+    end, event = _end(drive, u0, line.deceleration)
     flowing = np.minimum(t, end)
-    fill = drive.fill - drive.exchange_rate * flowing * (u0 - deceleration * flowing / 2)
-    ended = t[-1] >= end
+    fill = drive.fill - drive.exchange_rate * flowing * (u0 - line.deceleration * flowing / 2)
+    ended = bool(t[-1] >= end)
     if ended and event is not Event.STALLED:
-        fill = np.where(t >= end, drive.lowest, fill)
-    return finished(
-        drive,
-        t,
-        fill,
-        regime_start=regime,
+        fill[t >= end] = drive.lowest
+    held = np.minimum(np.maximum(fill, drive.lowest), drive.highest)
+    flows = _velocity(drive, line, float(held[-1])) > 0
+    return Transfer(
+        instants=t,
+        fill=held,
+        regime_start=Regime.SIPHON,
+        regime_end=Regime.SIPHON if flows else Regime.BLOCKED,
         event=event if ended else Event.NONE,
         event_time=end if ended else None,
+        primed=flows and not (ended and event is Event.EMPTY),
+        evaluations=2,
+    )
+
+
+class _Line(NamedTuple):
+    """u^2 as a straight line over the driven chamber's fill."""
+
+    per_pressure: float
+    """a, m^3/kg."""
+    per_fill: float
+    """b, Pa."""
+    deceleration: float
+    """-du/dt while it flows, a b S/V, m/s^2."""
+
+
+def _line(drive: Drive) -> _Line:
+    law = cast(LinearSquaredVelocity, drive.law)
+    a, b = law.velocity_squared_per_pressure, law.pressure_per_fill_difference
+    return _Line(per_pressure=a, per_fill=b, deceleration=a * b * drive.exchange_rate)
+
+
+def _velocity(drive: Drive, line: _Line, fill: float) -> float:
+    squared = line.per_pressure * (drive.gas_pressure + line.per_fill * (2 * fill - drive.total))
+    return math.sqrt(squared) if squared > 0 and drive.gas_pressure > 0 else 0.0
+
+
+def _blocked(drive: Drive, t: FloatArray) -> Transfer:
+    return Transfer(
+        instants=t,
+        fill=np.full(t.shape, drive.fill),
+        regime_start=Regime.BLOCKED,
+        regime_end=Regime.BLOCKED,
+        event=Event.BLOCKED,
+        event_time=0.0,
+        primed=False,
         evaluations=1,
     )
 

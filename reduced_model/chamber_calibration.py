@@ -15,6 +15,7 @@ from ringbalance.physics.results import Estimate, Statistics, Status
 from ringbalance.physics.ring import RingQuantities, ring_quantities
 from ringbalance.reduced_model.chamber_inputs import InputEffect, chamber_closed_forms, input_effects
 from ringbalance.reduced_model.gravity import SAFETY, GravityEffect, closed_ring, gravity_effect
+from ringbalance.reduced_model.gravity_choice import gravity_choice
 from ringbalance.reduced_model.gravity_open import open_ring_effect
 from ringbalance.reduced_model.hermite import HermiteTable
 from ringbalance.reduced_model.hermite_fit import table_from_samples
@@ -97,6 +98,8 @@ class ChamberCalibration:
     """Its largest share of wall pressure or moment at equal fills."""
     gravity_modelled: bool
     """Whether the finite elements hold it."""
+    gravity_check: str
+    """What running the next rung at a few fills said of that choice."""
     status: Status
     statistics: Statistics
 
@@ -122,8 +125,8 @@ def fill_nodes(*, largest: float, sparse: bool) -> tuple[FloatArray, FloatArray]
 def calibrate_chamber(scene: Scene) -> ChamberCalibration:
     """Run the finite elements over the fill range and judge what they leave open.
 
-    Gravity is modelled when its second-order share at equal fills exceeds the scene's tolerance; otherwise
-    its estimate goes into the half-widths.
+    Gravity is modelled when its second-order share exceeds the scene's tolerance, by the estimate and by a
+    check at a few fills; otherwise its estimate goes into the half-widths.
 
     Args:
         scene: the scene; a ring must exist.
@@ -133,8 +136,8 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
 
     Source: Eqs. 2 to 12 of the liquid-ring paper with exact plates, by finite elements.
     """
-    share = gravity_share(scene)
-    modelled = share > scene.tolerance
+    choice = gravity_choice(scene=scene, share=gravity_share(scene))
+    modelled = choice.modelled
     nodes, reported = fill_nodes(largest=scene.disc.max_fill_ratio, sparse=modelled)
     fills = np.append(nodes, [x for x in reported if np.min(np.abs(nodes - x)) > 1e-12])
     effect = _gravity(scene, fills)
@@ -163,8 +166,9 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
         moment_per_mass_inputs=math.hypot(*(e.moment_per_mass for e in effects.values())),
         input_effects=effects,
         gravity=effect,
-        gravity_share=share,
+        gravity_share=choice.share,
         gravity_modelled=modelled,
+        gravity_check=choice.told,
         status=ring.status,
         statistics=ring.statistics,
     )

@@ -9,10 +9,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.chamber_calibration import ChamberCalibration
+from ringbalance.reduced_model.chamber_terms import amplification, capillary_share
 from ringbalance.reduced_model.gravity import gravity_ratio
 from ringbalance.reduced_model.operating_point import OperatingPoint
 from ringbalance.reduced_model.transients import (
@@ -25,6 +28,7 @@ from ringbalance.scene.models import Scene
 
 LEFT_OUT = "left out"
 NOT_MODELLED = "not modelled in this version"
+IN_THE_LOOP = "modelled by `ringbalance simulate`, beside the quasi-steady law given here"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,6 +64,7 @@ def models_used(
         _plates(scene),
         _gravity(scene, chamber),
         _sloshing(scene),
+        *_unmodelled(scene),
         _hump(scene, law, point),
         _friction(scene, point),
         _rotation(scene, point),
@@ -104,7 +109,9 @@ def _gravity(scene: Scene, chamber: ChamberCalibration) -> Term:
     return Term(
         term="gravity, mean over a turn",
         model=held,
-        why=f"second order in g/(omega^2 a) at equal fills; {_against(scene, share)}",
+        why=(
+            f"second order in g/(omega^2 a) at equal fills; {_against(scene, share)}; {chamber.gravity_check}"
+        ),
         estimated_contribution=share,
     )
 
@@ -117,15 +124,41 @@ def _sloshing(scene: Scene) -> Term:
             why="on a vertical shaft gravity does not turn in the disc's frame",
             estimated_contribution=0.0,
         )
-    share = gravity_ratio(scene)
+    ripple, swing = gravity_ratio(scene), amplification(scene, scene.disc.max_fill_ratio / 2)
+    share = ripple * max(swing, 1.0)
+    above = share > scene.tolerance
     return Term(
         term="gravity ripple at 1x and sloshing",
-        model=_judged(scene, share),
+        model="apart, by `ringbalance trade`; the means given here do not hold it" if above else LEFT_OUT,
         why=(
-            f"tilt of order g/(omega^2 a); {_against(scene, share)}; "
-            "a sloshing mode near 1x would amplify it at every speed"
+            f"tilt g/(omega^2 a) = {_percent(ripple)}, which the liquid's swing at 1x makes "
+            f"|1/(1 - 1/s^2)| = {swing:.2g} times as large at every speed; {_against(scene, share)}; "
+            "it vanishes in the mean over a turn"
         ),
         estimated_contribution=share,
+    )
+
+
+def _unmodelled(scene: Scene) -> tuple[Term, ...]:
+    """What no rung holds: surface tension, and the layers at the walls of a chamber."""
+    x = np.array([scene.disc.max_fill_ratio / 2])
+    capillary = capillary_share(scene, x)["pressures"]
+    omega = abs(scene.rotor.speed)
+    ekman = scene.liquid.kinematic_viscosity / (omega * scene.disc.outer_radius**2)
+    layers = gravity_ratio(scene) * ekman**0.5 if scene.environment.shaft == "horizontal" else 0.0
+    return (
+        Term(
+            term="surface tension",
+            model=_judged(scene, capillary),
+            why=f"sigma (2/B + 1/(a alpha) + 1/a)/P, an inverse Bond number; {_against(scene, capillary)}",
+            estimated_contribution=capillary,
+        ),
+        Term(
+            term="friction at the walls of a chamber",
+            model=_judged(scene, layers),
+            why=f"g/(omega^2 a) sqrt(Ek), Ek = nu/(omega R2^2) = {ekman:.1e}; {_against(scene, layers)}",
+            estimated_contribution=layers,
+        ),
     )
 
 
@@ -184,9 +217,10 @@ def _transients(scene: Scene, law: CalibratedLaw, point: OperatingPoint) -> tupl
     def timed(term: str, time: float | None, formula: str) -> Term:
         share = None if time is None else time / pulse
         told = "" if time is None else f" of {1e3 * time:.3g} ms in a gas time of {1e3 * pulse:.3g} ms"
+        above = share is not None and share > scene.tolerance
         return Term(
             term=term,
-            model=_judged(scene, share),
+            model=IN_THE_LOOP if above else LEFT_OUT,
             why=f"{formula}{told}; {_against(scene, share)}",
             estimated_contribution=share,
         )

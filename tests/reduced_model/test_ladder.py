@@ -7,7 +7,7 @@ import dataclasses
 import pytest
 
 from ringbalance.reduced_model.calibration import Calibration
-from ringbalance.reduced_model.ladder import LEFT_OUT, NOT_MODELLED, Term, models_used
+from ringbalance.reduced_model.ladder import IN_THE_LOOP, LEFT_OUT, Term, models_used
 from ringbalance.reduced_model.operating_point import operating_point
 from ringbalance.reduced_model.transients import filling_time, inertia_time, pulse_time, tube_liquid_share
 from ringbalance.scene.models import Scene
@@ -30,7 +30,7 @@ def test_every_term_says_model_and_reason(table_1_calibration: Calibration) -> N
     assert all(t.model and t.why for t in table_1_calibration.models_used)
 
 
-@pytest.mark.parametrize(("tolerance", "model"), [(0.01, LEFT_OUT), (1e-4, NOT_MODELLED)])
+@pytest.mark.parametrize(("tolerance", "model"), [(0.01, LEFT_OUT), (1e-4, IN_THE_LOOP)])
 def test_tolerance_decides_on_the_tubes_inertia(
     table_1_calibration: Calibration, table_1_scene: Scene, tolerance: float, model: str
 ) -> None:
@@ -49,7 +49,7 @@ def test_valve_and_filling_are_unknown_until_the_scene_asks(
     )
     asked = chosen(table_1_calibration, dataclasses.replace(table_1_scene, gas=gas))
     assert asked["valve lag"].estimated_contribution == pytest.approx(0.1 / 0.8)
-    assert asked["valve lag"].model == NOT_MODELLED
+    assert asked["valve lag"].model == IN_THE_LOOP
     assert asked["gas filling of the chamber"].estimated_contribution is not None
 
 

@@ -8,15 +8,20 @@ from dataclasses import replace
 from importlib.resources import files
 from typing import Any
 
+import numpy as np
 import pytest
 
+from ringbalance.controller import simulate
 from ringbalance.reduced_model.calibration import calibrate
-from ringbalance.reports import fifty, hump, inside
+from ringbalance.reduced_model.paper_law import paper_model
+from ringbalance.reports import fifty, hump, inside, paper_again
 from ringbalance.reports.figure_style import Drawing
 from ringbalance.reports.render import render
 from ringbalance.reports.section import Section, Work
 from ringbalance.reports.sections import SECTIONS, drawings_in, viewed
 from ringbalance.scene.models import Scene
+from ringbalance.verification.loops import loop_scene
+from ringbalance.verification.runner import paper_scene
 
 Record = dict[str, Any]
 
@@ -192,3 +197,47 @@ def test_the_three_dimensional_check_tells_when_it_was_run(evidence: Record) -> 
     assert check is not None
     assert (check["when"], check["hash"]) == ("2031-05-06", "efefefefefef")
     assert "12.3" in check["result"]
+
+
+@pytest.fixture(scope="module")
+def again(work: Work) -> Record:
+    return paper_again.collect(work)
+
+
+def test_the_papers_figures_come_out_of_one_set_of_constants(evidence: Record, again: Record) -> None:
+    assert again["constants"]["rate_m_per_s"] == pytest.approx(7.2e-6, rel=0.01)
+    assert len(again["trial"]) == 4
+    assert all(run["settled"] and run["misadjustments"] for run in again["trial"])
+    assert [bool(run["overshoots"]) for run in again["gains"]] == [False, False, False, True, True]
+    assert max(run["settling_time_s"] for run in again["amplitudes"]) < 5
+    assert sum(run["misadjustments"] for run in again["amplitudes"]) == 0
+    for told in again["velocity"]:
+        assert told["departure_paper"] == pytest.approx(told["departure_printed"], abs=2e-3)
+        assert told["departure_levels"] > told["departure_paper"] + 0.01
+    view = paper_again.view(with_section(evidence, "paper_again", again))
+    assert view is not None
+    origins = " ".join(row["origin"] for row in view["constants"])
+    assert origins.count("fitted") == 2
+    assert {drawing.name for drawing in drawings_in(view)} == {
+        f"paper-figure-{name}" for name in ("4", "4-law", "6", "7", "7-phase", "8")
+    }
+
+
+def test_half_the_fitted_constant_gives_the_literal_reading_the_same_runs(again: Record) -> None:
+    scene = loop_scene(paper_scene(), kind="target_vector", proportional=0.16e6, integral_time=None)
+    model = paper_model(scene)
+    half = replace(scene.rotor, influence_coefficient=scene.rotor.influence_coefficient / 2)
+    literal = simulate(replace(scene, rotor=half), replace(model, moment=paper_again.literal_moment(model)))
+    own = simulate(scene, model)
+    np.testing.assert_allclose(literal.amplitude, own.amplitude, rtol=1e-9, atol=1e-15)
+    reading = again["reading"]
+    ratio = reading["onset_literal_s_per_m"] / reading["onset_transferred_s_per_m"]
+    assert ratio == pytest.approx(0.5, abs=0.05)
+    assert (
+        reading["figure_8"]["literal"]["overshoots"] > 0 == reading["figure_8"]["transferred"]["overshoots"]
+    )
+
+
+def test_only_the_papers_moment_has_a_literal_reading(work: Work) -> None:
+    with pytest.raises(ValueError, match="only the paper's model"):
+        paper_again.literal_moment(work.calibration.model)

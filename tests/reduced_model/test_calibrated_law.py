@@ -259,3 +259,26 @@ def test_table_inverts_to_the_law(law: CalibratedLaw) -> None:
 def test_what_cannot_be_is_refused(law: CalibratedLaw, wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=r"fill_ratio|gas_pressure"):
         law.evaluate(**({"fill_ratio": 0.2, "gas_pressure": 1e6} | wrong))
+
+
+@pytest.mark.parametrize(
+    ("bore", "viscosity", "speed"), [(1.2e-3, 1.4e-7, 1383.0), (0.2e-3, 2.9e-5, 3700.0), (5e-3, 1.3e-3, 60.0)]
+)
+def test_spread_of_the_heads_never_falls_below_that_of_k(
+    table_1_scene: Scene, bore: float, viscosity: float, speed: float
+) -> None:
+    """Where a source's range ends the half-width steps up; a spline through the step must not swing below."""
+    scene = dataclasses.replace(
+        table_1_scene,
+        tube=dataclasses.replace(table_1_scene.tube, bore=bore, bends=()),
+        liquid=dataclasses.replace(table_1_scene.liquid, kinematic_viscosity=viscosity),
+        rotor=dataclasses.replace(table_1_scene.rotor, speed=speed),
+    )
+    heads = tube_heads(scene)
+    u = np.geomspace(2e-5, 5e2, 4001)
+    loss = tube_loss(tube=scene.tube, liquid=scene.liquid, angular_velocity=speed, velocity=u)
+    exact = loss.k.uncertainty / (loss.k.value + 1)
+    tabulated = heads.spread(np.log(u))
+    assert np.all(tabulated > 0.97 * exact)
+    assert np.median(tabulated / exact) < 1.05
+    assert np.all(heads.hump_spread(np.log(u)) > 0)

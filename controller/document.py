@@ -44,6 +44,7 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         "energy_J": simulation.energy,
         "noise_floor_m": simulation.noise_floor,
         "samples": _samples(simulation.samples),
+        "terms_modelled": list(simulation.terms_modelled),
         "models_used": [asdict(term) for term in simulation.terms],
     }
 

@@ -283,6 +283,7 @@ def _record(run: _Run, cause: Cause, *, integrator: str, chosen: tuple[Choice, .
         noise_floor=run.floor,
         limit=run.scene.controller.limit,
         energy=math.fsum(injection.operation.energy for injection in facts.injections),
+        terms_modelled=tuple(choice.term for choice in chosen if choice.modelled),
         terms=terms(scene=run.scene, model=run.plant.model, integrator=integrator, chosen=chosen),
     )
 

@@ -93,3 +93,5 @@ class Simulation:
     """Work of the driving gas against the surroundings over all injections, J."""
     terms: tuple[Term, ...]
     """Physical terms modelled and left out."""
+    terms_modelled: tuple[str, ...]
+    """Names of the terms that are modelled beyond the flow law; empty: it alone carries the operations."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from ringbalance.controller.algorithm import Command, Controller, Measurement, ValveCommand
 from ringbalance.controller.algorithms import controller_of
+from ringbalance.controller.consequences_gain import LoopGain, loop_gain
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.law_based import LawBased
 from ringbalance.controller.loop import simulate
@@ -26,6 +27,7 @@ __all__ = [
     "Ensemble",
     "Injection",
     "LawBased",
+    "LoopGain",
     "Measurement",
     "Outcome",
     "Simulation",
@@ -36,6 +38,7 @@ __all__ = [
     "controller_of",
     "ensemble_document",
     "find_consequences",
+    "loop_gain",
     "simulate",
     "simulate_ensemble",
     "simulation_document",

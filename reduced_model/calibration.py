@@ -73,7 +73,7 @@ def calibrate(scene: AnyScene) -> Calibration:
         SceneError: a rotor too slow for the liquid to form a ring, or a balancer without liquid.
         ValueError: a tube whose bends do not fit into its length.
 
-    Source: finite elements for the chamber, correlations for the tube; see the parts.
+    Source: finite elements for the chamber and the laminar tube, correlations beyond; see the parts.
     """
     scene = liquid_ring_scene(scene)
     check_ring(scene)

@@ -186,7 +186,7 @@ def _friction(scene: Scene, point: OperatingPoint) -> Term:
     if scene.tube.drag_coefficient is not None:
         model, why = "k by decree", "the scene fixes drag_coefficient"
     else:
-        model = "k(u) from correlations, laminar to turbulent"
+        model = "k(u): finite elements laminar, correlations turbulent"
         why = "against the liquid-ring paper's constant k = 50: relative change of the velocity"
     share = None if point.k is None else abs(((paper.PAPER_DRAG_COEFFICIENT + 1) / (point.k + 1)) ** 0.5 - 1)
     return Term(term="loss of the tube", model=model, why=why, estimated_contribution=share)
@@ -203,7 +203,7 @@ def _rotation(scene: Scene, point: OperatingPoint) -> Term:
         )
     return Term(
         term="friction by rotation",
-        model="correlations joined to exact limits",
+        model="finite-element table laminar, correlation turbulent",
         why="half the rotation's share of k + 1 at the operating point: its effect on the velocity",
         estimated_contribution=abs(extra) / (point.k + 1) / 2,
     )

@@ -23,7 +23,7 @@ TOLERANCES: Final = (1e-6, 0.1)
 """Smallest and largest tolerance that a choice is made for."""
 NEGLIGIBLE: Final = 1e-3
 """Of the tolerance: what is worth less is left out unchecked."""
-HOPELESS: Final = 30.0
+HOPELESS: Final = 100.0
 """Times the tolerance: a rung that leaves out a single thing worth more is not tried."""
 MARGIN: Final = 1.01
 """A rung within this factor of the tolerance is kept at the check: its reference is known no better, and the
@@ -216,7 +216,8 @@ def _doubtful(ladder: Ladder, rung: Rung, tolerance: float) -> frozenset[str]:
 
 
 def _hopeless(ladder: Ladder, rung: Rung, tolerance: float) -> bool:
-    worth = [ladder.contributions[term].value or 0.0 for term in rung.leaves_out]
+    left = [ladder.contributions[term] for term in rung.leaves_out]
+    worth = [0.0 if c.rough else c.value or 0.0 for c in left]
     return max(worth, default=0.0) > HOPELESS * tolerance
 
 

@@ -34,6 +34,7 @@ LOSSES: Final = (CONSTANT, CORRELATIONS, ROTATING, TABLES)
 FORMULAS: Final = {CONSTANT: 1, CORRELATIONS: 20, ROTATING: 60, TABLES: 260}
 """Formulas per call, as counted work; the tables' look-ups among them."""
 _TURBULENT_PROFILE: Final = 1.06
+_LEAST_KL: Final = 220.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,8 +91,9 @@ def _correlations(scene: Scene, tube: Tube, velocity: FloatArray) -> Loss:
 def _rotating(scene: Scene, tube: Tube, velocity: FloatArray) -> Loss:
     re, rough = _reynolds(scene, tube, velocity), tube.roughness / tube.bore
     rotation = _rotation(scene, tube)
-    # Below its stated range the recalled laminar formula falls under one, which rotation cannot do.
-    laminar = np.maximum(ito_nanbu_laminar(kl=np.maximum(rotation * re, 1e-12)), 1.0)
+    # At the lower end of its range, Kl = 220, the recalled formula is one; below, it would rise again.
+    kl = np.maximum(rotation * re, _LEAST_KL)
+    laminar = np.maximum(ito_nanbu_laminar(kl=kl), 1.0)
     f = friction_factor(reynolds=re, relative_roughness=rough)
     turning = friction_factor(
         reynolds=re,

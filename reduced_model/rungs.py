@@ -30,6 +30,8 @@ class Contribution:
     """Relative to the quantity; None where the scene gives no basis for an estimate."""
     formula: str
     source: str
+    rough: bool = False
+    """Whether it may be far too large, so that no rung is ruled out by it alone."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.physics.tube_friction import friction_factor, turbulent_share
+from ringbalance.physics.tube_friction import turbulent_share
 from ringbalance.physics.tube_numbers import reynolds_number, rotation_reynolds_number
 from ringbalance.reduced_model.chamber_terms import MEAN, PLATES, chamber_contributions
 from ringbalance.reduced_model.chamber_values import by_closed_form
@@ -32,6 +32,8 @@ _RECALLED: Final = 0.3
 """Share of the rotation term that its correlations may be off by, from their distance to the tables."""
 _LAMINAR_ENDS: Final = 1.3
 """What laminar ends add to k."""
+_CREEPING_ENDS: Final = 12 * np.pi
+"""The same times Re where the flow creeps."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,7 +102,8 @@ def loss_contributions(scene: Scene) -> Mapping[str, Contribution]:
     """
     flow = flow_estimate(scene)
     constant = abs((PAPER_DRAG_COEFFICIENT + 1) / (flow.k + 1) - 1)
-    tables = _RECALLED * flow.rotation_share + flow.laminar_share * _LAMINAR_ENDS / (flow.k + 1)
+    ends = _LAMINAR_ENDS + _CREEPING_ENDS / max(flow.reynolds, 1e-6)
+    tables = _RECALLED * flow.rotation_share + flow.laminar_share * ends / (flow.k + 1)
     # Where the other branch rules, part of the rotation term still differs.
     tables += 0.02 * flow.rotation_share
     given = scene.tube.drag_coefficient is not None
@@ -115,7 +118,7 @@ def loss_contributions(scene: Scene) -> Mapping[str, Contribution]:
         (
             TABLE,
             tables,
-            "0.3 of the rotation term, and 1.3/(k + 1) while laminar",
+            "0.3 of the rotation term, and (1.3 + 12 pi/Re)/(k + 1) while laminar",
             "spread of the correlations",
         ),
     )
@@ -188,39 +191,28 @@ def _lever(scene: Scene) -> float:
 
 
 def _hump(scene: Scene) -> Contribution:
-    told = {
-        "formula": "1 - u_separated/u_siphon, or 1 where the column to the hump outweighs the gas",
-        "source": "energy balance up to the hump",
-    }
-    radius = scene.tube.hump_radius
-    if radius is None:
-        return Contribution(term=HUMP, value=0.0, **told)
-    own, other = _levels(scene)
-    column = column_pressure(scene=scene, radius=radius)
-    pressure, rho = scene.gas.pressure, scene.liquid.density
-    if np.any(pressure + own - column <= 0):
-        return Contribution(term=HUMP, value=1.0, **told)
-    cavity = scene.liquid.vapour_pressure - scene.gas.ambient_pressure
-    surplus = np.maximum(pressure + own - other, 0.0) / rho
-    margin = (pressure - cavity + own - column) / rho
-    speed = max(flow_estimate(scene).velocity, 1e-6)
-    loss = loss_at(scene, loss=CORRELATIONS, velocity=speed)
-    full = np.sqrt(2 * surplus / (float(loss.k) + 1))
-    torn = np.sqrt(2 * margin / (float(loss.upstream_k) + float(loss.kinetic_factor)))
+    worth = 0.0 if scene.tube.hump_radius is None else _hump_worth(scene, scene.tube.hump_radius)
     return Contribution(
-        term=HUMP, value=float(np.max(np.where(torn < full, 1 - torn / np.maximum(full, 1e-300), 0))), **told
+        term=HUMP,
+        value=worth,
+        formula="1 - u_separated/u_siphon, or 1 where the column to the hump outweighs the gas",
+        source="energy balance up to the hump",
+        rough=True,
     )
 
 
-def friction_at(scene: Scene) -> float:
-    """Friction factor of the straight tube at the estimated flow.
-
-    Args:
-        scene: the scene.
-
-    Returns:
-        f (Darcy).
-    """
-    flow = flow_estimate(scene)
-    rough = scene.tube.roughness / scene.tube.bore
-    return float(friction_factor(reynolds=max(flow.reynolds, 1e-6), relative_roughness=rough))
+def _hump_worth(scene: Scene, radius: float) -> float:
+    own, other = _levels(scene)
+    column, rho = column_pressure(scene=scene, radius=radius), scene.liquid.density
+    surplus = scene.gas.pressure + own - other
+    flows = surplus > 0
+    if np.any(flows & (scene.gas.pressure + own - column <= 0)):
+        return 1.0
+    if not np.any(flows):
+        return 0.0
+    cavity = scene.liquid.vapour_pressure - scene.gas.ambient_pressure
+    margin = (scene.gas.pressure - cavity + own - column)[flows] / rho
+    loss = loss_at(scene, loss=CORRELATIONS, velocity=max(flow_estimate(scene).velocity, 1e-6))
+    full = np.sqrt(2 * surplus[flows] / rho / (float(loss.k) + 1))
+    torn = np.sqrt(2 * np.maximum(margin, 0.0) / (float(loss.upstream_k) + float(loss.kinetic_factor)))
+    return float(np.max(np.maximum(1 - torn / full, 0.0)))

@@ -96,6 +96,8 @@ def collect_evidence(
     consequences = consequences_document(find_consequences(scene, calibration.model, members=MEMBERS[level]))
     tell("sections")
     sections = collected(Work(scene=scene, calibration=calibration, level=level))
+    # What a section measured by the clock does not reproduce.
+    clocked = {name: record.pop("times") for name, record in sections.items() if "times" in record}
     tell("verification")
     cases = _verification(scene, level, saved, workers, tell)
     return {
@@ -115,7 +117,7 @@ def collect_evidence(
         **sections,
         "verification": cases,
         "pictures": {"drawn": False, "text": "The 3-D pictures were not asked for.", "files": []},
-        "times": {"date": date.today().isoformat()},
+        "times": {"date": date.today().isoformat()} | clocked,
     }
 
 

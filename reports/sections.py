@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from ringbalance.reports import consequence_view, extremes, fifty, hump, inside, paper_again, sloshing
+from ringbalance.reports import consequence_view, extremes, fifty, hump, inside, paper_again, sloshing, trade
 from ringbalance.reports.figure_style import Drawing
 from ringbalance.reports.section import Record, Section, Work
 
@@ -28,6 +28,7 @@ SECTIONS: Final[tuple[Section, ...]] = (
     Section(name="claims", title="Claims of the paper"),
     Section(name="numerics", title="Numerical verification"),
     extremes.SECTION,
+    trade.SECTION,
     Section(name="models", title="Models used, and why"),
     Section(name="scene", title="Scene and provenance"),
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -11,14 +11,14 @@ import numpy as np
 from ringbalance.reduced_model.cost_model import CostModel, committed_costs, fitted_costs
 from ringbalance.reduced_model.gravity import check_ring
 from ringbalance.reduced_model.ladder_choice import Choice, Values, choose
-from ringbalance.reduced_model.law_rungs import base_law
-from ringbalance.reduced_model.rungs import Ladder
+from ringbalance.reduced_model.law_rungs import QUADRATURE, SERIES, base_law
+from ringbalance.reduced_model.rungs import Ladder, Rung
 from ringbalance.reduced_model.rungs_chamber import chamber_ladders
 from ringbalance.reduced_model.rungs_flow import LawBook, k_ladder, velocity_ladder
 from ringbalance.reduced_model.scene_numbers import scene_numbers
 from ringbalance.scene.models import Scene
 from ringbalance.verification.trade_measure import Clock, Measured, Trade, measure, works_and_seconds
-from ringbalance.verification.trade_operation import mass_ladder, settling_ladder
+from ringbalance.verification.trade_operation import EXPLICIT, MANY, mass_ladder, settling_ladder
 
 Record = dict[str, Any]
 Level = Literal["light", "heavy"]
@@ -26,6 +26,9 @@ Level = Literal["light", "heavy"]
 TOLERANCES: Final = (0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 QUICK: Final = ("wall_pressure", "moment", "k", "velocity", "transferred_mass")
 """Quantities of a light trade; the settling time takes whole runs of the loop."""
+_OWN_ALONE: Final = (("light", "transferred_mass"),)
+"""Where models are chosen for the scene's own tolerance alone."""
+_LAWS: Final = ("velocity", "transferred_mass")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,8 +98,9 @@ def trade_study(
         if progress is not None:
             progress(ladder.title)
         values = Values(ladder)
-        trades.append(measure(ladder, values=values, costs=costs, clock=_no_longer(clock, ladder)))
-        wanted = _wanted(scene, tolerances)
+        shown = thinned(ladder) if level == "light" else ladder
+        trades.append(measure(shown, values=values, costs=costs, clock=_no_longer(clock, ladder)))
+        wanted = _wanted(scene, () if (level, ladder.quantity) in _OWN_ALONE else tolerances)
         chosen[ladder.quantity] = tuple(
             choose(ladder, tolerance, costs=costs, values=values) for tolerance in wanted if ladder.points
         )
@@ -105,15 +109,32 @@ def trade_study(
     )
 
 
+def thinned(ladder: Ladder) -> Ladder:
+    """A ladder of laws with every second rung left out: levels and ways through time that lie close together.
+
+    Args:
+        ladder: any ladder.
+
+    Returns:
+        The ladder; the highest rung stays, and choices are made on the whole one.
+    """
+
+    def kept(rung: Rung) -> bool:
+        close = rung.models.get("level of a chamber") in (SERIES, QUADRATURE)
+        return rung is ladder.top or not (close or rung.models.get("operation in time") == EXPLICIT[MANY])
+
+    return replace(ladder, rungs=tuple(rung for rung in ladder.rungs if kept(rung)))
+
+
 def _clock(level: Level) -> Clock:
     return Clock(repeats=3) if level == "heavy" else Clock(repeats=1, memory=False)
 
 
 def _no_longer(clock: Clock | None, ladder: Ladder) -> Clock | None:
-    """Runs of the whole loop are timed once each, and not traced."""
-    if clock is None or ladder.quantity != "settling_time":
-        return clock
-    return Clock(repeats=1, memory=False)
+    """Runs of the whole loop are timed once each, and not traced; a light study times no laws."""
+    if clock is None or (clock.repeats == 1 and ladder.quantity in _LAWS):
+        return None
+    return Clock(repeats=1, memory=False) if ladder.quantity == "settling_time" else clock
 
 
 def refitted(trades: Sequence[Trade], *, costs: CostModel) -> CostModel | None:

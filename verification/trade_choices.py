@@ -68,7 +68,7 @@ def judge(
     quantities: Sequence[str],
     tolerances: Sequence[float] = TOLERANCES,
     check: bool = True,
-    worth: Mapping[str, float] | None = None,
+    worth: float = 1.0,
 ) -> list[Judged]:
     """Choose models for a scene at every tolerance, and judge each choice by the highest rung.
 
@@ -77,24 +77,22 @@ def judge(
         quantities: names.
         tolerances: relative.
         check: whether choices are checked; without it the estimates alone decide.
-        worth: factors on contributions by name; anything but 1 is a deliberate fault.
+        worth: factor on every contribution; anything but 1 is a deliberate fault.
 
     Returns:
         One record for each quantity and tolerance.
     """
     found = []
     for ladder in ladders_for(scene, quantities):
-        spoiled = replace(ladder, contributions=_spoiled(ladder.contributions, worth or {}))
+        spoiled = replace(ladder, contributions=_spoiled(ladder.contributions, worth))
         values = Values(spoiled)
         found += [_judged(scene, spoiled, values, tolerance, check=check) for tolerance in tolerances]
     return found
 
 
-def _spoiled(
-    contributions: Mapping[str, Contribution], worth: Mapping[str, float]
-) -> Mapping[str, Contribution]:
+def _spoiled(contributions: Mapping[str, Contribution], worth: float) -> Mapping[str, Contribution]:
     return {
-        term: replace(c, value=None if c.value is None else c.value * worth.get(term, 1.0))
+        term: replace(c, value=None if c.value is None else c.value * worth)
         for term, c in contributions.items()
     }
 

@@ -1,0 +1,143 @@
+"""Speed against accuracy: every ladder of models with its front, and the rungs that a tolerance needs."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ringbalance.reports.figure_style import FOUND, INK, MUTED, PAPER, Drawing, draw, logarithmic
+from ringbalance.reports.numbers import MISSING, number, percent
+from ringbalance.reports.prose import typeset
+from ringbalance.reports.section import Record, Section, Work
+from ringbalance.verification.trade import trade_document, trade_study
+
+_LEAST: Final = 1e-9
+"""Error at which a rung that equals the highest is drawn."""
+_MOST_ROWS: Final = 8
+
+
+def collect(work: Work) -> Record | None:
+    """The trade of the scene, light: without the settling time.
+
+    Args:
+        work: scene, calibration and level.
+
+    Returns:
+        Record; its `times` differ from run to run and are kept apart.
+    """
+    return trade_document(trade_study(work.scene, level="light"))
+
+
+def view(evidence: Record) -> Record | None:
+    """The section on models against tolerances, every number already text.
+
+    Args:
+        evidence: the whole document.
+
+    Returns:
+        `quantities`, `numbers` and `tolerance`; None where nothing was measured.
+    """
+    found = evidence.get("trade")
+    if not found:
+        return None
+    times = (evidence["times"].get("trade") or {}).get("rungs", {})
+    return {
+        "tolerance": percent(found["tolerance"]),
+        "numbers": [
+            {
+                "name": typeset(n["name"]),
+                "value": MISSING if n["value"] is None else number(n["value"], digits=3),
+                "formula": typeset(n["formula"]),
+                "tells": typeset(n["tells"]),
+            }
+            for n in found["numbers"]
+        ],
+        "quantities": [_quantity(q, times.get(q["quantity"], [])) for q in found["quantities"] if q["rungs"]],
+    }
+
+
+def _quantity(found: Record, times: list[Record]) -> Record:
+    seconds = {entry["name"]: entry["seconds"] for entry in times}
+    front = sorted((r for r in found["rungs"] if r["on_front"]), key=lambda r: r["cost_s"])
+    own = found["choices"][-1]
+    return {
+        "title": typeset(found["title"]),
+        "status": "" if found["status"]["code"] == "ok" else typeset(found["status"]["text"]),
+        "knee": typeset(found["knee"]),
+        "top": typeset(found["top"]),
+        "known": _error(found["top_uncertainty"]),
+        "front": [
+            {
+                "name": typeset(rung["name"]),
+                "error": MISSING if rung["name"] == found["top"] else _error(rung["error"]),
+                "cost": _time(rung["cost_s"]),
+                "time": MISSING if seconds.get(rung["name"]) is None else _time(seconds[rung["name"]]),
+            }
+            for rung in front[:_MOST_ROWS]
+        ],
+        "choices": [
+            {
+                "tolerance": _error(choice["tolerance"]),
+                "rung": typeset(choice["rung"]),
+                "check": MISSING if choice["measured"] is None else _error(choice["measured"]),
+                "cost": _time(choice["cost_s"]),
+            }
+            for choice in found["choices"][:-1]
+        ],
+        "own": {"rung": typeset(own["rung"]), "reasons": [typeset(text) for text in own["reasons"]]},
+        "figure": front_figure(found),
+    }
+
+
+def _error(value: float) -> str:
+    return percent(value, digits=2) if value >= 1e-3 else number(value, digits=2)
+
+
+def _time(value: float) -> str:
+    unit, scale = ("µs", 1e-6) if value < 1e-3 else ("ms", 1e-3) if value < 1 else ("s", 1.0)
+    return f"{number(value / scale, digits=2)} {unit}"
+
+
+def front_figure(found: Record) -> Drawing:
+    """Error against counted cost of every rung, with the front and its knee.
+
+    Args:
+        found: one entry of `quantities`.
+
+    Returns:
+        The figure.
+    """
+    rungs = sorted(found["rungs"], key=lambda r: r["cost_s"])
+    cost = np.array([r["cost_s"] for r in rungs])
+    error = np.array([max(r["error"], _LEAST) for r in rungs])
+    front = np.array([r["on_front"] for r in rungs])
+    at_knee = np.array([r["name"] == found["knee"] for r in rungs])
+
+    def paint(_figure: Figure, axes: Axes) -> None:
+        axes.plot(cost[~front], error[~front], "o", color=MUTED, markersize=3.5)
+        axes.plot(cost[front], error[front], "o-", color=FOUND, markersize=5, linewidth=1.4)
+        axes.plot(cost[at_knee], error[at_knee], "D", color=INK, markersize=7, fillstyle="none")
+        axes.axhline(found["top_uncertainty"], color=PAPER, linewidth=1, linestyle=":")
+        logarithmic(axes, "x", ticks=[10.0**e for e in range(-6, 3)])
+        logarithmic(axes, "y", ticks=[10.0**e for e in range(-9, 3, 2)])
+        axes.set_xlim(cost.min() / 2, cost.max() * 2)
+        low = min(error.min(), found["top_uncertainty"])
+        axes.set_ylim(low / 3, max(error.max() * 3, 1.0))
+        axes.set_xlabel("counted cost in s")
+        axes.set_ylabel("error against the highest rung")
+
+    return draw(
+        name=f"trade-{found['quantity'].replace('_', '-')}",
+        paint=paint,
+        height=3.0,
+        alt=f"Error of {len(rungs)} rungs for {found['title']} against their cost, falling along the front "
+        f"to the highest rung; the knee is {found['knee']}.",
+        caption=f"{found['title'][0].upper()}{found['title'][1:]}. Line: no rung is both cheaper and nearer. "
+        "Diamond: the knee. Dotted: what the highest rung itself is known to.",
+    )
+
+
+SECTION: Final = Section(name="trade", title="Speed against accuracy", collect=collect, view=view)

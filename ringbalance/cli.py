@@ -35,6 +35,15 @@ COMMANDS = {
         "ringbalance.verification.cli:verify",
         "The verification cases and the paper's claims, judged.",
     ),
+    "compare": ("ringbalance.controller.compare_cli:compare", "Two balancers on one rotor, side by side."),
+    "trade": (
+        "ringbalance.verification.trade_cli:trade",
+        "Speed against accuracy: ladders of models measured, and the rungs that a tolerance needs.",
+    ),
+    "extremes": (
+        "ringbalance.reports.extremes_cli:extremes",
+        "Where answers end, what is said beyond, and whether all holds in between.",
+    ),
     "plot": ("ringbalance.reports.cli:plot", "The off-screen 3-D pictures alone."),
 }
 THREAD_COUNTS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")

@@ -194,7 +194,7 @@ DIMENSIONS: Mapping[str, Dimension] = MappingProxyType(
         "stiffness": Dimension(
             name="a stiffness",
             example="1000 N/m",
-            units=_units({"N/m": 1, "kN/m": 1000, "N/mm": 1000, "N/um": 10**6}),
+            units=_units({"N/m": 1, "kN/m": 1000, "N/mm": 1000, "N/um": 10**6, "MN/m": 10**6}),
             smallest=1e-6,
             largest=1e15,
         ),

@@ -30,7 +30,7 @@ from ringbalance.controller.eccentric.plant import SIZE, Drive, drive_of, loads,
 LONGEST: Final = 0.1
 """Greatest product of a substep and the plant's fastest rate."""
 _STAGES: Final = 6
-_BISECTIONS: Final = 60
+_BISECTIONS: Final = 40
 _MOST_EVENTS: Final = 64
 _COUPLING = np.zeros((_STAGES, _STAGES - 1))
 _COUPLING[1, :1] = (1 / 5,)

@@ -20,7 +20,7 @@ from ringbalance.scene.uncertain import UNCERTAIN, nominal_value, with_value
 
 Load = Callable[[Mapping[str, Any]], Scene]
 BUNDLED = ("liquid_ring_paper", "silicone_oil_100cst", "perfluorinated_oil", "six_chamber")
-DRIVEN = ("eccentric_mass_paper", "washing_machine")
+DRIVEN = ("eccentric_mass_paper", "washing_machine", "driven_masses_small")
 """Tested in test_eccentric_scene.py."""
 
 

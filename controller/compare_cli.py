@@ -1,0 +1,82 @@
+"""The command `ringbalance compare`."""
+
+from __future__ import annotations
+
+import cmath
+import json as json_format
+import math
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from ringbalance.controller.compare import Comparison, Side, comparison_document
+from ringbalance.controller.compare import compare as compare_scenes
+from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.loading import load_model
+from ringbalance.reduced_model.model import BalancerModel
+from ringbalance.reduced_model.paper_law import paper_model
+from ringbalance.scene.loader import load_scene
+from ringbalance.scene.models import Scene
+
+SETTLED = 0
+NOT_SETTLED = 1
+
+
+def compare(first: Path, second: Path, *, law: str = "calibrated", json: bool = False) -> int:
+    """Run two balancers on one rotor, that of the first scene.
+
+    Args:
+        first: a scene file; its rotor, vibration sensor and limit hold for both.
+        second: another scene file; only its balancer counts.
+        law: of a liquid ring: "calibrated", "paper", or a file written by `ringbalance calibrate --save`.
+        json: print one JSON document instead of a table.
+
+    Returns:
+        Exit code: 0 both settled, 1 not both; the result is printed either way.
+
+    Raises:
+        SceneError: a scene that cannot be used, or a balancer that cannot work on that rotor.
+    """
+
+    def model_of(scene: Scene) -> BalancerModel:
+        if law == "calibrated":
+            return calibrate(scene).model
+        return paper_model(scene) if law == "paper" else load_model(Path(law))
+
+    told = load_scene(first), load_scene(second)
+    with Console(stderr=True).status("both balancers on one rotor ..."):
+        found = compare_scenes(*told, model_of=model_of)
+    if json:
+        print(json_format.dumps(comparison_document(found), allow_nan=False))
+    else:
+        _show(found, Console())
+    return SETTLED if all(side.settled for side in found.sides) else NOT_SETTLED
+
+
+def _show(comparison: Comparison, console: Console) -> None:
+    rotor = comparison.rotor
+    lag = math.degrees(-cmath.phase(rotor.influence))
+    console.print(
+        f"rotor of {rotor.source}: {rotor.speed * 30 / math.pi:.6g} rpm, "
+        f"{abs(rotor.influence):.4g} m/(kg m) at a lag of {lag:.4g} deg, "
+        f"{1e6 * rotor.amplitude:.4g} um before balancing, limit {1e6 * rotor.limit:.4g} um",
+        highlight=False,
+    )
+    table = Table("", *(side.scene.name for side in comparison.sides))
+    rows = {
+        "balancer": [side.scene.balancer.replace("_", " ") for side in comparison.sides],
+        "time to the limit": [_time(side) for side in comparison.sides],
+        "left over": [f"{100 * side.residual_ratio:.3g} %" for side in comparison.sides],
+        "energy": [f"{side.energy:.4g} J" for side in comparison.sides],
+        "worst on the way": [f"{1e6 * side.worst_amplitude:.4g} um" for side in comparison.sides],
+    }
+    for name, cells in rows.items():
+        table.add_row(name, *cells)
+    console.print(table)
+    for side in comparison.sides:
+        console.print(f"{side.scene.source}: {side.status}", markup=False, highlight=False)
+
+
+def _time(side: Side) -> str:
+    return "did not settle" if side.time is None else f"{side.time:.4g} s"

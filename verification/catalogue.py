@@ -43,6 +43,7 @@ from ringbalance.verification.cases.manufactured_2d import case as manufactured_
 from ringbalance.verification.cases.manufactured_3d import case as manufactured_3d
 from ringbalance.verification.cases.manufactured_flow import case as manufactured_flow
 from ringbalance.verification.cases.mixing_length import case as mixing_length
+from ringbalance.verification.cases.model_choice import case as model_choice
 from ringbalance.verification.cases.rotating_section import case as rotating_section
 from ringbalance.verification.cases.sloshing import case as sloshing
 from ringbalance.verification.evidence import CaseCode
@@ -62,6 +63,7 @@ _CODE: Mapping[str, CaseCode] = {
     "integrator_orders": integrator_orders,
     "friction_blend": friction_blend,
     "mixing_length": mixing_length,
+    "model_choice": model_choice,
     "coverage": coverage,
     "extremes": extremes,
     "claim_01_volume": claim_01_volume,

@@ -7,6 +7,7 @@ own equations, which converges at twice the rate of integrated wall stresses.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,6 +85,7 @@ class _Iteration:
     """Whether the last step was well below the one before, so that old factors may serve once more."""
     iterations: int = 0
     factorizations: int = 0
+    progress: Callable[[str], None] | None = None
 
 
 def _residual(system: FlowSystem, c: Coefficients, entries: FloatArray, state: _Iteration) -> FloatArray:
@@ -103,7 +105,8 @@ def _factorize(system: FlowSystem, c: Coefficients, entries: FloatArray, state: 
     if c.inertia != 0.0:
         jacobian = entries + c.inertia * convection_entries(system, state.vector)
     quads = system.space.mesh.refdom.__name__ == "RefQuad"
-    factors = factorize(matrix=free_matrix(system, jacobian), along_diagonal=quads)
+    layers = None if system.layers is None else system.layers[system.free]
+    factors = factorize(matrix=free_matrix(system, jacobian), along_diagonal=quads, layers=layers)
     state.factorizations += 1
     if system.flow_component is not None:
         state.bordering = factors.solve(system.flow_load[system.free])
@@ -128,6 +131,8 @@ def _step(
     before, state.update = state.update, moved / largest if largest > 0.0 else 0.0
     state.contracting = state.update < 0.1 * before
     state.iterations += 1
+    if state.progress is not None:
+        state.progress(f"Newton iteration {state.iterations}: relative change {state.update:.1e}")
 
 
 def _iterate(
@@ -206,6 +211,7 @@ def solve_flow(
     flow_rate: float = 0.0,
     start: FlowSolution | None = None,
     settings: NewtonSettings | None = None,
+    progress: Callable[[str], None] | None = None,
 ) -> FlowSolution:
     """Steady flow of a system for given coefficients.
 
@@ -217,6 +223,7 @@ def solve_flow(
         flow_rate: integral of the system's flow component over the domain; unused without one.
         start: a flow of the same system to start from.
         settings: of Newton's method.
+        progress: told in a few words how each iteration went; None for silence.
 
     Returns:
         The flow; its status says NOT_CONVERGED, with a remedy, when Newton's method failed.
@@ -230,7 +237,7 @@ def solve_flow(
     if start is not None and start.vector.size != system.space.unknowns:
         raise ValueError("start belongs to another system")
     if start is None:
-        state = _Iteration(vector=system.fixed_values.copy(), gradient=0.0)
+        state = _Iteration(vector=system.fixed_values.copy(), gradient=0.0, progress=progress)
         still = Coefficients(inertia=0.0, viscosity=coefficients.viscosity, rotation=coefficients.rotation)
         problem = _iterate(system, still, flow_rate, settings, state)
         if problem or coefficients.inertia == 0.0:
@@ -240,7 +247,7 @@ def solve_flow(
         vector = np.where(
             np.isin(np.arange(start.vector.size), system.free), start.vector, system.fixed_values
         )
-        state = _Iteration(vector=vector, gradient=start.driving_gradient)
+        state = _Iteration(vector=vector, gradient=start.driving_gradient, progress=progress)
     problem = _iterate(system, coefficients, flow_rate, settings, state)
     return _solution(system, coefficients, settings, state, problem)
 

@@ -15,7 +15,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse.linalg import splu
 
+from ringbalance.physics.navier_stokes_layers import factorize_layers
+
 FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
 
 _GOOD, _USABLE, _REFINEMENTS = 1e-12, 1e-8, 3
 
@@ -65,12 +68,13 @@ def _with_pivoting(matrix: Any) -> Any:
     return splu(matrix, permc_spec="COLAMD")
 
 
-def factorize(*, matrix: Any, along_diagonal: bool) -> Factors:
+def factorize(*, matrix: Any, along_diagonal: bool, layers: IntArray | None = None) -> Factors:
     """Factors of a square sparse matrix.
 
     Args:
         matrix: CSC, with symmetric pattern.
         along_diagonal: try without pivoting first.
+        layers: of the unknowns on a long, thin mesh, from `layers_of`; None for a mesh of any shape.
 
     Returns:
         The factors.
@@ -78,6 +82,8 @@ def factorize(*, matrix: Any, along_diagonal: bool) -> Factors:
     Raises:
         RuntimeError: the matrix is singular.
     """
+    if layers is not None:
+        return Factors(matrix=matrix, factors=factorize_layers(matrix=matrix, layers=layers), pivoted=True)
     if not along_diagonal:
         return Factors(matrix=matrix, factors=_with_pivoting(matrix), pivoted=True)
     try:

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import sparse
 
+from ringbalance.physics.navier_stokes_layers import layers_of
 from ringbalance.physics.navier_stokes_space import (
     FlowSpace,
     at_points,
@@ -87,6 +88,8 @@ class FlowSystem:
     mass: FloatArray
     convection: FloatArray
     """Contracted quadrature tables."""
+    layers: IntArray | None = None
+    """Layers of all unknowns along a long, thin mesh, for factors slab by slab."""
 
 
 def _block_list(space: FlowSpace, coriolis: FloatArray) -> tuple[tuple[int, int], ...]:
@@ -173,6 +176,7 @@ def flow_system(
     coriolis: npt.ArrayLike | None = None,
     body_force: Callable[[FloatArray], FloatArray] | None = None,
     stress_form: bool = False,
+    slab: IntArray | None = None,
 ) -> FlowSystem:
     """Operators and numbering of a flow problem, to be solved for any coefficients.
 
@@ -185,6 +189,7 @@ def flow_system(
         coriolis: C, shape (components, components); default none.
         body_force: of coordinates (dimension, elements, points), giving (components, elements, points).
         stress_form: viscous term with the transposed gradient, needed for the torque on a moving wall.
+        slab: number of every element's slab along a long, thin mesh, which is then solved slab by slab.
 
     Returns:
         The system.
@@ -225,7 +230,16 @@ def flow_system(
         free_pattern=part,
         mass=mass_table(space),
         convection=convection_table(space),
+        layers=None if slab is None else _layers(space, slab),
     )
+
+
+def _layers(space: FlowSpace, slab: IntArray) -> IntArray:
+    velocity, pressure = (
+        layers_of(slab=slab, element_dofs=basis.element_dofs, size=basis.N)
+        for basis in (space.velocity, space.pressure)
+    )
+    return np.concatenate([np.tile(velocity, space.components), pressure])
 
 
 def split(space: FlowSpace, vector: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -9,6 +9,7 @@ from functools import lru_cache
 from importlib.resources import files
 
 from ringbalance.verification.case import CaseDefinition, parse_case
+from ringbalance.verification.cases.bent_tube_3d import case as bent_tube_3d
 from ringbalance.verification.cases.claim_01_volume import case as claim_01_volume
 from ringbalance.verification.cases.claim_02_ring_radius import case as claim_02_ring_radius
 from ringbalance.verification.cases.claim_03_chamber_moment import case as claim_03_chamber_moment
@@ -65,6 +66,7 @@ _CODE: Mapping[str, CaseCode] = {
     "mixing_length": mixing_length,
     "model_choice": model_choice,
     "coverage": coverage,
+    "bent_tube_3d": bent_tube_3d,
     "extremes": extremes,
     "claim_01_volume": claim_01_volume,
     "claim_02_ring_radius": claim_02_ring_radius,

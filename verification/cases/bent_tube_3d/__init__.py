@@ -1,0 +1,1 @@
+"""The bent tube in the rotating frame, in three dimensions."""

@@ -13,11 +13,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final
 
 from ringbalance.reduced_model.transients import REFERENCE_PRESSURE, REFERENCE_TEMPERATURE
-
-Process = Literal["isothermal", "adiabatic"]
+from ringbalance.scene.models import GasProcess
 
 HEAT_CAPACITY_RATIO: Final = 1.4
 """gamma of air."""
@@ -41,7 +40,7 @@ class GasLine:
     """C, m^3/(s Pa)."""
     critical_ratio: float
     """b."""
-    process: Process = "isothermal"
+    process: GasProcess
 
     @property
     def exponent(self) -> float:

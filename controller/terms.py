@@ -26,7 +26,7 @@ FILLING: Final = "gas filling"
 LAG: Final = "valve lag"
 MODELS: Final = {
     INERTIA: "rho L du/dt of the liquid in the tube",
-    FILLING: "ISO 6358, isothermal",
+    FILLING: "ISO 6358",
     LAG: "pure delay",
 }
 """The terms that a run can model, and how."""
@@ -186,6 +186,7 @@ def _line(gas: Gas) -> GasLine | None:
         temperature=gas.temperature,
         conductance=gas.conductance,
         critical_ratio=gas.critical_ratio,
+        process=gas.process,
     )
 
 
@@ -208,8 +209,10 @@ def _choice(
         )
     reason = _out_of_reach(term, model, scene)
     modelled = above and not reason
-    more = f"; {reason}" if above and reason else _told_more(term, time) if modelled else ""
-    return Choice(term=term, time=time, share=share, modelled=modelled, why=told + more)
+    more = (
+        f"; {reason}" if above and reason else _told_more(term, time, scene.gas.process) if modelled else ""
+    )
+    return Choice(term=term, time=time, share=share, modelled=modelled, why=told)
 
 
 def _against(share: float, tolerance: float) -> str:
@@ -226,11 +229,13 @@ def _out_of_reach(term: str, model: BalancerModel, scene: Scene) -> str:
     return ""
 
 
-def _told_more(term: str, time: float) -> str:
+def _told_more(term: str, time: float, process: str) -> str:
     if term != FILLING:
         return ""
+    if process == "adiabatic":
+        return "; estimated isothermal, modelled without heat from the walls, which takes less"
     sooner = 1e3 * time * (1 - 1 / HEAT_CAPACITY_RATIO)
-    return f"; without heat from the walls it would take up to {sooner:.3g} ms less"
+    return f"; isothermal: without heat from the walls it would take up to {sooner:.3g} ms less"
 
 
 def _term(choice: Choice) -> Term:

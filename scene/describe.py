@@ -120,6 +120,7 @@ _GAS = (
     _Line(path="gas.critical_ratio", quantity="critical pressure ratio b"),
     _Line(path="gas.dead_volume", quantity="dead volume", dimension="volume", unit="ml"),
     _Line(path="gas.valve_lag", quantity="valve lag", dimension="time", unit="ms"),
+    _Line(path="gas.process", quantity="gas in the chambers", note="matters with a conductance only"),
 )
 _ROTOR = (
     _Line(path="rotor.speed", quantity="speed", dimension="speed", unit="rpm"),

@@ -13,6 +13,7 @@ from typing import Literal
 HumpGas = Literal["vented", "trapped"]
 Entrance = Literal["sharp", "rounded", "projecting"]
 Shaft = Literal["horizontal", "vertical"]
+GasProcess = Literal["isothermal", "adiabatic"]
 ControllerKind = Literal["target_vector", "trial", "law_based"]
 
 
@@ -117,6 +118,8 @@ class Gas:
     """Between valve and chamber, m^3."""
     valve_lag: float | None
     """s."""
+    process: GasProcess
+    """Whether a chamber's gas keeps its temperature while it fills and vents, or takes no heat."""
 
 
 @dataclass(frozen=True, kw_only=True)

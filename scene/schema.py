@@ -173,6 +173,11 @@ class GasTable(Table):
     valve_lag: Time = unused(
         "the valves open and close at once", "time from the command to the valve's motion"
     )
+    process: Annotated[str | None, choice("isothermal", "adiabatic")] = standard(
+        "isothermal",
+        "whether a chamber's gas keeps its temperature while it fills and vents, or takes no heat; "
+        "matters with conductance only",
+    )
 
 
 class EnvironmentTable(Table):

@@ -153,6 +153,7 @@ def line(**changes: Any) -> GasLine:
         temperature=293.15,
         conductance=1e-8,
         critical_ratio=0.3,
+        process="isothermal",
     )
     return replace(base, **changes)
 

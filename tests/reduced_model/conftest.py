@@ -51,6 +51,7 @@ GAS = models.Gas(
     critical_ratio=None,
     dead_volume=None,
     valve_lag=None,
+    process="isothermal",
 )
 ROTOR = models.Rotor(
     speed=10000 * 2 * math.pi / 60,

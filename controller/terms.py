@@ -209,9 +209,8 @@ def _choice(
         )
     reason = _out_of_reach(term, model, scene)
     modelled = above and not reason
-    more = (
-        f"; {reason}" if above and reason else _told_more(term, time, scene.gas.process) if modelled else ""
-    )
+    told += f"; {reason}" if above and reason else ""
+    told += _told_more(term, time, scene.gas.process) if modelled else ""
     return Choice(term=term, time=time, share=share, modelled=modelled, why=told)
 
 

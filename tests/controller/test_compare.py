@@ -1,0 +1,175 @@
+"""Two balancers on one rotor: what is carried over, what is refused, and what comes out."""
+
+from __future__ import annotations
+
+import cmath
+import json
+import math
+from dataclasses import replace
+
+import pytest
+
+from ringbalance.controller.compare import compare, comparison_document
+from ringbalance.controller.compare_rotor import own_scene, rotor_of, scene_on
+from ringbalance.controller.eccentric.parameters import plant_parameters
+from ringbalance.controller.eccentric.plant_whirl import influence, steady_whirl
+from ringbalance.reduced_model.paper_law import paper_model
+from ringbalance.scene import (
+    EccentricScene,
+    Scene,
+    SceneError,
+    bundled_scene,
+    eccentric_scene,
+    liquid_ring_scene,
+    load_scene,
+)
+from ringbalance.scene.eccentric_models import SpeedPoint
+
+RPM = math.pi / 30
+
+
+@pytest.fixture(scope="module")
+def driven() -> EccentricScene:
+    return eccentric_scene(load_scene(bundled_scene("eccentric_mass_paper")))
+
+
+@pytest.fixture(scope="module")
+def small() -> EccentricScene:
+    return eccentric_scene(load_scene(bundled_scene("driven_masses_small")))
+
+
+def test_driven_masses_on_the_liquid_rings_rotor(paper_scene: Scene, driven: EccentricScene) -> None:
+    """Speed, influence coefficient and lag, first vibration, noise and limit are those of the other scene."""
+    told = eccentric_scene(scene_on(rotor_of(paper_scene), driven))
+    speed = told.rotor.speed_profile[0].speed
+    assert speed == paper_scene.rotor.speed
+    found = influence(plant_parameters(told), speed)
+    assert abs(found) == pytest.approx(0.0108, rel=1e-12)
+    assert math.degrees(-cmath.phase(found)) == pytest.approx(17.0, rel=1e-12)
+    whirl = steady_whirl(plant_parameters(told), speed, told.masses.initial_angle)
+    assert abs(whirl) == pytest.approx(10e-6, rel=1e-9)
+    assert math.degrees(cmath.phase(whirl)) == pytest.approx(90.0, rel=1e-9)
+    assert told.rotor.mass == pytest.approx(driven.rotor.mass)
+    assert told.sensor.position_noise == paper_scene.sensor.amplitude_noise
+    assert told.supervisor.limit == paper_scene.controller.limit
+    assert told.masses.initial_angle[1] - told.masses.initial_angle[0] == pytest.approx(math.pi)
+    believed = told.imbalance_filter
+    assert (believed.assumed_stiffness, believed.assumed_damping) == pytest.approx(
+        (told.rotor.stiffness, told.rotor.damping)
+    )
+
+
+def test_the_scene_made_for_that_rotor_has_it_already(paper_scene: Scene, small: EccentricScene) -> None:
+    """What the comments of the small scene say its numbers come from."""
+    told = eccentric_scene(scene_on(rotor_of(paper_scene), small))
+    assert told.rotor.stiffness == pytest.approx(small.rotor.stiffness, rel=1e-5)
+    assert told.rotor.damping == pytest.approx(small.rotor.damping, rel=1e-5)
+    assert told.imbalance.mass == pytest.approx(small.imbalance.mass, rel=1e-4)
+    assert told.imbalance.phase == pytest.approx(small.imbalance.phase, rel=1e-9)
+
+
+def test_a_liquid_ring_on_the_driven_masses_rotor(paper_scene: Scene, small: EccentricScene) -> None:
+    """There and back again; gas times per unbalance and wrong beliefs are kept."""
+    wrong = replace(
+        paper_scene,
+        controller=replace(
+            paper_scene.controller,
+            assumed_influence_coefficient=1.1 * paper_scene.rotor.influence_coefficient,
+            assumed_lag_angle=paper_scene.rotor.lag_angle + 0.2,
+        ),
+    )
+    other = replace(small, rotor=replace(small.rotor, stiffness=2 * small.rotor.stiffness))
+    told = liquid_ring_scene(scene_on(rotor_of(other), wrong))
+    parameters = plant_parameters(other)
+    alpha = influence(parameters, small.rotor.speed_profile[0].speed)
+    assert told.rotor.influence_coefficient == pytest.approx(abs(alpha))
+    assert told.rotor.lag_angle == pytest.approx(-cmath.phase(alpha))
+    assert told.rotor.initial_amplitude == pytest.approx(abs(alpha) * parameters.unbalance)
+    assert told.rotor.initial_phase == pytest.approx(small.imbalance.phase + cmath.phase(alpha))
+    control, before = told.controller, wrong.controller
+    gas = control.proportional * told.rotor.influence_coefficient
+    assert gas == pytest.approx(before.proportional * wrong.rotor.influence_coefficient)
+    assert control.assumed_influence_coefficient == pytest.approx(1.1 * told.rotor.influence_coefficient)
+    assert control.assumed_lag_angle - told.rotor.lag_angle == pytest.approx(0.2)
+    assert control.limit == small.supervisor.limit
+
+
+def test_a_liquid_ring_on_its_own_rotor_is_left_alone(paper_scene: Scene) -> None:
+    assert own_scene(paper_scene) is paper_scene
+
+
+def test_driven_masses_start_in_steady_whirl_at_constant_speed(driven: EccentricScene) -> None:
+    told = eccentric_scene(own_scene(driven))
+    assert [corner.speed for corner in told.rotor.speed_profile] == pytest.approx([100 * RPM])
+    decay = told.rotor.damping / (2 * plant_parameters(told).mass)
+    assert math.exp(-decay * told.supervisor.start) < 1e-5
+    assert told.run.time_limit == pytest.approx(driven.run.time_limit + told.supervisor.start)
+
+
+def test_no_ring_at_the_speed_of_the_driven_masses(driven: EccentricScene, paper_scene: Scene) -> None:
+    pattern = "on the rotor of eccentric_mass_paper.toml: so slow that gravity"
+    first = replace(driven, run=replace(driven.run, time_limit=0.01))
+    with pytest.raises(SceneError, match=pattern) as caught:
+        compare(first, paper_scene, model_of=paper_model)
+    assert caught.value.faults[0].file == "liquid_ring_paper.toml"
+
+
+def _at(driven: EccentricScene, speed: float) -> EccentricScene:
+    profile = (SpeedPoint(time=0.0, speed=speed),)
+    return replace(driven, rotor=replace(driven.rotor, speed_profile=profile))
+
+
+def test_what_cannot_be_compared(driven: EccentricScene, paper_scene: Scene) -> None:
+    with pytest.raises(SceneError, match="does not turn forwards"):
+        rotor_of(_at(driven, 0.0))
+    with pytest.raises(SceneError, match="does not turn forwards"):
+        rotor_of(_at(driven, -10.0))
+    with pytest.raises(SceneError, match="never becomes steady"):
+        rotor_of(replace(driven, rotor=replace(driven.rotor, damping=0.0)))
+    with pytest.raises(SceneError, match="does not vibrate"):
+        rotor_of(replace(driven, imbalance=replace(driven.imbalance, mass=0.0)))
+    ahead = replace(paper_scene, rotor=replace(paper_scene.rotor, lag_angle=-0.3))
+    with pytest.raises(SceneError, match=r"no bearing of this kind gives a lag of -17\.19 deg"):
+        scene_on(rotor_of(ahead), driven)
+    light = rotor_of(replace(driven, rotor=replace(driven.rotor, mass=0.2)))
+    heavy = replace(driven, masses=replace(driven.masses, mass=3.0))
+    with pytest.raises(SceneError, match="heavier than the rotor itself"):
+        scene_on(light, heavy)
+
+
+def test_two_liquid_rings(paper_scene: Scene) -> None:
+    """The same disc twice comes to the same; each number is that of its own run."""
+    quiet = replace(
+        paper_scene,
+        sensor=replace(paper_scene.sensor, amplitude_noise=0.0, phase_noise=0.0),
+        run=replace(paper_scene.run, time_limit=60.0),
+    )
+    found = comparison_document(compare(quiet, quiet, model_of=paper_model))
+    assert json.loads(json.dumps(found, allow_nan=False)) == found
+    assert {"scenes", "time_s", "residual_ratio", "energy_J", "worst_amplitude_m"} <= set(found)
+    for key in ("time_s", "residual_ratio", "energy_J", "worst_amplitude_m", "settled"):
+        first, second = found[key]
+        assert first == pytest.approx(second, rel=1e-6), key
+    assert found["settled"] == [True, True]
+    assert found["worst_amplitude_m"][0] == pytest.approx(10e-6)
+    assert found["residual_ratio"][0] < 0.05 / 10
+    assert [scene["source"] for scene in found["scenes"]] == ["liquid_ring_paper.toml"] * 2
+
+
+def test_two_pairs_of_driven_masses(driven: EccentricScene) -> None:
+    """A second pair of half the mass cannot undo the imbalance of the first one's rotor."""
+    strong = replace(driven, run=replace(driven.run, time_limit=40.0))
+    weak = replace(strong, masses=replace(driven.masses, mass=0.06), source="weak.toml")
+    found = compare(strong, weak, model_of=paper_model)
+    good, poor = found.sides
+    assert good.settled
+    assert good.time is not None
+    assert 0 < good.time < 40
+    assert good.energy > 0
+    # From the steady vibration the worst amplitude is no less than that.
+    assert good.worst_amplitude > 0.95 * found.rotor.amplitude
+    assert not poor.settled
+    assert poor.time is None
+    # What two masses of 0.06 kg leave of 0.18 kg at the same radius, their centres one length apart.
+    pair = 2 * 0.06 * math.cos(0.05 / 0.23 / 2)
+    assert poor.residual_ratio == pytest.approx((0.18 - pair) / 0.18, abs=0.02)

@@ -34,6 +34,7 @@ def test_tables_show_what_matters(name: str, capsys: pytest.CaptureFixture[str])
         "Velocity",
         "Models used",
         "full siphon stalls",
+        "cavitation margin",
     ):
         assert word in shown
     assert "nan" not in shown

@@ -19,6 +19,7 @@ from ringbalance.controller.trial import Trial
 if TYPE_CHECKING:
     from ringbalance.controller.consequences import Consequences, consequences_document, find_consequences
     from ringbalance.controller.ensemble import Ensemble, ensemble_document, simulate_ensemble
+    from ringbalance.controller.prepared_run import PreparedRun, Trace, prepare_run
 
 __all__ = [
     "Command",
@@ -30,8 +31,10 @@ __all__ = [
     "LoopGain",
     "Measurement",
     "Outcome",
+    "PreparedRun",
     "Simulation",
     "TargetVector",
+    "Trace",
     "Trial",
     "ValveCommand",
     "consequences_document",
@@ -46,6 +49,9 @@ __all__ = [
 
 _HOME = {
     "Consequences": "ringbalance.controller.consequences",
+    "PreparedRun": "ringbalance.controller.prepared_run",
+    "Trace": "ringbalance.controller.prepared_run",
+    "prepare_run": "ringbalance.controller.prepared_run",
     "Ensemble": "ringbalance.controller.ensemble",
     "consequences_document": "ringbalance.controller.consequences",
     "ensemble_document": "ringbalance.controller.ensemble",

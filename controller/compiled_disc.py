@@ -137,10 +137,24 @@ def note_settling(shared: Record, run: Record, length: float, points: int) -> No
 
 
 @compiled
-def _note(shared: Record, run: Record, time: float) -> None:
-    """One instant of a stretch that has been moved through."""
+def back_at(shared: Record, run: Record, time: float) -> tuple[float, float]:
+    """One instant of the stretch that was last moved through.
+
+    Args:
+        shared: of type `SHARED`.
+        run: the member, its valves still those of the stretch; its `trial` becomes the fills then.
+        time: s from the start of the stretch.
+
+    Returns:
+        Real and imaginary part of the vibration then, m.
+    """
     for i in range(shared.chambers // 2):
         run.trial[i] = _pair_at(shared, run, i, time)[0]
-    real, imaginary = vibration(shared, run, True)
+    return vibration(shared, run, True)
+
+
+@compiled
+def _note(shared: Record, run: Record, time: float) -> None:
+    real, imaginary = back_at(shared, run, time)
     above = math.hypot(real, imaginary) > shared.limit
     run.since = math.inf if above else min(run.since, run.time + time)

@@ -37,7 +37,7 @@ def run_members(shared: Record, runs: Any) -> None:
     clock = np.zeros(shared.confirming)
     for i in range(runs.size):
         run = runs[i]
-        _start(shared, run)
+        start(shared, run)
         while run.cause == GOES_ON and run.samples < shared.most_samples:
             if run.calm:
                 _pass_calm(shared, run, clock)
@@ -46,8 +46,10 @@ def run_members(shared: Record, runs: Any) -> None:
                 run.samples += 1
                 _sample(shared, run)
                 if run.cause == GOES_ON:
-                    _act(shared, run)
-        _judge(shared, run, clock[max(run.samples - shared.confirming, 0) % shared.confirming])
+                    if run.pair >= 0:
+                        gas(shared, run)
+                    wait(shared, run)
+        judge(shared, run, clock[max(run.samples - shared.confirming, 0) % shared.confirming])
 
 
 @compiled
@@ -71,13 +73,20 @@ def _pass_calm(shared: Record, run: Record, clock: FloatArray) -> None:
         if samples & 1 == 0:
             even, odd = uniform_radii(shared, run.number, samples // 2)
     if samples > run.samples:
+        # A sample in full would have left no memory and no valve.
         forget(run)
         run.phase_before = run.phase
     run.time, run.samples = time, samples
 
 
 @compiled
-def _start(shared: Record, run: Record) -> None:
+def start(shared: Record, run: Record) -> None:
+    """Level chambers, nothing remembered.
+
+    Args:
+        shared: of type `SHARED`.
+        run: with what is its own filled in, all else zero.
+    """
     reset(shared, run)
     forget(run)
     _look(shared, run)
@@ -90,13 +99,13 @@ def _start(shared: Record, run: Record) -> None:
 def _look(shared: Record, run: Record) -> None:
     """True vibration."""
     run.real, run.imaginary = vibration(shared, run, False)
-    run.amplitude = math.hypot(run.real, run.imaginary)
+    run.amplitude, run.stale = math.hypot(run.real, run.imaginary), 1
 
 
 @compiled
 def _expect(shared: Record, run: Record) -> None:
     """The phase, and the uniform number from which on noise cannot lift the amplitude above the limit."""
-    run.phase = math.atan2(run.imaginary, run.real)
+    run.phase, run.stale = math.atan2(run.imaginary, run.real), 0
     room = shared.limit - run.amplitude
     if room < 0.0:
         run.certain = 2.0
@@ -109,26 +118,40 @@ def _expect(shared: Record, run: Record) -> None:
 
 @compiled
 def _sample(shared: Record, run: Record) -> None:
-    """One look at the vibration, one step of the controller, and whether the run ends here."""
-    amplitude_noise, phase_noise = noise_pair(shared, run.number, run.samples - 1)
-    run.seen_amplitude = abs(run.amplitude + shared.amplitude_noise * amplitude_noise)
-    run.seen_phase = run.phase + shared.phase_noise * phase_noise
-    _watch(shared, run)
+    """One look at the vibration, with noise of its own."""
+    now = noise_pair(shared, run.number, run.samples - 1)
+    before = 0.0
+    if run.samples > 1 and abs(run.amplitude + shared.amplitude_noise * now[0]) > shared.limit:
+        # The sample before may have been passed over: its noise is made again.
+        before = noise_pair(shared, run.number, run.samples - 2)[1]
+    react(shared, run, now, before)
+
+
+@compiled
+def react(shared: Record, run: Record, noise: tuple[float, float], noise_before: float) -> None:
+    """What the sensor shows, one step of the controller, and whether the run ends here.
+
+    Args:
+        shared: of type `SHARED`.
+        run: the member; its `samples` counts this one already.
+        noise: of amplitude and phase, in standard deviations.
+        noise_before: of the phase of the sample before, in standard deviations.
+    """
+    run.seen_amplitude = abs(run.amplitude + shared.amplitude_noise * noise[0])
+    run.seen_phase = run.phase + shared.phase_noise * noise[1]
+    _watch(shared, run, run.phase_before + shared.phase_noise * noise_before)
     decide(shared, run)
     run.cause = _cause(shared, run)
     run.phase_before = run.phase
 
 
 @compiled
-def _watch(shared: Record, run: Record) -> None:
+def _watch(shared: Record, run: Record, seen_before: float) -> None:
     """Overshoots, rises and misadjustments, as `judgement` counts them."""
     if run.samples == 1:
         run.first_seen = run.seen_amplitude
     elif run.seen_amplitude > shared.limit:
-        # The sample before may have been passed over: its noise is made again.
-        noise = noise_pair(shared, run.number, run.samples - 2)[1]
-        before = run.phase_before + shared.phase_noise * noise
-        run.overshoots += 1 if math.cos(run.seen_phase - before) < 0.0 else 0
+        run.overshoots += 1 if math.cos(run.seen_phase - seen_before) < 0.0 else 0
     if run.operated:
         higher = run.seen_amplitude - run.last_seen > shared.noise_floor
         run.rises = run.rises + 1 if higher else 0
@@ -151,26 +174,40 @@ def _cause(shared: Record, run: Record) -> int:
 
 
 @compiled
-def _act(shared: Record, run: Record) -> None:
-    """Gas, if a valve opens, and the wait until the next sample or the end."""
-    changed = run.pair >= 0
-    if changed:
-        _gas(shared, run)
+def wait(shared: Record, run: Record) -> float:
+    """Until the next sample, or the end.
+
+    Args:
+        shared: of type `SHARED`.
+        run: the member; its liquid moves where a tube is full.
+
+    Returns:
+        s, zero at the end.
+    """
     length = max(min(shared.period, shared.time_limit - run.time), 0.0)
+    run.pair, run.other_pair = -1, -1
     if length > 0.0 and any_wet(shared, run):
-        run.pair, run.other_pair, changed = -1, -1, True
         move(shared, run, length)
         _look(shared, run)
         note_settling(shared, run, length, shared.drift_points)
     run.time += length
-    if changed:
+    if run.stale:
         _expect(shared, run)
     run.calm = 0 if run.operated or run.rises >= shared.rises_tolerated or any_wet(shared, run) else 1
+    return float(length)
 
 
 @compiled
-def _gas(shared: Record, run: Record) -> None:
-    """All valves of a command open together; pairs flow in parallel."""
+def gas(shared: Record, run: Record) -> float:
+    """All valves of a command open together; pairs flow in parallel.
+
+    Args:
+        shared: of type `SHARED`.
+        run: the member, with its open valves.
+
+    Returns:
+        s until the last one has closed.
+    """
     both = run.other_pair >= 0
     length = max(run.duration, run.other_duration) if both else run.duration
     working = run.other_pair if both and run.other_duration > run.duration else run.pair
@@ -183,11 +220,18 @@ def _gas(shared: Record, run: Record) -> None:
     run.idle = 0 if moved else run.idle + 1
     run.time += length
     run.operated = 1
+    return float(length)
 
 
 @compiled
-def _judge(shared: Record, run: Record, confirmed: float) -> None:
-    """As `outcome_of` does, from the time of the sample since which the amplitude must have stayed."""
+def judge(shared: Record, run: Record, confirmed: float) -> None:
+    """As `outcome_of` does.
+
+    Args:
+        shared: of type `SHARED`.
+        run: at its end; its verdict is filled in.
+        confirmed: time of the sample from which on the amplitude must have stayed, s.
+    """
     if run.cause == AT_REST:
         confirmed = run.time
     run.settled = 1 if run.since <= confirmed else 0

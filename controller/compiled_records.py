@@ -101,6 +101,7 @@ _RUN_WHOLE: Final = (
     "other_pair",
     "other_first",
     "operated",  # whether a valve has opened since the last sample
+    "stale",  # whether the vibration has changed since its phase was taken
     "calm",  # whether nothing has moved since the last sample and nothing can
     "rises",
     "idle",

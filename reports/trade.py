@@ -8,7 +8,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ringbalance.reports.figure_style import FOUND, INK, MUTED, PAPER, Drawing, draw, logarithmic
+from ringbalance.reports.figure_style import (
+    FOUND,
+    INK,
+    MUTED,
+    PAPER,
+    Drawing,
+    draw,
+    legend_above,
+    logarithmic,
+)
 from ringbalance.reports.numbers import MISSING, number, percent
 from ringbalance.reports.prose import typeset
 from ringbalance.reports.section import Record, Section, Work
@@ -64,7 +73,7 @@ def _quantity(found: Record, times: list[Record]) -> Record:
     front = sorted((r for r in found["rungs"] if r["on_front"]), key=lambda r: r["cost_s"])
     own = found["choices"][-1]
     return {
-        "title": typeset(found["title"]),
+        "title": typeset(_headed(found["title"])),
         "status": "" if found["status"]["code"] == "ok" else typeset(found["status"]["text"]),
         "knee": typeset(found["knee"]),
         "top": typeset(found["top"]),
@@ -92,6 +101,11 @@ def _quantity(found: Record, times: list[Record]) -> Record:
     }
 
 
+def _headed(title: str) -> str:
+    """With a capital, unless it is a symbol."""
+    return title if len(title) == 1 else title[0].upper() + title[1:]
+
+
 def _error(value: float) -> str:
     return percent(value, digits=2) if value >= 1e-3 else number(value, digits=2)
 
@@ -116,27 +130,29 @@ def front_figure(found: Record) -> Drawing:
     front = np.array([r["on_front"] for r in rungs])
     at_knee = np.array([r["name"] == found["knee"] for r in rungs])
 
-    def paint(_figure: Figure, axes: Axes) -> None:
-        axes.plot(cost[~front], error[~front], "o", color=MUTED, markersize=3.5)
-        axes.plot(cost[front], error[front], "o-", color=FOUND, markersize=5, linewidth=1.4)
-        axes.plot(cost[at_knee], error[at_knee], "D", color=INK, markersize=7, fillstyle="none")
-        axes.axhline(found["top_uncertainty"], color=PAPER, linewidth=1, linestyle=":")
-        logarithmic(axes, "x", ticks=[10.0**e for e in range(-6, 3)])
-        logarithmic(axes, "y", ticks=[10.0**e for e in range(-9, 3, 2)])
+    def paint(figure: Figure, axes: Axes) -> None:
+        known = found["top_uncertainty"]
+        axes.plot(cost[~front], error[~front], "o", color=MUTED, markersize=3.5, label="beaten by another")
+        axes.plot(cost[front], error[front], "o-", color=FOUND, markersize=5, label="the front")
+        axes.plot(cost[at_knee], error[at_knee], "D", color=INK, markersize=8, fillstyle="none", label="knee")
+        axes.axhline(known, color=PAPER, linewidth=1, linestyle=":", label="known to")
+        logarithmic(axes, "x")
+        logarithmic(axes, "y")
         axes.set_xlim(cost.min() / 2, cost.max() * 2)
         low = min(error.min(), found["top_uncertainty"])
         axes.set_ylim(low / 3, max(error.max() * 3, 1.0))
         axes.set_xlabel("counted cost in s")
-        axes.set_ylabel("error against the highest rung")
+        axes.set_ylabel("error against the top")
+        legend_above(figure, axes, columns=4)
 
     return draw(
         name=f"trade-{found['quantity'].replace('_', '-')}",
         paint=paint,
-        height=3.0,
+        height=2.9,
         alt=f"Error of {len(rungs)} rungs for {found['title']} against their cost, falling along the front "
         f"to the highest rung; the knee is {found['knee']}.",
-        caption=f"{found['title'][0].upper()}{found['title'][1:]}. Line: no rung is both cheaper and nearer. "
-        "Diamond: the knee. Dotted: what the highest rung itself is known to.",
+        caption=f"{_headed(found['title'])}. The highest rung is drawn at 10⁻⁹; dotted: what it "
+        "is itself known to.",
     )
 
 

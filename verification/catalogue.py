@@ -32,6 +32,7 @@ from ringbalance.verification.cases.claim_19_denser_liquid import case as claim_
 from ringbalance.verification.cases.claim_20_rectangular_element import case as claim_20_rectangular_element
 from ringbalance.verification.cases.conservation import case as conservation
 from ringbalance.verification.cases.coverage import case as coverage
+from ringbalance.verification.cases.developing_flow import case as developing_flow
 from ringbalance.verification.cases.extremes import case as extremes
 from ringbalance.verification.cases.friction_blend import case as friction_blend
 from ringbalance.verification.cases.gci_behaviour import case as gci_behaviour
@@ -57,6 +58,7 @@ _CODE: Mapping[str, CaseCode] = {
     "conservation": conservation,
     "manufactured_flow": manufactured_flow,
     "rotating_section": rotating_section,
+    "developing_flow": developing_flow,
     "sloshing": sloshing,
     "gci_celik2008": gci_celik2008,
     "gci_behaviour": gci_behaviour,

@@ -1,0 +1,1 @@
+"""The decay of disturbances along the turning tube against exact rates."""

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from ringbalance.controller.algorithm import Command, Controller, Measurement, ValveCommand
 from ringbalance.controller.algorithms import controller_of
-from ringbalance.controller.consequences_gain import LoopGain, loop_gain
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.law_based import LawBased
 from ringbalance.controller.loop import simulate
@@ -18,6 +17,7 @@ from ringbalance.controller.trial import Trial
 
 if TYPE_CHECKING:
     from ringbalance.controller.consequences import Consequences, consequences_document, find_consequences
+    from ringbalance.controller.consequences_gain import LoopGain, loop_gain
     from ringbalance.controller.ensemble import Ensemble, ensemble_document, simulate_ensemble
     from ringbalance.controller.prepared_run import PreparedRun, Trace, prepare_run
 
@@ -42,6 +42,7 @@ __all__ = [
     "ensemble_document",
     "find_consequences",
     "loop_gain",
+    "prepare_run",
     "simulate",
     "simulate_ensemble",
     "simulation_document",
@@ -49,14 +50,16 @@ __all__ = [
 
 _HOME = {
     "Consequences": "ringbalance.controller.consequences",
+    "consequences_document": "ringbalance.controller.consequences",
+    "find_consequences": "ringbalance.controller.consequences",
+    "LoopGain": "ringbalance.controller.consequences_gain",
+    "loop_gain": "ringbalance.controller.consequences_gain",
+    "Ensemble": "ringbalance.controller.ensemble",
+    "ensemble_document": "ringbalance.controller.ensemble",
+    "simulate_ensemble": "ringbalance.controller.ensemble",
     "PreparedRun": "ringbalance.controller.prepared_run",
     "Trace": "ringbalance.controller.prepared_run",
     "prepare_run": "ringbalance.controller.prepared_run",
-    "Ensemble": "ringbalance.controller.ensemble",
-    "consequences_document": "ringbalance.controller.consequences",
-    "ensemble_document": "ringbalance.controller.ensemble",
-    "find_consequences": "ringbalance.controller.consequences",
-    "simulate_ensemble": "ringbalance.controller.ensemble",
 }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -14,11 +15,11 @@ from ringbalance.reports.figure_style import FOUND, MUTED, PAPER, THIRD, Drawing
 from ringbalance.reports.numbers import number
 from ringbalance.reports.prose import typeset
 from ringbalance.reports.section import Record, Section
+from ringbalance.verification.extremes import MAP_PREFIX
 from ringbalance.verification.extremes_axes import Axis, axis_of
 from ringbalance.verification.extremes_point import Ending
 
 CASE: Final = "extremes"
-_MAP: Final = "map of "
 _COLOURS: Final = {
     Ending.SOLVED: (FOUND, 0.55),
     Ending.WIDE: (FOUND, 0.22),
@@ -49,8 +50,20 @@ def view(evidence: Record) -> Record:
         "text": typeset(case.get("explanation", "")),
         "date": case.get("date", ""),
         "rows": _rows(tables["axes"]),
-        "maps": [_map(name, columns) for name, columns in tables.items() if name.startswith(_MAP)],
+        "maps": map_drawings(tables),
     }
+
+
+def map_drawings(tables: Mapping[str, Record]) -> list[Drawing]:
+    """The stability maps.
+
+    Args:
+        tables: columns of the case's tables, by name.
+
+    Returns:
+        A drawing of each that is a map.
+    """
+    return [_map(name, columns) for name, columns in tables.items() if name.startswith(MAP_PREFIX)]
 
 
 def _rows(columns: Record) -> list[Record]:
@@ -67,20 +80,27 @@ def _rows(columns: Record) -> list[Record]:
                 "title": title,
                 "tried": span("tried"),
                 "answered": span("answered"),
-                "beyond": typeset(_shortened(str(columns["beyond"][index]))),
+                "beyond": typeset(shortened([str(columns["beyond"][index])])),
             }
         )
     return rows
 
 
-def _shortened(text: str) -> str:
-    """The first message past an axis' end, without the name of a file that nobody has."""
-    first = text.split("; extremes")[0].split("\n")[0]
+def shortened(messages: Sequence[str]) -> str:
+    """The first message past an axis' end, without the name of a file that nobody has.
+
+    Args:
+        messages: of the program; empty texts count as none.
+
+    Returns:
+        A sentence.
+    """
+    first = next((text for text in messages if text), "").split("\n")[0]
     return first.split(".toml: ", 1)[-1] or "nothing: the whole range is answered"
 
 
 def _map(name: str, columns: Record) -> Drawing:
-    x, y = (axis_of(part) for part in name.removeprefix(_MAP).split(" and "))
+    x, y = (axis_of(part) for part in name.removeprefix(MAP_PREFIX).split(" and "))
     xs, ys = (np.unique(np.asarray(columns[axis.name], dtype=np.float64)) for axis in (x, y))
     shape = (ys.size, xs.size)
     endings = np.asarray(columns["ending"], dtype=object).reshape(shape)

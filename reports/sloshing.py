@@ -28,7 +28,7 @@ _MODES: Final = 4
 _POINTS: Final = 17
 _COARSE: Final = ((8, 24), (4, 12), (2, 6))
 """Meshes for figures and sentences: three digits."""
-_NEAR: Final = 0.05
+_NEAR: Final = 0.15
 """Distance of a frequency from the speed, over the speed, that counts as a fill to avoid."""
 
 
@@ -45,7 +45,11 @@ def collect(work: Work) -> Record | None:
     if scene.environment.shaft == "vertical" or scene.environment.gravity == 0:
         return None
     largest = scene.disc.max_fill_ratio
-    fills = np.append(np.linspace(0.02, 1.0, _POINTS - 1) * largest, scene.disc.initial_fill)
+    met = resonant_fills(disc=scene.disc, modes=_MODES)
+    # A peak is narrower than the distance of even points.
+    peaks = [x * side for _, x in met for side in (0.96, 0.99, 1.0, 1.01, 1.04) if x * side <= largest]
+    even = np.linspace(0.02, 1.0, _POINTS) * largest
+    fills = np.append(np.unique([*even, *peaks]), scene.disc.initial_fill)
     modes = sloshing_modes(disc=scene.disc, fill_ratio=fills[:-1], modes=_MODES, cells=_COARSE)
     answer = sloshing_response(
         disc=scene.disc,
@@ -62,9 +66,7 @@ def collect(work: Work) -> Record | None:
         "amplification": answer.amplification.value[:-1].tolist(),
         "surface_amplitude_m": answer.surface_amplitude.value[:-1].tolist(),
         "depth_m": (scene.disc.outer_radius - answer.surface_radius[:-1]).tolist(),
-        "resonant": [
-            {"mode": mode, "fill_ratio": x} for mode, x in resonant_fills(disc=scene.disc, modes=_MODES)
-        ],
+        "resonant": [{"mode": mode, "fill_ratio": x} for mode, x in met],
         "equal": {
             "fill_ratio": scene.disc.initial_fill,
             "amplification": float(answer.amplification.value[-1]),
@@ -99,8 +101,9 @@ def view(evidence: Record) -> Record | None:
 def _equal(found: Record) -> str:
     equal = found["equal"]
     return (
-        f"At equal fills gravity swings a chamber’s moment {short(equal['amplification'])} times as much as "
-        f"a surface that followed it at once would; the surface moves by "
+        "At equal fills gravity swings a chamber’s moment "
+        f"{short(equal['amplification'], digits=2)} times as much as a surface that followed at once would; "
+        "the surface moves by "
         f"{shown(equal['surface_amplitude_m'], 'm', digits=2)} each way, once a turn. "
         f"Gravity is {number(equal['tilt_ratio'], digits=2)} of the centrifugal acceleration there."
     )
@@ -115,7 +118,7 @@ def _avoid(found: Record) -> str:
     told = [f"{short(item['fill_ratio'], digits=2)} (mode {item['mode']})" for item in strong]
     near = (
         [f"from about {short(_nearing(found), digits=2)} up, where the first mode comes near the speed"]
-        if abs(top - 1) < 0.15
+        if abs(top - 1) <= _NEAR
         else []
     )
     return f"Fills to pass quickly, at any speed: {', '.join([*told, *near])}."

@@ -23,6 +23,8 @@ Progress = Callable[[str, int, int], None]
 Record = dict[str, Any]
 
 SEED: Final = 1
+MAP_PREFIX: Final = "map of "
+"""Of the name of a map's table."""
 MOST_SHOWN: Final = 20
 """Violations told in full."""
 
@@ -134,6 +136,39 @@ def extremes_document(extremes: Extremes) -> Record:
         "violations": _violations(extremes),
         "axes": [_sweep(sweep) for sweep in extremes.sweeps],
         "maps": [_map(found) for found in extremes.maps],
+    }
+
+
+def extremes_tables(extremes: Extremes) -> dict[str, dict[str, list[Any]]]:
+    """The axes and the maps as columns of equal length.
+
+    Args:
+        extremes: of `find_extremes`.
+
+    Returns:
+        Columns by table: "axes", and "map of x and y" for each map.
+    """
+    answered = [sweep.solved() or (0.0, 0.0) for sweep in extremes.sweeps]
+    axes: dict[str, list[Any]] = {
+        "axis": [sweep.axis.title for sweep in extremes.sweeps],
+        "unit": [sweep.axis.unit for sweep in extremes.sweeps],
+        "tried from": [sweep.axis.low for sweep in extremes.sweeps],
+        "tried to": [sweep.axis.high for sweep in extremes.sweeps],
+        "answered from": [low for low, _ in answered],
+        "answered to": [high for _, high in answered],
+        "beyond": ["; ".join(sweep.beyond()) for sweep in extremes.sweeps],
+    }
+    maps = {f"{MAP_PREFIX}{item.x.name} and {item.y.name}": _map_columns(item) for item in extremes.maps}
+    return {"axes": axes, **maps}
+
+
+def _map_columns(item: StabilityMap) -> dict[str, list[Any]]:
+    places = [(x, y) for y in item.y_values for x in item.x_values]
+    return {
+        item.x.name: [float(x) for x, _ in places],
+        item.y.name: [float(y) for _, y in places],
+        "ending": [str(j.ending) for j in item.judgements],
+        "loop": [j.loop for j in item.judgements],
     }
 
 

@@ -12,14 +12,13 @@ from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table
 from ringbalance.verification.extremes import (
     SIZES,
-    Extremes,
     Size,
     broken,
     counted,
+    extremes_tables,
     find_extremes,
 )
 from ringbalance.verification.extremes_design import Base
-from ringbalance.verification.extremes_maps import StabilityMap
 from ringbalance.verification.extremes_point import SOUND, Defect, Ending
 
 _DEFECTS: Final = {
@@ -77,35 +76,5 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "worst": worst,
             **{name: float(endings[str(ending)]) for name, ending in _NUMBERS.items()},
         },
-        tables=(_axes_table(found), *(_map_table(item) for item in found.maps)),
-    )
-
-
-def _axes_table(found: Extremes) -> Table:
-    answered = [sweep.solved() or (0.0, 0.0) for sweep in found.sweeps]
-    return Table(
-        name="axes",
-        columns={
-            "axis": [sweep.axis.title for sweep in found.sweeps],
-            "unit": [sweep.axis.unit for sweep in found.sweeps],
-            "tried from": [sweep.axis.low for sweep in found.sweeps],
-            "tried to": [sweep.axis.high for sweep in found.sweeps],
-            "answered from": [low for low, _ in answered],
-            "answered to": [high for _, high in answered],
-            "beyond": ["; ".join(sweep.beyond()) for sweep in found.sweeps],
-        },
-    )
-
-
-def _map_table(item: StabilityMap) -> Table:
-    places = [(x, y) for y in item.y_values for x in item.x_values]
-    return Table(
-        name=f"map of {item.x.name} and {item.y.name}",
-        columns={
-            item.x.name: [float(x) for x, _ in places],
-            item.y.name: [float(y) for _, y in places],
-            "ending": [str(j.ending) for j in item.judgements],
-            "loop": [j.loop for j in item.judgements],
-        },
-        units={item.x.name: item.x.unit, item.y.name: item.y.unit},
+        tables=[Table(name=name, columns=columns) for name, columns in extremes_tables(found).items()],
     )

@@ -1,0 +1,117 @@
+"""The sections on waves and on the extremes: what they say follows the numbers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, cast
+
+import pytest
+
+from ringbalance.reports import extremes, sloshing
+from ringbalance.reports.section import Work
+from ringbalance.scene import Scene
+from ringbalance.verification.extremes_axes import AXES
+
+Record = dict[str, Any]
+
+
+def waves(*, resonant: list[Record], top: float, code: str = "ok", text: str = "solved") -> Record:
+    return {
+        "fill_ratio": [0.1, 0.3, 0.5],
+        "frequency_ratio": [[0.3, 0.5, top], [0.8, 1.2, 1.5]],
+        "amplification": [0.2, 1.0, 4.0],
+        "surface_amplitude_m": [1e-6, 1e-6, 2e-6],
+        "depth_m": [1e-3, 3e-3, 5e-3],
+        "resonant": resonant,
+        "equal": {
+            "fill_ratio": 0.25,
+            "amplification": 0.8,
+            "surface_amplitude_m": 1e-6,
+            "tilt_ratio": 2e-4,
+        },
+        "status": {"code": code, "text": text},
+    }
+
+
+def findings(record: Record) -> str:
+    view = sloshing.view({"sloshing": record})
+    assert view is not None
+    return " ".join(view["findings"])
+
+
+def test_fills_that_gravity_drives_are_named_and_others_are_not() -> None:
+    met = [{"mode": 2, "fill_ratio": 0.2}, {"mode": 3, "fill_ratio": 0.06}]
+    told = findings(waves(resonant=met, top=0.6))
+    assert "0.06 (mode 3)" in told
+    assert "mode 2" not in told
+
+
+def test_a_first_mode_that_nears_the_speed_is_named() -> None:
+    assert "from about 0.5 up" in findings(waves(resonant=[], top=0.95))
+    assert "No mode" in findings(waves(resonant=[], top=0.6))
+
+
+def test_waves_that_are_not_small_are_said() -> None:
+    assert "Avoid that fill" in findings(
+        waves(resonant=[], top=0.6, code="out_of_range", text="avoid that fill")
+    )
+
+
+def test_no_gravity_no_waves(vertical_scene: Scene) -> None:
+    work = Work(scene=vertical_scene, calibration=cast(Any, None), level="light")
+    assert sloshing.collect(work) is None
+    assert sloshing.view({}) is None
+
+
+@pytest.fixture
+def vertical_scene(paper_scene: Scene) -> Scene:
+    return replace(paper_scene, environment=replace(paper_scene.environment, shaft="vertical"))
+
+
+def table() -> Record:
+    count = len(AXES)
+    return {
+        "axis": [axis.title for axis in AXES],
+        "unit": [axis.unit for axis in AXES],
+        "tried from": [1.0] * count,
+        "tried to": [1e5] * count,
+        "answered from": [150.0] * count,
+        "answered to": [2e4] * count,
+        "beyond": ['disc.toml: [rotor] speed = "1 rpm": too slow; allowed: more', *[""] * (count - 1)],
+    }
+
+
+def evidence() -> Record:
+    cells = [(x, y) for y in (0.1, 0.2, 0.4) for x in (1.0, 10.0, 100.0)]
+    ending = ["solved", "refused with a message", "solved, with a reservation"] * 3
+    columns = {
+        "speed": [x for x, _ in cells],
+        "fill": [y for _, y in cells],
+        "ending": ending,
+        "loop": ["settled"] * 9,
+    }
+    tables = [
+        {"name": "axes", "columns": table()},
+        {"name": "map of speed and fill", "columns": columns},
+    ]
+    return {
+        "verification": [{"id": "extremes", "explanation": "All held.", "tables": tables, "date": "today"}]
+    }
+
+
+def test_the_extremes_say_how_far_and_what_is_beyond() -> None:
+    view = extremes.view(evidence())
+    assert view["rows"][0]["beyond"].startswith("[rotor] speed")
+    assert view["rows"][1]["beyond"] == "nothing: the whole range is answered"
+    assert view["rows"][0]["answered"].endswith("rpm")
+
+
+def test_a_map_draws_every_ending_that_occurs_and_no_other() -> None:
+    (drawing,) = extremes.view(evidence())["maps"]
+    assert drawing.name == "extremes-speed-fill"
+    assert "refused with a message" in drawing.svg
+    assert "broken" not in drawing.svg
+
+
+def test_extremes_that_were_not_run_say_so() -> None:
+    assert extremes.view({"verification": [{"id": "extremes", "tables": []}]}) == {"ran": False}

@@ -103,15 +103,28 @@ def _followed(
     return path.solutions[0]
 
 
-def _triangles(space: FlowSpace, cells: IntArray | slice = slice(None)) -> IntArray:
-    """Eight straight triangles per nine-node cell, counter-clockwise, shape (m, 3)."""
+def quarter_cells(*, space: FlowSpace, cells: IntArray | slice = slice(None)) -> IntArray:
+    """Four straight quadrilaterals per nine-node cell, counter-clockwise.
+
+    Args:
+        space: on a plane mesh of quadrilaterals.
+        cells: of the mesh; default all.
+
+    Returns:
+        Node numbers, shape (m, 4).
+    """
     v0, v1, v2, v3, s, e, n, w, c = space.velocity.element_dofs[:, cells]
     quads = [(v0, s, c, w), (s, v1, e, c), (c, e, v2, n), (w, c, n, v3)]
-    halves = [t for a, b, d, f in quads for t in ((a, b, d), (a, d, f))]
-    nodes = np.concatenate([np.stack(half, axis=1) for half in halves]).astype(np.int64)
+    nodes = np.concatenate([np.stack(quad, axis=1) for quad in quads]).astype(np.int64)
     x, y = space.node_coordinates()[:, nodes]
-    area = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
+    area = (x[:, 2] - x[:, 0]) * (y[:, 3] - y[:, 1]) - (x[:, 3] - x[:, 1]) * (y[:, 2] - y[:, 0])
     return np.where((area > 0)[:, None], nodes, nodes[:, ::-1])
+
+
+def _triangles(space: FlowSpace, cells: IntArray | slice = slice(None)) -> IntArray:
+    """Eight straight triangles per nine-node cell, counter-clockwise, shape (m, 3)."""
+    quads = quarter_cells(space=space, cells=cells)
+    return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
 def _potential(space: FlowSpace, gradient: FloatArray, known: IntArray, values: FloatArray) -> FloatArray:
@@ -309,8 +322,16 @@ def _meridional_stream_function(system: FlowSystem, flow: FlowSolution) -> Float
     return _potential(fitted, np.stack([-r * v, r * u]), np.concatenate([axis, wall]), values)
 
 
-def _pressure_at_velocity_nodes(space: FlowSpace, pressure: FloatArray) -> FloatArray:
-    """The bilinear pressure at all nodes of the velocity."""
+def nodal_pressure(*, space: FlowSpace, pressure: FloatArray) -> FloatArray:
+    """The linear pressure at all nodes of the velocity.
+
+    Args:
+        space: the space.
+        pressure: nodal, shape (pressure nodes,).
+
+    Returns:
+        Shape (velocity nodes,).
+    """
     basis: Any = space.pressure
     at = np.asarray(space.velocity.elem.doflocs, dtype=np.float64).T
     shape = np.stack([np.broadcast_to(basis.elem.lbasis(at, i)[0], at.shape[1]) for i in range(basis.Nbfun)])
@@ -333,7 +354,7 @@ def _near_the_mouth(end: End, system: FlowSystem, flow: FlowSolution, re: float,
         velocity=flow.velocity[:, used],
         speed=np.asarray(np.hypot(*flow.velocity[:, used]), dtype=np.float64),
         stream_function=_meridional_stream_function(system, flow)[used],
-        pressure=2 / re * _pressure_at_velocity_nodes(space, flow.pressure - reservoir)[used],
+        pressure=2 / re * nodal_pressure(space=space, pressure=flow.pressure - reservoir)[used],
         reynolds=re,
         status=status,
     )

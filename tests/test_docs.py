@@ -22,6 +22,7 @@ PAGES = (
     "CONTRIBUTING.md",
     "docs/README.md",
     "docs/how-it-works.md",
+    "docs/is-k-50-right.md",
     "docs/commands.md",
     "docs/scene-file.md",
 )

@@ -1,0 +1,117 @@
+"""The ring under gravity by quadrature, against sums over a fine grid and against closed forms."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_first_moment, surface_radius
+from ringbalance.reduced_model.tilted_ring import TiltedRing, tilted_ring
+from ringbalance.scene import models
+
+
+def by_grid(
+    disc: models.Disc, *, fill: float, tilt: float, turns: int = 8, cells: int = 1200
+) -> tuple[float, float]:
+    """Means over a turn of |r + G|^2 - b^2 on the wall, m^2, and of int x dA, m^3, by midpoints."""
+    r = disc.plate_thickness + (disc.outer_radius - disc.plate_thickness) * (np.arange(cells) + 0.5) / cells
+    phi = disc.central_angle * ((np.arange(cells // 2) + 0.5) / (cells // 2) - 0.5)
+    radius, angle = np.meshgrid(r, phi)
+    inside = (np.abs(angle) < half_angle(disc=disc, radius=radius)) & (radius > disc.inner_radius / 3)
+    area = radius * (r[1] - r[0]) * (phi[1] - phi[0])
+    wanted = fill * chamber_volume(disc=disc) / disc.axial_width
+    top = float(half_angle(disc=disc, radius=disc.outer_radius))
+    wall = np.linspace(-top, top, 2001)
+    wall = (wall[1:] + wall[:-1]) / 2
+    pressures, moments = [], []
+    for psi in 2 * np.pi * np.arange(turns) / turns:
+        level = radius**2 + 2 * radius * tilt * np.cos(angle - psi) + tilt**2
+        low, high = 0.0, (disc.outer_radius + tilt) ** 2
+        for _ in range(50):
+            middle = (low + high) / 2
+            deep = float(np.sum(area[inside & (level > middle)])) > wanted
+            low, high = (middle, high) if deep else (low, middle)
+        wet = inside & (level > low)
+        moments.append(float(np.sum((area * radius * np.cos(angle))[wet])))
+        on_wall = disc.outer_radius**2 + 2 * disc.outer_radius * tilt * np.cos(wall - psi) + tilt**2
+        pressures.append(float(np.mean(on_wall)) - low)
+    return float(np.mean(pressures)), float(np.mean(moments))
+
+
+def ring(
+    disc: models.Disc, *, tilt: float, fills: list[float], shaft: models.Shaft = "horizontal"
+) -> TiltedRing:
+    return tilted_ring(
+        disc=disc,
+        density=1000.0,
+        angular_velocity=10.0,
+        gravity=100.0 * tilt,
+        shaft=shaft,
+        fill_ratio=np.array(fills),
+    )
+
+
+def test_the_tilted_circle_against_a_grid(table_1_scene: models.Scene) -> None:
+    disc, tilt = table_1_scene.disc, 3e-3
+    found = ring(disc, tilt=tilt, fills=[0.4])
+    pressure, moment = by_grid(disc, fill=0.4, tilt=tilt)
+    assert found.closed[0]
+    assert found.wall_pressure[0] == pytest.approx(1000 * 100 / 2 * pressure, rel=2e-3)
+    assert found.moment[0] == pytest.approx(1000 * disc.axial_width * moment, rel=2e-3)
+
+
+def test_without_gravity_it_is_the_closed_form(table_1_scene: models.Scene) -> None:
+    disc = table_1_scene.disc
+    for shaft in ("horizontal", "vertical"):
+        found = ring(disc, tilt=0.0, fills=[0.1, 0.25, 0.5], shaft=shaft)
+        a = surface_radius(disc=disc, fill_ratio=np.array([0.1, 0.25, 0.5]))
+        alpha = half_angle(disc=disc, radius=a)
+        assert found.wall_pressure == pytest.approx(1000 * 100 / 2 * (disc.outer_radius**2 - a**2), rel=1e-12)
+        exact = 1000 * disc.axial_width * liquid_first_moment(disc=disc, surface_radius=a)
+        assert found.moment == pytest.approx(exact, rel=1e-12)
+        assert found.moment_per_volume == pytest.approx(1000 * a * np.sin(alpha) / alpha, rel=1e-10)
+        assert found.wall_pressure_ripple == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_slope_of_the_moment_is_that_of_the_moment(table_1_scene: models.Scene) -> None:
+    disc, x, step = table_1_scene.disc, 0.4, 1e-4
+    for shaft in ("horizontal", "vertical"):
+        found = ring(disc, tilt=2e-3, fills=[x - step, x, x + step], shaft=shaft)
+        volume = chamber_volume(disc=disc)
+        slope = (found.moment[2] - found.moment[0]) / (2 * step * volume)
+        # Liquid is added at every angle of gravity, so means and slopes commute.
+        assert found.moment_per_volume[1] == pytest.approx(slope, rel=1e-5)
+
+
+def test_an_open_ring_is_told(table_1_scene: models.Scene) -> None:
+    assert list(ring(table_1_scene.disc, tilt=8e-3, fills=[0.05, 0.5]).closed) == [False, True]
+
+
+@settings(max_examples=12, deadline=None, derandomize=True)
+@given(
+    angle=st.sampled_from([40.0, 60.0, 90.0, 120.0]),
+    fill=st.floats(0.3, 0.6),
+    small=st.floats(1e-4, 2e-3),
+)
+def test_the_mean_changes_with_the_square_of_gravity(angle: float, fill: float, small: float) -> None:
+    disc = models.Disc(
+        outer_radius=0.05,
+        inner_radius=0.02,
+        axial_width=0.06,
+        central_angle=math.radians(angle),
+        chambers=round(360 / angle),
+        plate_thickness=1e-3,
+        max_fill_ratio=0.6,
+        initial_fill=0.3,
+    )
+    still, one, two = (ring(disc, tilt=t, fills=[fill]) for t in (0.0, small / 2, small))
+    first, second = one.moment - still.moment, two.moment - still.moment
+    assert second[0] == pytest.approx(4 * first[0], rel=0.05, abs=1e-10 * still.moment[0])
+    assert two.wall_pressure_ripple[0] == pytest.approx(2 * one.wall_pressure_ripple[0], rel=1e-2)
+    wider = dataclasses.replace(disc, axial_width=0.12)
+    assert ring(wider, tilt=small, fills=[fill]).moment[0] == pytest.approx(2 * two.moment[0], rel=1e-12)

@@ -1,0 +1,153 @@
+"""The friction filter against an accurate integration of the mass's motion, and what the print would do."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from ringbalance.controller.eccentric.friction_filter import (
+    FrictionEstimate,
+    FrictionNoise,
+    TrackModel,
+    friction_covariance,
+    friction_flow,
+    friction_restart,
+    friction_step,
+)
+
+TRACK = TrackModel(0.0112, 0.16, 0.0414)
+SPEED = 10.47
+STEP = 1e-3
+NOISE = FrictionNoise(1e-4, 1e-4, 1e-12)
+CASES = [(0.5, 0.01, 0.2), (0.3, 0.005, -0.1), (-0.4, 0.01, -0.2), (3.0, 0.0, 0.0)]
+
+
+def accurate(rate: float, arm: float, torque: float, duration: float) -> float:
+    direction = math.copysign(1.0, rate)
+
+    def slope(_: float, w: list[float]) -> list[float]:
+        friction = direction * arm * TRACK.moment * (SPEED + w[0]) ** 2
+        return [(torque - TRACK.damping * w[0] - friction) / TRACK.inertia]
+
+    return float(solve_ivp(slope, (0, duration), [rate], rtol=1e-11, atol=1e-13).y[0, -1])
+
+
+@pytest.mark.parametrize(("rate", "arm", "torque"), CASES)
+def test_flow_is_the_motion(rate: float, arm: float, torque: float) -> None:
+    flow = friction_flow(TRACK, rate, arm, SPEED, torque, STEP, False)
+    change = accurate(rate, arm, torque, STEP) - rate
+    assert flow.rate - rate == pytest.approx(change, rel=1e-3, abs=1e-9)
+    # Of second order: a tenth of the step, a thousandth of the error, down to round-off.
+    short = friction_flow(TRACK, rate, arm, SPEED, torque, STEP / 10, False)
+    error = abs(short.rate - accurate(rate, arm, torque, STEP / 10))
+    assert error <= 2e-3 * abs(flow.rate - accurate(rate, arm, torque, STEP)) + 1e-12
+
+
+@pytest.mark.parametrize(("rate", "arm", "torque"), CASES)
+def test_derivatives_are_the_flows(rate: float, arm: float, torque: float) -> None:
+    flow = friction_flow(TRACK, rate, arm, SPEED, torque, STEP, False)
+    small = 1e-5
+    by_rate = (accurate(rate + small, arm, torque, STEP) - accurate(rate - small, arm, torque, STEP)) / (
+        2 * small
+    )
+    by_arm = (accurate(rate, arm + small, torque, STEP) - accurate(rate, arm - small, torque, STEP)) / (
+        2 * small
+    )
+    assert flow.by_rate == pytest.approx(by_rate, rel=1e-4)
+    assert flow.by_arm == pytest.approx(by_arm, rel=5e-3)
+
+
+def drive(
+    *, arm: float, seed: int, steps: int = 2000, stray: bool = False
+) -> tuple[FrictionEstimate, list[float]]:
+    """A mass kept near 0.4 rad/s, observed by the filter; `stray` puts the arm into d/d mu once more."""
+    random = np.random.default_rng(seed)
+    rate, estimate = 0.4, FrictionEstimate(0.4, 0.0, 1e-4, 0.0, 0.02**2)
+    arms = []
+    for _ in range(steps):
+        torque = 0.8 * (0.5 - rate)
+        friction = arm * TRACK.moment * (SPEED + rate) ** 2
+        rate += STEP / TRACK.inertia * (torque - TRACK.damping * rate - friction)
+        seen = rate + 0.01 * random.standard_normal()
+        estimate = (
+            _printed_step(estimate, seen, torque)
+            if stray
+            else friction_step(estimate, TRACK, NOISE, seen, SPEED, torque, STEP, False)
+        )
+        arms.append(estimate.arm)
+    return estimate, arms
+
+
+def _printed_step(old: FrictionEstimate, seen: float, torque: float) -> FrictionEstimate:
+    """One step with the printed f_13 = -dt chi (W + w)^2 sgn(w)/r_b, with chi in excess."""
+    flow = friction_flow(TRACK, old.rate, old.arm, SPEED, torque, STEP, False)
+    by_arm = -STEP * old.arm * (SPEED + old.rate) ** 2 / 0.23
+    covariance = np.array([[old.rate_variance, old.covariance], [old.covariance, old.arm_variance]])
+    jacobian = np.array([[flow.by_rate, by_arm], [0.0, 1.0]])
+    covariance = jacobian @ covariance @ jacobian.T + np.diag([NOISE.acceleration * STEP, 0.0])
+    gain = covariance[:, 0] / (covariance[0, 0] + NOISE.rate_variance)
+    state = np.array([flow.rate, old.arm]) + gain * (seen - flow.rate)
+    covariance = covariance - np.outer(gain, covariance[0])
+    return FrictionEstimate(
+        float(state[0]), float(state[1]), covariance[0, 0], covariance[0, 1], covariance[1, 1]
+    )
+
+
+@pytest.mark.parametrize("arm", [0.0, 0.002, 0.01])
+def test_the_arm_is_found_within_what_the_filter_claims(arm: float) -> None:
+    estimate, _ = drive(arm=arm, seed=1)
+    assert abs(estimate.arm - arm) < 4 * math.sqrt(estimate.arm_variance)
+    assert math.sqrt(estimate.arm_variance) < 2e-4
+
+
+def test_errors_are_as_large_as_the_covariance_says() -> None:
+    nees = [
+        (found.arm - 0.01) ** 2 / found.arm_variance
+        for found, _ in (drive(arm=0.01, seed=seed, steps=400) for seed in range(40))
+    ]
+    # The plant has none of the process noise that the filter allows for, so the mean is at most about one.
+    assert 0.1 < np.mean(nees) < 1.9
+
+
+def test_the_printed_jacobian_never_starts_from_zero() -> None:
+    """With chi in d/d mu an estimate of zero has no sensitivity, no gain, and stays zero."""
+    printed, _ = drive(arm=0.01, seed=1, stray=True)
+    right, _ = drive(arm=0.01, seed=1)
+    assert printed.arm == 0.0
+    assert right.arm == pytest.approx(0.01, rel=0.05)
+
+
+def test_the_printed_transition_is_not_the_flow() -> None:
+    """Eq. 33 multiplies the state with the Jacobian; the motion is not linear, and friction counts twice."""
+    rate, arm, torque = 0.4, 0.01, 0.1
+    flow = friction_flow(TRACK, rate, arm, SPEED, torque, STEP, False)
+    linear = flow.by_rate * rate + flow.by_arm * arm
+    true = accurate(rate, arm, torque, STEP)
+    assert abs(flow.rate - true) < 1e-7
+    assert abs(linear - true) > 1e-3
+
+
+def test_a_resting_mass_teaches_nothing() -> None:
+    old = FrictionEstimate(0.3, 0.01, 1e-4, 1e-6, 1e-6)
+    found = friction_restart(old, NOISE, 0.0)
+    assert (found.arm, found.arm_variance, found.covariance) == (0.01, 1e-6, 0.0)
+
+
+def test_pair_covariance_keeps_the_papers_order() -> None:
+    one, two = FrictionEstimate(1.0, 2.0, 3.0, 0.5, 4.0), FrictionEstimate(1.0, 2.0, 5.0, 0.25, 6.0)
+    found = friction_covariance(one, two)
+    np.testing.assert_array_equal(np.diag(found), [3.0, 5.0, 4.0, 6.0])
+    assert found[0, 2] == 0.5
+    assert found[1, 3] == 0.25
+    np.testing.assert_array_equal(found, found.T)
+
+
+def test_euler_is_close_for_short_steps_and_unstable_for_long_ones() -> None:
+    near = friction_flow(TRACK, 0.4, 0.01, SPEED, 0.1, 1e-4, True)
+    exact = friction_flow(TRACK, 0.4, 0.01, SPEED, 0.1, 1e-4, False)
+    assert near.rate == pytest.approx(exact.rate, rel=1e-3)
+    assert abs(friction_flow(TRACK, 0.4, 0.01, SPEED, 0.1, 0.2, True).by_rate) > 1
+    assert abs(friction_flow(TRACK, 0.4, 0.01, SPEED, 0.1, 0.2, False).by_rate) < 1

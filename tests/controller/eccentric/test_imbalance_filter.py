@@ -1,0 +1,301 @@
+"""The imbalance filter against matrix exponentials, batch least squares and its own claims of accuracy."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy.linalg import block_diag, expm
+
+from ringbalance.controller.eccentric.imbalance_filter import (
+    ImbalanceEstimate,
+    correct,
+    imbalance_deviation,
+    imbalance_history,
+    own_imbalance,
+    predict,
+    predicted_deviation,
+    start_estimate,
+    turned_back,
+)
+from ringbalance.controller.eccentric.imbalance_filter_model import (
+    FilterMatrices,
+    ProcessNoise,
+    WhirlModel,
+    dynamic_stiffness,
+    euler_step_limit,
+    euler_transition,
+    filter_matrices,
+    process_covariance,
+    whirl_generator,
+    whirl_transition,
+)
+
+FloatArray = npt.NDArray[np.float64]
+
+MODEL = WhirlModel(5.36, 10.0, 1000.0)
+SPEED = 100 * math.pi / 30
+STEP = 1e-3
+NOISE = ProcessNoise(1e-6, 1e-10)
+VARIANCE = np.array([1e-8, 1e-8, 1e-6, 1e-6])
+TRUE = np.array([0.03, -0.02])
+MODELS = [MODEL, WhirlModel(26.2, 180.0, 12e3), WhirlModel(2.0, 400.0, 50.0), WhirlModel(1.0, 20.0, 100.0)]
+
+
+def start() -> ImbalanceEstimate:
+    return start_estimate(0.02, 0.2, 0.08)
+
+
+def matrices(*, laboratory: bool = False, noise: ProcessNoise = NOISE, step: float = STEP) -> FilterMatrices:
+    return filter_matrices(MODEL, noise, SPEED, step, laboratory, False)
+
+
+def record(
+    *, steps: int, seed: int, laboratory: bool = False, noise: ProcessNoise = NOISE, prior: bool = False
+) -> tuple[FloatArray, FloatArray]:
+    """States and samples drawn from the filter's own model; from its prior when asked."""
+    random = np.random.default_rng(seed)
+    told = matrices(laboratory=laboratory, noise=noise)
+    state = np.concatenate([np.zeros(4), TRUE])
+    if prior:
+        state = random.multivariate_normal(np.zeros(6), start().covariance)
+    states, samples = np.zeros((steps, 6)), np.zeros((steps, 4))
+    for i in range(steps):
+        push = random.multivariate_normal(np.zeros(6), told.process) if noise.acceleration else 0.0
+        state = told.transition @ state + push
+        states[i] = state
+        samples[i] = told.observation @ state + np.sqrt(VARIANCE) * random.standard_normal(4)
+    return states, samples
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("speed", [0.0, 3.0, SPEED, 24.1, -7.0])
+@pytest.mark.parametrize("step", [1e-4, 1e-3, 0.03])
+def test_transition_is_the_matrix_exponential(model: WhirlModel, speed: float, step: float) -> None:
+    generator = whirl_generator(model=model, angular_velocity=speed)
+    expected = expm(generator * step)
+    np.testing.assert_allclose(whirl_transition(model, speed, step), expected, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(euler_transition(model, speed, step), np.eye(6) + generator * step, atol=1e-15)
+
+
+def test_generator_is_the_whirls_equation() -> None:
+    """In the fixed frame a free whirl is a plain oscillator: roots s of M s^2 + C s + K, seen at s - j W."""
+    roots = np.roots([MODEL.mass, MODEL.damping, MODEL.stiffness]) - 1j * SPEED
+    found = np.linalg.eigvals(whirl_generator(model=MODEL, angular_velocity=SPEED)[:4, :4])
+    for value in (*roots, *roots.conj()):
+        assert np.min(np.abs(found - value)) < 1e-10
+    steady = SPEED**2 * complex(*TRUE) / dynamic_stiffness(model=MODEL, angular_velocity=SPEED)
+    whole = np.array([steady.real, steady.imag, 0, 0, *TRUE])
+    np.testing.assert_allclose(whirl_transition(MODEL, SPEED, 0.7) @ whole, whole, atol=1e-14)
+
+
+def test_process_covariance_is_van_loans() -> None:
+    generator = whirl_generator(model=MODEL, angular_velocity=SPEED)
+    power = np.diag([0, 0, 1e-3, 1e-3, 1e-8, 1e-8])
+    block = expm(np.block([[-generator, power], [np.zeros((6, 6)), generator.T]]) * 0.02)
+    expected = block[6:, 6:].T @ block[:6, 6:]
+    found = process_covariance(MODEL, ProcessNoise(1e-3, 1e-8), SPEED, 0.02)
+    np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-16)
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("speed", [0.0, 5.0, SPEED, 40.0])
+def test_eulers_step_limit_is_where_its_eigenvalues_leave_the_unit_circle(
+    model: WhirlModel, speed: float
+) -> None:
+    limit = float(euler_step_limit(model=model, angular_velocity=speed))
+    for share, grows in ((0.999, False), (1.001, True)):
+        radius = max(abs(np.linalg.eigvals(euler_transition(model, speed, share * limit)[:4, :4])))
+        assert (radius > 1) == grows
+
+
+def test_euler_has_no_step_without_damping() -> None:
+    free = MODEL._replace(damping=0.0)
+    assert np.all(euler_step_limit(model=free, angular_velocity=[1.0, 10.0]) == 0)
+
+
+def test_covariance_history_is_the_information_filters() -> None:
+    """Sums of inverses in place of gains: another arithmetic for the same numbers."""
+    told = matrices()
+    _, samples = record(steps=60, seed=1)
+    states, covariances = imbalance_history(start(), matrices=told, samples=samples, variance=VARIANCE)
+    state, covariance = start()
+    for i in range(60):
+        state = told.transition @ state
+        covariance = told.transition @ covariance @ told.transition.T + told.process
+        information = np.linalg.inv(covariance)
+        seen = information + told.observation.T @ (told.observation / VARIANCE[:, None])
+        covariance = np.linalg.inv(seen)
+        state = covariance @ (information @ state + told.observation.T @ (samples[i] / VARIANCE))
+        np.testing.assert_allclose(covariances[i], covariance, rtol=1e-6, atol=1e-14)
+        np.testing.assert_allclose(states[i], state, rtol=1e-6, atol=1e-9)
+
+
+def test_last_estimate_is_the_batch_least_squares_solution() -> None:
+    """Without process noise all samples hang on the first state: one weighted least-squares problem."""
+    none = ProcessNoise(0.0, 0.0)
+    told = matrices(noise=none)
+    _, samples = record(steps=300, seed=2, noise=none)
+    states, covariances = imbalance_history(start(), matrices=told, samples=samples, variance=VARIANCE)
+    rows, power = [np.diag(1 / np.sqrt(np.diag(start().covariance)))], np.eye(6)
+    sides = [np.zeros(6)]
+    for sample in samples:
+        power = told.transition @ power
+        rows.append(told.observation @ power / np.sqrt(VARIANCE)[:, None])
+        sides.append(sample / np.sqrt(VARIANCE))
+    whole = np.vstack(rows)
+    first = np.linalg.lstsq(whole, np.concatenate(sides), rcond=None)[0]
+    np.testing.assert_allclose(states[-1], power @ first, rtol=1e-8, atol=1e-11)
+    spread = power @ np.linalg.inv(whole.T @ whole) @ power.T
+    np.testing.assert_allclose(covariances[-1], spread, rtol=1e-7, atol=1e-16)
+
+
+@pytest.mark.parametrize("laboratory", [False, True])
+def test_errors_are_as_large_as_the_covariance_says(laboratory: bool) -> None:
+    """The mean of e^T P^-1 e over runs drawn from the prior is the number of states, 6."""
+    runs, nees = 60, []
+    for seed in range(runs):
+        states, samples = record(steps=150, seed=seed, laboratory=laboratory, prior=True)
+        found, covariances = imbalance_history(
+            start(), matrices=matrices(laboratory=laboratory), samples=samples, variance=VARIANCE
+        )
+        error = states[-1] - found[-1]
+        nees.append(error @ np.linalg.solve(covariances[-1], error))
+    # Chi-squared of 6 degrees of freedom: standard deviation sqrt(12/60) of the mean; 4 of them.
+    assert np.mean(nees) == pytest.approx(6.0, abs=4 * math.sqrt(12 / runs))
+
+
+def test_josephs_form_stays_symmetric_and_positive() -> None:
+    told, estimate = matrices(noise=ProcessNoise(0.0, 0.0)), start()
+    tiny = np.full(4, 1e-14)
+    for _ in range(200):
+        estimate = correct(predict(estimate, told, np.zeros(2)), told, np.zeros(4), tiny)
+        assert np.array_equal(estimate.covariance, estimate.covariance.T)
+        assert np.min(np.linalg.eigvalsh(estimate.covariance)) >= 0
+
+
+def test_both_frames_know_the_imbalance() -> None:
+    states, _ = record(steps=4000, seed=3, noise=ProcessNoise(0.0, 0.0))
+    random = np.random.default_rng(4)
+    noise = np.sqrt(VARIANCE) * random.standard_normal((4000, 4))
+    time = STEP * np.arange(1, 4001)
+    z, v = states[:, 0] + 1j * states[:, 1], states[:, 2] + 1j * states[:, 3]
+    turn = np.exp(1j * SPEED * time)
+    outside = np.column_stack([(turn * z).real, (turn * z).imag, *_parts(turn * (v + 1j * SPEED * z))])
+    back = np.array([turned_back(s, SPEED * t) for s, t in zip(outside + noise, time, strict=True)])
+    for laboratory, samples in ((False, states[:, :4] + noise), (True, back)):
+        told = matrices(laboratory=laboratory)
+        found, covariances = imbalance_history(start(), matrices=told, samples=samples, variance=VARIANCE)
+        error = np.hypot(*(found[-1, 4:] - TRUE))
+        assert error < 4 * imbalance_deviation(covariances[-1])
+        assert error < 2e-3 * np.hypot(*TRUE)
+
+
+def _parts(values: npt.NDArray[np.complex128]) -> tuple[FloatArray, FloatArray]:
+    return values.real, values.imag
+
+
+def test_masses_that_are_not_opposite_are_taken_out() -> None:
+    own = own_imbalance(0.0414, 0.2, 2.9)
+    told = matrices(noise=ProcessNoise(0.0, 0.0))
+    state, samples = np.concatenate([np.zeros(4), TRUE + own]), []
+    for _ in range(3000):
+        state = told.transition @ state
+        samples.append(state[:4].copy())
+    known = (float(own[0]), float(own[1]))
+    for given, expected in ((known, TRUE), ((0.0, 0.0), TRUE + own)):
+        found, _ = imbalance_history(
+            start(), matrices=told, samples=np.array(samples), variance=VARIANCE, mass_imbalance=given
+        )
+        np.testing.assert_allclose(found[-1, 4:], expected, rtol=1e-3)
+
+
+def test_a_resting_rotor_is_refused_and_a_slow_one_told() -> None:
+    still = filter_matrices(MODEL, NOISE, 0.0, STEP, False, False)
+    with pytest.raises(ValueError, match="at rest"):
+        imbalance_history(start(), matrices=still, samples=np.zeros((5, 4)), variance=VARIANCE)
+    last = [
+        predicted_deviation(
+            start(),
+            model=MODEL,
+            noise=ProcessNoise(0.0, 0.0),
+            variance=VARIANCE,
+            angular_velocity=speed,
+            step=0.02,
+            duration=20.0,
+        )[-1]
+        for speed in (0.5, 1.0, 2.0)
+    ]
+    # A steady whirl of W^2 U/K: half the speed, four times the uncertainty.
+    assert last[0] / last[1] == pytest.approx(4, rel=0.15)
+    assert last[1] / last[2] == pytest.approx(4, rel=0.15)
+
+
+def test_a_sample_that_is_not_a_number_is_passed_over() -> None:
+    told = matrices()
+    ahead = predict(start(), told, np.zeros(2))
+    found = correct(ahead, told, np.full(4, np.nan), VARIANCE)
+    np.testing.assert_array_equal(found.state, ahead.state)
+    np.testing.assert_array_equal(found.covariance, ahead.covariance)
+
+
+def test_the_printed_observation_lets_the_imbalance_into_the_velocity() -> None:
+    """Its last row is 0 0 0 1 1 1: the filter then blames the imbalance for what y' shows."""
+    printed = matrices().observation.copy()
+    printed[3, 4:] = 1.0
+    _, samples = record(steps=4000, seed=5, noise=ProcessNoise(0.0, 0.0))
+    for observation, good in ((matrices().observation, True), (printed, False)):
+        told = matrices()._replace(observation=observation)
+        found, _ = imbalance_history(start(), matrices=told, samples=samples, variance=VARIANCE)
+        error = np.hypot(*(found[-1, 4:] - TRUE)) / np.hypot(*TRUE)
+        assert (error < 0.01) == good
+
+
+def test_the_printed_process_noise_is_no_covariance() -> None:
+    """diag(O randn) with normal numbers is negative half of the time, and takes the covariance along."""
+    random = np.random.default_rng(0)
+    told, estimate = matrices(), start()
+    lowest = 0.0
+    for _ in range(200):
+        told = told._replace(process=np.diag(1e-6 * random.standard_normal(6)))
+        estimate = correct(predict(estimate, told, np.zeros(2)), told, np.zeros(4), VARIANCE)
+        lowest = min(lowest, float(np.min(np.linalg.eigvalsh(estimate.covariance))))
+        if not np.all(np.isfinite(estimate.covariance)):
+            break
+    assert lowest < -1e-8
+
+
+def test_the_printed_damping_matrix_is_no_whirl() -> None:
+    """Eq. 12 adds 2 W M on the diagonal: a damping that the speed makes, and no gyroscopic coupling."""
+    generator = whirl_generator(model=MODEL, angular_velocity=SPEED)
+    printed = generator.copy()
+    printed[2, 2:4] = [-(MODEL.damping / MODEL.mass + 2 * SPEED), 0.0]
+    printed[3, 2:4] = [0.0, -(MODEL.damping / MODEL.mass + 2 * SPEED)]
+    right = np.max(np.linalg.eigvals(generator[:4, :4]).real)
+    wrong = np.max(np.linalg.eigvals(printed[:4, :4]).real)
+    assert right == pytest.approx(-MODEL.damping / (2 * MODEL.mass))
+    assert abs(wrong - right) > 1.0
+
+
+def test_the_printed_magnitude_and_phase_fail() -> None:
+    """Eq. 23 adds the components, and takes tan^-1 of their ratio: wrong size, and half a turn lost."""
+    for phase in np.radians([30.0, 100.0, 210.0, 300.0]):
+        x, y = 0.0414 * math.cos(phase), 0.0414 * math.sin(phase)
+        assert abs(x + y - 0.0414) > 0.006
+        assert math.hypot(x, y) == pytest.approx(0.0414)
+        assert math.atan2(y, x) % (2 * math.pi) == pytest.approx(phase)
+    x, y = math.cos(math.radians(210)), math.sin(math.radians(210))
+    assert math.atan(y / x) == pytest.approx(math.radians(30))
+
+
+def test_block_structure_of_sensor_noise_is_kept() -> None:
+    """Taking the sensors in one after the other is the same as all at once."""
+    told, estimate = matrices(laboratory=True), predict(start(), matrices(laboratory=True), np.zeros(2))
+    sample = np.array([1e-3, -2e-3, 0.01, 0.02])
+    found = correct(estimate, told, sample, VARIANCE)
+    h, p = told.observation, estimate.covariance
+    gain = p @ h.T @ np.linalg.inv(h @ p @ h.T + block_diag(*VARIANCE))
+    np.testing.assert_allclose(found.state, estimate.state + gain @ (sample - h @ estimate.state), atol=1e-12)
+    np.testing.assert_allclose(found.covariance, p - gain @ h @ p, atol=1e-13)

@@ -1,0 +1,91 @@
+"""Targets and who goes where, against brute force."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ringbalance.controller.eccentric.targets import assign, target_angles, wrapped
+
+MOMENT = 0.0414
+GAP = 0.217
+ANGLES = st.floats(-10, 10)
+
+
+def residual(imbalance: float, phase: float, first: float, second: float) -> float:
+    own = MOMENT * (cmath.exp(1j * first) + cmath.exp(1j * second))
+    return abs(imbalance * cmath.exp(1j * phase) + own)
+
+
+@given(st.floats(0, 0.0823), ANGLES)
+def test_within_reach_nothing_is_left(imbalance: float, phase: float) -> None:
+    found = target_angles(imbalance, phase, MOMENT, GAP)
+    assert not found.saturated
+    assert residual(imbalance, phase, found.first, found.second) < 1e-15
+    assert found.residual == 0
+
+
+@given(st.floats(0.083, 0.3), ANGLES)
+def test_beyond_reach_the_masses_lie_side_by_side(imbalance: float, phase: float) -> None:
+    found = target_angles(imbalance, phase, MOMENT, GAP)
+    assert found.saturated
+    apart = abs(wrapped(found.first - found.second))
+    assert apart == pytest.approx(GAP, abs=1e-12)
+    assert found.residual == pytest.approx(residual(imbalance, phase, found.first, found.second), rel=1e-9)
+
+
+@pytest.mark.parametrize("imbalance", [0.01, 0.05, 0.0825, 0.12])
+def test_no_other_places_are_better(imbalance: float) -> None:
+    """Over all pairs of a fine grid that keep their distance."""
+    grid = np.linspace(-np.pi, np.pi, 721)
+    first, second = np.meshgrid(grid, grid)
+    apart = np.abs(np.pi - np.mod(np.pi - (second - first), 2 * np.pi))
+    left = np.abs(imbalance * np.exp(0.4j) + MOMENT * (np.exp(1j * first) + np.exp(1j * second)))
+    best = np.min(left[apart >= GAP])
+    assert target_angles(imbalance, 0.4, MOMENT, GAP).residual <= best + 1e-12
+
+
+@given(ANGLES, st.floats(0.3, 5.9), ANGLES, st.floats(0.3, 5.9))
+def test_travel_is_the_shortest_without_a_collision(
+    first: float, lead: float, target: float, target_lead: float
+) -> None:
+    second, other = first + lead, target + target_lead
+    found = assign(first, second, target, other)
+    least = math.inf
+    for goals, one, two in product(((target, other), (other, target)), range(-4, 5), range(-4, 5)):
+        travels = goals[0] - first + 2 * np.pi * one, goals[1] - second + 2 * np.pi * two
+        after = lead + travels[1] - travels[0]
+        if 0 < after < 2 * np.pi:
+            least = min(least, travels[0] ** 2 + travels[1] ** 2)
+    assert found.first**2 + found.second**2 <= least + 1e-9
+    goals = (other, target) if found.swapped else (target, other)
+    ends = (first + found.first, second + found.second)
+    np.testing.assert_allclose(np.exp(1j * np.array(ends)), np.exp(1j * np.array(goals)), atol=1e-9)
+    assert 0 < lead + found.second - found.first < 2 * np.pi
+
+
+def test_unwrapped_distances_send_the_masses_the_long_way() -> None:
+    """Eq. 27 as printed: angles of 3.0 and -3.0 rad look six apart, though they are 0.28."""
+    first, second, one, two = 3.0, 0.0, -3.0, 0.1
+    printed = min((first - one) ** 2 + (second - two) ** 2, (second - one) ** 2 + (first - two) ** 2)
+    found = assign(first, second, one, two)
+    assert found.first == pytest.approx(2 * math.pi - 6.0)
+    assert found.first**2 + found.second**2 < 0.02 * printed
+
+
+def test_the_printed_arccos_adds_to_the_imbalance() -> None:
+    """Eq. 26 without its minus sign puts both masses on the side of the imbalance."""
+    wrong = math.acos(0.05 / (2 * MOMENT))
+    assert residual(0.05, 0.0, wrong, -wrong) == pytest.approx(2 * 0.05)
+
+
+@given(ANGLES)
+def test_wrapped_is_the_same_direction(angle: float) -> None:
+    assert -math.pi < wrapped(angle) <= math.pi
+    assert cmath.exp(1j * wrapped(angle)) == pytest.approx(cmath.exp(1j * angle))

@@ -1,0 +1,193 @@
+"""The data behind the paper's figures and the extremes: what is claimed, what is found, what bounds it."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import quad, solve_ivp
+
+from ringbalance.controller.eccentric.figures_bound import motion_bound
+from ringbalance.controller.eccentric.figures_effort import figure_six
+from ringbalance.controller.eccentric.figures_extremes import (
+    euler_map,
+    noise_extremes,
+    saturation_curve,
+    wrong_belief,
+)
+from ringbalance.controller.eccentric.figures_imbalance import figure_four
+from ringbalance.controller.eccentric.figures_runs import (
+    figure_eight,
+    figure_five,
+    figure_nine,
+    figure_seven,
+    steady_peak_speed,
+)
+from ringbalance.controller.eccentric.figures_scenes import RPM, changed
+from ringbalance.controller.eccentric.parameters import PlantParameters, plant_parameters
+from ringbalance.controller.eccentric.plant_whirl import steady_whirl
+from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
+
+
+@pytest.fixture(scope="module")
+def scene() -> EccentricScene:
+    return eccentric_scene(load_scene(bundled_scene("eccentric_mass_paper")))
+
+
+def test_figure_four_honest_filters_need_no_seconds(scene: EccentricScene) -> None:
+    found = figure_four(scene, duration=6.0)
+    np.testing.assert_allclose(found.estimate[:, -1], found.true, atol=1e-4)
+    assert max(found.honest_time) < 0.3
+    assert np.all(found.covariance_norm[:, -1] < 1e-6 * found.covariance_norm[:, 0])
+    # Three to four seconds take a sensor noise believed more than a thousand times too large.
+    within = found.scales[(found.scaled_time >= 2) & (found.scaled_time <= 5)]
+    assert within.size
+    assert np.min(within) > 1000
+
+
+def test_figure_five_finds_both_friction_arms(scene: EccentricScene) -> None:
+    found = figure_five(scene, time_limit=8.0)
+    assert max(found.relative_error) < 0.02
+    assert max(found.time_to_converge) < 1.0
+
+
+def test_figure_six_grows_only_with_what_compensation_leaves(scene: EccentricScene) -> None:
+    found = figure_six(scene, step=5e-4)
+    np.testing.assert_allclose(found.growth(found.exact), 1.0, rtol=1e-3)
+    assert np.all(found.growth(found.short) > 1.5)
+    assert np.all(found.growth(found.without) > 3)
+    # q/r and mass ratio as the paper has them: a larger ratio costs more.
+    assert np.all(np.diff(found.exact, axis=1) > 0)
+    assert np.all(found.short[0, :, -1] > found.short[1, :, -1])
+
+
+def test_figure_seven_balances_both_imbalances(scene: EccentricScene) -> None:
+    found = figure_seven(scene, time_limit=20.0)
+    plant = plant_parameters(scene)
+    expected = abs(steady_whirl(plant, 100 * RPM, (0.0, math.pi)))
+    assert found.before == pytest.approx((expected, expected))
+    assert max(found.after) < 2e-3 * expected
+    for run in found.runs:
+        assert run.settled
+
+
+def test_figure_eight_is_mended_by_fine_tuning(scene: EccentricScene) -> None:
+    found = figure_eight(scene)
+    plant = plant_parameters(scene)
+    # Both masses 10 degrees on turn the correction by 10 degrees: 2 sin 5 deg of the imbalance is left.
+    expected = 2 * math.sin(math.radians(5)) * abs(steady_whirl(plant, 100 * RPM, (0.0, math.pi)))
+    assert found.positioned == pytest.approx((expected, expected), rel=0.02)
+    assert max(found.after) < scene.supervisor.limit
+    for run in found.runs:
+        assert run.settled
+        assert "fine tuning" in [stage.name for stage in run.stages]
+
+
+def test_figure_nine_passes_the_models_own_critical_speed(scene: EccentricScene) -> None:
+    found = figure_nine(scene)
+    assert found.critical_speed / RPM == pytest.approx(130.43, abs=0.01)
+    assert found.rotor_critical_speed / RPM == pytest.approx(135.05, abs=0.01)
+    # A ramp of 1 rpm/s peaks behind the steady peak.
+    expected, at = fixed_frame_peak(plant_parameters(scene))
+    amplitude, speed = found.locked_peak
+    assert amplitude == pytest.approx(expected, rel=1e-6)
+    assert speed == pytest.approx(at, abs=1e-3)
+    assert found.steady_peak_speed < speed < found.steady_peak_speed + 4 * RPM
+    assert found.balanced_peak[0] < 2e-3 * amplitude
+
+
+def fixed_frame_peak(plant: PlantParameters) -> tuple[float, float]:
+    """A run-up from 100 rpm at 1 rpm/s with opposite masses, as one forced oscillator that does not turn."""
+    first = 100 * RPM
+
+    def slope(t: float, q: np.ndarray) -> list[complex]:
+        speed, turn = first + RPM * t, first * t + 0.5 * RPM * t * t
+        force = plant.unbalance * complex(speed**2, -RPM) * cmath.exp(1j * (turn + plant.phase))
+        return [q[1], (force - plant.damping * q[1] - plant.stiffness * q[0]) / plant.mass]
+
+    whirl = steady_whirl(plant, first, (0.0, math.pi))
+    begin = [whirl, 1j * first * whirl]
+    grid = np.linspace(28, 38, 20001)
+    found = solve_ivp(slope, (0, 38), begin, t_eval=grid, rtol=1e-10, atol=1e-13, method="DOP853")
+    size = np.abs(found.y[0])
+    return float(np.max(size)), float(first + RPM * grid[np.argmax(size)])
+
+
+def test_steady_peak_speed_is_the_largest_whirl(scene: EccentricScene) -> None:
+    plant = plant_parameters(scene)
+    speeds = np.linspace(10, 20, 20001)
+    whirl = speeds**2 / np.abs(plant.stiffness - plant.mass * speeds**2 + 1j * plant.damping * speeds)
+    assert steady_peak_speed(plant) == pytest.approx(speeds[np.argmax(whirl)], abs=1e-3)
+    assert steady_peak_speed(plant._replace(damping=1000.0)) == math.inf
+
+
+def test_the_bound_holds_is_sharp_at_resonance_and_is_not_the_printed_one(scene: EccentricScene) -> None:
+    plant = plant_parameters(scene)
+    natural = math.sqrt(plant.stiffness / plant.mass)
+    still = motion_bound(plant._replace(moment=0.0), speed=natural, rate=0.0)
+    whirl = plant.unbalance * natural**2 / (plant.damping * natural)
+    assert whirl <= still.amplitude <= 4 / math.pi * whirl * 1.1
+    # A whirl at the critical speed has just the velocity at which the printed argument begins to hold.
+    assert natural * whirl == pytest.approx(still.velocity_threshold)
+    turning = motion_bound(plant, speed=10.47, rate=0.52)
+    assert turning.printed_force < turning.force - 2 * plant.moment * 10.47**2 * 0.99
+    half = plant.damping / (2 * plant.mass)
+    damped = math.sqrt(natural**2 - half**2)
+    period = math.pi / damped
+    h = [
+        quad(lambda t: math.exp(-half * t) * abs(math.sin(damped * t)), i * period, (i + 1) * period)[0]
+        for i in range(120)
+    ]
+    assert turning.amplitude == pytest.approx(turning.force * sum(h) / (plant.mass * damped), rel=1e-6)
+    slope = [
+        quad(
+            lambda t: math.exp(-half * t) * abs(math.cos(damped * t) - half / damped * math.sin(damped * t)),
+            i * period / 50,
+            (i + 1) * period / 50,
+        )[0]
+        for i in range(3000)
+    ]
+    assert turning.velocity == pytest.approx(turning.force * sum(slope) / plant.mass, rel=1e-4)
+
+
+@pytest.mark.parametrize("damping", [0.0, 1e4])
+def test_the_bound_wants_a_rotor_that_swings(scene: EccentricScene, damping: float) -> None:
+    with pytest.raises(ValueError, match="damping"):
+        motion_bound(plant_parameters(scene)._replace(damping=damping), speed=1.0, rate=0.0)
+
+
+@pytest.mark.parametrize("belief", ["assumed_mass", "assumed_stiffness", "assumed_damping"])
+def test_wrong_beliefs_shift_the_estimate_by_the_ratio_of_stiffnesses(
+    scene: EccentricScene, belief: str
+) -> None:
+    found = wrong_belief(scene, belief=belief, relative=[-0.1, 0.05, 0.1])  # type: ignore[arg-type]
+    np.testing.assert_allclose(found.estimated, found.predicted, atol=2e-3)
+    assert np.all(np.abs(found.predicted - 1) > 5e-3)
+
+
+def test_euler_grows_beyond_its_limit_and_the_exact_transition_never(scene: EccentricScene) -> None:
+    found = euler_map(scene, steps=[1e-3, 3e-3, 6e-3], speeds=[2.0, 10.47, 24.1, 60.0])
+    assert np.all(found.exact_growth < 1)
+    np.testing.assert_array_equal(found.growth > 1, found.step[:, None] > found.limit[None, :])
+
+
+def test_saturation_leaves_what_is_beyond_both_masses(scene: EccentricScene) -> None:
+    reach = 2 * plant_parameters(scene).moment * math.cos(0.05 / 0.23 / 2)
+    values = np.array([0.5, 0.999, 1.001, 1.5]) * reach
+    expected = np.maximum(values - reach, 0)
+    np.testing.assert_allclose(saturation_curve(scene, imbalances=values), expected, atol=1e-12)
+
+
+def test_noise_takes_time_and_then_the_gate(scene: EccentricScene) -> None:
+    calm, loud, deaf = noise_extremes(scene, noises=(1e-6, 1e-3, 5e-3), time_limit=61.0)
+    assert calm.settled
+    assert loud.settled
+    assert calm.stages[0].end < loud.stages[0].end
+    assert deaf.outcome.value == "imbalance_uncertain"
+
+
+def test_changed_keeps_the_rest(scene: EccentricScene) -> None:
+    assert changed(scene, "lqr", state_weight=2.0) == replace(scene, lqr=replace(scene.lqr, state_weight=2.0))

@@ -1,0 +1,246 @@
+"""The whole strategy on the plant: it settles, repeats to the bit, and says how it fails."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import ringbalance
+from ringbalance.controller.cli import simulate as command
+from ringbalance.controller.eccentric.document import eccentric_document, thinned
+from ringbalance.controller.eccentric.figures_scenes import RPM, at_constant_speed, changed
+from ringbalance.controller.eccentric.parameters import plant_parameters
+from ringbalance.controller.eccentric.plant_whirl import moment_vector
+from ringbalance.controller.eccentric.run import simulate_eccentric
+from ringbalance.controller.eccentric.run_record import EccentricOutcome, EccentricRun
+from ringbalance.controller.eccentric.strategy import strategy_start, strategy_step
+from ringbalance.controller.eccentric.strategy_records import EccentricMeasurement
+from ringbalance.controller.eccentric.strategy_settings import strategy_settings
+from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
+from ringbalance.scene.eccentric_models import SpeedPoint
+
+
+@pytest.fixture(scope="module")
+def paper() -> EccentricScene:
+    return eccentric_scene(load_scene(bundled_scene("eccentric_mass_paper")))
+
+
+@pytest.fixture(scope="module")
+def scene(paper: EccentricScene) -> EccentricScene:
+    """At 100 rpm for twenty seconds."""
+    return at_constant_speed(paper, time_limit=20.0)
+
+
+@pytest.fixture(scope="module")
+def run(scene: EccentricScene) -> EccentricRun:
+    return simulate_eccentric(scene)
+
+
+def names(run: EccentricRun) -> list[str]:
+    return [stage.name for stage in run.stages]
+
+
+def test_it_settles_through_all_stages(run: EccentricRun) -> None:
+    assert run.settled
+    assert run.outcome is EccentricOutcome.SETTLED
+    assert names(run) == ["imbalance estimation", "friction estimation", "positioning", "check", "rest"]
+    assert run.settling_time is not None
+    assert run.settling_time < 10
+    assert run.residual_ratio is not None
+    assert run.residual_ratio < 2e-3
+    assert not run.warnings
+    assert run.drive_off[-1]
+
+
+def test_the_masses_undo_the_imbalance(run: EccentricRun, scene: EccentricScene) -> None:
+    left = abs(moment_vector(plant_parameters(scene), run.mass_angle[:, -1].tolist()))
+    assert left < 2e-3 * plant_parameters(scene).unbalance
+
+
+def test_estimates_are_as_good_as_they_claim(run: EccentricRun, scene: EccentricScene) -> None:
+    told, plant = run.estimates, plant_parameters(scene)
+    true = plant.unbalance * np.array([math.cos(plant.phase), math.sin(plant.phase)])
+    error = told.imbalance[-1] - true
+    assert error @ np.linalg.solve(told.imbalance_covariance[-1], error) < 20
+    arms = np.array(scene.masses.friction_arm)
+    assert np.all(np.abs(told.friction_arm[-1] - arms) < 5 * np.sqrt(told.friction_variance[-1]))
+
+
+def test_a_seed_gives_the_same_bits(run: EccentricRun, scene: EccentricScene) -> None:
+    again = simulate_eccentric(scene, seed=scene.run.seed)
+    np.testing.assert_array_equal(again.whirl, run.whirl)
+    np.testing.assert_array_equal(again.voltage, run.voltage)
+    assert not np.array_equal(simulate_eccentric(scene, seed=1).whirl, run.whirl)
+
+
+def test_progress_is_told(scene: EccentricScene) -> None:
+    told: list[tuple[float, float]] = []
+    simulate_eccentric(changed(scene, "run", time_limit=12.0), progress=lambda *a: told.append(a))
+    assert [limit for _, limit in told] == [12.0, 12.0]
+    assert told[0][0] == pytest.approx(10.0)
+
+
+def test_the_step_is_pure(scene: EccentricScene) -> None:
+    settings = strategy_settings(scene)
+    sample = EccentricMeasurement(0.0, 10.0, 0.0, 0.0, np.array([1e-3, 0, 0, 0]), (0.0, 3.0), (0.0, 0.0))
+    state = strategy_start(settings, sample)
+    first, voltage = strategy_step(settings, state, sample)
+    again, same = strategy_step(settings, state, sample)
+    assert voltage == same
+    assert first.plan == again.plan
+    np.testing.assert_array_equal(first.whirl.estimate.state, again.whirl.estimate.state)
+    bad = sample._replace(angle=(math.nan, 3.0))
+    skipped, kept = strategy_step(settings, first, bad)
+    assert kept == voltage
+    assert skipped.plan == first.plan
+
+
+def test_plain_python_gives_the_compiled_steps_numbers(scene: EccentricScene) -> None:
+    settings = strategy_settings(scene)
+    sample = EccentricMeasurement(0.0, 10.0, 0.0, 0.0, np.array([1e-3, 0, 0, 0]), (0.0, 3.0), (0.01, 0.0))
+    step: Any = strategy_step
+    compiled, plain = strategy_start(settings, sample), strategy_start(settings, sample)
+    for i in range(5):
+        seen = sample._replace(time=1e-3 * i)
+        compiled, one = strategy_step(settings, compiled, seen)
+        plain, two = step.py_func(settings, plain, seen)
+        assert one == pytest.approx(two, rel=1e-12)
+    np.testing.assert_allclose(compiled.whirl.estimate.state, plain.whirl.estimate.state, rtol=1e-12)
+
+
+def test_document_has_the_promised_keys(run: EccentricRun) -> None:
+    found = json.loads(json.dumps(eccentric_document(run), allow_nan=False))
+    promised = {"balancer", "settled", "settling_time_s", "status", "time_s", "amplitude_m", "phase_rad"}
+    assert promised | {"mass_angle_rad", "estimates", "stages", "residual_ratio"} <= found.keys()
+    assert found["balancer"] == "eccentric_mass"
+    length = len(found["time_s"])
+    assert 2 < length < 4000
+    assert [len(found["amplitude_m"]), len(found["phase_rad"])] == [length, length]
+    assert [len(angle) for angle in found["mass_angle_rad"]] == [length, length]
+    assert len(found["estimates"]["imbalance_covariance"]) == length
+    assert found["stages"][0].keys() == {"name", "start_s", "end_s"}
+    assert found["stages"][-1]["end_s"] == found["time_s"][-1]
+    assert max(found["amplitude_m"]) == run.worst_amplitude
+    assert thinned(run, rows=10).size < 40
+
+
+def test_the_command_takes_either_balancer(capsys: pytest.CaptureFixture[str]) -> None:
+    path = bundled_scene("eccentric_mass_paper")
+    assert command(path, json=True) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["settled"]
+    assert command(path) == 0
+    assert "friction estimation" in capsys.readouterr().out
+    assert isinstance(ringbalance.simulate(load_scene(path)), EccentricRun)
+    with pytest.raises(ValueError, match="no flow law"):
+        ringbalance.simulate(load_scene(path), flow_law=object())  # type: ignore[call-overload]
+
+
+def test_the_washing_machine_settles() -> None:
+    found = simulate_eccentric(eccentric_scene(load_scene(bundled_scene("washing_machine"))))
+    assert found.settled
+    assert found.residual_ratio is not None
+    assert found.residual_ratio < 5e-3
+    np.testing.assert_allclose(found.estimates.friction_arm[-1], [0.004, 0.006], rtol=0.05)
+
+
+@pytest.mark.parametrize("arms", [(0.0, 0.0), (0.004, 0.012), (0.0, 0.01)])
+def test_any_friction_is_mastered(scene: EccentricScene, arms: tuple[float, float]) -> None:
+    found = simulate_eccentric(changed(scene, "masses", friction_arm=arms))
+    assert found.settled
+    slippery = min(arms) == 0
+    assert ("the drives hold" in " ".join(found.warnings)) == slippery
+    # The pair stays opposite although its frictions differ: the rotor does not feel them go round.
+    friction = next(stage for stage in found.stages if stage.name == "friction estimation")
+    during = (found.time >= friction.start + 0.2) & (found.time <= friction.end)
+    apart = found.mass_angle[1] - found.mass_angle[0] - math.pi
+    assert np.max(np.abs(apart[during])) < math.radians(1.5)
+
+
+def test_without_the_pair_loop_unequal_masses_part(scene: EccentricScene) -> None:
+    slow = changed(changed(scene, "masses", friction_arm=(0.004, 0.012)), "friction_filter", pair_gain=0.0)
+    found = simulate_eccentric(slow)
+    friction = next(stage for stage in found.stages if stage.name == "friction estimation")
+    during = (found.time >= friction.start) & (found.time <= friction.end)
+    apart = found.mass_angle[1] - found.mass_angle[0] - math.pi
+    assert np.max(np.abs(apart[during])) > math.radians(2)
+
+
+def outcome(scene: EccentricScene) -> tuple[EccentricOutcome, str]:
+    found = simulate_eccentric(scene)
+    assert not found.settled
+    return found.outcome, found.status
+
+
+def test_each_way_to_fail_is_told(scene: EccentricScene) -> None:
+    short = changed(scene, "supervisor", imbalance_time=3.0, friction_time=3.0, positioning_time=5.0)
+    slow = at_constant_speed(short, time_limit=5.0, speed=0.5 * RPM)
+    assert outcome(slow) == (EccentricOutcome.TOO_SLOW, Having("lowest_speed"))
+    ramp = (SpeedPoint(time=0.0, speed=10.0), SpeedPoint(time=5.0, speed=12.0))
+    rising = changed(changed(short, "rotor", speed_profile=ramp), "run", time_limit=5.0)
+    assert outcome(rising) == (EccentricOutcome.SPEED_NOT_CONSTANT, Having("speed_profile"))
+    noisy = changed(short, "imbalance_filter", position_noise=5e-3, velocity_noise=0.05)
+    assert outcome(noisy) == (EccentricOutcome.IMBALANCE_UNCERTAIN, Having("imbalance_filter.gate"))
+    heavy = changed(short, "imbalance", mass=0.5)
+    assert outcome(heavy) == (EccentricOutcome.SATURATED, Having("heavier masses"))
+    weak = changed(short, "motor", maximum_voltage=0.05)
+    assert outcome(weak) == (EccentricOutcome.STALLED, Having("maximum_voltage"))
+    unsure = changed(short, "friction_filter", rate_noise=5.0)
+    assert outcome(unsure) == (EccentricOutcome.FRICTION_UNCERTAIN, Having("friction_filter.gate"))
+    sticky = changed(short, "lqr", friction_compensation="none")
+    assert outcome(sticky) == (EccentricOutcome.NOT_ARRIVED, Having("break_away"))
+    assert outcome(changed(scene, "run", time_limit=3.0)) == (
+        EccentricOutcome.TIME_LIMIT,
+        Having("run.time_limit"),
+    )
+    locked = changed(scene, "supervisor", strategy="locked")
+    assert outcome(locked) == (EccentricOutcome.LOCKED, Having("strategy"))
+
+
+class Having:
+    """Equal to any text that holds some words."""
+
+    def __init__(self, words: str) -> None:
+        self.words = words
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, str) and self.words in other
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def test_a_saturated_rotor_keeps_what_two_masses_cannot_undo(scene: EccentricScene) -> None:
+    found = simulate_eccentric(changed(scene, "imbalance", mass=0.5))
+    assert found.targets is not None
+    assert found.targets.saturated
+    left = abs(
+        moment_vector(plant_parameters(changed(scene, "imbalance", mass=0.5)), found.mass_angle[:, -1])
+    )
+    assert left == pytest.approx(found.targets.residual, rel=0.01)
+
+
+def test_the_laboratory_sensor_does_as_well(scene: EccentricScene) -> None:
+    found = simulate_eccentric(changed(scene, "sensor", frame="laboratory"))
+    assert found.settled
+    assert found.residual_ratio is not None
+    assert found.residual_ratio < 2e-3
+
+
+def test_masses_need_not_start_opposite(scene: EccentricScene) -> None:
+    found = simulate_eccentric(changed(scene, "masses", initial_angle=(0.4, 2.0)))
+    assert found.settled
+    assert found.residual_ratio is not None
+    assert found.residual_ratio < 2e-3
+
+
+def test_the_printed_compensation_leaves_stuck_masses_stuck(scene: EccentricScene) -> None:
+    """sgn of a rate of zero is zero: nothing breaks the masses away once they rest beside their targets."""
+    still = changed(changed(scene, "lqr", friction_compensation="printed"), "sensor", encoder_rate_noise=0.0)
+    near = changed(still, "supervisor", arrival_angle=math.radians(0.05), positioning_time=6.0)
+    assert simulate_eccentric(near).outcome is EccentricOutcome.NOT_ARRIVED
+    mended = changed(near, "lqr", friction_compensation="break_away")
+    assert simulate_eccentric(mended).settled

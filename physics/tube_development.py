@@ -12,11 +12,12 @@ FloatArray = npt.NDArray[np.float64]
 _CREEPING: Final = 0.2
 _INERTIAL: Final = 57.0
 _EKMAN: Final = 47.21
-DEVELOPMENT_SHARE: Final = 0.5
+DEVELOPMENT_SHARE: Final = 1.0
 """Half-width of what development adds, over rotation's extra friction on one developing length.
 
-Three-dimensional solutions of the inlet, a parabola or a blunt profile, at (Re, R) = (100, 100), (200, 50)
-and (20, 200), gave from -0.29 to +0.20 of it, beyond what the same inlet costs at rest.
+One stands for an inlet that the secondary flow reaches only after that length.  Three-dimensional solutions
+of the inlet, a parabola or a blunt profile, at (Re, R) = (100, 100), (200, 50) and (20, 200), gave from -0.70
+to +0.20, beyond what the same inlet costs at rest: a blunt one loses less where rotation keeps flow blunt.
 """
 
 
@@ -52,9 +53,9 @@ def developing_length(
 def development_spread(
     *, length: float, bore: float, developing: npt.ArrayLike, rotation_loss: npt.ArrayLike
 ) -> FloatArray:
-    """Half-width of k for flow that is not developed yet: half of rotation's share on the developing length.
+    """Half-width of k for flow that is not developed yet: rotation's share on the developing length.
 
-    0.5 k_rot (l/L) (1 - exp(-L/l))
+    k_rot (l/L) (1 - exp(-L/l))
 
     Args:
         length: L of the tube, m.

@@ -92,20 +92,24 @@ def model_parts(*, tube: Tube, state: TubeState) -> dict[str, FloatArray]:
         entrance_loss(tube=tube, reynolds=re, critical_ratio=ratio)[1],
         exit_loss(tube=tube, reynolds=re, critical_ratio=ratio, friction_ratio=lam.value)[1],
     )
-    laminar = 1 - turbulent_share(reynolds=re, critical_ratio=ratio)
-    developing = developing_length(
-        reynolds=re, rotation_reynolds=state.rotation_reynolds, friction_ratio=lam.value
-    )
-    entry = development_spread(
-        length=tube.length, bore=tube.bore, developing=developing, rotation_loss=state.terms["rotation"]
-    )
     return {
         "friction correlation": straight * friction,
         "rotation model": tube.length / tube.bore * (higher - state.rotating_friction),
-        "rotation entry": laminar * entry,
+        "rotation entry": _development_part(tube, state, lam.value),
         "ends": np.sqrt(sum(e**2 for e in ends)),
         "bends": bend_spread(reynolds=re, critical_ratio=ratio) * state.terms["bends"],
     }
+
+
+def _development_part(tube: Tube, state: TubeState, friction_ratio: FloatArray) -> FloatArray:
+    """What laminar flow that is still developing may add to k."""
+    laminar = 1 - turbulent_share(reynolds=state.reynolds, critical_ratio=state.critical_ratio)
+    developing = developing_length(
+        reynolds=state.reynolds, rotation_reynolds=state.rotation_reynolds, friction_ratio=friction_ratio
+    )
+    return laminar * development_spread(
+        length=tube.length, bore=tube.bore, developing=developing, rotation_loss=state.terms["rotation"]
+    )
 
 
 def input_parts(

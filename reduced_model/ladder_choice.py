@@ -7,7 +7,6 @@ first chosen when the estimate was too small, a cheaper one when it was too larg
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -123,19 +122,20 @@ def checked_tolerance(tolerance: float) -> float:
     return tolerance
 
 
-def predicted_error(rung: Rung, contributions: Mapping[str, Contribution]) -> float:
-    """Sum of what a rung leaves out, by the estimates; infinite where one has no basis.
+def predicted_error(rung: Rung, ladder: Ladder) -> float:
+    """Sum of what a rung leaves out and the highest one holds, by the estimates; infinite without a basis.
 
     Args:
         rung: the rung.
-        contributions: by name.
+        ladder: the ladder it stands on.
 
     Returns:
         Relative error.
 
     Source: errors of one sign at worst.
     """
-    values = [contributions[term].value for term in sorted(rung.leaves_out)]
+    left = sorted(rung.leaves_out - ladder.top.leaves_out)
+    values = [ladder.contributions[term].value for term in left]
     return float("inf") if any(v is None for v in values) else float(sum(v for v in values if v is not None))
 
 
@@ -169,9 +169,7 @@ def choose(
         raise ValueError(f"{ladder.quantity}: {ladder.status.text}")
     model = costs or committed_costs()
     ranked = ranked_rungs(ladder, model)
-    first = next(
-        (rung for rung in ranked if predicted_error(rung, ladder.contributions) <= tolerance), ladder.top
-    )
+    first = next((rung for rung in ranked if predicted_error(rung, ladder) <= tolerance), ladder.top)
     held = values or Values(ladder)
     reference = _next_up(ladder, first, tolerance, ranked) if check else None
     if reference is None:
@@ -212,11 +210,11 @@ def _doubtful(ladder: Ladder, rung: Rung, tolerance: float) -> frozenset[str]:
         value = ladder.contributions[term].value
         return value is None or value >= NEGLIGIBLE * tolerance
 
-    return frozenset(term for term in rung.leaves_out if matters(term))
+    return frozenset(term for term in rung.leaves_out - ladder.top.leaves_out if matters(term))
 
 
 def _hopeless(ladder: Ladder, rung: Rung, tolerance: float) -> bool:
-    left = [ladder.contributions[term] for term in rung.leaves_out]
+    left = [ladder.contributions[term] for term in rung.leaves_out - ladder.top.leaves_out]
     worth = [0.0 if c.rough else c.value or 0.0 for c in left]
     return max(worth, default=0.0) > HOPELESS * tolerance
 

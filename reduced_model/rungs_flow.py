@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import partial
 from typing import Final
@@ -260,11 +261,14 @@ def velocity_uncertainty(scene: Scene, book: LawBook) -> float:
         book: its laws.
 
     Returns:
-        Relative half-width.
+        Relative half-width; with gravity's worth where no rung of this scene holds it.
     """
+    missing = 0.0
+    if QUADRATURE not in levels_available(scene):
+        missing = flow_contributions(scene)[GRAVITY].value or 0.0
     x = scene.disc.max_fill_ratio / 2
     flow = book.base.evaluate(
         fill_ratio=x, opposite_fill_ratio=x, gas_pressure=scene.gas.pressure, primed=True
     )
     speed = abs(float(flow.velocity))
-    return float(flow.uncertainty) / speed if speed else 0.0
+    return math.hypot(float(flow.uncertainty) / speed if speed else 0.0, missing)

@@ -123,7 +123,13 @@ def loss_contributions(scene: Scene) -> Mapping[str, Contribution]:
         ),
     )
     return {
-        term: Contribution(term=term, value=0.0 if given else value, formula=formula, source=source)
+        term: Contribution(
+            term=term,
+            value=0.0 if given else value,
+            formula=formula,
+            source=source,
+            rough=term != LOSS,
+        )
         for term, value, formula, source in found
     }
 
@@ -145,6 +151,7 @@ def flow_contributions(scene: Scene) -> Mapping[str, Contribution]:
             value=None if c.value is None else c.value / 2,
             formula=f"half of {c.formula}",
             source=c.source,
+            rough=c.rough,
         )
         for name, c in loss_contributions(scene).items()
     }

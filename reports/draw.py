@@ -24,9 +24,10 @@ from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
 from ringbalance.reports.disc_shapes import chamber_outline, ring, split_hexahedra, tube_path, web
+from ringbalance.reports.draw_tube import draw_tube
+from ringbalance.reports.draw_view import label_at, look
 from ringbalance.reports.picture_text import (
     BAR_SHADES,
-    FONT_SIZE,
     Bar,
     Label,
     letter,
@@ -57,8 +58,10 @@ def main(arguments: list[str]) -> int:
     """
     job = json.loads(Path(arguments[0]).read_text(encoding="utf-8"))
     lengths = {key: None if value is None else value * _MILLIMETRES for key, value in job["lengths"].items()}
-    for name, paint in {"pressure": _draw_pressure, "disc": _draw_disc}.items():
-        liquid = _in_millimetres(pv.read(job["fields"][name]))
+    paints = {"pressure": _draw_pressure, "disc": _draw_disc} | ({"tube": draw_tube} if job["tube"] else {})
+    for name, paint in paints.items():
+        field = job["fields"].get(name)
+        liquid = None if field is None else _in_millimetres(pv.read(field))
         for theme in THEMES:
             plotter: Any = pv.Plotter(
                 off_screen=True, window_size=[SCALE * side for side in PICTURE], lighting="light kit"
@@ -119,24 +122,6 @@ def _bar(title: str, colours: Colormap, high: float) -> Bar:
     )
 
 
-def _look(
-    plotter: Any,
-    *,
-    direction: tuple[float, float, float],
-    up: tuple[float, float, float],
-    zoom: float,
-    bounds: tuple[float, ...],
-    lift: float,
-) -> None:
-    """Points the camera at a box from a direction; the box stands a little right, the bar has the left."""
-    middle = np.array(bounds).reshape(3, 2).mean(axis=1)
-    plotter.camera_position = [tuple(middle + np.array(direction)), tuple(middle), up]
-    plotter.camera.view_angle = 18
-    plotter.reset_camera(bounds=bounds, render=False)
-    plotter.camera.zoom(zoom)
-    plotter.camera.SetWindowCenter(-0.12, -lift)
-
-
 def _draw_pressure(
     plotter: Any, job: Record, liquid: Any, theme: Theme
 ) -> tuple[list[tuple[FloatArray, Label]], Bar]:
@@ -153,12 +138,12 @@ def _draw_pressure(
     reach = outer * math.sin(min(half, math.pi / 2))
     low = min(inner * math.cos(half), outer * math.cos(half))
     bounds = (low, outer, -reach, reach, -width / 2, width / 2)
-    _look(plotter, direction=(75, -80, 150), up=(1, 0, 0), zoom=1.35, bounds=bounds, lift=0.11)
+    look(plotter, direction=(75, -80, 150), up=(1, 0, 0), zoom=1.35, bounds=bounds, lift=0.11)
     shallow = float(np.hypot(liquid.points[:, 0], liquid.points[:, 1]).min())
     return [
-        _label("outer wall", _polar(outer, 0.45 * half, 0.1 * width), shift=(60, -110)),
-        _label("free surface", _polar(shallow, 0.55 * half, width / 2), shift=(-125, 150)),
-        _label("gas", _polar(0.75 * inner + 0.25 * outer, 0.0, width / 2)),
+        label_at("outer wall", _polar(outer, 0.45 * half, 0.1 * width), shift=(60, -110)),
+        label_at("free surface", _polar(shallow, 0.55 * half, width / 2), shift=(-125, 150)),
+        label_at("gas", _polar(0.75 * inner + 0.25 * outer, 0.0, width / 2)),
     ], _bar("pressure in MPa", _VIRIDIS, high)
 
 
@@ -185,13 +170,6 @@ def _add_field(plotter: Any, part: Any, high: float) -> None:
     )
     lines = surface.contour(np.linspace(0, high, 9)[1:-1], scalars="pressure")
     plotter.add_mesh(lines, color="white", line_width=3, opacity=0.6)
-
-
-def _label(
-    text: str, place: FloatArray, *, shift: tuple[float, float] = (0, 0), size: int = FONT_SIZE
-) -> tuple[FloatArray, Label]:
-    """A label at a place of the scene; its place in the picture is found once the camera stands."""
-    return place, Label(text=text, place=(0, 0), shift=shift, size=size)
 
 
 def _polar(radius: float, angle: float, height: float) -> FloatArray:
@@ -222,7 +200,7 @@ def _draw_disc(
     outer, inner = disc["outer_radius"], disc["inner_radius"]
     labels.append(_add_arrow(plotter, 1.17 * outer, theme))
     rim = 1.2 * outer
-    _look(
+    look(
         plotter,
         direction=(35, -95, 150),
         up=(0, 1, 0),
@@ -233,7 +211,7 @@ def _draw_disc(
     for index, name in enumerate(job["letters"]):
         angle = 2 * math.pi * (index / count) - 0.22 * job["central_angle"]
         # Beside the middle of the chamber, where the tube does not run.
-        labels.append(_label(name, _polar(0.62 * inner + 0.38 * outer, angle, 0.0), size=54))
+        labels.append(label_at(name, _polar(0.62 * inner + 0.38 * outer, angle, 0.0), size=54))
     return labels, _bar("depth in mm", _WATER, high)
 
 
@@ -278,7 +256,7 @@ def _add_arrow(plotter: Any, radius: float, theme: Theme) -> tuple[FloatArray, L
         resolution=36,
     )
     plotter.add_mesh(tip, color=theme.mark, ambient=0.4)
-    return _label("rotation", _polar(1.16 * radius, math.radians(300), -0.1 * radius))
+    return label_at("rotation", _polar(1.16 * radius, math.radians(300), -0.1 * radius))
 
 
 def _add_tube(plotter: Any, disc: Record, theme: Theme) -> list[tuple[FloatArray, Label]]:
@@ -290,15 +268,15 @@ def _add_tube(plotter: Any, disc: Record, theme: Theme) -> list[tuple[FloatArray
     tube = pv.lines_from_points(path).strip().tube(radius=radius, n_sides=32, capping=True)
     plotter.add_mesh(tube, color=theme.tube, smooth_shading=True, ambient=0.25, specular=0.3)
     if hump is None:
-        return [_label("connecting tube", np.array([0.0, 0.0, height]), shift=(150, 120))]
+        return [label_at("connecting tube", np.array([0.0, 0.0, height]), shift=(150, 120))]
     top = np.array([0.0, hump, height])
     plotter.add_mesh(
         pv.Sphere(radius=1.7 * radius, center=top), color=theme.mark, smooth_shading=True, ambient=0.3
     )
     side = path[len(path) // 4]
     return [
-        _label(f"hump at {hump:.4g} mm", top, shift=(-10, -110)),
-        _label("connecting tube", side, shift=(250, -100)),
+        label_at(f"hump at {hump:.4g} mm", top, shift=(-10, -110)),
+        label_at("connecting tube", side, shift=(250, -100)),
     ]
 
 

@@ -15,6 +15,7 @@ from ringbalance.controller.rotor import chamber_letters
 from ringbalance.reports.fields import chamber_field, shown_fill, write_field
 from ringbalance.reports.opengl import OpenGL, find_opengl
 from ringbalance.reports.picture_theme import PICTURE
+from ringbalance.reports.tube_picture import tube_field
 from ringbalance.reports.units import given, shown
 from ringbalance.scene import Scene
 
@@ -77,11 +78,12 @@ def start_drawing(
     found = find_opengl() if opengl is None else opengl
     figures = folder / _FIGURES
     figures.mkdir(parents=True, exist_ok=True)
-    captions = _captions(scene)
+    tube = tube_field(scene)
+    captions = _captions(scene, tube)
     if not found.available:
         return Drawing3D(process=None, text=found.text, folder=figures, captions=captions)
     job = folder / "drawing.json"
-    job.write_text(json.dumps(_job(scene, fields, figures)), encoding="utf-8")
+    job.write_text(json.dumps({**_job(scene, fields, figures), "tube": tube}), encoding="utf-8")
     process = subprocess.Popen(
         [sys.executable, "-m", "ringbalance.reports.draw", str(job)],
         env={**os.environ, "VTK_DEFAULT_OPENGL_WINDOW": found.window, "OMP_NUM_THREADS": "1"},
@@ -166,13 +168,14 @@ def _job(scene: Scene, fields: Mapping[str, Path], folder: Path) -> Record:
     }
 
 
-def _captions(scene: Scene) -> dict[str, tuple[str, str]]:
+def _captions(scene: Scene, tube: Record | None) -> dict[str, tuple[str, str]]:
     letters = chamber_letters(scene.disc.chambers)
     fill, most = given(shown_fill(scene), "1"), given(scene.disc.max_fill_ratio, "1")
     speed = shown(scene.rotor.speed, "rad/s", digits=5)
     hump = scene.tube.hump_radius
     path = "straight across" if hump is None else f"over its hump at a radius of {given(hump, 'm')}"
-    return {
+    of_tube = {} if tube is None else {"tube": _tube_caption(tube)}
+    return of_tube | {
         "disc": (
             f"The disc cut open across its shaft: chambers {letters[0]} to {letters[-1]}, each with a ring "
             f"of liquid on its outer wall; a tube leads from one chamber {path} to the opposite one.",
@@ -186,3 +189,11 @@ def _captions(scene: Scene) -> dict[str, tuple[str, str]]:
             f"largest fill ratio of {most} and {speed}, gravity left out. White lines join equal pressures.",
         ),
     }
+
+
+def _tube_caption(tube: Record) -> tuple[str, str]:
+    return (
+        f"The connecting tube on its disc, half a turn over the hump, coloured by pressure: {tube['text']}.",
+        f"The tube at equal fills under {tube['gas']}, coloured by gauge pressure: {tube['text']}. Its "
+        "radius is that of the calculation, straight along each leg; its turn about the shaft is schematic.",
+    )

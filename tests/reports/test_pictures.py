@@ -15,6 +15,7 @@ from ringbalance.reports.opengl import OpenGL, find_opengl
 from ringbalance.reports.picture_text import BAR_SHADES, Bar, letter, shade_bar, with_palette
 from ringbalance.reports.picture_theme import PICTURE, THEMES
 from ringbalance.reports.pictures import finish_drawing, start_drawing, stop_drawing, write_fields
+from ringbalance.reports.tube_picture import tube_field
 from ringbalance.scene import Scene, bundled_scene
 
 NO_OPENGL = OpenGL(available=False, window="", text="The 3-D pictures were left out: no OpenGL here.")
@@ -38,7 +39,7 @@ def pixels(path: Path) -> Any:
 def test_files_are_there_and_of_moderate_size(drawn: Path) -> None:
     names = {path.relative_to(drawn).as_posix() for path in drawn.rglob("*") if path.is_file()}
     assert names == {
-        *(f"figures/{name}-{theme.name}.png" for name in ("disc", "pressure") for theme in THEMES),
+        *(f"figures/{name}-{theme.name}.png" for name in ("disc", "pressure", "tube") for theme in THEMES),
         "fields/chamber_at_start.vtu",
         "fields/chamber_largest_fill.vtu",
     }
@@ -47,7 +48,7 @@ def test_files_are_there_and_of_moderate_size(drawn: Path) -> None:
 
 @needs_opengl
 @pytest.mark.parametrize("theme", THEMES, ids=lambda theme: theme.name)
-@pytest.mark.parametrize("name", ["disc", "pressure"])
+@pytest.mark.parametrize("name", ["disc", "pressure", "tube"])
 def test_a_picture_shows_something_on_the_ground_of_its_page(drawn: Path, name: str, theme: Any) -> None:
     image = pixels(drawn / "figures" / f"{name}-{theme.name}.png")
     assert image.shape == (PICTURE[1], PICTURE[0], 3)
@@ -129,3 +130,22 @@ def test_a_palette_holds_no_more_than_it_can() -> None:
     noise[..., 1] = np.arange(10)[:, None]
     with pytest.raises(ValueError, match="256 colours"):
         with_palette(Image.fromarray(noise))
+
+
+def test_the_tube_is_coloured_by_its_own_pressures(paper_scene: Scene) -> None:
+    field = tube_field(paper_scene)
+    assert field is not None
+    points, pressure = np.array(field["points"]), np.array(field["pressure"])
+    radius = np.hypot(points[:, 0], points[:, 1])
+    assert radius[0] == pytest.approx(paper_scene.tube.port_radius)
+    assert radius[field["hump"]] == pytest.approx(paper_scene.tube.hump_radius)
+    np.testing.assert_allclose(points[0, :2], -points[-1, :2], atol=1e-12)
+    assert np.all(np.linalg.norm(np.diff(points, axis=0), axis=1) > 0)
+    # Torn at the hump: the lowest pressure begins there.
+    assert pressure[field["hump"]] == pytest.approx(pressure.min(), abs=1.0)
+    assert not all(field["full"])
+
+
+def test_a_straight_tube_has_no_such_picture(paper_scene: Scene) -> None:
+    plain = dataclasses.replace(paper_scene, tube=dataclasses.replace(paper_scene.tube, hump_radius=None))
+    assert tube_field(plain) is None

@@ -20,6 +20,8 @@ GRAM_MILLIMETRE: Final = 1e-6
 CONFIRMING_SAMPLES: Final = 5
 """Samples over which the amplitude must have stayed when something could still change it."""
 MANY_OVERSHOOTS: Final = 2
+MANY_CHAMBERS: Final = 4
+"""Beyond these more than two pairs share the work."""
 NEARLY_EMPTY: Final = 1e-6
 """Fill ratio at which a chamber's last liquid is looked at."""
 LEAST_PRESSURE: Final = 1.0
@@ -223,10 +225,16 @@ def _capacity(facts: Facts) -> str:
 
 
 def _empty(facts: Facts) -> str:
+    control = facts.scene.controller
+    cure = "check rotor.influence_coefficient, the assumed lag angle, and the sense of rotation"
+    if facts.plant.chambers > MANY_CHAMBERS and control.kind != "law_based":
+        cure = (
+            f"{control.kind} asks no other pairs for what an empty chamber cannot give: controller.kind = "
+            f'"law_based" does; or {cure}'
+        )
     return (
         f"{_not_settled(facts)}; no liquid can leave chamber {_longest(facts).chamber} although the "
-        "unbalance is within the disc's capacity: check rotor.influence_coefficient, the lag angle that the "
-        "controller assumes, and the sense of rotation"
+        f"unbalance is within the disc's capacity: {cure}"
     )
 
 

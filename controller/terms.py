@@ -200,7 +200,7 @@ def _choice(
     share = time / pulse
     above = share > scene.tolerance
     told = (
-        f"costs about {time * 1e3:.3g} ms of a first gas time of {pulse * 1e3:.3g} ms; "
+        f"costs about {time * 1e3:.3g} ms of a first gas time of {pulse * 1e3:.4g} ms; "
         f"{_against(share, scene.tolerance)}"
     )
     if asked is not None:

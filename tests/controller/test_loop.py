@@ -20,6 +20,7 @@ from ringbalance.controller.loop import simulate
 from ringbalance.controller.quadrature import quadrature
 from ringbalance.controller.simulation import Outcome, Simulation
 from ringbalance.reduced_model.model import BalancerModel
+from ringbalance.reduced_model.paper_law import paper_model
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 
@@ -135,6 +136,18 @@ def test_an_unbalance_beyond_the_capacity_is_said_so(scene: Scene, model: Balanc
     assert "1219 g mm" in run.status
     assert run.amplitude[-1] == pytest.approx(30e-6 - 0.0108 * 1218.6e-6, rel=1e-3)
     assert run.time[-1] < scene.run.time_limit
+
+
+def test_an_empty_chamber_among_many_points_to_the_algorithm_that_asks_the_others(
+    scene: Scene,
+) -> None:
+    disc = replace(scene.disc, chambers=8, central_angle=math.pi / 4)
+    eight = with_rotor(replace(scene, disc=disc), initial_amplitude=10e-6, initial_phase=0.3)
+    own = paper_model(eight)
+    run = simulate(eight, own)
+    assert run.outcome is Outcome.CHAMBER_EMPTY
+    assert 'controller.kind = "law_based"' in run.status
+    assert simulate(with_controller(eight, kind="law_based"), own).settled
 
 
 def test_too_little_pressure_stalls_and_names_what_is_needed(scene: Scene, model: BalancerModel) -> None:

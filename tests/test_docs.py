@@ -23,6 +23,7 @@ PAGES = (
     "docs/README.md",
     "docs/how-it-works.md",
     "docs/is-k-50-right.md",
+    "docs/how-to-choose.md",
     "docs/commands.md",
     "docs/scene-file.md",
 )

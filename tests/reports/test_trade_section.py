@@ -1,0 +1,93 @@
+"""The report's section on speed against accuracy, from a small document."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from ringbalance.reports.trade import view
+
+Record = dict[str, Any]
+
+
+def rung(name: str, error: float, cost: float, *, front: bool = True) -> Record:
+    return {"name": name, "error": error, "cost_s": cost, "on_front": front, "models": {}, "leaves_out": []}
+
+
+def choice(tolerance: float, name: str, measured: float | None) -> Record:
+    return {
+        "tolerance": tolerance,
+        "rung": name,
+        "measured": measured,
+        "cost_s": 2e-3,
+        "reasons": [f"{name}: in; worth 1e-3", "checked: 2e-4"],
+    }
+
+
+@pytest.fixture
+def evidence() -> Record:
+    quantity = {
+        "quantity": "wall_pressure",
+        "title": "wall pressure",
+        "status": {"code": "out_of_range", "text": "gravity leaves a closed ring above 0.3 only"},
+        "rungs": [
+            rung("formula", 0.09, 4e-5),
+            rung("closed form", 1.6e-3, 3e-4),
+            rung("coarse mesh", 1.7e-3, 0.04, front=False),
+            rung("fine mesh", 0.0, 0.8),
+        ],
+        "knee": "closed form",
+        "top": "fine mesh",
+        "top_uncertainty": 7.8e-5,
+        "choices": [
+            choice(0.1, "formula", 0.09),
+            choice(1e-2, "closed form", None),
+            choice(0.01, "closed form", None),
+        ],
+    }
+    return {
+        "trade": {
+            "tolerance": 0.01,
+            "numbers": [
+                {"name": "Re", "value": 27800.0, "formula": "u d/nu", "tells": "laminar or turbulent"},
+                {
+                    "name": "valve lag over gas time",
+                    "value": None,
+                    "formula": "lag over T",
+                    "tells": "valve lag",
+                },
+            ],
+            "quantities": [quantity, {**quantity, "quantity": "k", "rungs": []}],
+        },
+        "times": {"trade": {"rungs": {"wall_pressure": [{"name": "closed form", "seconds": 5.6e-4}]}}},
+    }
+
+
+def test_the_front_and_the_choices_are_told(evidence: Record) -> None:
+    found = view(evidence)
+    assert found is not None
+    (quantity,) = found["quantities"]
+    assert [row["name"] for row in quantity["front"]] == ["formula", "closed form", "fine mesh"]
+    assert quantity["front"][1] == {
+        "name": "closed form",
+        "error": "0.16\u202f%",
+        "cost": "300 µs",
+        "time": "560 µs",
+    }
+    assert [row["rung"] for row in quantity["choices"]] == ["formula", "closed form"]
+    assert quantity["own"]["reasons"][1].startswith("checked")
+    assert "closed ring" in quantity["status"]
+    assert found["numbers"][1]["value"] == "–"
+
+
+def test_the_figure_draws_every_rung(evidence: Record) -> None:
+    found = view(evidence)
+    assert found is not None
+    figure = found["quantities"][0]["figure"]
+    assert figure.name == "trade-wall-pressure"
+    assert "4 rungs" in figure.alt
+
+
+def test_without_a_trade_there_is_no_section() -> None:
+    assert view({"times": {}}) is None

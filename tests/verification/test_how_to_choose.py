@@ -1,0 +1,42 @@
+"""The page on choosing says what is measured now."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def tool() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("choose_table", ROOT / "tools" / "choose_table.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def rows(tool: ModuleType, name: str) -> list[str]:
+    """Rows of one table as they stand on the page."""
+    found = {match[1]: match[0] for match in tool.BLOCK.finditer(tool.PAGE.read_text(encoding="utf-8"))}
+    return [line for line in found[name].splitlines() if line.startswith("| ")][1:]
+
+
+def test_quick_rows_are_what_is_measured(tool: ModuleType) -> None:
+    assert rows(tool, "paper")[:3] == tool.table("paper", only=tool.QUICK)
+
+
+def test_every_table_is_there(tool: ModuleType) -> None:
+    for name, (_, quantities) in tool.scenes().items():
+        assert len(rows(tool, name)) == len(quantities)
+
+
+@pytest.mark.heavy
+def test_the_whole_page_is_what_is_measured(tool: ModuleType) -> None:
+    text = tool.PAGE.read_text(encoding="utf-8")
+    assert tool.page(text) == text

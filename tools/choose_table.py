@@ -1,0 +1,85 @@
+"""Write the tables of docs/how-to-choose.md anew: the rung that each tolerance needs, measured.
+
+python tools/choose_table.py            prints the page with fresh tables
+python tools/choose_table.py --write    puts it into docs/how-to-choose.md
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import re
+from dataclasses import replace
+from pathlib import Path
+
+from ringbalance.reduced_model.ladder_choice import Values, choose
+from ringbalance.reduced_model.rungs import Ladder
+from ringbalance.scene import bundled_scene, load_scene
+from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.verification.trade_choices import ladders_for
+
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "how-to-choose.md"
+TOLERANCES = (0.1, 1e-2, 1e-3, 1e-4)
+BLOCK = re.compile(r"<!-- table: (\w+) -->\n.*?<!-- end -->", re.DOTALL)
+QUICK = ("wall_pressure", "moment", "k")
+"""Quantities whose rows take seconds."""
+
+
+def scenes() -> dict[str, tuple[Scene, tuple[str, ...]]]:
+    """Scenes of the page with the quantities that are told of each."""
+    paper = liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper")))
+    oil = liquid_ring_scene(load_scene(bundled_scene("silicone_oil_100cst")))
+    slow = replace(paper, rotor=replace(paper.rotor, speed=600 * math.pi / 30))
+    loop = ("velocity", "transferred_mass", "settling_time")
+    return {
+        "paper": (paper, (*QUICK, *loop)),
+        "slow": (slow, ("wall_pressure", "moment")),
+        "oil": (oil, ("k", "velocity", "transferred_mass")),
+    }
+
+
+def row(ladder: Ladder) -> str:
+    """One row: a quantity with the rung for each tolerance and its measured error."""
+    values, points = Values(ladder), tuple(range(len(ladder.points)))
+    cells = []
+    for tolerance in TOLERANCES:
+        rung = choose(ladder, tolerance, values=values).rung
+        error = values.error(rung, ladder.top, points)
+        told = "the top" if error < 3e-8 else f"{error:.0e}"
+        cells.append(f"{rung.name} ({told})")
+    return f"| {ladder.title} | " + " | ".join(cells) + f" | {ladder.top_uncertainty:.0e} |"
+
+
+def table(name: str, *, only: tuple[str, ...] | None = None) -> list[str]:
+    """Rows of one scene's table."""
+    scene, quantities = scenes()[name]
+    wanted = tuple(q for q in quantities if only is None or q in only)
+    return [row(ladder) for ladder in ladders_for(scene, wanted)]
+
+
+def page(text: str) -> str:
+    """The page with fresh tables."""
+    head = "| quantity | " + " | ".join(f"{100 * t:g} %" for t in TOLERANCES) + " | top known to |"
+    rule = "|---" * (len(TOLERANCES) + 2) + "|"
+
+    def fresh(match: re.Match[str]) -> str:
+        rows = "\n".join([head, rule, *table(match[1])])
+        return f"<!-- table: {match[1]} -->\n{rows}\n<!-- end -->"
+
+    return BLOCK.sub(fresh, text)
+
+
+def main() -> None:
+    """Print the page, or write it."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--write", action="store_true")
+    fresh = page(PAGE.read_text(encoding="utf-8"))
+    if parser.parse_args().write:
+        PAGE.write_text(fresh, encoding="utf-8")
+    else:
+        print(fresh)
+
+
+if __name__ == "__main__":
+    main()

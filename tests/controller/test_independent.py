@@ -14,13 +14,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
+from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Injection, Simulation
-from ringbalance.physics.tube_ends import kinetic_factor
-from ringbalance.physics.tube_numbers import rotation_reynolds_number
-from ringbalance.physics.tube_rotation import STRAIGHT_CRITICAL_REYNOLDS, critical_reynolds
+from ringbalance.physics.tube_state import tube_state
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.scene.models import Scene
 
@@ -36,12 +35,14 @@ class Second:
         self.volume = disc.axial_width * self.area(disc.inner_radius)
         self.rate = math.pi / 4 * tube.bore**2 / self.volume
         self.port = self.depth(tube.port_radius)
-        rotation = rotation_reynolds_number(
+        log_u = np.linspace(math.log(1e-2), math.log(1e3), 4000)
+        state = tube_state(
+            tube=tube,
+            liquid=scene.liquid,
             angular_velocity=scene.rotor.speed,
-            bore=tube.bore,
-            kinematic_viscosity=scene.liquid.kinematic_viscosity,
+            velocity=np.exp(log_u),
         )
-        self.critical = float(critical_reynolds(rotation_reynolds=rotation) / STRAIGHT_CRITICAL_REYNOLDS)
+        self.alpha = CubicSpline(log_u, state.kinetic_factor)
 
     def half_angle(self, r: float) -> float:
         return self.scene.disc.central_angle / 2 - math.asin(self.scene.disc.plate_thickness / r)
@@ -99,8 +100,7 @@ class Second:
         share = 1 - tube.hump_position if back else tube.hump_position
 
         def excess(u: float) -> float:
-            reynolds = u * tube.bore / self.scene.liquid.kinematic_viscosity
-            alpha = float(kinetic_factor(reynolds=reynolds, critical_ratio=self.critical))
+            alpha = float(self.alpha(math.log(max(u, 1e-2))))
             return (alpha + share * k) * u * u / 2 - margin / rho
 
         return min(siphon, float(brentq(excess, 1e-12, 1e4, xtol=1e-14)))

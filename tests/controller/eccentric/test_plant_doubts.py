@@ -33,7 +33,7 @@ def p(scene: EccentricScene) -> PlantParameters:
 
 
 def test_k32_as_printed_misses_a_torque_as_large_as_friction(p: PlantParameters) -> None:
-    """Eq. (2): Omega^2 sin phi in place of -Omega^2 cos phi; at 100 rpm before balancing, phi = 0."""
+    """The matrix K: Omega^2 sin phi in place of -Omega^2 cos phi; at 100 rpm before balancing, phi = 0."""
     whirl = steady_whirl(p, SPEED, OPPOSITE)
     right = p.moment * SPEED**2 * (0.0 * whirl.real - 1.0 * whirl.imag)
     printed = p.moment * SPEED**2 * (0.0 * whirl.real + 0.0 * whirl.imag)

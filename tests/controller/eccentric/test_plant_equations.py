@@ -159,7 +159,7 @@ def entry(equations: list[sp.Expr], row: int, symbol: sp.Symbol) -> sp.Expr:
 x_, y_, p1_, p2_, xd_, yd_, w1_, w2_ = VALUES
 B = M_B * R_B
 PRINTED: dict[str, tuple[int, sp.Symbol, Callable[[], sp.Expr]]] = {
-    # Eq. (2) has m_b r_b [Omega^2 sin(phi_1) + Omega' cos(phi_1)] in both columns of row 3.
+    # The paper has m_b r_b [Omega^2 sin(phi_1) + Omega' cos(phi_1)] in both columns of row 3.
     "K(3,1)": (2, x_, lambda: B * (SPEED**2 * sp.sin(p1_) + RATE * sp.cos(p1_))),
     "K(3,2)": (2, y_, lambda: B * (-(SPEED**2) * sp.cos(p1_) + RATE * sp.sin(p1_))),
     "K(4,2)": (3, y_, lambda: B * (-(SPEED**2) * sp.cos(p2_) + RATE * sp.sin(p2_))),

@@ -213,6 +213,7 @@ def _facts(
     return RunFacts(
         scene=scene,
         cause=cause,
+        stage=Stage(int(record.stage[-1])),
         findings=findings,
         time=float(time[-1]),
         speed=speed,

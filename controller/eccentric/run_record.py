@@ -122,9 +122,9 @@ class EccentricRun:
     def residual_ratio(self) -> float | None:
         """Final amplitude over what the first places would give at the same speed.
 
-        At constant speed that is final over initial steady amplitude.  None where nothing vibrates.
+        At constant speed that is final over initial steady amplitude.  None where nothing would vibrate.
         """
-        if self.unbalanced_amplitude == 0:
+        if self.unbalanced_amplitude < NOTHING * self.limit:
             return None
         return self.final_amplitude / self.unbalanced_amplitude
 
@@ -139,5 +139,7 @@ class EccentricRun:
         return float(np.max(self.amplitude))
 
 
+NOTHING = 1e-6
+"""Share of the limit below which a vibration is round-off."""
 FINAL_TIME = 1.0
 """Over which the final amplitude is averaged, s."""

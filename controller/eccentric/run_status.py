@@ -10,13 +10,15 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.controller.eccentric.run_record import EccentricOutcome
-from ringbalance.controller.eccentric.supervisor_plan import HELD, Cause, Findings
+from ringbalance.controller.eccentric.supervisor_plan import HELD, Cause, Findings, Stage
 from ringbalance.scene.eccentric_models import EccentricScene
 
 FloatArray = npt.NDArray[np.float64]
 
 MILLIMETRE = 1e-3
 RPM = 2 * math.pi / 60
+STALLED_SHARE = 0.5
+"""Share of the friction stage with a mass nearly at a standstill that is to blame for its failure."""
 NOTICEABLE_STALL = 0.05
 """Share of the friction stage with a mass nearly at a standstill that is worth a warning."""
 
@@ -27,6 +29,8 @@ class RunFacts:
 
     scene: EccentricScene
     cause: Cause
+    stage: Stage
+    """At the end of the run."""
     findings: Findings
     time: float
     """End of the run, s."""
@@ -85,7 +89,20 @@ def outcome_of(facts: RunFacts) -> EccentricOutcome:
         return EccentricOutcome.SETTLED if settled else EccentricOutcome.RISES_AGAIN
     if facts.cause is Cause.SPEED_CHANGED and facts.settling_time is not None:
         return EccentricOutcome.SETTLED
-    return OUTCOMES.get(facts.cause, EccentricOutcome.TIME_LIMIT)
+    return OUTCOMES.get(_cause(facts), EccentricOutcome.TIME_LIMIT)
+
+
+def _cause(facts: RunFacts) -> Cause:
+    """Of the end; a run that ends within a stage may show already why the stage would have failed."""
+    if facts.stage is Stage.IMBALANCE:
+        if abs(facts.speed[-1]) < facts.scene.supervisor.lowest_speed:
+            return Cause.TOO_SLOW
+        steady = facts.speed.size < 2 or facts.speed[-1] == facts.speed[-2]
+        return facts.cause if steady else Cause.SPEED_NOT_CONSTANT
+    findings = facts.findings
+    if facts.stage is Stage.FRICTION and findings.stalled > STALLED_SHARE * findings.driven:
+        return Cause.STALLED
+    return facts.cause
 
 
 def status_text(facts: RunFacts, outcome: EccentricOutcome) -> str:

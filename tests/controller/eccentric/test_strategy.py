@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -128,11 +129,15 @@ def test_document_has_the_promised_keys(run: EccentricRun) -> None:
     assert thinned(run, rows=10).size < 40
 
 
-def test_the_command_takes_either_balancer(capsys: pytest.CaptureFixture[str]) -> None:
-    path = bundled_scene("eccentric_mass_paper")
-    assert command(path, json=True) == 0
+def test_the_command_takes_either_balancer(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "short.toml"
+    told = bundled_scene("eccentric_mass_paper").read_text()
+    path.write_text(told.replace('time_limit = "250 s"', 'time_limit = "12 s"'))
+    # Twelve seconds bring the masses home but not the check to its end.
+    assert command(path, json=True) == 1
     found = json.loads(capsys.readouterr().out)
-    assert found["settled"]
+    assert found["outcome"] == "time_limit"
+    path.write_text(told.replace('time_limit = "250 s"', 'time_limit = "20 s"'))
     assert command(path) == 0
     assert "friction estimation" in capsys.readouterr().out
     assert isinstance(ringbalance.simulate(load_scene(path)), EccentricRun)
@@ -244,3 +249,31 @@ def test_the_printed_compensation_leaves_stuck_masses_stuck(scene: EccentricScen
     assert simulate_eccentric(near).outcome is EccentricOutcome.NOT_ARRIVED
     mended = changed(near, "lqr", friction_compensation="break_away")
     assert simulate_eccentric(mended).settled
+
+
+def test_a_run_that_ends_early_tells_why_it_would_have_failed(scene: EccentricScene) -> None:
+    still = at_constant_speed(scene, time_limit=2.0, speed=0.0)
+    assert outcome(still) == (EccentricOutcome.TOO_SLOW, Having("lowest_speed"))
+    assert simulate_eccentric(still).residual_ratio is None
+    fast = at_constant_speed(scene, time_limit=8.0, speed=1000 * RPM)
+    assert outcome(fast) == (EccentricOutcome.STALLED, Having("drive_speed"))
+
+
+def test_a_drive_that_nearly_stalls_is_warned_of(scene: EccentricScene) -> None:
+    weak = changed(changed(scene, "friction_filter", drive_speed=0.02, speed_gain=2.0), "run", time_limit=6.0)
+    paper_law = changed(weak, "friction_filter", pair_gain=0.0)
+    assert any("nearly stalled" in warning for warning in simulate_eccentric(paper_law).warnings)
+
+
+@pytest.mark.parametrize("speed", [-100.0, 60.0, 130.0, 300.0])
+def test_any_speed_will_do(scene: EccentricScene, speed: float) -> None:
+    found = simulate_eccentric(at_constant_speed(scene, time_limit=20.0, speed=speed * RPM))
+    assert found.settled
+    assert found.residual_ratio is not None
+    assert found.residual_ratio < 5e-3
+
+
+def test_no_imbalance_is_no_trouble(scene: EccentricScene) -> None:
+    found = simulate_eccentric(changed(scene, "imbalance", mass=0.0))
+    assert found.settled
+    assert found.residual_ratio is None

@@ -1,4 +1,4 @@
-"""Quadrature, explicit segments and an adaptive integrator on one operation."""
+"""Every integrator on one operation, and Eq. 20's segments into a stall."""
 
 # ruff: noqa: ARG001 - every case answers to one interface
 from __future__ import annotations
@@ -20,6 +20,8 @@ from ringbalance.reduced_model.flow_law import Flow
 from ringbalance.reduced_model.paper import stall_pressure
 from ringbalance.reduced_model.paper_law import PaperLaw, paper_law
 from ringbalance.scene.models import Scene
+from ringbalance.verification.cases.integrator_orders.side_by_side import side_by_side, tapered_error
+from ringbalance.verification.cases.integrator_orders.stall import stall_study
 from ringbalance.verification.evidence import Convergence, Evidence, Found, Level, Reference
 from ringbalance.verification.orders import OrderStudy, order_study
 
@@ -89,7 +91,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     Args:
         scene: the scene; its own gas pressure is not used.
         level: not used.
-        defect: "exchange_rate_off" or "frozen_velocity".
+        defect: "exchange_rate_off", "frozen_velocity" or "stall_rate_off".
 
     Returns:
         Evidence.
@@ -102,15 +104,27 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     spoiled = 1.001 if defect == "exchange_rate_off" else 1.0
     duration = _SHARE * _end(long)
     study = _explicit(long, duration, frozen=defect == "frozen_velocity")
+    low = _drive(law, _BELOW_STALL * empties)
+    stall = stall_study(low, law, spoiled=defect == "stall_rate_off")
+    t = np.linspace(0, duration, 21)[1:]
     found = {
         "quadrature_error": _quadrature_error(long, duration, spoiled),
-        "stall_error": _stall_error(_drive(law, _BELOW_STALL * empties), spoiled),
+        "stall_error": _stall_error(low, spoiled),
         "moved_error": _moved_error(long, duration),
         "explicit_order": study.settled_order,
         "kinked_difference": _kinked_difference(law, long, duration),
+        "tapered_quadrature": tapered_error(long, law, t, quadrature),
+        "tapered_adaptive": tapered_error(long, law, t, adaptive_ode(tolerance=1e-10)),
+        "overshoot_share": stall.overshoot_share,
+        "overshoot_reach": stall.overshoot_reach,
+        "limit_error": stall.limit_error,
+        "cycle_error": stall.cycle_error,
     }
     return Evidence(
         found={name: Found(value=value) for name, value in found.items()},
+        numbers={"longest_for_per_mille": stall.longest_for_per_mille, "time_to_stall": _end(low)},
+        series=(stall.series,),
+        tables=(side_by_side(long, law, duration),),
         convergence=(
             Convergence(
                 quantity="fill by explicit segments, relative error",

@@ -1,0 +1,157 @@
+"""Every integrator on two laws with exact solutions: the paper's, and one without its parabola in time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.controller.adaptive_ode import adaptive_ode
+from ringbalance.controller.closed_form import closed_form
+from ringbalance.controller.explicit_segments import explicit_segments
+from ringbalance.controller.quadrature import quadrature
+from ringbalance.controller.transfer import Drive, Integrator
+from ringbalance.reduced_model.flow_law import Flow
+from ringbalance.reduced_model.paper_law import PaperLaw
+from ringbalance.verification.evidence import Table
+
+FloatArray = npt.NDArray[np.float64]
+
+WAYS: Final[Mapping[str, Integrator]] = {
+    "closed form": closed_form,
+    "quadrature": quadrature,
+    "adaptive, 1e-5": adaptive_ode(tolerance=1e-5),
+    "adaptive, 1e-8": adaptive_ode(tolerance=1e-8),
+    "adaptive, 1e-11": adaptive_ode(tolerance=1e-11),
+    "Eq. 20, 16 segments": explicit_segments(16),
+    "Eq. 20, 128 segments": explicit_segments(128),
+    "Eq. 20, 1024 segments": explicit_segments(1024),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class TaperedLaw:
+    """The paper's velocity times (1 + x/x_max)/2: smooth, and with an exact solution of its own."""
+
+    base: PaperLaw
+
+    @property
+    def name(self) -> str:
+        """ "tapered"."""
+        return "tapered"
+
+    @property
+    def max_fill_ratio(self) -> float:
+        """Of the paper's law."""
+        return self.base.max_fill_ratio
+
+    def evaluate(
+        self,
+        *,
+        fill_ratio: npt.ArrayLike,
+        opposite_fill_ratio: npt.ArrayLike | None = None,
+        gas_pressure: npt.ArrayLike,
+        primed: npt.ArrayLike = False,
+    ) -> Flow:
+        """As the paper's law, slower the emptier the driven chamber.
+
+        Args:
+            fill_ratio: x of the driven chamber, any shape.
+            opposite_fill_ratio: of the opposite one.
+            gas_pressure: gauge, Pa.
+            primed: not used.
+
+        Returns:
+            Flow.
+        """
+        flow = self.base.evaluate(
+            fill_ratio=fill_ratio,
+            opposite_fill_ratio=opposite_fill_ratio,
+            gas_pressure=gas_pressure,
+            primed=primed,
+        )
+        share = (1 + np.asarray(fill_ratio) / self.max_fill_ratio) / 2
+        return replace(flow, velocity=flow.velocity * share)
+
+    def table(self) -> Mapping[str, FloatArray]:
+        """Of the paper's law.
+
+        Returns:
+            Its arrays.
+        """
+        return self.base.table()
+
+
+def tapered_fill(drive: Drive, law: PaperLaw, time: FloatArray) -> FloatArray:
+    """Exact fill under the tapered law, from a gas pressure that empties the chamber.
+
+    With s = sqrt(alpha + beta x) and u = s (1 + x/x_max)/2 the fill obeys ds/dt = -(S/V) (A + D s^2)/2, so
+    s = sqrt(A/D) tan(atan(s_0 sqrt(D/A)) - (S/V) sqrt(A D) t/2).
+
+    Args:
+        drive: from a fill at which liquid flows.
+        law: the paper's law.
+        time: s, any shape.
+
+    Returns:
+        x, of that shape.
+    """
+    a, b = law.velocity_squared_per_pressure, law.pressure_per_fill_difference
+    alpha, beta = a * (drive.gas_pressure - b * drive.total), 2 * a * b
+    d = 0.5 / law.max_fill_ratio
+    rest = beta / 2 - d * alpha
+    start = math.atan(math.sqrt(alpha + beta * drive.fill) * math.sqrt(d / rest))
+    s = math.sqrt(rest / d) * np.tan(start - drive.exchange_rate * math.sqrt(rest * d) / 2 * time)
+    return np.asarray((s**2 - alpha) / beta, dtype=np.float64)
+
+
+def tapered_error(drive: Drive, law: PaperLaw, time: FloatArray, way: Integrator) -> float:
+    """Largest error of an integrator under the tapered law.
+
+    Args:
+        drive: under the paper's law.
+        law: the paper's law.
+        time: s, ascending.
+        way: the integrator.
+
+    Returns:
+        In fill.
+    """
+    found = way(replace(drive, law=TaperedLaw(base=law)), time).fill
+    return float(np.max(np.abs(found - tapered_fill(drive, law, time))))
+
+
+def side_by_side(drive: Drive, law: PaperLaw, duration: float) -> Table:
+    """Error at the end of a long operation, and what it costs, for every integrator.
+
+    Args:
+        drive: under the paper's law.
+        law: the paper's law.
+        duration: s.
+
+    Returns:
+        Table; the closed form has no row for the tapered law, and its own is the reference.
+    """
+    t = np.array([duration])
+    exact = float(closed_form(drive, t).fill[-1])
+    rows = []
+    for name, way in WAYS.items():
+        done = way(drive, t)
+        tapered = math.nan if way is closed_form else tapered_error(drive, law, t, way)
+        error = abs(float(done.fill[-1]) - exact)
+        rows.append((name, _number(error), _number(tapered), f"{done.evaluations}"))
+    columns = ("integrator", "error, paper's law", "error, tapered law", "velocities taken")
+    return Table(
+        name="integrators side by side: error in fill at the end of a long operation",
+        columns={name: [row[i] for row in rows] for i, name in enumerate(columns)},
+    )
+
+
+def _number(error: float) -> str:
+    if math.isnan(error):
+        return "does not apply"
+    return f"{error:.1e}" if error > np.finfo(np.float64).eps else "round-off"

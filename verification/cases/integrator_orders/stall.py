@@ -1,0 +1,187 @@
+"""Eq. 20's segments near a stall, where u goes like the square root of the distance: limit and cycle.
+
+With d the distance to the stall, u = c sqrt(d) and kappa = (S/V) c dt, one segment takes d to
+d - kappa sqrt(d).  The exact flow stalls after tau = 2 sqrt(d)/((S/V) c).  A segment stays on its side of
+the stall only while kappa <= sqrt(d), which is dt <= tau/2: however short the segments, the last ones are too
+long.  What steps over lands kappa sqrt(d) - d beyond the stall, kappa^2/4 at the most.  A full tube would let
+it flow back from there: the map's slope 1 - kappa/(2 sqrt(d)) leaves (-1, 1) where sqrt(d) < kappa/4, and the
+steps end in the cycle d = +-kappa^2/4, in which that slope is zero, so that every start is drawn into it.
+"""
+
+# ruff: noqa: ARG002 - every law answers to one interface
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.controller.closed_form import closed_form
+from ringbalance.controller.explicit_segments import explicit_segments
+from ringbalance.controller.transfer import Drive
+from ringbalance.reduced_model.flow_law import Flow, Regime
+from ringbalance.reduced_model.paper_law import PaperLaw
+from ringbalance.verification.evidence import Axis, Curve, Series
+
+FloatArray = npt.NDArray[np.float64]
+
+COUNTS: Final = (8, 16, 32, 64, 128)
+_PHASES: Final = np.linspace(1.0, 1.3, 31)
+"""Durations, in units of the time to the stall: each lets the segments meet the stall differently."""
+_STARTS: Final = (0.02, 0.05, 0.1)
+_BISECTIONS: Final = 40
+_CYCLES: Final = 5
+"""Times to the stall after which a tube that stays full has found its cycle."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FullTube:
+    """The paper's law of a tube that stays full: beyond the stall it flows back."""
+
+    base: PaperLaw
+
+    @property
+    def name(self) -> str:
+        """ "full tube"."""
+        return "full tube"
+
+    @property
+    def max_fill_ratio(self) -> float:
+        """Of the paper's law."""
+        return self.base.max_fill_ratio
+
+    def evaluate(
+        self,
+        *,
+        fill_ratio: npt.ArrayLike,
+        opposite_fill_ratio: npt.ArrayLike | None = None,
+        gas_pressure: npt.ArrayLike,
+        primed: npt.ArrayLike = False,
+    ) -> Flow:
+        """u = sign(D) sqrt(|D|) with D the paper's u^2.
+
+        Args:
+            fill_ratio: x of the driven chamber, any shape.
+            opposite_fill_ratio: of the opposite one.
+            gas_pressure: gauge, Pa.
+            primed: not used.
+
+        Returns:
+            Flow.
+        """
+        x, p = np.asarray(fill_ratio, dtype=np.float64), np.asarray(gas_pressure, dtype=np.float64)
+        other = self.max_fill_ratio - x if opposite_fill_ratio is None else np.asarray(opposite_fill_ratio)
+        squared = self.base.velocity_squared_per_pressure * (
+            p + self.base.pressure_per_fill_difference * (x - other)
+        )
+        velocity = np.sign(squared) * np.sqrt(np.abs(squared))
+        return Flow(
+            velocity=velocity,
+            regime=np.where(velocity < 0, Regime.REVERSE, Regime.SIPHON).astype(np.int64),
+            uncertainty=np.zeros_like(velocity),
+            primed=np.ones_like(velocity, dtype=np.bool_),
+        )
+
+    def table(self) -> Mapping[str, FloatArray]:
+        """Of the paper's law.
+
+        Returns:
+            Its arrays.
+        """
+        return self.base.table()
+
+
+@dataclass(frozen=True, kw_only=True)
+class StallStudy:
+    """What the runs show, each beside what the derivation says."""
+
+    overshoot_share: float
+    """Largest step over the stall, over kappa^2/4."""
+    overshoot_reach: float
+    """The same for the number of segments at which it is least: the bound is met, not only kept."""
+    cycle_error: float
+    """Amplitude in which the steps of a tube that stays full end, over kappa^2/4, less one."""
+    limit_error: float
+    """Longest segment that does not step over, relative to half the time to the stall, less one."""
+    longest_for_per_mille: float
+    """Segment that steps over by a thousandth of the fill at the most, s."""
+    series: Series
+
+
+def stall_study(drive: Drive, law: PaperLaw, *, spoiled: bool = False) -> StallStudy:
+    """Run the segments into the stall.
+
+    Args:
+        drive: under the paper's law at a pressure that stalls.
+        law: the paper's law.
+        spoiled: whether the derivation's rate is off by a tenth on purpose.
+
+    Returns:
+        StallStudy.
+    """
+    stall, per_root = _stall(drive, law)
+    rate = per_root * (1.1 if spoiled else 1.0)
+    end = 2 * math.sqrt(drive.fill - stall) / per_root
+    bound = np.array([(rate * end / n) ** 2 / 4 for n in COUNTS])
+    over = np.array([_overshoots(drive, stall, end, n) for n in COUNTS])
+    cycle = np.array([_cycle(drive, law, stall, end, n) for n in COUNTS])
+    # Durations differ a little between the runs of one count, so each is held against its own bound.
+    share = over / (bound[:, None] * _PHASES**2)
+    return StallStudy(
+        overshoot_share=float(share.max()),
+        overshoot_reach=float(share.max(axis=1).min()),
+        cycle_error=float(np.max(np.abs(cycle / bound - 1))),
+        limit_error=max(abs(_longest(drive, stall, d) * rate / math.sqrt(d) - 1) for d in _STARTS),
+        longest_for_per_mille=2 * math.sqrt(1e-3) / rate,
+        series=Series(
+            name="fill beyond the stall against the length of a segment",
+            x=Axis(
+                name="segment over the time to the stall", unit="1", values=1 / np.array(COUNTS, dtype=float)
+            ),
+            y=(
+                Curve(
+                    name="largest step over the stall, Eq. 20",
+                    unit="1",
+                    values=over.max(axis=1),
+                    style="paper",
+                ),
+                Curve(name="cycle of a tube that stays full", unit="1", values=cycle),
+                Curve(name="kappa^2/4", unit="1", values=bound, style="reference"),
+            ),
+            log=True,
+        ),
+    )
+
+
+def _stall(drive: Drive, law: PaperLaw) -> tuple[float, float]:
+    """Fill of the stall, and (S/V) c."""
+    a, b = law.velocity_squared_per_pressure, law.pressure_per_fill_difference
+    stall = (drive.total - drive.gas_pressure / b) / 2
+    return stall, drive.exchange_rate * math.sqrt(2 * a * b)
+
+
+def _overshoots(drive: Drive, stall: float, end: float, count: int) -> FloatArray:
+    """How far beyond the stall segments land, for durations that are a little different."""
+    landed = [explicit_segments(count)(drive, np.array([end * phase])).fill[-1] for phase in _PHASES]
+    return np.maximum(stall - np.array(landed), 0.0)
+
+
+def _cycle(drive: Drive, law: PaperLaw, stall: float, end: float, count: int) -> float:
+    """Distance from the stall in which the steps of a tube that stays full end."""
+    full = replace(drive, law=FullTube(base=law))
+    way = explicit_segments(_CYCLES * count)
+    return abs(float(way(full, np.array([_CYCLES * end])).fill[-1]) - stall)
+
+
+def _longest(drive: Drive, stall: float, distance: float) -> float:
+    """Longest single segment from a distance that ends on the same side of the stall, by runs."""
+    near = replace(drive, fill=stall + distance)
+    low, high = 0.0, float(closed_form(near, np.array([1e9])).event_time or math.nan)
+    for _ in range(_BISECTIONS):
+        middle = (low + high) / 2
+        stays = float(explicit_segments(1)(near, np.array([middle])).fill[-1]) >= stall
+        low, high = (middle, high) if stays else (low, middle)
+    return low

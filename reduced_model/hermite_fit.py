@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import make_interp_spline
+from scipy.interpolate import PchipInterpolator, make_interp_spline
 
 from ringbalance.reduced_model.hermite import HermiteTable
 
@@ -33,6 +33,25 @@ def table_from_samples(*, start: float, stop: float, value: npt.ArrayLike) -> He
     return HermiteTable(
         start=start, step=step, value=y, slope=spline(places, 1) / step, curvature=spline(places, 2) / step**2
     )
+
+
+def level_table(*, start: float, stop: float, value: npt.ArrayLike) -> HermiteTable:
+    """Interpolate equally spaced samples that may step, without ever leaving the span of two neighbours.
+
+    Args:
+        start: x of the first sample.
+        stop: x of the last sample.
+        value: samples, shape (n,), n at least 2.
+
+    Returns:
+        HermiteTable with slopes limited as by Fritsch and Butland and no curvature at the samples.
+
+    Source: Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300; error O(step^2).
+    """
+    y = np.asarray(value, dtype=np.float64)
+    places, step = np.arange(y.size, dtype=np.float64), (stop - start) / (y.size - 1)
+    slope = PchipInterpolator(places, y).derivative()(places) / step
+    return HermiteTable(start=start, step=step, value=y, slope=slope, curvature=np.zeros_like(y))
 
 
 def refined_table(

@@ -7,12 +7,11 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
-from numpy.lib.stride_tricks import sliding_window_view
 
 from ringbalance.physics.tube_loss import TubeLoss, tube_loss
 from ringbalance.physics.tube_state import tube_state, upstream_loss
 from ringbalance.reduced_model.hermite import HermiteTable
-from ringbalance.reduced_model.hermite_fit import refined_table, table_from_samples
+from ringbalance.reduced_model.hermite_fit import level_table, refined_table
 from ringbalance.reduced_model.hump_path import reversed_tube
 from ringbalance.scene.models import Scene, Tube
 
@@ -22,8 +21,7 @@ TABLE_VELOCITIES: Final = (1e-5, 1e3)
 """m/s; below, the flow creeps and the head is proportional to u; above, to a power of u."""
 TABLE_ERROR: Final = 1e-9
 """Aimed at, relative, between the nodes."""
-_SPREAD_NODES: Final = 513
-_BINOMIAL: Final = (0.0625, 0.25, 0.375, 0.25, 0.0625)
+_SPREAD_NODES: Final = 2049
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -87,16 +85,10 @@ def tube_heads(scene: Scene) -> TubeHeads:
         head=tables[0],
         hump_head=tables[1] if len(tables) > 1 else None,
         return_hump_head=tables[2] if len(tables) > 1 else None,
-        spread=table_from_samples(start=start, stop=stop, value=_evened(spread)),
-        hump_spread=table_from_samples(start=start, stop=stop, value=_evened(hump_spread)),
+        spread=level_table(start=start, stop=stop, value=spread),
+        hump_spread=level_table(start=start, stop=stop, value=hump_spread),
         interpolation_error=max(errors),
     )
-
-
-def _evened(spread: FloatArray) -> FloatArray:
-    """The largest of five neighbours, evened: a step where a range ends would swing the spline to zero."""
-    largest = sliding_window_view(np.pad(spread, 2, mode="edge"), 5).max(axis=1)
-    return np.asarray(sliding_window_view(np.pad(largest, 2, mode="edge"), 5) @ np.array(_BINOMIAL))
 
 
 def _loss(scene: Scene, velocity: FloatArray) -> TubeLoss:

@@ -267,7 +267,7 @@ def test_what_cannot_be_is_refused(law: CalibratedLaw, wrong: dict[str, float]) 
 def test_spread_of_the_heads_never_falls_below_that_of_k(
     table_1_scene: Scene, bore: float, viscosity: float, speed: float
 ) -> None:
-    """Where a source's range ends the half-width steps up; a spline through the step must not swing below."""
+    """Where a source's range ends the half-width steps up; a table must not swing below on either side."""
     scene = dataclasses.replace(
         table_1_scene,
         tube=dataclasses.replace(table_1_scene.tube, bore=bore, bends=()),
@@ -275,10 +275,12 @@ def test_spread_of_the_heads_never_falls_below_that_of_k(
         rotor=dataclasses.replace(table_1_scene.rotor, speed=speed),
     )
     heads = tube_heads(scene)
-    u = np.geomspace(2e-5, 5e2, 4001)
+    u = np.geomspace(2e-5, 5e2, 20001)
     loss = tube_loss(tube=scene.tube, liquid=scene.liquid, angular_velocity=speed, velocity=u)
     exact = loss.k.uncertainty / (loss.k.value + 1)
     tabulated = heads.spread(np.log(u))
-    assert np.all(tabulated > 0.97 * exact)
-    assert np.median(tabulated / exact) < 1.05
+    neighbours = np.lib.stride_tricks.sliding_window_view(np.pad(exact, 12, mode="edge"), 25)
+    assert np.all(tabulated > 0.99 * neighbours.min(axis=1))
+    assert np.all(tabulated < 1.01 * neighbours.max(axis=1))
+    assert np.median(np.abs(tabulated / exact - 1)) < 1e-4
     assert np.all(heads.hump_spread(np.log(u)) > 0)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ringbalance.reduced_model.hermite import HermiteTable
-from ringbalance.reduced_model.hermite_fit import refined_table, table_from_samples
+from ringbalance.reduced_model.hermite_fit import level_table, refined_table, table_from_samples
 
 
 def test_quintics_are_exact() -> None:
@@ -72,3 +72,16 @@ def test_tables_that_make_no_sense_are_refused(broken: dict[str, object]) -> Non
     good: dict[str, object] = {"start": 0.0, "step": 1.0, "value": two, "slope": two, "curvature": two}
     with pytest.raises(ValueError, match=r"finite|positive|two nodes"):
         HermiteTable(**(good | broken))  # type: ignore[arg-type]
+
+
+def test_a_table_through_a_step_stays_between_its_neighbours() -> None:
+    steps = np.array([0.1, 0.1, 0.5, 0.5, 0.02, 0.3, 0.3])
+    table = level_table(start=0.0, stop=6.0, value=steps)
+    x = np.linspace(0.0, 6.0, 6001)
+    cell = np.minimum(x.astype(int), 5)
+    low, high = (f(steps[cell], steps[cell + 1]) for f in (np.minimum, np.maximum))
+    assert np.all((table(x) >= low - 1e-12) & (table(x) <= high + 1e-12))
+    np.testing.assert_allclose(table(np.arange(7.0)), steps)
+    fine = np.linspace(0, 3, 301)
+    smooth = level_table(start=0.0, stop=3.0, value=np.exp(fine))
+    assert np.max(np.abs(smooth(fine[:-1] + 0.004) / np.exp(fine[:-1] + 0.004) - 1)) < 1e-4

@@ -7,7 +7,17 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from ringbalance.reports import consequence_view, extremes, fifty, hump, inside, paper_again, sloshing, trade
+from ringbalance.reports import (
+    consequence_view,
+    driven,
+    extremes,
+    fifty,
+    hump,
+    inside,
+    paper_again,
+    sloshing,
+    trade,
+)
 from ringbalance.reports.figure_style import Drawing
 from ringbalance.reports.section import Record, Section, Work
 
@@ -25,7 +35,8 @@ SECTIONS: Final[tuple[Section, ...]] = (
     Section(name="loop", title="The closed loop"),
     paper_again.SECTION,
     consequence_view.SECTION,
-    Section(name="claims", title="Claims of the paper"),
+    Section(name="claims", title="Claims of the liquid-ring paper"),
+    driven.SECTION,
     Section(name="numerics", title="Numerical verification"),
     extremes.SECTION,
     trade.SECTION,

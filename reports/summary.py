@@ -77,16 +77,21 @@ def tone(verdict: str) -> str:
     return _TONES.get(verdict, "open")
 
 
-def claims(evidence: Record) -> list[Record]:
-    """Cases that judge the paper, in its order.
+def claims(evidence: Record, *, paper: str = "liquid_ring") -> list[Record]:
+    """Cases that judge one paper, in its order.
 
     Args:
         evidence: the document.
+        paper: "liquid_ring" or "eccentric_mass".
 
     Returns:
         Case records.
     """
-    found = [case for case in evidence["verification"] if case["kind"] == "claim"]
+    found = [
+        case
+        for case in evidence["verification"]
+        if case["kind"] == "claim" and case.get("paper", "liquid_ring") == paper
+    ]
     return sorted(found, key=lambda case: (case.get("number") or math.inf, case["id"]))
 
 

@@ -73,8 +73,10 @@ class CaseDefinition(_Record):
     """All of a case that is not computed."""
 
     id: Identifier
+    paper: Literal["liquid_ring", "eccentric_mass"] = "liquid_ring"
+    """Whose claim it is, or whose balancer a check belongs to."""
     number: int | None = None
-    """Of the claim, 1 to 20."""
+    """Of the claim, from 1 in each paper."""
     kind: Kind
     title: Text
     claim: Text
@@ -89,7 +91,7 @@ class CaseDefinition(_Record):
     equations: tuple[Text, ...]
     reference: ReferenceText
     judged_on: Literal["scene", "paper"] = "scene"
-    """Whether the scene at hand is judged, or always the paper's own disc."""
+    """Whether the scene at hand is judged, or always the paper's own disc, or rotor with driven masses."""
     headline: bool = False
     cost: Literal["light", "heavy"] = "light"
     quantity: tuple[Quantity, ...] = Field(min_length=1)

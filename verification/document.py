@@ -33,6 +33,7 @@ def case_document(result: CaseResult) -> Document:
         "kind": definition.kind,
         "verdict": result.verdict.value,
         "quantities": [_quantity(quantity) for quantity in result.quantities],
+        "paper": definition.paper,
         "number": definition.number,
         "title": definition.title,
         "claim": definition.claim,
@@ -78,6 +79,7 @@ def definition_document(definition: CaseDefinition) -> Document:
     return {
         "id": definition.id,
         "kind": definition.kind,
+        "paper": definition.paper,
         "number": definition.number,
         "title": definition.title,
         "claim": definition.claim,

@@ -1,0 +1,1 @@
+"""Appendix B of the driven-mass paper: a bound on the rotor's motion."""

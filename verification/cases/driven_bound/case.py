@@ -1,0 +1,54 @@
+"""The printed force beside the largest one, and the corrected bound beside a run."""
+
+# ruff: noqa: ARG001 - every case answers to one interface
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ringbalance.controller.eccentric.figures_bound import motion_bound
+from ringbalance.controller.eccentric.figures_runs import figure_seven
+from ringbalance.controller.eccentric.parameters import plant_parameters
+from ringbalance.scene.models import Scene
+from ringbalance.verification.driven_masses import driven_scene
+from ringbalance.verification.evidence import Evidence, Found, Level, Reference
+
+_RATE = 1.0
+"""rad/s, of the masses against the rotor."""
+
+
+def reference(scene: Scene) -> Mapping[str, Reference]:
+    """No references: the printed words are limits.
+
+    Args:
+        scene: not used.
+
+    Returns:
+        Nothing.
+    """
+    return {}
+
+
+def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Forces and amplitudes against their bounds.
+
+    Args:
+        scene: not used: the driven-mass paper's rotor is taken.
+        level: not used.
+        defect: "rotor_at_rest".
+
+    Returns:
+        Evidence.
+    """
+    rotor = driven_scene()
+    speed = rotor.rotor.speed_profile[0].speed
+    parameters = plant_parameters(rotor)
+    turning = motion_bound(parameters, speed=speed, rate=_RATE)
+    judged = turning if defect is None else motion_bound(parameters, speed=0.0, rate=_RATE)
+    largest = max(run.worst_amplitude for run in figure_seven(rotor).runs)
+    return Evidence(
+        found={
+            "force_ratio": Found(value=judged.printed_force / judged.force),
+            "amplitude_ratio": Found(value=largest / turning.amplitude),
+        },
+        numbers={"bound": turning.amplitude, "largest": largest},
+    )

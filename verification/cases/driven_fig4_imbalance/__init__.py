@@ -1,0 +1,1 @@
+"""Fig. 4 of the driven-mass paper: how fast the imbalance becomes known."""

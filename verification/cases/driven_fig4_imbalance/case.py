@@ -1,0 +1,82 @@
+"""Four imbalances estimated, and the covariances that the printed time needs."""
+
+# ruff: noqa: ARG001 - every case answers to one interface
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ringbalance.controller.eccentric.figures_imbalance import FigureFour, figure_four
+from ringbalance.scene.models import Scene
+from ringbalance.verification.driven_masses import driven_scene, thinned
+from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
+
+PRINTED = 3.5
+"""Middle of the printed 3 to 4 s."""
+
+
+def reference(scene: Scene) -> Mapping[str, Reference]:
+    """No references: the printed words are limits.
+
+    Args:
+        scene: not used.
+
+    Returns:
+        Nothing.
+    """
+    return {}
+
+
+def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Convergence times under honest and under ever less honest covariances.
+
+    Args:
+        scene: not used: the driven-mass paper's rotor is taken.
+        level: not used.
+        defect: "noise_overrated".
+
+    Returns:
+        Evidence.
+    """
+    found = figure_four(driven_scene())
+    honest = max(found.honest_time) if defect is None else float(found.scaled_time[-1])
+    norm = found.covariance_norm
+    reached = np.isfinite(found.scaled_time)
+    scale = np.exp(np.interp(PRINTED, found.scaled_time[reached], np.log(found.scales[reached])))
+    return Evidence(
+        found={
+            "honest": Found(value=honest),
+            "covariance": Found(value=float(np.max(norm[:, -1] / norm[:, 0]))),
+        },
+        numbers={"printed": PRINTED, "scale": float(scale)},
+        series=(_estimates(found), _times(found)),
+    )
+
+
+def _estimates(found: FigureFour) -> Series:
+    """The figure's own four curves, as distances from the truth over the imbalance."""
+    error = np.linalg.norm(found.estimate - found.true[:, None, :], axis=2)
+    size = np.linalg.norm(found.true, axis=1)
+    shown = found.time <= 0.5
+    return Series(
+        name="error of the estimate over the imbalance, honest covariances",
+        x=Axis(name="time", unit="s", values=thinned(found.time[shown])),
+        y=tuple(
+            Curve(name=f"{phase:.0f} degrees", unit="1", values=thinned(row[shown] / one))
+            for phase, row, one in zip(found.phases, error, size, strict=True)
+        ),
+    )
+
+
+def _times(found: FigureFour) -> Series:
+    reached = np.isfinite(found.scaled_time)
+    return Series(
+        name="time to be within 2 % over the noise that the filter believes in",
+        x=Axis(name="believed over true noise", unit="1", values=found.scales[reached]),
+        y=(
+            Curve(name="found", unit="s", values=found.scaled_time[reached]),
+            Curve(name="printed", unit="s", values=np.full(int(reached.sum()), PRINTED), style="paper"),
+        ),
+        log=True,
+    )

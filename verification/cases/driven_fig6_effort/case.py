@@ -1,0 +1,67 @@
+"""Effort over the speed under four ways of compensating friction."""
+
+# ruff: noqa: ARG001 - every case answers to one interface
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ringbalance.controller.eccentric.figures_effort import FigureSix, figure_six
+from ringbalance.scene.models import Scene
+from ringbalance.verification.driven_masses import driven_scene
+from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
+
+_STEP = {"light": 4e-4, "heavy": 1e-4}
+"""s, of the integration; the effort hangs on it by a thousandth."""
+
+
+def reference(scene: Scene) -> Mapping[str, Reference]:
+    """No references: the printed words are limits.
+
+    Args:
+        scene: not used.
+
+    Returns:
+        Nothing.
+    """
+    return {}
+
+
+def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Growth of the effort with the speed.
+
+    Args:
+        scene: not used: the driven-mass paper's rotor is taken.
+        level: "heavy" integrates more finely.
+        defect: "friction_left_to_the_regulator".
+
+    Returns:
+        Evidence.
+    """
+    found = figure_six(driven_scene(), step=_STEP[level])
+    judged = found.exact if defect is None else found.without
+    without = found.growth(found.without)
+    return Evidence(
+        found={"exact": Found(value=float(found.growth(judged).min()))},
+        numbers={
+            "without": float(without.min()),
+            "without_most": float(without.max()),
+            "short": float(found.growth(found.short).min()),
+            "as_printed": float(found.growth(found.printed).min()),
+        },
+        series=(_figure(found),),
+    )
+
+
+def _figure(found: FigureSix) -> Series:
+    """The first mass ratio at the third weight, near the paper's own choice."""
+    at = (0, 2)
+    return Series(
+        name="effort of one move over the speed",
+        x=Axis(name="speed over natural frequency", unit="1", values=found.speed_ratios),
+        y=(
+            Curve(name="compensated exactly", unit="N m s", values=found.exact[at]),
+            Curve(name="arm believed a fifth too small", unit="N m s", values=found.short[at]),
+            Curve(name="not compensated", unit="N m s", values=found.without[at]),
+            Curve(name="as printed", unit="N m s", values=found.printed[at], style="paper"),
+        ),
+    )

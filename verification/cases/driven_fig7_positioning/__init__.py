@@ -1,0 +1,1 @@
+"""Fig. 7 of the driven-mass paper: balanced by positioning alone."""

@@ -1,0 +1,61 @@
+"""Masses ten degrees beside their targets, then tuned by trial."""
+
+# ruff: noqa: ARG001 - every case answers to one interface
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ringbalance.controller.eccentric.figures_runs import BalancingFigure, figure_eight
+from ringbalance.scene.models import Scene
+from ringbalance.verification.driven_masses import driven_scene, envelope, thinned
+from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
+
+_TIME = {None: 200.0, "tuning_given_up": 25.0}
+"""s."""
+
+
+def reference(scene: Scene) -> Mapping[str, Reference]:
+    """No references: the printed words are limits.
+
+    Args:
+        scene: not used.
+
+    Returns:
+        Nothing.
+    """
+    return {}
+
+
+def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Amplitudes after positioning and after fine tuning.
+
+    Args:
+        scene: not used: the driven-mass paper's rotor is taken.
+        level: not used.
+        defect: "tuning_given_up".
+
+    Returns:
+        Evidence.
+    """
+    found = figure_eight(driven_scene(), time_limit=_TIME[defect])
+    left = np.divide(found.positioned, found.before)
+    ended = np.divide(found.after, found.before)
+    settled = [run.settling_time or run.time[-1] for run in found.runs]
+    return Evidence(
+        found={"left": Found(value=float(left.min())), "ended": Found(value=float(ended.max()))},
+        numbers={"left_m": min(found.positioned), "end": max(found.after), "time": float(max(settled))},
+        series=(_amplitudes(found),),
+    )
+
+
+def _amplitudes(found: BalancingFigure) -> Series:
+    return Series(
+        name="amplitude",
+        x=Axis(name="time", unit="s", values=thinned(found.runs[0].time)),
+        y=tuple(
+            Curve(name=f"imbalance at {phase:.0f} degrees", unit="m", values=envelope(run.amplitude))
+            for phase, run in zip(found.phases, found.runs, strict=True)
+        ),
+    )

@@ -9,7 +9,11 @@ from ringbalance.controller import simulate as run_closed_loop
 from ringbalance.controller.eccentric.run import simulate_eccentric
 from ringbalance.controller.eccentric.run_record import EccentricRun
 from ringbalance.reduced_model import CompleteLaw, balancer_model, calibrate
-from ringbalance.scene import EccentricScene, Scene
+from ringbalance.scene import AnyScene, EccentricScene, Scene
+
+
+@overload
+def simulate(scene: AnyScene, *, flow_law: CompleteLaw) -> Simulation: ...
 
 
 @overload
@@ -20,9 +24,7 @@ def simulate(scene: Scene, *, flow_law: CompleteLaw | None = None) -> Simulation
 def simulate(scene: EccentricScene, *, flow_law: None = None) -> EccentricRun: ...
 
 
-def simulate(
-    scene: Scene | EccentricScene, *, flow_law: CompleteLaw | None = None
-) -> Simulation | EccentricRun:
+def simulate(scene: AnyScene, *, flow_law: CompleteLaw | None = None) -> Simulation | EccentricRun:
     """One closed-loop run of a scene's rotor: under a flow law, or with two driven masses.
 
     Args:

@@ -181,7 +181,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         flows = [flow]
     fine, length = flows[0], float(flows[0].arc_length[-1])
     sizes = _sizes(scene, meshes)
-    half_width = _half_width(losses, sizes)
+    half_width, order = _half_width(losses, sizes)
     terms = _terms(scene, length)
     plain = terms["friction"] + terms["rotation"]
     explained = plain + terms["shift"]
@@ -204,6 +204,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "shift": terms["shift"],
             "sum": plain + terms["bends"],
             "sum_gap": losses[-1] / (plain + terms["bends"]) - 1,
+            "explained_gap": losses[-1] / explained - 1,
             "half_width": half_width,
         },
         convergence=(
@@ -213,9 +214,10 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
                 formal_order=_FORMAL_ORDER,
                 size=[size / sizes[0] for size in sizes],
                 value=losses,
+                observed_order=order,
                 gci=half_width / losses[-1],
                 geometry="quadratic",
-                note="size: cube root of the volume per unknown",
+                note="size: cube root of the volume per cell",
             ),
         )
         if len(losses) > 1
@@ -226,7 +228,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 
 
 def _sizes(scene: Scene, meshes: Sequence[tuple[int, int, float]]) -> list[float]:
-    """Typical cell, from the number of cells: (8 n^2/..) cells in the half section times those along."""
+    """Cube root of the volume per cell, up to a factor."""
     counts = []
     for around, across, along in meshes:
         section = 2 * around**2 + 4 * around * across
@@ -234,13 +236,14 @@ def _sizes(scene: Scene, meshes: Sequence[tuple[int, int, float]]) -> list[float
     return [count ** (-1 / 3) for count in counts]
 
 
-def _half_width(losses: Sequence[float], sizes: Sequence[float]) -> float:
+def _half_width(losses: Sequence[float], sizes: Sequence[float]) -> tuple[float, tuple[float, ...]]:
+    """95 % half-width of the finest loss, and the observed order."""
     if len(losses) < 3:
-        return 0.0
+        return 0.0, ()
     found = gci(
         values=list(losses)[::-1], sizes=list(sizes)[::-1], formal_order=_FORMAL_ORDER, round_off=1e-9
     )
-    return float(found.uncertainty)
+    return float(found.uncertainty), (float(found.observed_order),)
 
 
 def _figure(flow: BentTubeFlow) -> Series:

@@ -59,6 +59,7 @@ from ringbalance.controller.eccentric.imbalance_filter_model import (
     whirl_generator,
     whirl_transition,
 )
+from ringbalance.controller.eccentric.imbalance_filter_scene import expected_deviation
 from ringbalance.controller.eccentric.lqr import LqrGain, lqr_gain, lqr_gain_discrete
 from ringbalance.controller.eccentric.parameters import PlantParameters, plant_parameters
 from ringbalance.controller.eccentric.plant_run import PlantRun, run_plant
@@ -116,6 +117,7 @@ __all__ = [
     "estimate_imbalance",
     "euler_map",
     "euler_step_limit",
+    "expected_deviation",
     "figure_eight",
     "figure_five",
     "figure_four",

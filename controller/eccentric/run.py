@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from ringbalance.controller.eccentric.arrays import IntArray
 from ringbalance.controller.eccentric.friction import LOCKED, STUCK
-from ringbalance.controller.eccentric.imbalance_filter import predicted_deviation, start_estimate
-from ringbalance.controller.eccentric.imbalance_filter_model import ProcessNoise, euler_step_limit
+from ringbalance.controller.eccentric.imbalance_filter_model import euler_step_limit
+from ringbalance.controller.eccentric.imbalance_filter_scene import expected_deviation
 from ringbalance.controller.eccentric.parameters import PlantParameters, plant_parameters
 from ringbalance.controller.eccentric.plant import rest_state, stuck_flags
 from ringbalance.controller.eccentric.plant_run import run_steps
@@ -43,8 +43,6 @@ Progress = Callable[[float, float], None]
 
 STRETCH: Final = 10_000
 """Samples between two calls of progress."""
-EXPECTED_STEPS: Final = 1_000
-"""Steps in which the expected uncertainty of a failed estimation is worked out."""
 
 STAGE_NAMES = {
     Stage.WAITING: "waiting",
@@ -226,35 +224,13 @@ def _facts(
         hold=int(record.hold[-1]),
         least_gap=float(np.min(_separations(angles))),
         euler_limit=float(euler_step_limit(model=believed_whirl(scene), angular_velocity=fastest)),
-        predicted=_expected(scene, slowest) if cause is Cause.IMBALANCE_UNCERTAIN else 0.0,
+        predicted=expected_deviation(scene, speed=slowest) if cause is Cause.IMBALANCE_UNCERTAIN else 0.0,
     )
 
 
 def _separations(angles: FloatArray) -> FloatArray:
     difference = angles[:, 1] - angles[:, 0]
     return np.abs(np.pi - np.mod(np.pi - difference, 2 * np.pi))
-
-
-def _expected(scene: EccentricScene, speed: float) -> float:
-    """Standard deviation that the longest estimation could have come to, worked out in long steps."""
-    told = scene.imbalance_filter
-    if speed == 0:
-        return told.initial_unbalance
-    step = scene.supervisor.imbalance_time / EXPECTED_STEPS
-    fewer = told.step / step
-    variance = np.repeat([told.position_noise**2, told.velocity_noise**2], 2) * fewer
-    start = start_estimate(told.initial_position, told.initial_velocity, told.initial_unbalance)
-    found = predicted_deviation(
-        start,
-        model=believed_whirl(scene),
-        noise=ProcessNoise(told.velocity_walk**2, told.unbalance_walk**2),
-        variance=variance,
-        angular_velocity=speed,
-        step=step,
-        duration=scene.supervisor.imbalance_time,
-        laboratory=scene.sensor.frame == "laboratory",
-    )
-    return float(found[-1])
 
 
 def _stages(stage: IntArray, time: FloatArray) -> tuple[StageSpan, ...]:

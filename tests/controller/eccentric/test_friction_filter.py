@@ -121,7 +121,7 @@ def test_the_printed_jacobian_never_starts_from_zero() -> None:
 
 
 def test_the_printed_transition_is_not_the_flow() -> None:
-    """Eq. 33 multiplies the state with the Jacobian; the motion is not linear, and friction counts twice."""
+    """Eq. 33 multiplies the state with the Jacobian: the drive's torque drops out of the prediction."""
     rate, arm, torque = 0.4, 0.01, 0.1
     flow = friction_flow(TRACK, rate, arm, SPEED, torque, STEP, False)
     linear = flow.by_rate * rate + flow.by_arm * arm
@@ -151,3 +151,14 @@ def test_euler_is_close_for_short_steps_and_unstable_for_long_ones() -> None:
     assert near.rate == pytest.approx(exact.rate, rel=1e-3)
     assert abs(friction_flow(TRACK, 0.4, 0.01, SPEED, 0.1, 0.2, True).by_rate) > 1
     assert abs(friction_flow(TRACK, 0.4, 0.01, SPEED, 0.1, 0.2, False).by_rate) < 1
+
+
+def test_the_printed_jacobian_is_that_of_a_mass_without_a_motor() -> None:
+    """f_11 = 1 - dt (gamma + ...)/(m_b r_b^2): with J_add and the back-EMF left out it falls too fast."""
+    gamma, inertia, rate, arm = 0.8, 0.009522, 0.4, 0.01
+    printed = 1 - STEP * (gamma + 2 * TRACK.moment * arm * (SPEED + rate)) / inertia
+    driven = TRACK._replace(damping=TRACK.damping + gamma)
+    right = friction_flow(driven, rate, arm, SPEED, gamma * 0.5, STEP, False).by_rate
+    assert abs(printed - right) > 2e-3
+    bare = TrackModel(inertia, gamma, TRACK.moment)
+    assert printed == pytest.approx(friction_flow(bare, rate, arm, SPEED, 0.0, STEP, True).by_rate)

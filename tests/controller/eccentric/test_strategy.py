@@ -14,13 +14,15 @@ import ringbalance
 from ringbalance.controller.cli import simulate as command
 from ringbalance.controller.eccentric.document import eccentric_document, thinned
 from ringbalance.controller.eccentric.figures_scenes import RPM, at_constant_speed, changed
+from ringbalance.controller.eccentric.imbalance_filter_scene import expected_deviation
+from ringbalance.controller.eccentric.lqr_law import PRINTED, friction_torque
 from ringbalance.controller.eccentric.parameters import plant_parameters
 from ringbalance.controller.eccentric.plant_whirl import moment_vector
 from ringbalance.controller.eccentric.run import simulate_eccentric
 from ringbalance.controller.eccentric.run_record import EccentricOutcome, EccentricRun
 from ringbalance.controller.eccentric.strategy import strategy_start, strategy_step
 from ringbalance.controller.eccentric.strategy_records import EccentricMeasurement
-from ringbalance.controller.eccentric.strategy_settings import strategy_settings
+from ringbalance.controller.eccentric.strategy_settings import drive_law, strategy_settings
 from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.eccentric_models import SpeedPoint
 
@@ -277,3 +279,25 @@ def test_no_imbalance_is_no_trouble(scene: EccentricScene) -> None:
     found = simulate_eccentric(changed(scene, "imbalance", mass=0.0))
     assert found.settled
     assert found.residual_ratio is None
+
+
+def test_what_can_be_known_is_told_beforehand(run: EccentricRun, scene: EccentricScene) -> None:
+    end = run.stages[0].end
+    expected = expected_deviation(scene, speed=100 * RPM, duration=end)
+    found = math.sqrt(np.max(np.linalg.eigvalsh(run.estimates.imbalance_covariance[-1])))
+    assert expected == pytest.approx(found, rel=0.1)
+    slow = expected_deviation(scene, speed=2 * RPM)
+    assert slow > 50 * expected_deviation(scene, speed=100 * RPM)
+    assert expected_deviation(scene, speed=0.0) == scene.imbalance_filter.initial_unbalance
+
+
+def test_the_printed_compensation_takes_the_angle_for_the_rate(scene: EccentricScene) -> None:
+    law = drive_law(scene)
+    arm, speed, angle, rate = 0.01, 10.47, 2.0, -1.0
+    friction = -arm * law.track.moment * (speed + rate) ** 2
+    printed = law._replace(compensation=PRINTED)
+    assert friction_torque(law, arm, speed, angle, rate, 0.0) == pytest.approx(friction)
+    assert friction_torque(printed, arm, speed, angle, rate, 0.0) / friction > 1.7
+    # At rest, a radian away from the goal, only one of them pushes.
+    assert friction_torque(law, arm, speed, angle, 0.0, 1.0) > 0
+    assert friction_torque(printed, arm, speed, angle, 0.0, 1.0) == 0

@@ -12,6 +12,9 @@ from ringbalance.reduced_model.hermite import HermiteTable
 
 FloatArray = npt.NDArray[np.float64]
 
+_STEEPEST = 2.5
+"""Slope at a sample over the smaller of its two chords up to which quintic pieces without curvature rise."""
+
 
 def table_from_samples(*, start: float, stop: float, value: npt.ArrayLike) -> HermiteTable:
     """Interpolate equally spaced samples by a spline of degree five (less for fewer than six samples).
@@ -50,8 +53,10 @@ def level_table(*, start: float, stop: float, value: npt.ArrayLike) -> HermiteTa
     """
     y = np.asarray(value, dtype=np.float64)
     places, step = np.arange(y.size, dtype=np.float64), (stop - start) / (y.size - 1)
-    slope = PchipInterpolator(places, y).derivative()(places) / step
-    return HermiteTable(start=start, step=step, value=y, slope=slope, curvature=np.zeros_like(y))
+    rises = np.abs(np.diff(y))
+    steepest = _STEEPEST * np.minimum(np.append(rises[:1], rises), np.append(rises, rises[-1:]))
+    slope = np.clip(PchipInterpolator(places, y).derivative()(places), -steepest, steepest)
+    return HermiteTable(start=start, step=step, value=y, slope=slope / step, curvature=np.zeros_like(y))
 
 
 def refined_table(

@@ -75,7 +75,7 @@ def test_tables_that_make_no_sense_are_refused(broken: dict[str, object]) -> Non
 
 
 def test_a_table_through_a_step_stays_between_its_neighbours() -> None:
-    steps = np.array([0.1, 0.1, 0.5, 0.5, 0.02, 0.3, 0.3])
+    steps = np.array([0.1, 0.4, 0.5, 0.5, 0.002, 0.3, 0.31])
     table = level_table(start=0.0, stop=6.0, value=steps)
     x = np.linspace(0.0, 6.0, 6001)
     cell = np.minimum(x.astype(int), 5)

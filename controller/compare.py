@@ -66,15 +66,18 @@ def compare(first: AnyScene, second: AnyScene, *, model_of: ModelOf) -> Comparis
         SceneError: a balancer that cannot work on that rotor.
     """
     rotor = rotor_of(first)
-    one = _side(rotor, own_scene(first), model_of)
     try:
-        other = _side(rotor, scene_on(rotor, second), model_of)
+        # Whether the second can work there at all is known before anything is run.
+        guest = scene_on(rotor, second)
+        one, other = _side(rotor, own_scene(first), model_of), _side(rotor, guest, model_of)
     except SceneError as error:
         raise SceneError(_placed(rotor, fault) for fault in error.faults) from error
     return Comparison(rotor=rotor, sides=(one, other))
 
 
 def _placed(rotor: OneRotor, fault: Fault) -> Fault:
+    if fault.file == rotor.source:
+        return fault
     return replace(fault, problem=f"on the rotor of {rotor.source}: {fault.problem}")
 
 

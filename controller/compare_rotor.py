@@ -21,6 +21,7 @@ from ringbalance.controller.eccentric.parameters import plant_parameters
 from ringbalance.controller.eccentric.plant_speed import profile_arrays, speed_at
 from ringbalance.controller.eccentric.plant_whirl import influence as rotor_influence
 from ringbalance.controller.rotor import influence, initial_vibration, wrapped
+from ringbalance.reduced_model.gravity import check_ring
 from ringbalance.scene.eccentric_models import EccentricRotor, EccentricScene, SpeedPoint
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.models import Scene
@@ -149,7 +150,7 @@ def _liquid_on(rotor: OneRotor, scene: Scene) -> Scene:
     share = coefficient / own.influence_coefficient
     vibration = rotor.influence * rotor.unbalance
     phase_noise = min(rotor.noise / abs(vibration), 1.0)
-    return replace(
+    told = replace(
         scene,
         rotor=replace(
             own,
@@ -169,6 +170,8 @@ def _liquid_on(rotor: OneRotor, scene: Scene) -> Scene:
             assumed_lag_angle=wrapped(control.assumed_lag_angle - own.lag_angle + lag),
         ),
     )
+    check_ring(told)
+    return told
 
 
 def _driven_on(rotor: OneRotor, scene: EccentricScene) -> EccentricScene:

@@ -1,9 +1,14 @@
-"""The tables of docs/is-k-50-right.md as Markdown, straight from the map."""
+"""The tables of docs/is-k-50-right.md as Markdown, straight from the map; as a program, rewrites the page.
+
+python -m ringbalance.reports.fifty_doc docs/is-k-50-right.md
+"""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -155,3 +160,37 @@ def hidden_table(apparent: Record, calibration: Calibration) -> str:
             )
         )
     return _table(("velocity", "gas", "k of the tube", "Eq. 18 reads", "Eq. 19 is off by"), rows)
+
+
+def filled(page: str) -> str:
+    """The page with its generated parts made anew.
+
+    Args:
+        page: Markdown with the marks `<!-- name -->` and `<!-- /name -->`.
+
+    Returns:
+        Markdown.
+    """
+    for name, text in document_tables().items():
+        start, end = f"<!-- {name} -->\n", f"\n<!-- /{name} -->"
+        before, _, rest = page.partition(start)
+        page = before + start + text + end + rest.partition(end)[2]
+    return page
+
+
+def main(arguments: list[str]) -> int:
+    """Rewrite the page in place.
+
+    Args:
+        arguments: path of docs/is-k-50-right.md.
+
+    Returns:
+        0.
+    """
+    path = Path(arguments[0])
+    path.write_text(filled(path.read_text(encoding="utf-8")), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -14,7 +14,7 @@ from ringbalance.reports.inside_figures import end_figure, section_figure
 from ringbalance.reports.numbers import number
 from ringbalance.reports.section import Record, Section, Work
 
-_LARGEST: Final = 1000.0
+_LARGEST: Final = 500.0
 """Re up to which a flow is drawn: beyond, a laminar one is thin layers that no picture shows."""
 _CHECK: Final = "bent_tube_3d"
 _DIGITS: Final = 4
@@ -109,13 +109,13 @@ def view(evidence: Record) -> Record | None:
 
 def _lead(found: Record) -> str:
     asked, drawn = found["reynolds"], found["section"]["reynolds"]
-    told = f"At the operating point Re is {number(asked, digits=3)} and R_Om {_rotation(found)}"
+    told = f"At the operating point Re is {number(asked, digits=3)} and ωd²/ν {_rotation(found)}"
     if found["laminar"] and drawn > 0.999 * asked:
         return f"{told}: laminar, and drawn as it is."
     why = "so fast a laminar flow is thin layers" if found["laminar"] else "there the flow is not laminar"
     return (
-        f"{told}; {why}. Drawn is laminar flow at Re {number(drawn, digits=3)} with the same ratio of R_Om "
-        "to Re: the pattern, not the flow of this tube."
+        f"{told}; {why}. Drawn is laminar flow at Re {number(drawn, digits=3)} with the same ratio of "
+        "ωd²/ν to Re: the pattern, not the flow of this tube."
     )
 
 
@@ -138,15 +138,12 @@ def three_dimensional_check(evidence: Record) -> Record | None:
     case: dict[str, Any] = cases[0]
     shown_case = case_view(case)
     run = case["verdict"] != "not run"
-    brief = shown_case["brief"]
-    found, bound, width = (brief[key] for key in ("found", "paper", "half_width"))
-    result = f"Found {found}, criterion {bound}, half-width {width}."
     digest = case.get("scene_sha256") or ""
     return {
         "verdict": case["verdict"],
         "anchor": anchor(case),
         "title": shown_case["title"],
-        "result": f"{brief['what']}: {result}" if run and brief["what"] else result,
+        "rows": shown_case["rows"] if run else [],
         "when": case.get("date") or (evidence["times"]["date"] if run else ""),
         "hash": digest[:12] if run else "",
         "why_not_run": shown_case["why_not_run"],

@@ -117,7 +117,7 @@ def section_figure(record: Record) -> Drawing:
         height=4.6,
         alt="Section of the turning tube: two mirrored vortices across the axial flow, whose peak they move "
         "towards one wall.",
-        caption=f"Developed laminar flow in the turning tube’s section, Re {re}, R_Om {rotation}: axial "
+        caption=f"Developed laminar flow in the turning tube’s section, Re {re}, ωd²/ν {rotation}: axial "
         "velocity in colour, in-plane streamlines; arrow: the way of the core. In-plane it is at most "
         f"{percent(strongest, digits=2)} of the mean velocity, yet friction changes by {more}.",
     )

@@ -29,5 +29,5 @@ def test_the_page_says_what_the_program_finds(name: str, tables: dict[str, str])
         rf"<!-- {name} -->\n(.*?)\n<!-- /{name} -->", PAGE.read_text(encoding="utf-8"), re.DOTALL
     )
     assert found, name
-    told = "paste the output of ringbalance.reports.fifty_doc.document_tables into docs/is-k-50-right.md"
+    told = "run: python -m ringbalance.reports.fifty_doc docs/is-k-50-right.md"
     assert found[1].strip() == tables[name].strip(), told

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -21,7 +22,8 @@ from ringbalance.reports.figure_style import (
 from ringbalance.reports.numbers import MISSING, number, percent
 from ringbalance.reports.prose import typeset
 from ringbalance.reports.section import Record, Section, Work
-from ringbalance.verification.trade import trade_document, trade_study
+from ringbalance.scene.models import Scene
+from ringbalance.verification.trade import TradeStudy, trade_document, trade_study
 
 _LEAST: Final = 1e-9
 """Error at which a rung that equals the highest is drawn."""
@@ -37,7 +39,13 @@ def collect(work: Work) -> Record | None:
     Returns:
         Record; its `times` differ from run to run and are kept apart.
     """
-    return trade_document(trade_study(work.scene, level="light"))
+    return trade_document(_study(work.scene))
+
+
+@lru_cache(maxsize=4)
+def _study(scene: Scene) -> TradeStudy:
+    """One measurement serves every report of a scene within a process."""
+    return trade_study(scene, level="light")
 
 
 def view(evidence: Record) -> Record | None:

@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from ringbalance.face import compare as compare
     from ringbalance.face import simulate as simulate
     from ringbalance.reduced_model import calibrate as calibrate
     from ringbalance.reduced_model import load_law as load_law
@@ -25,6 +26,7 @@ _HOME = {
     "SceneError": "ringbalance.scene",
     "bundled_scene": "ringbalance.scene",
     "calibrate": "ringbalance.reduced_model",
+    "compare": "ringbalance.face",
     "load_law": "ringbalance.reduced_model",
     "load_scene": "ringbalance.scene",
     "paper_law": "ringbalance.reduced_model",

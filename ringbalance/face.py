@@ -6,6 +6,8 @@ from typing import overload
 
 from ringbalance.controller import Simulation
 from ringbalance.controller import simulate as run_closed_loop
+from ringbalance.controller.compare import Comparison
+from ringbalance.controller.compare import compare as run_comparison
 from ringbalance.controller.eccentric.run import simulate_eccentric
 from ringbalance.controller.eccentric.run_record import EccentricRun
 from ringbalance.reduced_model import CompleteLaw, balancer_model, calibrate
@@ -45,3 +47,19 @@ def simulate(scene: AnyScene, *, flow_law: CompleteLaw | None = None) -> Simulat
         return simulate_eccentric(scene)
     law = calibrate(scene).flow_law if flow_law is None else flow_law
     return run_closed_loop(scene, balancer_model(law))
+
+
+def compare(first: AnyScene, second: AnyScene) -> Comparison:
+    """Put two balancers on the rotor of the first scene, and let each balance it.
+
+    Args:
+        first: its rotor, vibration sensor and limit hold for both.
+        second: only its balancer counts; liquid rings run under their calibrated laws.
+
+    Returns:
+        Comparison.
+
+    Raises:
+        SceneError: a balancer that cannot work on that rotor.
+    """
+    return run_comparison(first, second, model_of=lambda scene: calibrate(scene).model)

@@ -25,6 +25,7 @@ PAGES = (
     "docs/is-k-50-right.md",
     "docs/how-to-choose.md",
     "docs/commands.md",
+    "docs/eccentric-strategy.md",
     "docs/scene-file.md",
 )
 LINK = re.compile(r"\]\(([^)#:]+)(?:#[^)]*)?\)")

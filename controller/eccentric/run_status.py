@@ -16,6 +16,7 @@ from ringbalance.scene.eccentric_models import EccentricScene
 FloatArray = npt.NDArray[np.float64]
 
 MILLIMETRE = 1e-3
+MICROMETRE = 1e-6
 RPM = 2 * math.pi / 60
 STALLED_SHARE = 0.5
 """Share of the friction stage with a mass nearly at a standstill that is to blame for its failure."""
@@ -163,17 +164,26 @@ def _warnings(facts: RunFacts) -> list[tuple[bool, str]]:
     ]
 
 
-def _mm(length: float) -> str:
-    return f"{length / MILLIMETRE:.4g} mm"
+def length_text(length: float) -> str:
+    """A vibration or a friction arm as a person reads it.
+
+    Args:
+        length: m.
+
+    Returns:
+        In millimetres, or in micrometres below a tenth of one.
+    """
+    small = abs(length) < 0.1 * MILLIMETRE
+    return f"{length / MICROMETRE:.4g} um" if small else f"{length / MILLIMETRE:.4g} mm"
 
 
 def _end(facts: RunFacts) -> str:
-    return f"{_mm(float(facts.amplitude[-1]))} at {facts.time:.4g} s"
+    return f"{length_text(float(facts.amplitude[-1]))} at {facts.time:.4g} s"
 
 
 def _settled(facts: RunFacts) -> str:
     return (
-        f"settled: not above the limit of {_mm(facts.scene.supervisor.limit)} from "
+        f"settled: not above the limit of {length_text(facts.scene.supervisor.limit)} from "
         f"{facts.settling_time:.4g} s on, {_end(facts)}; nothing to do"
     )
 
@@ -181,15 +191,16 @@ def _settled(facts: RunFacts) -> str:
 def _rises(facts: RunFacts) -> str:
     since = facts.checked or 0
     worst = since + int(np.argmax(facts.amplitude[since:]))
+    limit, most = length_text(facts.scene.supervisor.limit), length_text(float(facts.amplitude[worst]))
     return (
-        f"not settled: balanced to within the limit of {_mm(facts.scene.supervisor.limit)} as measured, but "
-        f"{_mm(float(facts.amplitude[worst]))} came later, at {facts.speed[worst] / RPM:.4g} rpm, and "
-        f"{_end(facts)}: lower imbalance_filter.gate, or raise supervisor.limit"
+        f"not settled: balanced to within the limit of {limit} as measured, but {most} came later, at "
+        f"{facts.speed[worst] / RPM:.4g} rpm, and {_end(facts)}: lower imbalance_filter.gate, or raise "
+        "supervisor.limit"
     )
 
 
 def _not_settled(facts: RunFacts) -> str:
-    return f"not settled: {_end(facts)} against the limit of {_mm(facts.scene.supervisor.limit)}"
+    return f"not settled: {_end(facts)} against the limit of {length_text(facts.scene.supervisor.limit)}"
 
 
 def _saturated(facts: RunFacts) -> str:

@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ringbalance.controller.eccentric.run_record import EccentricRun
+from ringbalance.controller.eccentric.run_status import length_text
 from ringbalance.controller.show import SPARK_WIDTH, sparkline
 
 
@@ -43,11 +44,12 @@ def _summary(run: EccentricRun) -> Table:
     ratio = "-" if run.residual_ratio is None else f"{100 * run.residual_ratio:.3g} %"
     for name, value in (
         ("settling time", when),
-        ("amplitude", f"{_mm(run.final_amplitude)} at the end, {_mm(run.worst_amplitude)} at worst"),
-        ("limit", _mm(run.limit)),
+        ("amplitude at the end", length_text(run.final_amplitude)),
+        ("amplitude at worst", length_text(run.worst_amplitude)),
+        ("limit", length_text(run.limit)),
         ("of the vibration without balancing", ratio),
         ("imbalance", _imbalance(run)),
-        ("friction arms", _friction(run)),
+        ("friction arms, +- standard deviation", _friction(run)),
         ("masses at", "  ".join(f"{_degrees(angle)} deg" for angle in run.mass_angle[:, -1])),
         ("electrical energy", f"{run.electrical_energy:.4g} J"),
     ):
@@ -65,7 +67,8 @@ def _imbalance(run: EccentricRun) -> str:
 def _friction(run: EccentricRun) -> str:
     arms, variances = run.estimates.friction_arm[-1], run.estimates.friction_variance[-1]
     return "  ".join(
-        f"{_mm(arm)} ({_mm(math.sqrt(variance))})" for arm, variance in zip(arms, variances, strict=True)
+        f"{length_text(arm)} +- {length_text(math.sqrt(variance))}"
+        for arm, variance in zip(arms, variances, strict=True)
     )
 
 
@@ -75,12 +78,8 @@ def _stages(run: EccentricRun) -> Table:
         table.add_column(name, justify="right" if side == "right" else "left")
     for stage in run.stages:
         end = run.amplitude[np.searchsorted(run.time, stage.end)]
-        table.add_row(stage.name, f"{stage.start:.3f}", f"{stage.end:.3f}", _mm(float(end)))
+        table.add_row(stage.name, f"{stage.start:.3f}", f"{stage.end:.3f}", length_text(float(end)))
     return table
-
-
-def _mm(length: float) -> str:
-    return f"{length * 1e3:.4g} mm"
 
 
 def _degrees(angle: float) -> str:

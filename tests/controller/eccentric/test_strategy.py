@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 import ringbalance
 from ringbalance.controller.cli import simulate as command
@@ -20,6 +23,7 @@ from ringbalance.controller.eccentric.parameters import plant_parameters
 from ringbalance.controller.eccentric.plant_whirl import moment_vector
 from ringbalance.controller.eccentric.run import simulate_eccentric
 from ringbalance.controller.eccentric.run_record import EccentricOutcome, EccentricRun
+from ringbalance.controller.eccentric.show import show_eccentric
 from ringbalance.controller.eccentric.strategy import strategy_start, strategy_step
 from ringbalance.controller.eccentric.strategy_records import EccentricMeasurement
 from ringbalance.controller.eccentric.strategy_settings import drive_law, strategy_settings
@@ -301,3 +305,20 @@ def test_the_printed_compensation_takes_the_angle_for_the_rate(scene: EccentricS
     # At rest, a radian away from the goal, only one of them pushes.
     assert friction_torque(law, arm, speed, angle, 0.0, 1.0) > 0
     assert friction_torque(printed, arm, speed, angle, 0.0, 1.0) == 0
+
+
+def test_the_documented_keys_are_there(run: EccentricRun) -> None:
+    page = (Path(__file__).resolve().parents[3] / "docs" / "commands.md").read_text()
+    section = page.split("## `simulate --json` of driven masses\n")[1].split("\n## ")[0]
+    cells = [line.split("|")[1] for line in section.splitlines() if line.startswith("|")]
+    told = {word for cell in cells for word in re.findall(r"`([a-zA-Z_]+)`", cell)}
+    assert told == eccentric_document(run).keys()
+
+
+def test_the_table_for_people_reads_well(run: EccentricRun) -> None:
+    told = io.StringIO()
+    show_eccentric(run, console=Console(file=told, width=120))
+    text = told.getvalue()
+    assert "settled: not above the limit of 0.3 mm" in text
+    assert f"{1e6 * run.final_amplitude:.4g} um" in text
+    assert "fine tuning" not in text

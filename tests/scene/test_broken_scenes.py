@@ -176,7 +176,9 @@ SINGLE: dict[str, Broken] = {
         "controller.limit", "0.01 um", "drowns in the sensor's noise", "above 0.01 um"
     ),
     "gain of zero": _one("controller.proportional", "0 s/um", "above 0", "s/um"),
-    "gain upside down": _one("controller.proportional", "0.08 um/s", "a unit of velocity, not of gain", "s/um"),
+    "gain upside down": _one(
+        "controller.proportional", "0.08 um/s", "a unit of velocity, not of gain", "s/um"
+    ),
     "integral time below zero": _one("controller.integral_time", "-1 s", "above 0", "a time above 0"),
     "gas times crossed": _one(
         "controller.minimum_gas_time", "6 s", "shorter than maximum_gas_time (5 s)", "below 5 s"

@@ -5,14 +5,13 @@ from __future__ import annotations
 import difflib
 import re
 from functools import lru_cache
-from importlib import import_module
 from importlib.resources import files
 from typing import Final, cast
 
+from ringbalance.verification import cases
 from ringbalance.verification.case import CaseDefinition, parse_case
 from ringbalance.verification.evidence import CaseCode
 
-_FOLDER: Final = "ringbalance.verification.cases"
 CASES: Final = (
     "manufactured_2d",
     "manufactured_3d",
@@ -84,8 +83,7 @@ def case_code(case_id: str) -> CaseCode:
         UnknownCaseError: no case of that id; the text names the nearest one.
     """
     _check_known(case_id)
-    # By name, so that listing the cases loads none of what they compute with.
-    return cast(CaseCode, import_module(f"{_FOLDER}.{case_id}.case"))
+    return cast(CaseCode, getattr(cases, f"{case_id}_code"))
 
 
 @lru_cache(maxsize=64)
@@ -103,7 +101,7 @@ def load_case(case_id: str) -> CaseDefinition:
         CaseError: its case.toml is not what a case must be.
     """
     _check_known(case_id)
-    path = files(_FOLDER) / case_id / "case.toml"
+    path = files(cases) / case_id / "case.toml"
     definition = parse_case(path.read_text(encoding="utf-8"), source=f"{case_id}/case.toml")
     if definition.id != case_id:
         raise ValueError(f'{case_id}/case.toml gives its id as "{definition.id}"')

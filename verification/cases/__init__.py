@@ -1,0 +1,15 @@
+"""One folder a case: what is claimed and how it is judged in case.toml, how it is computed in case.py.
+
+`<id>_code` is a case's computation, loaded when it is first asked for: listing the cases loads none of them.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from types import ModuleType
+
+
+def __getattr__(name: str) -> ModuleType:
+    if not name.endswith("_code"):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return import_module(f"{__name__}.{name.removesuffix('_code')}.case")

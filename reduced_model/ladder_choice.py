@@ -24,7 +24,7 @@ NEGLIGIBLE: Final = 1e-3
 """Of the tolerance: what is worth less is left out unchecked."""
 HOPELESS: Final = 100.0
 """Times the tolerance: a rung that leaves out a single thing worth more is not tried."""
-MARGIN: Final = 1.01
+MARGIN: Final = 1.001
 """A rung within this factor of the tolerance is kept at the check: its reference is known no better, and the
 next one may cost many times as much."""
 

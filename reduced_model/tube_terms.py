@@ -141,7 +141,7 @@ def flow_contributions(scene: Scene) -> Mapping[str, Contribution]:
         scene: the scene.
 
     Returns:
-        Contributions by name.
+        Contributions by name; all rough, because none counts where the tube is blocked.
 
     Source: stands with each; u^2 is proportional to the head over k + 1.
     """
@@ -151,7 +151,7 @@ def flow_contributions(scene: Scene) -> Mapping[str, Contribution]:
             value=None if c.value is None else c.value / 2,
             formula=f"half of {c.formula}",
             source=c.source,
-            rough=c.rough,
+            rough=True,
         )
         for name, c in loss_contributions(scene).items()
     }
@@ -164,6 +164,7 @@ def flow_contributions(scene: Scene) -> Mapping[str, Contribution]:
             value=None if chamber[of].value is None else chamber[of].value * lever,  # type: ignore[operator]
             formula=f"({chamber[of].formula}) |P_A - P_C|/(2 (p + P_A - P_C))",
             source=chamber[of].source,
+            rough=True,
         )
         for name, of in ((LEVEL, PLATES), (GRAVITY, MEAN))
     }

@@ -164,6 +164,7 @@ def operation_contributions(scene: Scene, *, model: BalancerModel) -> Mapping[st
             value=change / (2 * count),
             formula="change of the velocity over an operation / (2 n)",
             source="Euler's step, first order",
+            rough=True,
         )
         for count, name in EXPLICIT.items()
     }
@@ -174,6 +175,7 @@ def operation_contributions(scene: Scene, *, model: BalancerModel) -> Mapping[st
             value=None if time is None else min(time / shortest, 1.0),
             formula="time it costs over the shortest gas time",
             source={INERTIA: "rho L du/dt", FILLING: "ISO 6358-1", LAG: "definition"}[term],
+            rough=True,
         )
         for term, time in times.items()
     }
@@ -278,7 +280,7 @@ def settling_ladder(scene: Scene, *, book: LawBook) -> Ladder:
         )
         return np.array([found.settling_time or 0.0])
 
-    return _ladder(
+    ladder = _ladder(
         scene,
         book,
         quantity="settling_time",
@@ -288,6 +290,10 @@ def settling_ladder(scene: Scene, *, book: LawBook) -> Ladder:
         solve=solve,
         operations=OPERATIONS,
         sets=_sets(times, laws),
+    )
+    # Whole runs are dear: what the estimates call hopeless is not tried.
+    return replace(
+        ladder, contributions={n: replace(c, rough=False) for n, c in ladder.contributions.items()}
     )
 
 

@@ -45,6 +45,7 @@ def collect(work: Work) -> Record:
     verdicts = liquid_verdicts(calibration=work.calibration)
     return {
         "bore_m": work.scene.tube.bore,
+        "decreed_k": work.scene.tube.drag_coefficient,
         "map": _map_record(found),
         "contours": {
             name: _contour(found, apparent=apparent) for name, apparent in (("k", False), ("apparent", True))
@@ -233,6 +234,7 @@ def view(evidence: Record) -> Record | None:
         "rows": rows,
         "any_needs": any(row["needs"] for row in rows),
         "any_stretched": any(row["stretched"] for row in rows),
+        "decreed": given(found["decreed_k"], "1") if found["decreed_k"] is not None else "",
         "gas": given(found["map"]["gas_pressure_Pa"], "Pa"),
         "bore": given(found["bore_m"], "m"),
         "map": map_figure(found) if found["map"]["runs"] else None,
@@ -261,6 +263,8 @@ def _lead(liquids: list[Record]) -> str:
         "too low": "too low for {}, whose velocity it makes too large",
         "nothing flows": "without meaning for {}, which do not flow here",
     }
+    if set(groups) == {"nothing flows"}:
+        return "Under the scene’s gas pressure nothing flows in this tube, so no k can be told for it."
     parts = [text.format(_series(groups[name])) for name, text in told.items() if name in groups]
     return f"In this tube, with k = 50: {'; '.join(parts)}."
 

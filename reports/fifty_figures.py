@@ -80,8 +80,8 @@ def map_figure(found: Record) -> Drawing:
         "viscosity; the line k = 50 runs from thin tubes for thin liquids to wide tubes for viscous ones.",
         caption=f"k over bore and viscosity, each point at its own operating point: equal fills, {gas}, "
         f"{density} kg/m³, all else as in the scene. Band: where k = 50 lies within its 95 % half-width. "
-        "Circles: the known liquids in this tube, with their k; open where the scene’s gas does not start "
-        f"them, then at the gas pressure of equal head.{blocked}",
+        "Circles: the known liquids in this tube, each with k at its own density; open where the scene’s gas "
+        f"does not start them, then at the gas pressure of equal head.{blocked}",
     )
 
 

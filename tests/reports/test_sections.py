@@ -99,7 +99,14 @@ def test_where_nothing_flows_the_page_says_so(evidence: Record, fifty_record: Re
     assert view is not None
     assert view["map"] is None
     assert {row["verdict"] for row in view["rows"]} == {"nothing flows"}
+    assert "no k can be told" in view["lead"]
     assert "there is no map to draw" in render({**evidence, "fifty": dry})
+
+
+def test_a_decreed_k_is_named(evidence: Record, fifty_record: Record) -> None:
+    decreed = {**fifty_record, "decreed_k": 50.0}
+    assert "The scene fixes k at 50" in render(with_section(evidence, "fifty", decreed))
+    assert "The scene fixes k" not in render(with_section(evidence, "fifty", fifty_record))
 
 
 def test_the_velocity_decides_whether_fifty_is_right() -> None:

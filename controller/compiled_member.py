@@ -122,8 +122,12 @@ def _sample(shared: Record, run: Record) -> None:
     now = noise_pair(shared, run.number, run.samples - 1)
     before = 0.0
     if run.samples > 1 and abs(run.amplitude + shared.amplitude_noise * now[0]) > shared.limit:
-        # The sample before may have been passed over: its noise is made again.
-        before = noise_pair(shared, run.number, run.samples - 2)[1]
+        if run.noise_sample == run.samples - 2:
+            before = run.noise_before
+        else:
+            # The sample before was passed over: its noise is made now.
+            before = noise_pair(shared, run.number, run.samples - 2)[1]
+    run.noise_before, run.noise_sample = now[1], run.samples - 1
     react(shared, run, now, before)
 
 

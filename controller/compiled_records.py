@@ -90,11 +90,13 @@ _RUN_REAL: Final = (
     "before_time",  # s, infinite for none
     "duration",  # s, of the first open valve
     "other_duration",  # s, of the second
+    "noise_before",  # of the phase of the last sample taken in full, in standard deviations
     "drift",  # how far liquid has run back with the gas off
     "start",  # first amplitude, m
     "settling_time",  # s, infinite when not settled
 )
 _RUN_WHOLE: Final = (
+    "noise_sample",  # its number in the run
     "number",  # of the member in the ensemble
     "pair",  # of the first open valve, -1 for none
     "first",  # whether it drives the positive side

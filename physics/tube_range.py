@@ -56,7 +56,7 @@ def range_notes(*, tube: Tube, state: TubeState, velocity: FloatArray) -> dict[s
             "rotation: laminar factor beyond Kl = 1e7 or R_Om = 1e5": ~_turbulent(laminar, unsteady)
             & untested,
             "rotation: critical Re extrapolated beyond R_Om = 2000": unsteady & (rotation > 2000),
-            "bends: formula rests on turbulent data": (laminar | unsteady) & bool(tube.bends),
+            "bends: scaled from one computed shape in laminar flow": (laminar | unsteady) & bool(tube.bends),
             "bends: angle above 180 deg or radius below d/2": np.full(re.shape, not shapes),
             "ends: tube too short for a developed laminar profile": laminar & developing,
         }

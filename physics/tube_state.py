@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,6 +41,8 @@ class TubeState:
     """F, laminar friction with rotation over that without."""
     bends: tuple[FloatArray, ...]
     """K of each bend, in order along the path."""
+    bend_half_width: FloatArray
+    """95 % half-width of their sum: one cause, so theirs add up."""
     kinetic_factor: FloatArray
     """alpha."""
     terms: Mapping[str, FloatArray]
@@ -107,18 +109,37 @@ def tube_state_at(*, tube: Tube, reynolds: npt.ArrayLike, rotation_reynolds: npt
         turbulent_ratio=turbulent_friction_ratio(reynolds=re, rotation_reynolds=rotation).value,
         critical_ratio=critical,
     )
-    bends = tuple(bend_loss(bend=b, bore=tube.bore, friction_factor=straight) for b in tube.bends)
+    bends = _bends(tube, re, rotation, critical, straight)
     return TubeState(
         reynolds=re,
         rotation_reynolds=rotation,
         critical_ratio=critical,
         straight_friction=straight,
         rotating_friction=turning,
-        bends=bends,
+        bends=tuple(k for k, _ in bends),
+        bend_half_width=np.asarray(sum((w for _, w in bends), start=np.zeros(re.shape))),
         laminar_ratio=laminar,
         kinetic_factor=kinetic_factor(reynolds=re, critical_ratio=critical, friction_ratio=laminar),
-        terms=_terms(tube, re, critical, laminar, straight, turning, bends),
+        terms=_terms(tube, re, critical, laminar, straight, turning, [k for k, _ in bends]),
     )
+
+
+def _bends(
+    tube: Tube, re: FloatArray, rotation: FloatArray, critical: FloatArray, straight: FloatArray
+) -> list[tuple[FloatArray, FloatArray]]:
+    """K and half-width of each bend; bends of one shape are evaluated once."""
+    known = {
+        bend: bend_loss(
+            bend=bend,
+            bore=tube.bore,
+            friction_factor=straight,
+            reynolds=re,
+            rotation_reynolds=rotation,
+            critical_ratio=critical,
+        )
+        for bend in set(tube.bends)
+    }
+    return [known[bend] for bend in tube.bends]
 
 
 def _terms(
@@ -128,7 +149,7 @@ def _terms(
     laminar: FloatArray,
     straight: FloatArray,
     turning: FloatArray,
-    bends: tuple[FloatArray, ...],
+    bends: Sequence[FloatArray],
 ) -> dict[str, FloatArray]:
     if tube.drag_coefficient is not None:
         return {"decree": np.full(re.shape, tube.drag_coefficient)}

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.physics.tube_bends import bend_spread, straight_length
+from ringbalance.physics.tube_bends import straight_length
 from ringbalance.physics.tube_development import developing_length, development_spread
 from ringbalance.physics.tube_ends import entrance_loss, exit_loss
 from ringbalance.physics.tube_friction import friction_factor, friction_uncertainty, turbulent_share
@@ -97,7 +97,7 @@ def model_parts(*, tube: Tube, state: TubeState) -> dict[str, FloatArray]:
         "rotation model": tube.length / tube.bore * (higher - state.rotating_friction),
         "rotation entry": _development_part(tube, state, lam.value),
         "ends": np.sqrt(sum(e**2 for e in ends)),
-        "bends": bend_spread(reynolds=re, critical_ratio=ratio) * state.terms["bends"],
+        "bends": state.bend_half_width,
     }
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.physics.rotating_section_table import ito_nanbu_laminar
-from ringbalance.physics.tube_bends import bend_loss, straight_length
+from ringbalance.physics.tube_bends import straight_length, turbulent_bend_loss
 from ringbalance.physics.tube_ends import turbulent_entrance_loss
 from ringbalance.physics.tube_friction import friction_factor
 from ringbalance.physics.tube_numbers import reynolds_number, rotation_reynolds_number
@@ -108,7 +108,7 @@ def _rotating(scene: Scene, tube: Tube, velocity: FloatArray) -> Loss:
 
 def _summed(tube: Tube, friction: FloatArray, along: FloatArray) -> Loss:
     """Entrance as in turbulent flow, bends, friction with or without rotation, extra; a turbulent profile."""
-    bends = [bend_loss(bend=b, bore=tube.bore, friction_factor=friction) for b in tube.bends]
+    bends = [turbulent_bend_loss(bend=b, bore=tube.bore, friction_factor=friction) for b in tube.bends]
     entrance = turbulent_entrance_loss(tube=tube)[0]
     share = tube.hump_position
     before = [k for i, k in enumerate(bends) if (i + 0.5) / len(bends) < share]

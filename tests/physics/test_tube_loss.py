@@ -12,6 +12,7 @@ from fluids.friction import friction_factor
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ringbalance.physics.tube_bends import bend_loss
 from ringbalance.physics.tube_loss import TubeLoss, tube_loss
 from ringbalance.physics.tube_numbers import reynolds_number, rotation_reynolds_number
 from ringbalance.scene.models import Bend, InputUncertainty, Liquid, Tube
@@ -99,9 +100,38 @@ def test_arc_friction_is_counted_once() -> None:
     tube = dataclasses.replace(TUBE, bends=(Bend(angle=math.pi, radius=20e-3),), length=math.pi * 20e-3)
     found = loss(tube, omega=0.0)
     np.testing.assert_allclose(found.terms["friction"], 0.0, atol=1e-12)
-    f = 64 / float(found.reynolds[0])
-    expected = bend_rounded(Di=tube.bore, angle=180.0, rc=20e-3, fd=f)
-    assert float(found.terms["bends"][0]) == pytest.approx(expected, rel=1e-9)
+    re, tight = float(found.reynolds[0]), tube.bore / 40e-3
+    arc = 64 / re * math.pi * 20e-3 / tube.bore
+    dean = re**2 * tight
+    excess = 1.25 * 2 * math.sqrt(tight) / 0.5 * dean / (dean + 28.0**2)
+    assert float(found.terms["bends"][0]) == pytest.approx(arc + excess, rel=1e-6)
+
+
+def test_a_turbulent_bend_is_the_librarys() -> None:
+    bend = Bend(angle=math.pi / 2, radius=3e-3)
+    k, width = bend_loss(bend=bend, bore=1.5e-3, friction_factor=0.02, reynolds=1e5)
+    expected = bend_rounded(Di=1.5e-3, angle=90.0, rc=3e-3, fd=0.02)
+    assert float(k) == pytest.approx(expected, rel=1e-3)
+    assert float(width) == pytest.approx(0.25 * expected, rel=1e-3)
+
+
+@pytest.mark.parametrize(("reynolds", "excess"), [(20, 0.18), (50, 0.55), (100, 0.94), (200, 1.14)])
+def test_a_laminar_bend_at_rest_is_that_of_the_three_dimensional_solution(
+    reynolds: float, excess: float
+) -> None:
+    f = 64 / reynolds
+    bend = Bend(angle=math.pi / 2, radius=2.0)
+    k, width = bend_loss(bend=bend, bore=1.0, friction_factor=f, reynolds=reynolds)
+    assert float(k) - f * math.pi == pytest.approx(excess, abs=0.05)
+    assert float(width) > 0.05
+
+
+@pytest.mark.parametrize("found", [-0.34, 0.30])
+def test_the_half_width_of_a_turning_bend_holds_both_senses(found: float) -> None:
+    """Re 200, R 118, by the three-dimensional solution, against and with the rotation."""
+    bend = Bend(angle=math.pi / 2, radius=2.0)
+    k, width = bend_loss(bend=bend, bore=1.0, friction_factor=0.32, reynolds=200.0, rotation_reynolds=118.0)
+    assert abs(float(k) - 0.32 * math.pi - found) < float(width)
 
 
 @given(tube=tubes, nu=viscosities, omega=speeds)

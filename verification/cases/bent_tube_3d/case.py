@@ -262,7 +262,7 @@ def _table(terms: Mapping[str, float], found: float) -> Table:
     rows = {
         "friction of the whole length": terms["friction"],
         "rotation": terms["rotation"],
-        "bends beyond the friction of their arcs, by correlation": terms["bends"],
+        "bends beyond the friction of their arcs, by the tube law": terms["bends"],
         "bends in three dimensions": found - plain,
         "bends as curvature added to rotation": terms["shift"],
     }

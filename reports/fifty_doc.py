@@ -129,7 +129,7 @@ def _crossings(found: DragMap) -> list[float | None]:
 
 
 def _bore(value: float | None) -> str:
-    return "beyond the map" if value is None else shown(value, "m", digits=2)
+    return "beyond the map" if value is None else shown(value, "m", digits=3)
 
 
 def hidden_table(apparent: Record, calibration: Calibration) -> str:

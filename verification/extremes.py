@@ -43,7 +43,7 @@ class Size:
 
 SIZES: Final[Mapping[Level, Size]] = {
     "light": Size(points=40, sweep=7, grid=5),
-    "heavy": Size(points=5000, sweep=31, grid=15),
+    "heavy": Size(points=5000, sweep=15, grid=8),
 }
 
 

@@ -106,6 +106,16 @@ AXES: Final = (
     Axis(name="noise", title="sensor noise over the limit", unit="1", low=1e-4, high=10.0, usual=(1e-3, 0.5)),
     Axis(name="period", title="controller period", unit="s", low=1e-3, high=100.0, usual=(0.05, 5.0)),
     Axis(name="tolerance", title="tolerance", unit="1", low=1e-10, high=0.1, usual=(1e-4, 0.1)),
+    Axis(
+        name="gravity",
+        title="gravity over standard gravity",
+        unit="1",
+        low=0.0,
+        high=2.0,
+        # Without gravity there is a closed form to hold the half-widths against.
+        usual=(0.0, 0.0),
+        spacing="linear",
+    ),
 )
 """What a designed set varies together, each after those that it hangs on."""
 
@@ -272,6 +282,10 @@ def _set_tolerance(document: Document, value: float, _: Scene) -> None:
     document["accuracy"] = {"tolerance": f"{100 * value!r} %"}
 
 
+def _set_gravity(document: Document, value: float, _: Scene) -> None:
+    document["environment"] = {**document.get("environment", {}), "gravity": f"{9.80665 * value!r} m/s^2"}
+
+
 def _later(_: Document, __: float, ___: Scene) -> None:
     """What hangs on other values is set when those are known."""
 
@@ -290,4 +304,5 @@ _SETTERS: Final = {
     "noise": _later,
     "period": _set_period,
     "tolerance": _set_tolerance,
+    "gravity": _set_gravity,
 }

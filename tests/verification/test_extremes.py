@@ -77,6 +77,7 @@ def test_each_axis_sets_what_it_says(document: dict[str, Any], paper_scene: Scen
         pressure=1.5,
         period=0.7,
         tolerance=1e-3,
+        gravity=0.5,
     )
     closing = paper_scene.disc.inner_radius * np.sin(np.radians(50))
     column = 1000 * scene.rotor.speed**2 * (44.5e-3**2 - 31.5e-3**2) / 2
@@ -88,6 +89,7 @@ def test_each_axis_sets_what_it_says(document: dict[str, Any], paper_scene: Scen
     assert scene.liquid.density == pytest.approx(paper_scene.liquid.density)
     assert (scene.tube.bore, scene.tube.roughness) == (pytest.approx(2e-3), pytest.approx(2e-5))
     assert scene.gas.pressure == pytest.approx(1.5 * column)
+    assert scene.environment.gravity == pytest.approx(0.5 * 9.80665)
     assert (scene.controller.period, scene.tolerance) == (pytest.approx(0.7), pytest.approx(1e-3))
 
 

@@ -28,8 +28,10 @@ Progress = Callable[[int, int], None]
 
 USUAL_SHARE: Final = 0.75
 """Of the coordinates, drawn from where most discs are; else all but a few points would be refused."""
-PERIODS: Final = 8
+PERIODS: Final = 6
 """Of the controller that a point's closed loop may take."""
+GAS_TIME: Final = 0.2
+"""s, beyond those: a short period with long gas times is no reason for hundreds of operations."""
 CHUNK: Final = 20
 
 
@@ -82,7 +84,7 @@ def judge(base: Base, point: Point) -> Judgement:
     scene = _made(base.document, base.file)
     document = varied(base.document, scene=scene, values=point)
     period = point.get("period", scene.controller.period)
-    longest = max(PERIODS * period, 2 * scene.controller.maximum_gas_time)
+    longest = PERIODS * period + GAS_TIME
     document["run"] = {**document.get("run", {}), "time_limit": f"{longest!r} s"}
     try:
         document = fitted(document, scene=scene, made=_made(document, base.file), values=point)

@@ -100,6 +100,8 @@ class _Run:
         self.ran_back = 0.0
         self.torn = self._separated(self.state)
         self.tears = 0
+        self.started = fill
+        self.balanced = False
 
     def _gas_states(self, fill: float, motion: Motion) -> list[float]:
         """Pressure and content of either gas."""
@@ -254,7 +256,7 @@ class _Run:
     def _start(self, state: FloatArray, found: Steady) -> int:
         """Direction in which resting liquid starts to flow; zero for none."""
         direction = int(np.sign(found.velocity))
-        if direction == 0 or self._limit(float(state[0]), direction) is not None:
+        if direction == 0 or self.balanced or self._limit(float(state[0]), direction) is not None:
             return 0
         if not self.dynamics.inertia:
             return direction
@@ -303,12 +305,15 @@ class _Run:
         if self.direction:
             self.primed = True
             self.length = FIRST_STEP
+            self.started = float(self.state[0])
             self.torn = self._separated(self.state)
             self._note(Event.NONE, self.direction)
 
     def _stop(self, event: Event) -> None:
         """At rest: at a limit exactly, and with a column only where the law has one."""
         self._note(event, self.direction)
+        # A start that moved nothing will move nothing again, until a valve or a gas pressure does.
+        self.balanced = self.dynamics.line is None and float(self.state[0]) == self.started
         if event in {Event.EMPTY, Event.FULL}:
             self.state[0] = self.lowest if self.direction > 0 else self.highest
         fills, gases = self._seen(self.state)
@@ -324,6 +329,7 @@ class _Run:
         """The next pending valve moves."""
         switch = self.pending.pop(0)
         self.valves[switch.chamber] = switch.opens
+        self.balanced = False
         if self.direction and not self.dynamics.inertia:
             self._note_regime()
             self.primed = self._found(self.state, primed=True).primed

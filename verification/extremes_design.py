@@ -81,7 +81,7 @@ def judge(base: Base, point: Point) -> Judgement:
     Returns:
         Judgement.
     """
-    scene = _made(base.document, base.file)
+    scene = made_of(base)
     document = varied(base.document, scene=scene, values=point)
     period = point.get("period", scene.controller.period)
     longest = PERIODS * period + GAS_TIME
@@ -91,6 +91,21 @@ def judge(base: Base, point: Point) -> Judgement:
     except SceneError as error:
         return refusal(error)
     return judge_point(document, file=base.file, defect=base.defect)
+
+
+def made_of(base: Base) -> Scene:
+    """The scene itself, before anything is varied.
+
+    Args:
+        base: the scene.
+
+    Returns:
+        Scene.
+
+    Raises:
+        SceneError: the document is no liquid-ring scene.
+    """
+    return _made(base.document, base.file)
 
 
 def _made(document: Mapping[str, Any], file: str) -> Scene:

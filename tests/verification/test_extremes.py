@@ -20,6 +20,7 @@ from ringbalance.verification.extremes import Size, broken, extremes_document, f
 from ringbalance.verification.extremes_axes import AXES, axis_of, fitted, toml_bytes, varied
 from ringbalance.verification.extremes_design import CHUNK, Base, Point, design, judge, judged
 from ringbalance.verification.extremes_maps import Sweep
+from ringbalance.verification.extremes_numerics import at_aspect, at_step
 from ringbalance.verification.extremes_point import Defect, Ending, Judgement, judge_point
 
 
@@ -183,7 +184,7 @@ def test_everything_is_told(base: Base, counting: list[Point]) -> None:
     size = Size(points=10, sweep=5, grid=3)
     found = find_extremes(base, size=size)
     told = extremes_document(found)
-    assert len(counting) == told["judged"] == 10 + 5 * len(AXES) + 9 * len(found.maps)
+    assert len(counting) == told["judged"] - 2 * 5 == 10 + 5 * len(AXES) + 9 * len(found.maps)
     assert broken(found) == 0
     assert sum(told["endings"].values()) == told["judged"]
     json.dumps(told, allow_nan=False)
@@ -209,3 +210,19 @@ def test_a_few_designed_points_hold(base: Base) -> None:
     for point in design(count=4, seed=1):
         found = judge(base, point)
         assert found.violations == (), (found.text, dict(point))
+
+
+def test_cells_of_any_aspect_ratio_hold_until_a_mesh_gives_out(paper_scene: Scene) -> None:
+    found = [at_aspect(paper_scene, aspect) for aspect in (1.0, 1e3, 1e6, 1e12)]
+    assert [j.ending for j in found] == [Ending.SOLVED] * 3 + [Ending.REFUSED]
+    assert all(0 <= j.worst_ratio <= 1 and j.residual < 1e-10 for j in found[:3])
+    assert "shallower" in found[3].text
+
+
+def test_segments_of_any_length_keep_their_bound(paper_scene: Scene) -> None:
+    found = {step: at_step(paper_scene, step) for step in (1e-7, 1e-3, 0.5, 100.0)}
+    assert all(j.violations == () for j in found.values())
+    assert found[1e-3].ending is Ending.SOLVED
+    assert found[0.5].ending is Ending.STATUS
+    # Of first order: a segment that is the whole operation errs by about half its own change of rate.
+    assert 0.01 < found[0.5].worst_ratio < 0.5

@@ -29,6 +29,8 @@ FIRST_STEP: Final = 1e-6
 """s."""
 MAX_STEPS: Final = 200_000
 BISECTIONS: Final = 48
+NOTHING_MOVED: Final = 1e-13
+"""Fill ratio below which a start has come to nothing but round-off."""
 MOST_TEARS: Final = 16
 """Crossings of the edge of tearing, within one stretch, that are found to the instant."""
 AT_REST: Final = 1e-6
@@ -313,7 +315,8 @@ class _Run:
         """At rest: at a limit exactly, and with a column only where the law has one."""
         self._note(event, self.direction)
         # A start that moved nothing will move nothing again, until a valve or a gas pressure does.
-        self.balanced = self.dynamics.line is None and float(self.state[0]) == self.started
+        moved = abs(float(self.state[0]) - self.started)
+        self.balanced = self.dynamics.line is None and moved < NOTHING_MOVED
         if event in {Event.EMPTY, Event.FULL}:
             self.state[0] = self.lowest if self.direction > 0 else self.highest
         fills, gases = self._seen(self.state)

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from fluids.fittings import bend_rounded
 
+from ringbalance.physics.bent_tube_terms import MOMENTUM_FACTOR
 from ringbalance.physics.tube_friction import turbulent_share
 from ringbalance.physics.tube_rotation import rotating_friction_ratio
 from ringbalance.scene.models import Bend, Tube
@@ -77,7 +78,7 @@ def _laminar_excess(
 ) -> tuple[FloatArray, FloatArray]:
     """What a laminar bend adds to the friction of its arc, mean over its senses of turning; half-width."""
     tight = bore / (2 * bend.radius)
-    dean, shift = re * math.sqrt(tight), 4 / 3 * re * tight
+    dean, shift = re * math.sqrt(tight), MOMENTUM_FACTOR * re * tight
     shape = bend.angle / (math.pi / 2) * math.sqrt(tight) / 0.5
     rest = LARGEST_EXCESS * shape * dean**2 / (dean**2 + HALF_WAY_DEAN**2)
     more, less = (

@@ -14,7 +14,7 @@ import numpy as np
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.verification.evidence import Level
-from ringbalance.verification.extremes_design import Base, Point, design, judged, made_of
+from ringbalance.verification.extremes_design import Base, Point, design, judged
 from ringbalance.verification.extremes_maps import StabilityMap, Sweep, stability_maps, sweeps
 from ringbalance.verification.extremes_numerics import numerical_sweeps
 from ringbalance.verification.extremes_point import Ending, Judgement
@@ -113,7 +113,7 @@ def find_extremes(
         points=points,
         sweeps=(
             *sweeps(base, count=size.sweep, workers=workers, progress=told("axes")),
-            *numerical_sweeps(made_of(base), count=size.sweep),
+            *numerical_sweeps(base.scene, count=size.sweep),
         ),
         maps=stability_maps(base, count=size.grid, workers=workers, progress=told("maps")),
         judgements=judged(base, points, workers=workers, progress=told("designed set"), kept=kept),

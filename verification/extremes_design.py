@@ -7,7 +7,7 @@ import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
-from functools import partial
+from functools import cached_property, partial
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Final
@@ -43,6 +43,11 @@ class Base:
     """Of its file."""
     file: str
     defect: Defect = SOUND
+
+    @cached_property
+    def scene(self) -> Scene:
+        """The scene itself, before anything is varied; read once for all points."""
+        return _made(self.document, self.file)
 
 
 def design(*, count: int, seed: int) -> tuple[Point, ...]:
@@ -81,7 +86,7 @@ def judge(base: Base, point: Point) -> Judgement:
     Returns:
         Judgement.
     """
-    scene = made_of(base)
+    scene = base.scene
     document = varied(base.document, scene=scene, values=point)
     period = point.get("period", scene.controller.period)
     longest = PERIODS * period + GAS_TIME
@@ -91,21 +96,6 @@ def judge(base: Base, point: Point) -> Judgement:
     except SceneError as error:
         return refusal(error)
     return judge_point(document, file=base.file, defect=base.defect)
-
-
-def made_of(base: Base) -> Scene:
-    """The scene itself, before anything is varied.
-
-    Args:
-        base: the scene.
-
-    Returns:
-        Scene.
-
-    Raises:
-        SceneError: the document is no liquid-ring scene.
-    """
-    return _made(base.document, base.file)
 
 
 def _made(document: Mapping[str, Any], file: str) -> Scene:

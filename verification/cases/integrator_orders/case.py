@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -16,11 +16,11 @@ from ringbalance.controller.closed_form import closed_form
 from ringbalance.controller.explicit_segments import explicit_segments
 from ringbalance.controller.quadrature import quadrature
 from ringbalance.controller.transfer import Drive
-from ringbalance.reduced_model.flow_law import Flow
 from ringbalance.reduced_model.paper import stall_pressure
 from ringbalance.reduced_model.paper_law import PaperLaw, paper_law
 from ringbalance.scene.models import Scene
 from ringbalance.verification.cases.integrator_orders.side_by_side import side_by_side, tapered_error
+from ringbalance.verification.cases.integrator_orders.slowed_law import SlowedLaw
 from ringbalance.verification.cases.integrator_orders.stall import stall_study
 from ringbalance.verification.evidence import Convergence, Evidence, Found, Level, Reference
 from ringbalance.verification.orders import OrderStudy, order_study
@@ -37,40 +37,9 @@ _KINK: Final = 0.6
 """Fill, in units of the largest, below which the kinked law slows down."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class _KinkedLaw:
-    """The paper's law, slower in proportion to the fill once that is below a kink; continuous, not smooth."""
-
-    base: PaperLaw
-
-    @property
-    def name(self) -> str:
-        return "kinked"
-
-    @property
-    def max_fill_ratio(self) -> float:
-        return self.base.max_fill_ratio
-
-    def evaluate(
-        self,
-        *,
-        fill_ratio: npt.ArrayLike,
-        opposite_fill_ratio: npt.ArrayLike | None = None,
-        gas_pressure: npt.ArrayLike,
-        primed: npt.ArrayLike = False,
-    ) -> Flow:
-        flow = self.base.evaluate(
-            fill_ratio=fill_ratio,
-            opposite_fill_ratio=opposite_fill_ratio,
-            gas_pressure=gas_pressure,
-            primed=primed,
-        )
-        kink = _KINK * self.max_fill_ratio
-        slowing = np.minimum(1.0, 0.5 + 0.5 * np.asarray(fill_ratio) / kink)
-        return replace(flow, velocity=flow.velocity * slowing)
-
-    def table(self) -> Mapping[str, FloatArray]:
-        return self.base.table()
+def _kinked(fill_ratio: FloatArray, largest: float) -> FloatArray:
+    """Slower in proportion to the fill once that is below a kink; continuous, not smooth."""
+    return np.asarray(np.minimum(1.0, 0.5 + 0.5 * fill_ratio / (_KINK * largest)))
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
@@ -191,6 +160,6 @@ def _explicit(drive: Drive, duration: float, *, frozen: bool) -> OrderStudy:
 
 
 def _kinked_difference(law: PaperLaw, drive: Drive, duration: float) -> float:
-    kinked = replace(drive, law=_KinkedLaw(base=law))
+    kinked = replace(drive, law=SlowedLaw(name="kinked", base=law, share=_kinked))
     t = np.linspace(0, duration, 21)[1:]
     return float(np.max(np.abs(quadrature(kinked, t).fill - adaptive_ode(tolerance=1e-11)(kinked, t).fill)))

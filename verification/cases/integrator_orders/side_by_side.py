@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -15,8 +15,8 @@ from ringbalance.controller.closed_form import closed_form
 from ringbalance.controller.explicit_segments import explicit_segments
 from ringbalance.controller.quadrature import quadrature
 from ringbalance.controller.transfer import Drive, Integrator
-from ringbalance.reduced_model.flow_law import Flow
 from ringbalance.reduced_model.paper_law import PaperLaw
+from ringbalance.verification.cases.integrator_orders.slowed_law import SlowedLaw
 from ringbalance.verification.evidence import Table
 
 FloatArray = npt.NDArray[np.float64]
@@ -33,57 +33,9 @@ WAYS: Final[Mapping[str, Integrator]] = {
 }
 
 
-@dataclass(frozen=True, kw_only=True)
-class TaperedLaw:
-    """The paper's velocity times (1 + x/x_max)/2: smooth, and with an exact solution of its own."""
-
-    base: PaperLaw
-
-    @property
-    def name(self) -> str:
-        """ "tapered"."""
-        return "tapered"
-
-    @property
-    def max_fill_ratio(self) -> float:
-        """Of the paper's law."""
-        return self.base.max_fill_ratio
-
-    def evaluate(
-        self,
-        *,
-        fill_ratio: npt.ArrayLike,
-        opposite_fill_ratio: npt.ArrayLike | None = None,
-        gas_pressure: npt.ArrayLike,
-        primed: npt.ArrayLike = False,
-    ) -> Flow:
-        """As the paper's law, slower the emptier the driven chamber.
-
-        Args:
-            fill_ratio: x of the driven chamber, any shape.
-            opposite_fill_ratio: of the opposite one.
-            gas_pressure: gauge, Pa.
-            primed: not used.
-
-        Returns:
-            Flow.
-        """
-        flow = self.base.evaluate(
-            fill_ratio=fill_ratio,
-            opposite_fill_ratio=opposite_fill_ratio,
-            gas_pressure=gas_pressure,
-            primed=primed,
-        )
-        share = (1 + np.asarray(fill_ratio) / self.max_fill_ratio) / 2
-        return replace(flow, velocity=flow.velocity * share)
-
-    def table(self) -> Mapping[str, FloatArray]:
-        """Of the paper's law.
-
-        Returns:
-            Its arrays.
-        """
-        return self.base.table()
+def _tapered(fill_ratio: FloatArray, largest: float) -> FloatArray:
+    """Smooth, and with an exact solution of its own."""
+    return np.asarray((1 + fill_ratio / largest) / 2)
 
 
 def tapered_fill(drive: Drive, law: PaperLaw, time: FloatArray) -> FloatArray:
@@ -121,7 +73,7 @@ def tapered_error(drive: Drive, law: PaperLaw, time: FloatArray, way: Integrator
     Returns:
         In fill.
     """
-    found = way(replace(drive, law=TaperedLaw(base=law)), time).fill
+    found = way(replace(drive, law=SlowedLaw(name="tapered", base=law, share=_tapered)), time).fill
     return float(np.max(np.abs(found - tapered_fill(drive, law, time))))
 
 

@@ -1,0 +1,65 @@
+"""A law to try integrators on: the paper's velocity times a share that depends on the fill."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.reduced_model.flow_law import Flow
+from ringbalance.reduced_model.paper_law import PaperLaw
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlowedLaw:
+    """The paper's law, slower in the share of its velocity that a function of the fill gives."""
+
+    name: str
+    base: PaperLaw
+    share: Callable[[FloatArray, float], FloatArray]
+    """From x of the driven chamber and the largest x."""
+
+    @property
+    def max_fill_ratio(self) -> float:
+        """Of the paper's law."""
+        return self.base.max_fill_ratio
+
+    def evaluate(
+        self,
+        *,
+        fill_ratio: npt.ArrayLike,
+        opposite_fill_ratio: npt.ArrayLike | None = None,
+        gas_pressure: npt.ArrayLike,
+        primed: npt.ArrayLike = False,
+    ) -> Flow:
+        """As the paper's law, slowed.
+
+        Args:
+            fill_ratio: x of the driven chamber, any shape.
+            opposite_fill_ratio: of the opposite one.
+            gas_pressure: gauge, Pa.
+            primed: not used.
+
+        Returns:
+            Flow.
+        """
+        flow = self.base.evaluate(
+            fill_ratio=fill_ratio,
+            opposite_fill_ratio=opposite_fill_ratio,
+            gas_pressure=gas_pressure,
+            primed=primed,
+        )
+        share = self.share(np.asarray(fill_ratio, dtype=np.float64), self.max_fill_ratio)
+        return replace(flow, velocity=flow.velocity * share)
+
+    def table(self) -> Mapping[str, FloatArray]:
+        """Of the paper's law.
+
+        Returns:
+            Its arrays.
+        """
+        return self.base.table()

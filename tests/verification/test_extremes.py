@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ringbalance.reduced_model.calibration import Calibration, calibrate
 from ringbalance.scene import bundled_scene
 from ringbalance.scene.loader import scene_from
 from ringbalance.scene.models import Scene
@@ -136,6 +137,47 @@ def test_half_widths_too_small_and_lost_liquid_are_noticed(document: dict[str, A
     assert narrow.ending is leaking.ending is Ending.BROKEN
     assert "half-width" in narrow.violations[0]
     assert "not conserved" in leaking.violations[0]
+
+
+@pytest.fixture(scope="module")
+def calibration(paper_scene: Scene) -> Calibration:
+    return calibrate(paper_scene)
+
+
+def faults(calibration: Calibration, **changes: Any) -> str:
+    return " ".join(extremes_point._calibration_faults(replace(calibration, **changes), 0.5))
+
+
+def test_a_sound_calibration_has_no_faults(calibration: Calibration) -> None:
+    assert faults(calibration) == ""
+
+
+def test_a_head_that_falls_with_the_velocity_is_noticed(calibration: Calibration) -> None:
+    tube = calibration.tube
+    falling = replace(tube.k, value=tube.k.value / tube.reynolds**3 - 1)
+    assert "head" in faults(calibration, tube=replace(tube, k=falling))
+
+
+@pytest.mark.parametrize(("name", "told"), [("wall_pressure", "wall pressure"), ("moment", "moment")])
+def test_a_chamber_quantity_that_does_not_grow_is_noticed(
+    calibration: Calibration, name: str, told: str
+) -> None:
+    curve = getattr(calibration.chamber, name)
+    spoiled = replace(calibration.chamber, **{name: replace(curve, value=-curve.value)})
+    assert f"the {told} does not grow" in faults(calibration, chamber=spoiled)
+
+
+def test_a_velocity_that_falls_with_the_pressure_is_noticed(
+    calibration: Calibration, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sound = type(calibration.flow_law).evaluate
+
+    def backwards(law: Any, **state: Any) -> Any:
+        flow = sound(law, **state)
+        return replace(flow, velocity=-flow.velocity)
+
+    monkeypatch.setattr(type(calibration.flow_law), "evaluate", backwards)
+    assert "the velocity falls" in " ".join(extremes_point._law_faults(calibration))
 
 
 def test_an_exception_is_a_finding(document: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:

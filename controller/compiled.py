@@ -17,6 +17,8 @@ from typing import Any, Final, ParamSpec, TypeVar, cast
 
 import numba
 
+from ringbalance.scene.files import cache_folder
+
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -62,8 +64,8 @@ def _kept_in(folder: Path) -> Iterator[None]:
 @cache
 def _folder() -> Path:
     """The user's folder for what can be made again, unless numba has been given one."""
-    home = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(home) / "ringbalance" / _digest()
+    given = os.environ.get("NUMBA_CACHE_DIR")
+    return (Path(given) / "ringbalance" if given else cache_folder()) / _digest()
 
 
 def _digest() -> str:

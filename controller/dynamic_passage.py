@@ -17,18 +17,17 @@ import numpy.typing as npt
 
 from ringbalance.controller.dynamic_column import Steady
 from ringbalance.controller.dynamic_motion import Dynamics, Motion, Two
-from ringbalance.controller.dynamic_steps import next_length, step
+from ringbalance.controller.dynamic_steps import RELATIVE_ERROR, Stepper, Taken
 from ringbalance.controller.transfer import Event
 from ringbalance.reduced_model.flow_law import Regime
 
 FloatArray = npt.NDArray[np.float64]
 
-RELATIVE_ERROR: Final = 1e-9
-"""Of each state, allowed to one step."""
-FIRST_STEP: Final = 1e-6
-"""s."""
 MAX_STEPS: Final = 200_000
 BISECTIONS: Final = 48
+LITTLE_MOVED: Final = 1e-9
+"""Fill ratio, ten times the error allowed to a step, below which a flow that ends either was the last swing
+of a column about its balance, or never ended: a creep, cut off by the explicit steps' error in velocity."""
 NOTHING_MOVED: Final = 1e-13
 """Fill ratio below which a start has come to nothing but round-off."""
 MOST_TEARS: Final = 16
@@ -95,15 +94,14 @@ class _Run:
         self.state = np.array(
             [fill, motion.velocity, *self._gas_states(fill, motion), 0.0, 0.0], dtype=np.float64
         )
-        self.allowed = self._allowed_errors()
         self.time = 0.0
-        self.length = FIRST_STEP
-        self.steps = 0
+        self.stepper = self._new_stepper()
         self.ran_back = 0.0
         self.torn = self._separated(self.state)
         self.tears = 0
         self.started = fill
         self.balanced = False
+        self.stopped = 0
 
     def _gas_states(self, fill: float, motion: Motion) -> list[float]:
         """Pressure and content of either gas."""
@@ -114,12 +112,16 @@ class _Run:
         (p, q), (m, n) = motion.gases, contents
         return [p + ambient, m, q + ambient, n]
 
-    def _allowed_errors(self) -> FloatArray:
-        """Absolute, of each state; the works are integrals of the others and ask for nothing."""
+    def _new_stepper(self) -> Stepper:
+        """With errors allowed to each state; the works are integrals of the others and ask for nothing."""
         pressure = self.dynamics.gas_pressure + self.dynamics.ambient_pressure
         share = RELATIVE_ERROR / 10
         gas = [share * pressure, share * self.state[3], share * pressure, share * self.state[5]]
-        return np.array([share, 1e2 * share, *gas, np.inf, np.inf])
+        return Stepper(
+            rates=self._rates,
+            allowed=np.array([share, 1e2 * share, *gas, np.inf, np.inf]),
+            integral_error=share * pressure * self.dynamics.chamber_volume,
+        )
 
     def until(self, stop: float) -> None:
         """To an instant, through the valves' movements on the way."""
@@ -181,7 +183,7 @@ class _Run:
     def _march(self, stop: float) -> None:
         while self.time < stop:
             self._settle()
-            if self.steps >= MAX_STEPS:
+            if self.stepper.steps >= MAX_STEPS:
                 self.record = replace(self.record, event=Event.UNFINISHED)
                 self.time = stop
             elif self._quiet():
@@ -191,19 +193,11 @@ class _Run:
 
     def _step(self, stop: float) -> None:
         """One accepted step, cut at the first event within it."""
-        while True:
-            self.steps += 1
-            length = min(self.length, stop - self.time)
-            end, error = step(self._rates, self.state, length)
-            relative = float(np.max(np.abs(error) / (self.allowed + RELATIVE_ERROR * np.abs(self.state))))
-            if relative <= 1 or self.steps >= MAX_STEPS or length < 1e-15:
-                break
-            self.length = next_length(length, relative if np.isfinite(relative) else 1e6)
-        last = length == stop - self.time
-        if not last or relative > 0.1:
-            self.length = next_length(length, relative)
+        taken = self.stepper.take(self.state, time=self.time, stop=stop, most=MAX_STEPS)
+        end, length = taken.end, taken.length
+        last = self.time + length >= stop
         if self._changes(end):
-            end, length = self._first_change(end, length)
+            end, length = self._first_change(taken)
             last = False
         self._ran_back(float(end[0] - self.state[0]))
         self.state = end
@@ -212,17 +206,17 @@ class _Run:
         self.torn = torn
         self.time = stop if last else self.time + length
 
-    def _first_change(self, end: FloatArray, length: float) -> tuple[FloatArray, float]:
+    def _first_change(self, taken: Taken) -> tuple[FloatArray, float]:
         """State and time just behind the event, by bisection of the step's length."""
-        low, high = 0.0, 1.0
+        low, high, end = 0.0, 1.0, taken.end
         for _ in range(BISECTIONS):
             middle = (low + high) / 2
-            found, _ = step(self._rates, self.state, middle * length)
+            found = taken.within(middle)
             if self._changes(found):
                 high, end = middle, found
             else:
                 low = middle
-        return end, high * length
+        return end, high * taken.length
 
     def _ran_back(self, change: float) -> None:
         driven = 1 if self.record.chamber == 0 else -1
@@ -306,7 +300,7 @@ class _Run:
         self.direction = self._start(self.state, found)
         if self.direction:
             self.primed = True
-            self.length = FIRST_STEP
+            self.stepper.begin_anew()
             self.started = float(self.state[0])
             self.torn = self._separated(self.state)
             self._note(Event.NONE, self.direction)
@@ -314,9 +308,7 @@ class _Run:
     def _stop(self, event: Event) -> None:
         """At rest: at a limit exactly, and with a column only where the law has one."""
         self._note(event, self.direction)
-        # A start that moved nothing will move nothing again, until a valve or a gas pressure does.
-        moved = abs(float(self.state[0]) - self.started)
-        self.balanced = self.dynamics.line is None and moved < NOTHING_MOVED
+        self._weigh(abs(float(self.state[0]) - self.started))
         if event in {Event.EMPTY, Event.FULL}:
             self.state[0] = self.lowest if self.direction > 0 else self.highest
         fills, gases = self._seen(self.state)
@@ -326,13 +318,24 @@ class _Run:
         self.primed = not gone and self._found(self.state, primed=True).primed
         self.state[1] = 0.0
         self.direction = 0
-        self.length = FIRST_STEP
+        self.stepper.begin_anew()
+
+    def _weigh(self, moved: float) -> None:
+        """Whether the next start can be more than round-off, and whether it asks for implicit steps."""
+        stiff = self.stepper.taken_as_stiff
+        creeping = self.stopped != -self.direction and not stiff
+        still = moved < (NOTHING_MOVED if creeping else LITTLE_MOVED)
+        # A start that moved nothing will move nothing again, until a valve or a gas pressure does.
+        self.balanced = self.dynamics.line is None and still
+        self.stepper.take_as_stiff(stiff or (creeping and moved < LITTLE_MOVED))
+        self.stopped = self.direction
 
     def _flip(self) -> None:
         """The next pending valve moves."""
         switch = self.pending.pop(0)
         self.valves[switch.chamber] = switch.opens
-        self.balanced = False
+        self.balanced, self.stopped = False, 0
+        self.stepper.take_as_stiff(False)
         if self.direction and not self.dynamics.inertia:
             self._note_regime()
             self.primed = self._found(self.state, primed=True).primed
@@ -340,7 +343,7 @@ class _Run:
         if self.dynamics.line is None:
             pressure = self.dynamics.gas_pressure if switch.opens else 0.0
             self.state[2 + 2 * switch.chamber] = self.dynamics.ambient_pressure + pressure
-        self.length = FIRST_STEP
+        self.stepper.begin_anew()
 
     def _quiet(self) -> bool:
         """Whether nothing changes any more until a valve moves: then the gases are put to their ends."""

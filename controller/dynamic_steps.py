@@ -1,12 +1,19 @@
-"""An embedded Runge-Kutta step of order 5 with its error estimate of order 4, for a handful of states."""
+"""Steps in time for a handful of states, explicit while that serves, implicit where friction makes it stiff.
+
+The explicit step is an embedded Runge-Kutta step of order 5 with its error estimate of order 4.  A very
+viscous liquid in a narrow tube answers in microseconds while the levels shift for minutes; there an implicit
+method of the same order takes over.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
+from scipy.integrate import Radau
 
 FloatArray = npt.NDArray[np.float64]
 Rates = Callable[[FloatArray], list[float]]
@@ -27,6 +34,14 @@ ESTIMATE: Final = np.array([-71 / 57600, 0, 71 / 16695, -71 / 1920, 17253 / 3392
 SAFETY: Final = 0.9
 SHRINK: Final = 0.2
 GROW: Final = 5.0
+RELATIVE_ERROR: Final = 1e-9
+"""Of each state, allowed to one step."""
+FIRST_STEP: Final = 1e-6
+"""s."""
+SHORTEST_STEP: Final = 1e-15
+"""s, below which no error is looked at."""
+STIFF_AFTER: Final = 300
+"""Explicit steps since the rates last jumped, after which the implicit method goes on."""
 
 
 def step(rates: Rates, state: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
@@ -63,3 +78,104 @@ def next_length(length: float, error: float) -> float:
     """
     factor = GROW if error == 0 else SAFETY * error**-0.2
     return length * min(max(factor, SHRINK), GROW)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Taken:
+    """One accepted step."""
+
+    end: FloatArray
+    """States, shape (m,)."""
+    length: float
+    """s."""
+    within: Callable[[float], FloatArray]
+    """States at a share of the way through it."""
+
+
+class Stepper:
+    """Takes steps, and remembers how long the next may be; lives as long as one march through time."""
+
+    def __init__(self, *, rates: Rates, allowed: FloatArray, integral_error: float) -> None:
+        """Begin with short explicit steps.
+
+        Args:
+            rates: of the states.
+            allowed: absolute error of each state in one step, shape (m,); infinite for mere integrals.
+            integral_error: absolute error of those under the implicit method, which needs one for all.
+        """
+        self.steps = 0
+        self._rates = rates
+        self._allowed = allowed
+        self._held = np.where(np.isinf(allowed), integral_error, allowed)
+        self._length = FIRST_STEP
+        self._since = 0
+        self._stiff = False
+        self._method: Radau | None = None
+
+    def begin_anew(self) -> None:
+        """The rates have jumped: go on with short steps."""
+        self._length, self._since, self._method = FIRST_STEP, 0, None
+
+    def take_as_stiff(self, stiff: bool) -> None:
+        """Choose the implicit method from the first step on, or no longer.
+
+        Args:
+            stiff: whether to.
+        """
+        self._stiff, self._method = stiff, None
+
+    @property
+    def taken_as_stiff(self) -> bool:
+        """Whether the implicit method is used from the first step on."""
+        return self._stiff
+
+    def take(self, state: FloatArray, *, time: float, stop: float, most: int) -> Taken:
+        """One step from a state.
+
+        Args:
+            state: shape (m,).
+            time: s.
+            stop: s, which is not stepped over.
+            most: number of steps from which on one is accepted whatever its error.
+
+        Returns:
+            Taken.
+        """
+        self._since += 1
+        if self._stiff or self._since > STIFF_AFTER:
+            found = self._implicit(state, time, stop)
+            if found is not None:
+                return found
+        return self._explicit(state, time, stop, most)
+
+    def _explicit(self, state: FloatArray, time: float, stop: float, most: int) -> Taken:
+        while True:
+            self.steps += 1
+            length = min(self._length, stop - time)
+            end, error = step(self._rates, state, length)
+            relative = float(np.max(np.abs(error) / (self._allowed + RELATIVE_ERROR * np.abs(state))))
+            if relative <= 1 or self.steps >= most or length < SHORTEST_STEP:
+                break
+            self._length = next_length(length, relative if np.isfinite(relative) else 1e6)
+        if length < stop - time or relative > 0.1:
+            self._length = next_length(length, relative)
+        return Taken(end=end, length=length, within=lambda share: step(self._rates, state, share * length)[0])
+
+    def _implicit(self, state: FloatArray, time: float, stop: float) -> Taken | None:
+        """None where it finds no step, as at a jump of the rates."""
+        self.steps += 1
+        method = self._method
+        if method is None or method.t_bound != stop or method.t != time:
+            method = self._method = self._from(state, time, stop)
+        method.step()
+        if method.status == "failed":
+            self._method = None
+            return None
+        dense, length = method.dense_output(), float(method.t) - time
+        return Taken(
+            end=method.y, length=length, within=lambda share: np.asarray(dense(time + share * length))
+        )
+
+    def _from(self, state: FloatArray, time: float, stop: float) -> Radau:
+        rates = self._rates
+        return Radau(lambda _, y: rates(y), time, state, stop, rtol=RELATIVE_ERROR, atol=self._held)

@@ -27,7 +27,8 @@ _COLOURS: Final = {
     Ending.REFUSED: (MUTED, 0.18),
     Ending.BROKEN: (PAPER, 1.0),
 }
-_SETTLED: Final = "settled"
+_SETTLED: Final = ("settled",)
+_UNSTABLE: Final = ("diverging", "drifting")
 _LEGEND: Final = 0.42
 """Inches above a map for its legend."""
 
@@ -70,33 +71,57 @@ def _rows(columns: Record) -> list[Record]:
     rows = []
     for index, title in enumerate(columns["axis"]):
         unit = "" if columns["unit"][index] == "1" else f" {columns['unit'][index]}"
-
-        def span(kind: str, at: int = index, symbol: str = unit) -> str:
-            low, high = (float(columns[f"{kind} {end}"][at]) for end in ("from", "to"))
-            return f"{number(low, digits=2)} to {number(high, digits=2)}{symbol}"
-
+        again = index > 0 and columns["axis"][index - 1] == title
+        ends = float(columns["from"][index]), float(columns["to"][index])
         rows.append(
             {
-                "title": title,
-                "tried": span("tried"),
-                "answered": span("answered"),
-                "beyond": typeset(shortened([str(columns["beyond"][index])])),
+                "title": "" if again else title,
+                "span": span_text(ends, unit),
+                "ending": outcome_text(str(columns["ending"][index]), str(columns["loop"][index])),
+                "said": typeset(shortened([str(columns["said"][index])])),
             }
         )
     return rows
 
 
+def span_text(ends: tuple[float, float], unit: str) -> str:
+    """First and last value of a stretch.
+
+    Args:
+        ends: the two.
+        unit: with a space before it; empty for none.
+
+    Returns:
+        "1 to 160 rpm", or one value where both are the same.
+    """
+    low, high = (number(end, digits=3) for end in ends)
+    return f"{low}{unit}" if low == high else f"{low} to {high}{unit}"
+
+
+def outcome_text(ending: str, loop: str) -> str:
+    """How points end along a stretch, in words.
+
+    Args:
+        ending: of calibration.
+        loop: outcome of the closed loop; empty where there is none.
+
+    Returns:
+        "solved; loop: settled", or the ending alone.
+    """
+    return f"{ending}; loop: {loop.replace('_', ' ')}" if loop else ending
+
+
 def shortened(messages: Sequence[str]) -> str:
-    """The first message past an axis' end, without the name of a file that nobody has.
+    """The first of some messages, without the name of a file that nobody has.
 
     Args:
         messages: of the program; empty texts count as none.
 
     Returns:
-        A sentence.
+        A sentence; empty for none.
     """
     first = next((text for text in messages if text), "").split("\n")[0]
-    return first.split(".toml: ", 1)[-1] or "nothing: the whole range is answered"
+    return first.split(".toml: ", 1)[-1]
 
 
 def _map(name: str, columns: Record) -> Drawing:
@@ -119,8 +144,9 @@ def _map(name: str, columns: Record) -> Drawing:
                     alpha=strength,
                     linewidth=0,
                 )
-        rows, cols = np.nonzero(loops == _SETTLED)
-        axes.plot(xs[cols], ys[rows], ".", color=FOUND, markersize=2.5)
+        for outcomes, marker, size in ((_SETTLED, "o", 3.0), (_UNSTABLE, "x", 3.5)):
+            rows, cols = np.nonzero(np.isin(loops, outcomes))
+            axes.plot(xs[cols], ys[rows], marker, color=FOUND, markersize=size, markeredgewidth=0.9)
         for axis, target, edges in (("x", x, edges_x), ("y", y, edges_y)):
             if target.spacing == "log":
                 logarithmic(axes, axis)
@@ -136,7 +162,7 @@ def _map(name: str, columns: Record) -> Drawing:
         height=3.4,
         alt=f"Where the program answers over {x.title} and {y.title}, and where it refuses with a message.",
         caption=f"{x.title[0].upper()}{x.title[1:]} and {y.title}, all else as in the scene. "
-        "Dots: the loop settles.",
+        "Dots: the loop settles; crosses: it diverges or drifts; neither: it ends in another way.",
     )
 
 

@@ -15,7 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 from rich.progress import Progress as Bar
 from rich.table import Table
 
-from ringbalance.reports.extremes import map_drawings, shortened
+from ringbalance.reports.extremes import map_drawings, outcome_text, shortened, span_text
 from ringbalance.reports.figure_style import standalone
 from ringbalance.reports.numbers import number
 from ringbalance.scene.files import write_whole
@@ -102,21 +102,17 @@ def _show(told: Record) -> None:
         highlight=False,
     )
     table = Table(box=None, header_style="dim", padding=(0, 1))
-    for title in ("input", "tried", "answered", "beyond"):
+    for title in ("input", "stretch", "ends", "said"):
         table.add_column(title, overflow="fold")
     for axis in told["axes"]:
-        table.add_row(axis["title"], *_spans(axis), shortened(axis["beyond"]))
+        for place, span in enumerate(axis["spans"]):
+            unit = "" if axis["unit"] == "1" else f" {axis['unit']}"
+            table.add_row(
+                "" if place else axis["title"],
+                span_text((span["low"], span["high"]), unit),
+                outcome_text(span["ending"], span["loop"]),
+                shortened([span["text"]]),
+            )
     console.print(table, highlight=False)
     for fault in told["violations"]:
         console.print(Padding(f"{fault['violations']} at {fault['point']}", (0, 0, 0, 2)), style="red")
-
-
-def _spans(axis: Record) -> tuple[str, str]:
-    unit = "" if axis["unit"] == "1" else f" {axis['unit']}"
-
-    def span(ends: list[float] | None) -> str:
-        if ends is None:
-            return "nowhere"
-        return f"{number(ends[0], digits=2)} to {number(ends[1], digits=2)}{unit}"
-
-    return span(axis["tried"]), span(axis["answered"])

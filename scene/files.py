@@ -1,4 +1,7 @@
-"""Outputs are written whole or not at all: to a temporary file beside the target, then renamed."""
+"""Outputs are written whole or not at all: to a temporary file beside the target, then renamed.
+
+What can be made again, and is only kept to save time, stands in the user's own cache folder.
+"""
 
 from __future__ import annotations
 
@@ -32,3 +35,14 @@ def write_whole(path: Path, data: str | bytes) -> Path:
         Path(temporary).unlink(missing_ok=True)
         raise
     return path
+
+
+def cache_folder() -> Path:
+    """The user's folder for what ringbalance can make again.
+
+    Returns:
+        Path; it may not exist yet.
+
+    Source: the XDG base directory specification, XDG_CACHE_HOME.
+    """
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "ringbalance"

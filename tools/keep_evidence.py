@@ -1,29 +1,47 @@
 """Keeps the heavy results of a report with the program, so that later light reports can show them.
 
-    python tools/keep_evidence.py out/evidence.json
+    python tools/keep_evidence.py out/evidence.json [heavy.json ...]
 
-Only heavy cases are kept, each with its date and the hash of its scene; a light report takes those whose
-scene is its own.
+Takes the evidence of heavy reports, and what `ringbalance verify CASE --level heavy --json` prints.  Only
+heavy cases are kept, each with its date and the hash of its scene, over what was kept of them before; a
+light report takes those whose scene is its own.
 """
 
 from __future__ import annotations
 
 import json
 import sys
+from datetime import date
 from pathlib import Path
+from typing import Any
 
-from ringbalance.reports.saved import PACKAGED, kept_document
+from ringbalance.reports.evidence import FORMAT, versions
+from ringbalance.reports.saved import PACKAGED, heavy_cases, kept_document
 from ringbalance.scene import write_whole
 
 TARGET = Path(__file__).resolve().parents[1] / "reports" / "data" / PACKAGED
 
 
+def document_of(path: Path) -> dict[str, Any]:
+    """The evidence in a file; bare cases get the date of their file, and the versions at hand."""
+    found = json.loads(path.read_text(encoding="utf-8"))
+    if isinstance(found, dict):
+        return found
+    day = date.fromtimestamp(path.stat().st_mtime).isoformat()
+    return {"format": FORMAT, "versions": versions(), "verification": found, "times": {"date": day}}
+
+
 def main(arguments: list[str]) -> int:
-    """Write the packaged evidence from that of a heavy report."""
-    document = json.loads(Path(arguments[0]).read_text(encoding="utf-8"))
-    kept = kept_document(document)
+    """Write the packaged evidence from files of heavy results."""
+    kept = document_of(TARGET)
+    cases = {case["id"]: case for case in heavy_cases(kept)}
+    for path in map(Path, arguments):
+        document = document_of(path)
+        cases |= {case["id"]: case for case in heavy_cases(document)}
+        kept = kept_document(document)
+    kept["verification"] = list(cases.values())
     write_whole(TARGET, json.dumps(kept, allow_nan=False, indent=1, ensure_ascii=False) + "\n")
-    print(f"{len(kept['verification'])} heavy cases kept in {TARGET}")
+    print(f"{len(cases)} heavy cases kept in {TARGET}: {', '.join(cases)}")
     return 0
 
 

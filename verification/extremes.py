@@ -5,7 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -37,14 +37,16 @@ class Size:
     points: int
     """Of the designed set."""
     sweep: int
-    """Values on each axis."""
+    """Values on each axis to begin with."""
+    fineness: float
+    """Share of an axis within which the place is found where points begin to end in another way."""
     grid: int
     """Values along each axis of a map."""
 
 
 SIZES: Final[Mapping[Level, Size]] = {
-    "light": Size(points=40, sweep=7, grid=5),
-    "heavy": Size(points=5000, sweep=15, grid=8),
+    "light": Size(points=40, sweep=7, fineness=0.03, grid=5),
+    "heavy": Size(points=5000, sweep=15, fineness=1e-3, grid=9),
 }
 
 
@@ -112,8 +114,8 @@ def find_extremes(
     return Extremes(
         points=points,
         sweeps=(
-            *sweeps(base, count=size.sweep, workers=workers, progress=told("axes")),
-            *numerical_sweeps(base.scene, count=size.sweep),
+            *sweeps(base, count=size.sweep, fineness=size.fineness, workers=workers, progress=told("axes")),
+            *numerical_sweeps(base.scene, count=size.sweep, fineness=size.fineness),
         ),
         maps=stability_maps(base, count=size.grid, workers=workers, progress=told("maps")),
         judgements=judged(base, points, workers=workers, progress=told("designed set"), kept=kept),
@@ -150,17 +152,17 @@ def extremes_tables(extremes: Extremes) -> dict[str, dict[str, list[Any]]]:
         extremes: of `find_extremes`.
 
     Returns:
-        Columns by table: "axes", and "map of x and y" for each map.
+        Columns by table: "axes", the stretches of each that end alike, and "map of x and y" for each map.
     """
-    answered = [sweep.solved() or (0.0, 0.0) for sweep in extremes.sweeps]
+    spans = [(sweep.axis, span) for sweep in extremes.sweeps for span in sweep.spans()]
     axes: dict[str, list[Any]] = {
-        "axis": [sweep.axis.title for sweep in extremes.sweeps],
-        "unit": [sweep.axis.unit for sweep in extremes.sweeps],
-        "tried from": [sweep.axis.low for sweep in extremes.sweeps],
-        "tried to": [sweep.axis.high for sweep in extremes.sweeps],
-        "answered from": [low for low, _ in answered],
-        "answered to": [high for _, high in answered],
-        "beyond": ["; ".join(sweep.beyond()) for sweep in extremes.sweeps],
+        "axis": [axis.title for axis, _ in spans],
+        "unit": [axis.unit for axis, _ in spans],
+        "from": [span.low for _, span in spans],
+        "to": [span.high for _, span in spans],
+        "ending": [str(span.ending) for _, span in spans],
+        "loop": [span.loop for _, span in spans],
+        "said": [span.text for _, span in spans],
     }
     maps = {f"{MAP_PREFIX}{item.x.name} and {item.y.name}": _map_columns(item) for item in extremes.maps}
     return {"axes": axes, **maps}
@@ -221,8 +223,10 @@ def _sweep(sweep: Sweep) -> Record:
         "tried": [axis.low, axis.high],
         "answered": None if solved is None else list(solved),
         "beyond": list(sweep.beyond()),
+        "spans": [{**asdict(span), "ending": str(span.ending)} for span in sweep.spans()],
         "values": sweep.values.tolist(),
         "ending": [str(j.ending) for j in sweep.judgements],
+        "loop": [j.loop for j in sweep.judgements],
         "residual": [j.residual for j in sweep.judgements],
     }
 

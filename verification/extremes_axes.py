@@ -96,6 +96,14 @@ AXES: Final = (
         spacing="linear",
     ),
     Axis(
+        name="unbalance",
+        title="unbalance over what one pair can carry",
+        unit="1",
+        low=0.01,
+        high=1.5,
+        usual=(0.05, 0.9),
+    ),
+    Axis(
         name="gain",
         title="controller gain over the scene's",
         unit="1",
@@ -159,7 +167,10 @@ def varied(document: Mapping[str, Any], *, scene: Scene, values: Mapping[str, fl
 def fitted(
     document: Mapping[str, Any], *, scene: Scene, made: Scene, values: Mapping[str, float]
 ) -> Document:
-    """The document with vibration, limit, noise and gain that suit what its disc can balance.
+    """The document with a rotor that suits what its disc can balance, and the loop's own axes set.
+
+    A disc that carries less liquid is put on a lighter rotor: its influence coefficient grows so that all
+    liquid of a pair makes the same vibration, and limit, gain and noise mean what they meant before.
 
     Args:
         document: of `varied`.
@@ -168,23 +179,34 @@ def fitted(
         values: by axis.
 
     Returns:
-        A new document, in which the loop has as much to do for its disc as in the scene that was varied.
+        A new document, in which the loop has as much to do for its disc as in the scene that was varied; the
+        unbalance of a disc with a single pair lies along that pair, the only direction it can balance.
     """
     changed = deepcopy(dict(document))
-    ratio = _capacity(made) / _capacity(scene)
-    before, control = scene.rotor.initial_amplitude, changed["controller"]
-    share = values.get("unbalance", before / _capacity(scene))
-    limit = ratio * scene.controller.limit
-    changed["rotor"]["initial_vibration"] = {
-        "amplitude": f"{share * _capacity(made)!r} m",
-        "phase": f"{math.degrees(scene.rotor.initial_phase)!r} deg",
-    }
-    control["limit"] = f"{limit!r} m"
-    control["fine_below"] = f"{ratio * scene.controller.fine_below!r} m"
-    control["proportional"] = f"{values.get('gain', 1.0) / ratio * scene.controller.proportional!r} s/m"
+    lighter = _capacity(scene) / _capacity(made)
+    rotor, control = changed["rotor"], changed["controller"]
+    rotor["influence_coefficient"] = _influence(lighter * scene.rotor.influence_coefficient)
+    if "assumed_influence_coefficient" in control:
+        believed = lighter * scene.controller.assumed_influence_coefficient
+        control["assumed_influence_coefficient"] = _influence(believed)
+    rotor["initial_vibration"] = _vibration(scene=scene, made=made, values=values)
+    control["proportional"] = f"{values.get('gain', 1.0) * scene.controller.proportional!r} s/m"
     noise = values.get("noise", scene.sensor.amplitude_noise / scene.controller.limit)
-    changed["sensor"] = {**changed.get("sensor", {}), "amplitude_noise": f"{noise * limit!r} m"}
+    amplitude = f"{noise * scene.controller.limit!r} m"
+    changed["sensor"] = {**changed.get("sensor", {}), "amplitude_noise": amplitude}
     return changed
+
+
+def _influence(coefficient: float) -> str:
+    return f"{coefficient!r} m/(kg*m)"
+
+
+def _vibration(*, scene: Scene, made: Scene, values: Mapping[str, float]) -> Document:
+    before, phase = scene.rotor.initial_amplitude, scene.rotor.initial_phase
+    amplitude = values["unbalance"] * _capacity(scene) if "unbalance" in values else before
+    if made.disc.chambers == 2:
+        phase = -scene.rotor.lag_angle
+    return {"amplitude": f"{amplitude!r} m", "phase": f"{math.degrees(phase)!r} deg"}
 
 
 def _capacity(scene: Scene) -> float:

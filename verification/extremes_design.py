@@ -7,7 +7,8 @@ import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
+from importlib.resources import files
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Final
@@ -28,7 +29,7 @@ Progress = Callable[[int, int], None]
 
 USUAL_SHARE: Final = 0.75
 """Of the coordinates, drawn from where most discs are; else all but a few points would be refused."""
-PERIODS: Final = 6
+PERIODS: Final = 20
 """Of the controller that a point's closed loop may take."""
 GAS_TIME: Final = 0.2
 """s, beyond those: a short period with long gas times is no reason for hundreds of operations."""
@@ -154,8 +155,19 @@ def _judge_all(base: Base, points: Sequence[Point]) -> list[Judgement]:
 
 def _key(base: Base, points: Sequence[Point]) -> str:
     """What kept judgements belong to; a set that goes on where a shorter one ended has the same beginning."""
-    text = json.dumps([dict(base.document), [dict(point) for point in points[:CHUNK]]], sort_keys=True)
+    first = [dict(point) for point in points[:CHUNK]]
+    text = json.dumps([_sources(), dict(base.document), first], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+@cache
+def _sources() -> str:
+    """Digest of the program itself: what another version found is not gone on with."""
+    found = hashlib.sha256()
+    for room in sorted(Path(str(files("ringbalance"))).iterdir()):
+        for file in sorted(room.rglob("*.py")) if room.is_dir() else [room]:
+            found.update(file.read_bytes())
+    return found.hexdigest()
 
 
 def _done(kept: Path | None, base: Base, points: Sequence[Point]) -> list[Judgement]:

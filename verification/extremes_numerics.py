@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -18,7 +18,7 @@ from ringbalance.reduced_model.paper_law import paper_law
 from ringbalance.scene.models import Scene
 from ringbalance.verification.exact_chamber import exact_wall_pressure
 from ringbalance.verification.extremes_axes import Axis
-from ringbalance.verification.extremes_maps import Sweep
+from ringbalance.verification.extremes_maps import Sweep, swept
 from ringbalance.verification.extremes_point import ROUND_OFF, Ending, Judgement
 
 ASPECT: Final = Axis(
@@ -31,22 +31,23 @@ SHORTEST: Final = 1e-3
 """s, of the operation that steps are taken through; longer steps are the whole operation."""
 
 
-def numerical_sweeps(scene: Scene, *, count: int) -> tuple[Sweep, ...]:
+def numerical_sweeps(scene: Scene, *, count: int, fineness: float) -> tuple[Sweep, ...]:
     """The numerics' own axes from end to end.
 
     Args:
         scene: whose disc, liquid and gas pressure are taken.
-        count: values on each axis.
+        count: values on each axis to begin with.
+        fineness: share of an axis within which each change is found.
 
     Returns:
         Sweeps over `ASPECT` and `STEP`.
     """
+    judges = {ASPECT.name: at_aspect, STEP.name: at_step}
 
-    def swept(axis: Axis, judge: Callable[[Scene, float], Judgement]) -> Sweep:
-        values = axis.at(np.linspace(0, 1, count))
-        return Sweep(axis=axis, values=values, judgements=tuple(judge(scene, float(v)) for v in values))
+    def judge_all(places: Sequence[tuple[Axis, float]]) -> list[Judgement]:
+        return [judges[axis.name](scene, value) for axis, value in places]
 
-    return swept(ASPECT, at_aspect), swept(STEP, at_step)
+    return swept((ASPECT, STEP), judge_all, count=count, fineness=fineness)
 
 
 def at_aspect(scene: Scene, aspect: float) -> Judgement:

@@ -13,7 +13,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from ringbalance.controller.dynamic_column import Column, column_of
-from ringbalance.controller.dynamic_motion import Dynamics
+from ringbalance.controller.dynamic_motion import Dynamics, Motion
 from ringbalance.controller.dynamic_passage import Passage, pass_time
 from ringbalance.controller.dynamic_steps import step
 from ringbalance.controller.liquid_ring import LiquidRing, initial_state
@@ -262,6 +262,34 @@ def test_work_bounds_the_integrators_steps(
     found = pulse(plant(calibrated, "tube inertia", "gas filling", **PIPED), 0.5, np.array([0.6]))
     assert found.motion.record.event is Event.UNFINISHED
     assert 0 <= found.fill <= 0.5
+
+
+def test_a_creep_through_a_narrow_tube_takes_few_steps(
+    scene: Scene, plant: Plant, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Friction answers in 70 us, the levels within seconds: explicit steps would take half a million."""
+    thick = replace(
+        scene,
+        liquid=replace(scene.liquid, name="custom", kinematic_viscosity=1e-3),
+        rotor=replace(scene.rotor, speed=250.0),
+        environment=replace(scene.environment, gravity=0.0),
+    )
+    own = plant(calibrate(thick).model, "tube inertia")
+    monkeypatch.setattr("ringbalance.controller.dynamic_passage.MAX_STEPS", 5000)
+    instants = np.array([0.5, 5.0, 50.0])
+    found = pass_time(own, fill=0.3, total=0.5, primed=True, motion=Motion(), instants=instants)
+
+    def rates(_: float, y: FloatArray) -> list[float]:
+        flow = own.tube_area * max(y[1], 0.0) / own.chamber_volume
+        fills = (float(y[0]), 0.5 - float(y[0]))
+        return [-flow, own.column.acceleration(fills, (0.0, 0.0), speed=max(float(y[1]), 0.0), direction=1)]
+
+    exact = solve_ivp(
+        rates, (0.0, 50.0), [0.3, 0.0], method="Radau", t_eval=instants, rtol=1e-10, atol=[1e-13, 1e-12]
+    )
+    assert found.motion.record.event is not Event.UNFINISHED
+    assert found.fills == pytest.approx(exact.y[0], abs=3e-9)
+    assert 0.25 < found.fills[2] < found.fills[1] < found.fills[0] < 0.3
 
 
 # --- in the loop ---

@@ -10,7 +10,6 @@ import pytest
 from ringbalance.reports import extremes, sloshing
 from ringbalance.reports.section import Work
 from ringbalance.scene import Scene
-from ringbalance.verification.extremes_axes import AXES
 
 Record = dict[str, Any]
 
@@ -69,15 +68,14 @@ def vertical_scene(paper_scene: Scene) -> Scene:
 
 
 def table() -> Record:
-    count = len(AXES)
     return {
-        "axis": [axis.title for axis in AXES],
-        "unit": [axis.unit for axis in AXES],
-        "tried from": [1.0] * count,
-        "tried to": [1e5] * count,
-        "answered from": [150.0] * count,
-        "answered to": [2e4] * count,
-        "beyond": ['disc.toml: [rotor] speed = "1 rpm": too slow; allowed: more', *[""] * (count - 1)],
+        "axis": ["speed", "speed", "fill"],
+        "unit": ["rpm", "rpm", "1"],
+        "from": [1.0, 162.0, 1e-6],
+        "to": [160.0, 1e5, 1e-6],
+        "ending": ["refused with a message", "solved", "solved"],
+        "loop": ["", "time_limit", "settled"],
+        "said": ['disc.toml: [rotor] speed = "160 rpm": too slow; allowed: more', "", ""],
     }
 
 
@@ -100,10 +98,12 @@ def evidence() -> Record:
 
 
 def test_the_extremes_say_how_far_and_what_is_beyond() -> None:
-    view = extremes.view(evidence())
-    assert view["rows"][0]["beyond"].startswith("[rotor] speed")
-    assert view["rows"][1]["beyond"] == "nothing: the whole range is answered"
-    assert view["rows"][0]["answered"].endswith("rpm")
+    slow, fast, fill = extremes.view(evidence())["rows"]
+    assert (slow["title"], slow["span"]) == ("speed", "1.00 to 160 rpm")
+    assert slow["said"].startswith("[rotor] speed")
+    assert (fast["title"], fast["ending"], fast["said"]) == ("", "solved; loop: time limit", "")
+    assert (fill["title"], fill["ending"]) == ("fill", "solved; loop: settled")
+    assert "to" not in fill["span"]
 
 
 def test_a_map_draws_every_ending_that_occurs_and_no_other() -> None:

@@ -11,7 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ringbalance.controller.loop import simulate
+from ringbalance.controller.quadrature import quadrature
+from ringbalance.controller.simulation import Outcome
 from ringbalance.reduced_model.calibration import Calibration, calibrate
+from ringbalance.reduced_model.paper_law import paper_law
 from ringbalance.scene import bundled_scene
 from ringbalance.scene.loader import scene_from
 from ringbalance.scene.models import Scene
@@ -95,25 +99,42 @@ def test_each_axis_sets_what_it_says(document: dict[str, Any], paper_scene: Scen
     assert (scene.controller.period, scene.tolerance) == (pytest.approx(0.7), pytest.approx(1e-3))
 
 
-def test_the_loop_has_as_much_to_do_on_any_disc(document: dict[str, Any], paper_scene: Scene) -> None:
-    """Vibration, limit, noise and gain follow the largest moment of the disc."""
-    values = {"fill": 0.05, "unbalance": 0.5, "gain": 2.0, "noise": 0.1}
-    changed = varied(document, scene=paper_scene, values=values)
-    thin = made(document, paper_scene, **values)
+def fitted_scene(document: dict[str, Any], scene: Scene, **values: float) -> Scene:
+    changed = varied(document, scene=scene, values=values)
+    disc = made(document, scene, **values)
     found = scene_from(
-        content=toml_bytes(fitted(changed, scene=paper_scene, made=thin, values=values)), file="disc.toml"
+        content=toml_bytes(fitted(changed, scene=scene, made=disc, values=values)), file="disc.toml"
     )
     assert isinstance(found, Scene)
-    moments = [
-        float(exact_moment(disc=s.disc, density=1000, fill_ratio=s.disc.max_fill_ratio))
-        for s in (thin, paper_scene)
-    ]
-    ratio = moments[0] / moments[1]
-    full = paper_scene.rotor.influence_coefficient * moments[0]
-    assert found.rotor.initial_amplitude == pytest.approx(0.5 * full)
-    assert found.controller.limit == pytest.approx(ratio * paper_scene.controller.limit)
-    assert found.controller.proportional == pytest.approx(2 * paper_scene.controller.proportional / ratio)
+    return found
+
+
+def full_vibration(scene: Scene) -> float:
+    moment = exact_moment(disc=scene.disc, density=scene.liquid.density, fill_ratio=scene.disc.max_fill_ratio)
+    return float(scene.rotor.influence_coefficient * moment)
+
+
+@pytest.mark.parametrize("fill", [0.05, 1e-6])
+def test_the_loop_has_as_much_to_do_on_any_disc(
+    document: dict[str, Any], paper_scene: Scene, fill: float
+) -> None:
+    """The rotor is as light as the disc's liquid, so that limit, gain and noise mean what they meant."""
+    found = fitted_scene(document, paper_scene, fill=fill, unbalance=0.5, gain=2.0, noise=0.1)
+    assert full_vibration(found) == pytest.approx(full_vibration(paper_scene))
+    assert found.controller.assumed_influence_coefficient == found.rotor.influence_coefficient
+    assert found.rotor.initial_amplitude == pytest.approx(0.5 * full_vibration(paper_scene))
+    assert found.controller.limit == pytest.approx(paper_scene.controller.limit)
+    assert found.controller.proportional == pytest.approx(2 * paper_scene.controller.proportional)
     assert found.sensor.amplitude_noise == pytest.approx(0.1 * found.controller.limit)
+
+
+def test_a_single_pair_gets_an_unbalance_that_it_can_balance(
+    document: dict[str, Any], paper_scene: Scene
+) -> None:
+    found = fitted_scene(document, paper_scene, angle=120.0, gain=0.3, unbalance=0.3)
+    found = replace(found, run=replace(found.run, time_limit=30.0))
+    run = simulate(found, flow_law=paper_law(found), integrator=quadrature)
+    assert run.outcome is Outcome.SETTLED
 
 
 def test_the_papers_scene_is_solved(document: dict[str, Any]) -> None:
@@ -223,7 +244,7 @@ def test_judgements_of_another_scene_are_not_taken(base: Base, tmp_path: Path, c
 
 
 def test_everything_is_told(base: Base, counting: list[Point]) -> None:
-    size = Size(points=10, sweep=5, grid=3)
+    size = Size(points=10, sweep=5, fineness=1.0, grid=3)
     found = find_extremes(base, size=size)
     told = extremes_document(found)
     assert len(counting) == told["judged"] - 2 * 5 == 10 + 5 * len(AXES) + 9 * len(found.maps)
@@ -233,13 +254,41 @@ def test_everything_is_told(base: Base, counting: list[Point]) -> None:
 
 
 @pytest.mark.usefixtures("counting")
-def test_a_sweep_tells_where_answers_end(base: Base) -> None:
-    found = find_extremes(base, size=Size(points=1, sweep=11, grid=2)).sweeps[0]
+def test_a_sweep_finds_where_answers_end(base: Base) -> None:
+    found = find_extremes(base, size=Size(points=1, sweep=11, fineness=1e-3, grid=2)).sweeps[0]
     assert isinstance(found, Sweep)
-    speeds = axis_of("speed").at(np.linspace(0, 1, 11))
-    inside = speeds[(speeds > 300) & (speeds < 2e4)]
-    assert found.solved() == (pytest.approx(inside[0]), pytest.approx(inside[-1]))
+    assert np.all(np.diff(found.values) > 0)
+    assert found.solved() == (pytest.approx(300, rel=0.02), pytest.approx(2e4, rel=0.02))
     assert found.beyond() == ("too fast",)
+    below, between, above = found.spans()
+    assert (below.low, above.high) == (pytest.approx(1), pytest.approx(1e5))
+    assert below.high < 300 < between.low
+    assert between.high < 2e4 < above.low
+    assert [span.ending for span in (below, between, above)] == [
+        Ending.REFUSED,
+        Ending.SOLVED,
+        Ending.REFUSED,
+    ]
+
+
+def sweep_of(*texts: str) -> Sweep:
+    ends = [Ending.REFUSED if text else Ending.SOLVED for text in texts]
+    found = tuple(Judgement(ending=end, text=text) for end, text in zip(ends, texts, strict=True))
+    return Sweep(axis=axis_of("speed"), values=np.arange(1.0, len(texts) + 1), judgements=found)
+
+
+def test_a_stretch_tells_what_is_said_next_to_the_answers() -> None:
+    spans = sweep_of("far", "near", "", "", "beyond", "further").spans()
+    assert [(span.low, span.high, span.text) for span in spans] == [
+        (1, 2, "near"),
+        (3, 4, ""),
+        (5, 6, "beyond"),
+    ]
+
+
+def test_an_axis_without_any_change_is_one_stretch() -> None:
+    (span,) = sweep_of("", "", "").spans()
+    assert (span.low, span.high, span.ending) == (1, 3, Ending.SOLVED)
 
 
 @pytest.mark.heavy

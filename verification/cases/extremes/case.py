@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from ringbalance.scene import bundled_scene
+from ringbalance.scene.files import cache_folder
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table
 from ringbalance.verification.extremes import (
@@ -26,9 +27,11 @@ _DEFECTS: Final = {
     "half_widths_hundredth": Defect(width_factor=0.01),
     "liquid_lost": Defect(leak=1e-6),
 }
-_FEW: Final = Size(points=40, sweep=2, grid=2)
+_FEW: Final = Size(points=40, sweep=2, fineness=1.0, grid=2)
 """Enough for a mutation to show."""
 _WORKERS: Final = 2
+_KEPT: Final = "extremes-points.json"
+"""From which an interrupted run goes on."""
 _PAPER: Final = "liquid_ring_paper"
 _NUMBERS: Final = {
     "solved": Ending.SOLVED,
@@ -63,7 +66,9 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """
     document = tomllib.loads(bundled_scene(_PAPER).read_text(encoding="utf-8"))
     base = Base(document=document, file=f"{_PAPER}.toml", defect=_DEFECTS[defect])
-    found = find_extremes(base, size=SIZES[level] if defect is None else _FEW, workers=_WORKERS)
+    size = SIZES[level] if defect is None else _FEW
+    kept = cache_folder() / _KEPT if level == "heavy" and defect is None else None
+    found = find_extremes(base, size=size, workers=_WORKERS, kept=kept)
     everything = found.everything
     endings = counted(everything)
     worst = max(j.worst_ratio for j in everything)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from rich.console import Console
+from rich.markup import escape
 from rich.padding import Padding
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 from rich.progress import Progress as Bar
@@ -111,7 +112,7 @@ def _show(told: Record) -> None:
                 "" if place else axis["title"],
                 span_text((span["low"], span["high"]), unit),
                 outcome_text(span["ending"], span["loop"]),
-                shortened([span["text"]]),
+                escape(shortened([span["text"]])),
             )
     console.print(table, highlight=False)
     for fault in told["violations"]:

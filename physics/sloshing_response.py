@@ -32,6 +32,8 @@ class SloshingResponse:
     """a, m, shape (n,)."""
     amplification: Estimate
     """Change of the chamber's moment over that of a surface which follows gravity at once, shape (n,)."""
+    pressure_amplification: Estimate
+    """Change of the mean pressure on the outer wall over that under such a surface, shape (n,)."""
     surface_amplitude: Estimate
     """Largest displacement of the surface, m zero-to-peak, shape (n,)."""
     damped_share: FloatArray
@@ -54,7 +56,8 @@ def sloshing_response(
     """Answer of the liquid in one chamber to gravity that turns in the disc's frame.
 
     (-s^2 S + 2 i s C + A + i s sqrt(i s E) W) psi = i s F with G = g r exp(i (angle + s omega t)), E =
-    nu/(omega R2^2); the reference is A psi = i s F, a surface always across the sum of both fields.
+    nu/(omega R2^2); the reference is A psi = i s F, a surface always across the sum of both fields.  The
+    wall pressure follows from psi by p'/rho = G + c - i s phi - 2 psi.
 
     Args:
         disc: the disc.
@@ -82,7 +85,7 @@ def sloshing_response(
     radii = np.atleast_1d(surface_radius(disc=disc, fill_ratio=fills))
     ekman = kinematic_viscosity / (angular_velocity * disc.outer_radius**2)
 
-    def on_mesh(radius: float, counts: tuple[int, int]) -> tuple[float, float, float]:
+    def on_mesh(radius: float, counts: tuple[int, int]) -> tuple[float, ...]:
         system = sloshing_system(disc=disc, surface_radius=radius, cells=counts)
         return _answer(system, frequency_ratio, ekman)
 
@@ -94,6 +97,7 @@ def sloshing_response(
         fill_ratio=fills,
         surface_radius=radii,
         amplification=Estimate(value=found[:, 0, 0].copy(), uncertainty=widths[:, 0]),
+        pressure_amplification=Estimate(value=found[:, 0, 3].copy(), uncertainty=widths[:, 3]),
         surface_amplitude=amplitude,
         damped_share=found[:, 0, 2].copy(),
         statistics=Statistics(unknowns=(2 * meshes[0][0] + 1) * (2 * meshes[0][1] + 1)),
@@ -120,8 +124,9 @@ def _check(fills: FloatArray, omega: float, viscosity: float, gravity: float, ra
         raise ValueError("kinematic_viscosity and gravity must be finite and not negative")
 
 
-def _answer(system: SloshingSystem, ratio: float, ekman: float) -> tuple[float, float, float]:
-    """Amplification, largest displacement for g/omega^2 = 1 (any unit of length), share left by damping."""
+def _answer(system: SloshingSystem, ratio: float, ekman: float) -> tuple[float, ...]:
+    """Amplification, largest displacement for g/omega^2 = 1 (any unit of length), share left by damping, and
+    amplification of the wall pressure."""
     forcing = system.outflow[1] + 1j * system.outflow[2]
     swinging = -(ratio**2) * system.kinetic + 2j * ratio * system.coriolis + system.centrifugal
     layers = 1j * ratio * np.sqrt(1j * ratio * ekman) * system.wall_loss
@@ -131,7 +136,10 @@ def _answer(system: SloshingSystem, ratio: float, ekman: float) -> tuple[float, 
     )
     moment, reference, undamped = (_size(system, psi) for psi in (damped, still, free))
     displacement = float(np.abs(system.flux @ damped).max()) / ratio
-    return moment / reference, displacement, moment / undamped
+    pressure = (
+        system.wall_drive - 1j * ratio * (system.potential @ damped) + 2 * (system.surface_mean @ damped)
+    )
+    return moment / reference, displacement, moment / undamped, float(abs(pressure / system.wall_drive))
 
 
 def _size(system: SloshingSystem, psi: ComplexArray) -> float:

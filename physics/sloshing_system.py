@@ -14,6 +14,14 @@ for (phi, q') = int grad psi . grad psi', it becomes
 
 with S the kinetic energy (the stiffness matrix condensed onto the surface), C antisymmetric, A the
 centrifugal stiffness, W what the Stokes layers on the walls take (E = nu/(omega R2^2)), and F = (G, q').
+
+The pressure is p'/rho = G + c - i s phi - 2 psi, and its mean over the free surface's moved place is zero, so
+the mean over the outer wall, where psi = 0, is
+
+    mean_w p'/rho = mean_w G - mean_a G - i s (mean_w phi - mean_a phi) + 2 mean_a psi.
+
+The difference of phi is int grad psi . grad chi for any chi that is 0 on one plate, 1 on the other, and
+grows evenly along the arcs of surface and wall: rot chi flows in through the one and out through the other.
 """
 
 from __future__ import annotations
@@ -55,6 +63,13 @@ class SloshingSystem:
     """Rows that take psi to q at `places`, shape (m, n)."""
     places: FloatArray
     """Places on the free surface, shape (2, m)."""
+    potential: FloatArray
+    """Row that takes psi to the mean of phi over the outer wall less that over the surface, shape (n,)."""
+    surface_mean: FloatArray
+    """Row that takes psi to its mean over the free surface, shape (n,)."""
+    wall_drive: complex
+    """Mean of x + i y over the outer wall less that over the free surface: the pressure of a surface that
+    follows gravity at once."""
     unknowns: int
     """Of the mesh, before condensation."""
 
@@ -88,6 +103,7 @@ def sloshing_system(*, disc: Disc, surface_radius: float, cells: tuple[int, int]
     free = np.concatenate([kept, inner])
     walls = np.concatenate([grid[:, 0], grid[-1, 1:-1], grid[::-1, -1]])
     slip = stiffness[walls[1:-1]][:, free] @ extension
+    wall = _Line.of(nodes[:, grid[-1]])
     return SloshingSystem(
         kinetic=kinetic,
         coriolis=-surface.integral(_SLOPE, _SHAPE, np.ones_like(surface.stretch))[1:-1, 1:-1],
@@ -96,8 +112,20 @@ def sloshing_system(*, disc: Disc, surface_radius: float, cells: tuple[int, int]
         outflow=surface.outflow()[:, 1:-1],
         flux=surface.flux()[:, 1:-1],
         places=surface.places.reshape(2, -1),
+        potential=_even_growth(grid, surface, wall) @ (stiffness[:, free] @ extension),
+        surface_mean=surface.mean()[1:-1],
+        wall_drive=wall.mean_place - surface.mean_place,
         unknowns=free.size,
     )
+
+
+def _even_growth(grid: IntArray, surface: _Line, wall: _Line) -> FloatArray:
+    """chi at all nodes: along each radius between its shares of the two arcs."""
+    inner, outer = surface.shares(), wall.shares()
+    along = np.linspace(0.0, 1.0, grid.shape[0])[:, None]
+    chi = np.empty(grid.size)
+    chi[grid] = (1 - along) * inner + along * outer
+    return chi
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -137,6 +165,24 @@ class _Line:
         for j in range(3):
             rows[:, j : j + local.shape[1] * 2 : 2][:, : local.shape[1]] += local[:, :, j]
         return rows
+
+    def mean(self) -> FloatArray:
+        """Row that takes values at the nodes to their mean over the arc."""
+        local = np.einsum("iq,eq,q->ei", _SHAPE, self.stretch, _WEIGHT)
+        row = np.zeros(2 * self.stretch.shape[0] + 1)
+        for k, block in enumerate(local):
+            row[2 * k : 2 * k + 3] += block
+        return np.asarray(row / row.sum(), dtype=np.float64)
+
+    @property
+    def mean_place(self) -> complex:
+        """Mean of x + i y over the arc."""
+        x, y = np.einsum("feq,eq,q->f", self.places, self.stretch, _WEIGHT)
+        return complex(x, y) / float(np.einsum("eq,q->", self.stretch, _WEIGHT))
+
+    def shares(self) -> FloatArray:
+        """Share of the arc up to each node; cells are of equal length."""
+        return np.linspace(0.0, 1.0, 2 * self.stretch.shape[0] + 1)
 
     def flux(self) -> FloatArray:
         """Values of q at the places, one row a place."""

@@ -36,7 +36,10 @@ METAL_DENSITY: Final = 3000.0
 LARGEST_SWING: Final = 30.0
 """Amplification that damping leaves at resonance, about."""
 _SWING_FLOOR: Final = 0.2
-"""Of the ripple: by so much the estimate of the amplification may be off."""
+"""Of the moment's ripple: by so much the estimate of the amplification may be off."""
+_CORIOLIS: Final = 2.0
+"""Of the pressure's ripple, times the swing: 2 omega times the flux along the ring, which is about that under
+which a free particle follows gravity however thin the ring."""
 
 
 def surface_tension(scene: Scene) -> float:
@@ -143,18 +146,22 @@ def _at(scene: Scene, fill: float) -> Mapping[str, Mapping[str, float]]:
         tilt *= scene.disc.axial_width / (2 * a)
     radial = scene.disc.plate_thickness / (a * alpha)
 
-    swing = abs(amplification(scene, fill) - 1) + _SWING_FLOOR
+    factor = amplification(scene, fill)
 
-    def gravity(ripple: float, mean: float) -> dict[str, float]:
+    def gravity(ripple: float, mean: float, swing: float) -> dict[str, float]:
         higher = mean * (tilt + radial) + ripple * tilt**2
         return {RIPPLE: ripple, SLOSHING: ripple * swing, MEAN: mean, HIGHER: higher + tilt**4}
 
     return {
         "pressures": gravity(
-            more.wall_pressure_ripple / base.wall_pressure, abs(more.wall_pressure) / base.wall_pressure
+            more.wall_pressure_ripple / base.wall_pressure,
+            abs(more.wall_pressure) / base.wall_pressure,
+            _CORIOLIS * max(1.0, factor),
         ),
         "moments": gravity(
-            more.moment_ripple / base.moment, _moment_share(base, more.moment, more.moment_per_mass)
+            more.moment_ripple / base.moment,
+            _moment_share(base, more.moment, more.moment_per_mass),
+            abs(factor - 1) + _SWING_FLOOR,
         ),
     }
 
@@ -170,15 +177,18 @@ def _terms(scene: Scene, rows: list[Mapping[str, float]], part: str) -> Terms:
     disc, cells = scene.disc, default_cells(disc=scene.disc)[1]
     bare = paper.sector_area(disc=disc) * disc.axial_width
     strips = 1 - chamber_volume(disc=disc) / bare
-    first = "rho omega^2 G |R2 s_2 - a s|/P" if part == "pressures" else "rho B a^2 G |shape|/U"
+    pressures = part == "pressures"
+    first = "rho omega^2 G |R2 s_2 - a s|/P" if pressures else "rho B a^2 G |shape|/U"
+    swing = "2 max(1, |1/(1 - 1/s^2)|)" if pressures else "(|1/(1 - 1/s^2)| - 1)"
+    force = "and the Coriolis force on its flux" if pressures else "without Coriolis force"
     found = (
         (PLATES, strips, "1 - V/(B theta (R2^2 - R1^2)/2)", "Eqs. 3, 7 and 12 against the exact geometry"),
         (RIPPLE, largest[RIPPLE], f"{first}, G = g/omega^2", "first order of |r + g/omega^2| = b"),
         (
             SLOSHING,
             largest[SLOSHING],
-            "ripple times (|1/(1 - 1/s^2)| - 1), s^2 = k tanh(k ln(R2/a)), k = pi/theta",
-            "lowest mode of a chamber without Coriolis force, driven at 1x",
+            f"ripple times {swing}, s^2 = k tanh(k ln(R2/a)), k = pi/theta",
+            f"lowest mode of a chamber {force}, driven at 1x",
         ),
         (MEAN, largest[MEAN], "order (G/a)^2", "second order of the same surface, mean over a turn"),
         (HIGHER, largest[HIGHER], "second order times (G/a + t/(a alpha)), and (G/a)^4", "remainder"),

@@ -180,24 +180,23 @@ def with_sloshing(
         still: the quasi-static model.
 
     Returns:
-        ChamberValues; the ripple of the moment times its amplification, that of the wall pressure times the
-        same number, which is an estimate there.
+        ChamberValues; the ripples times their amplifications.
 
     Source: `sloshing_response`.
     """
     found = still(scene, fill)
-    factor = sloshing_factor(scene, fill)
+    of_pressure, of_moment = sloshing_factors(scene, fill)
     return replace(
         found,
-        wall_pressure_ripple=factor * found.wall_pressure_ripple,
-        moment_ripple=factor * found.moment_ripple,
+        wall_pressure_ripple=of_pressure * found.wall_pressure_ripple,
+        moment_ripple=of_moment * found.moment_ripple,
     )
 
 
 def forget_solves() -> None:
     """Do every solve anew when it is next asked for, so that it can be timed."""
     elements_at.cache_clear()
-    sloshing_factor.cache_clear()
+    sloshing_factors.cache_clear()
 
 
 def sloshing_meshes(scene: Scene) -> tuple[tuple[int, int], ...]:
@@ -214,15 +213,15 @@ def sloshing_meshes(scene: Scene) -> tuple[tuple[int, int], ...]:
 
 
 @lru_cache(maxsize=256)
-def sloshing_factor(scene: Scene, fill: float) -> float:
-    """How much the swinging liquid enlarges gravity's ripple of the moment, by finite elements.
+def sloshing_factors(scene: Scene, fill: float) -> tuple[float, float]:
+    """How much the swinging liquid enlarges gravity's ripples, by finite elements.
 
     Args:
         scene: the scene.
         fill: x, above zero.
 
     Returns:
-        Amplification.
+        Amplifications of the wall pressure and of the moment.
 
     Source: `sloshing_response`.
     """
@@ -234,7 +233,7 @@ def sloshing_factor(scene: Scene, fill: float) -> float:
         gravity=scene.environment.gravity,
         cells=sloshing_meshes(scene),
     )
-    return float(found.amplification.value[0])
+    return float(found.pressure_amplification.value[0]), float(found.amplification.value[0])
 
 
 @lru_cache(maxsize=256)

@@ -131,7 +131,7 @@ def chamber_ladders(scene: Scene) -> tuple[Ladder, Ladder]:
 def _swing_uncertainty(
     scene: Scene, fills: FloatArray, terms: Mapping[str, Mapping[str, Contribution]]
 ) -> Mapping[str, float]:
-    """What linear sloshing leaves open: its square, and for the pressure the moment's factor it borrows."""
+    """What linear sloshing leaves open: its square, and the meshes of the swinging liquid."""
     factor = max((amplification(scene, float(x)) for x in fills), default=1.0)
     if scene.environment.shaft == "vertical":
         return {"pressures": 0.0, "moments": 0.0}
@@ -139,12 +139,8 @@ def _swing_uncertainty(
     def of(part: str, term: str) -> float:
         return terms[part][term].value or 0.0
 
-    # The square of a wave's height, and the meshes of the swinging liquid.
     waves = (of("pressures", RIPPLE) * factor) ** 2
-    return {
-        "pressures": waves + of("pressures", SLOSHING),
-        "moments": waves + _SWING_MESH * of("moments", SLOSHING),
-    }
+    return {part: waves + _SWING_MESH * of(part, SLOSHING) for part in ("pressures", "moments")}
 
 
 def _status(scene: Scene, fills: FloatArray) -> Status:

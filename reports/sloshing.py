@@ -64,12 +64,14 @@ def collect(work: Work) -> Record | None:
         "frequency_ratio": modes.frequency_ratio.value.T.tolist(),
         "frequency_ratio_uncertainty": modes.frequency_ratio.uncertainty.T.tolist(),
         "amplification": answer.amplification.value[:-1].tolist(),
+        "pressure_amplification": answer.pressure_amplification.value[:-1].tolist(),
         "surface_amplitude_m": answer.surface_amplitude.value[:-1].tolist(),
         "depth_m": (scene.disc.outer_radius - answer.surface_radius[:-1]).tolist(),
         "resonant": [{"mode": mode, "fill_ratio": x} for mode, x in met],
         "equal": {
             "fill_ratio": scene.disc.initial_fill,
             "amplification": float(answer.amplification.value[-1]),
+            "pressure_amplification": float(answer.pressure_amplification.value[-1]),
             "surface_amplitude_m": float(answer.surface_amplitude.value[-1]),
             "tilt_ratio": float(
                 scene.environment.gravity / (scene.rotor.speed**2 * answer.surface_radius[-1])
@@ -100,11 +102,12 @@ def view(evidence: Record) -> Record | None:
 
 def _equal(found: Record) -> str:
     equal = found["equal"]
+    moment, pressure = (short(equal[key], digits=2) for key in ("amplification", "pressure_amplification"))
     return (
-        "At equal fills gravity swings a chamber’s moment "
-        f"{short(equal['amplification'], digits=2)} times as much as a surface that followed at once would; "
-        "the surface moves by "
-        f"{shown(equal['surface_amplitude_m'], 'm', digits=2)} each way, once a turn. "
+        f"At equal fills gravity swings a chamber’s moment {moment} times as much as a surface that followed "
+        f"at once would, and the wall pressure {pressure} times: the Coriolis force on the "
+        "liquid that runs along the wall presses on it, however thin the ring. "
+        f"The surface moves by {shown(equal['surface_amplitude_m'], 'm', digits=2)} each way, once a turn. "
         f"Gravity is {number(equal['tilt_ratio'], digits=2)} of the centrifugal acceleration there."
     )
 
@@ -177,22 +180,24 @@ def _swing(found: Record) -> Drawing:
     fills = np.asarray(found["fill_ratio"])
 
     def paint(figure: Figure, axes: Axes) -> None:
-        axes.plot(fills, found["amplification"], color=FOUND, label="with inertia and Coriolis force")
+        axes.plot(fills, found["amplification"], color=FOUND, label="moment")
+        axes.plot(fills, found["pressure_amplification"], color=THIRD, label="wall pressure")
         axes.axhline(1.0, color=MUTED, linewidth=1.2, linestyle=(0, (5, 2)), label="surface follows at once")
         for item in found["resonant"]:
-            axes.axvline(item["fill_ratio"], color=THIRD, linewidth=0.8, linestyle=":")
+            axes.axvline(item["fill_ratio"], color=MUTED, linewidth=0.8, linestyle=":")
         logarithmic(axes, "y", ticks=[a * 10.0**b for b in range(-3, 4) for a in (1, 2, 5)])
-        values = np.asarray(found["amplification"])
+        values = np.asarray([*found["amplification"], *found["pressure_amplification"]])
         axes.set_ylim(0.7 * values.min(), 1.5 * max(values.max(), 1.0))
         axes.set_xlim(0, 1.05 * fills[-1])
         axes.set_xlabel("fill ratio")
-        axes.set_ylabel("swing of the moment")
-        legend_above(figure, axes, columns=1)
+        axes.set_ylabel("swing")
+        legend_above(figure, axes, columns=2)
 
     return draw(
         name="sloshing-swing",
         paint=paint,
-        alt="Swing of a chamber's moment under gravity over that of a surface which follows gravity at once.",
+        alt="Swing of a chamber's moment and of its wall pressure under gravity over those of a surface "
+        "which follows gravity at once.",
         caption="What inertia and Coriolis force make of gravity’s pull, over a surface that follows at "
         "once. Dotted: fills at which a mode meets the speed; even modes hardly feel gravity.",
     )

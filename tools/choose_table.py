@@ -46,7 +46,7 @@ def row(ladder: Ladder) -> str:
     for tolerance in TOLERANCES:
         rung = choose(ladder, tolerance, values=values).rung
         error = values.error(rung, ladder.top, points)
-        told = "the top" if error < 3e-8 else f"{error:.0e}"
+        told = "as the top" if error < 3e-8 else f"{error:.0e}"
         cells.append(f"{rung.name} ({told})")
     return f"| {ladder.title} | " + " | ".join(cells) + f" | {ladder.top_uncertainty:.0e} |"
 

@@ -18,6 +18,7 @@ from scipy.integrate import quad_vec
 from scipy.linalg import eigvals
 
 FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,19 +97,55 @@ def cosine_amplification(waves: CosineWaves, *, frequency_ratio: float) -> float
 
     Source: as `cosine_frequencies`, forced.
     """
-    half, s = waves.central_angle / 2, frequency_ratio
-
-    def rows(angle: float) -> npt.NDArray[np.complexfloating]:
-        return np.asarray(np.exp(1j * angle) * np.cos(waves.wavenumber * (angle + half)))
-
-    load = quad_vec(rows, -half, half, epsabs=1e-12)[0]
-    matrix = s**2 * waves.mass - waves.spring + 2j * s * waves.mixed
+    load = _load(waves)
     swing, still = (
-        np.asarray(np.linalg.solve(m, -1j * s * load) * waves.wavenumber, dtype=np.complex128)
-        for m in (matrix, -waves.spring.astype(np.complex128))
+        _potential(waves, frequency_ratio, load, still=still) * waves.wavenumber for still in (False, True)
     )
 
-    def size(flux: npt.NDArray[np.complexfloating]) -> float:
+    def size(flux: ComplexArray) -> float:
         return float(np.hypot(abs(load.real @ flux), abs(load.imag @ flux)))
 
     return size(swing) / size(still)
+
+
+def cosine_pressure_amplification(waves: CosineWaves, *, frequency_ratio: float, depth: float) -> float:
+    """Swing of the mean wall pressure under the same forcing, over that of such a surface.
+
+    Cosines have no mean, so phi has the same one, none, on wall and surface, and p' is left with the
+    difference of G and with 2 psi at the surface.
+
+    Args:
+        waves: of `cosine_waves`.
+        frequency_ratio: s.
+        depth: H = ln(R2/a).
+
+    Returns:
+        Ratio.
+
+    Source: p'/rho = G + c - i s phi - 2 psi, with psi = -sum B_n sin(k angle) at the surface.
+    """
+    half, radius = waves.central_angle / 2, np.exp(-depth)
+    drive = (1 - radius) * np.sin(half) / half
+    found = _potential(waves, frequency_ratio, radius * _load(waves), still=False)
+    order = waves.wavenumber * waves.central_angle / np.pi
+    stream = -np.sum(found * (1 - np.cos(np.pi * order)) / (np.pi * order))
+    return float(abs(1 + 2 * stream / drive))
+
+
+def _load(waves: CosineWaves) -> ComplexArray:
+    """Integrals of exp(i angle) with each cosine."""
+    half = waves.central_angle / 2
+
+    def rows(angle: float) -> ComplexArray:
+        return np.asarray(np.exp(1j * angle) * np.cos(waves.wavenumber * (angle + half)))
+
+    return np.asarray(quad_vec(rows, -half, half, epsabs=1e-12)[0])
+
+
+def _potential(
+    waves: CosineWaves, frequency_ratio: float, load: ComplexArray, *, still: bool
+) -> ComplexArray:
+    """B, of the forced waves or of a surface that follows at once."""
+    s = frequency_ratio
+    inertia = 0.0 if still else s**2 * waves.mass + 2j * s * waves.mixed
+    return np.asarray(np.linalg.solve(inertia - waves.spring, -1j * s * load), dtype=np.complex128)

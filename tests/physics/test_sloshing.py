@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial import cKDTree
+from skfem import Basis, ElementQuad2, FacetBasis, LinearForm, condense, solve
+from skfem.models.poisson import laplace
 
+from ringbalance.mesh.chamber import chamber_mesh
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.results import StatusCode
 from ringbalance.physics.sloshing import resonant_fills, sloshing_modes
 from ringbalance.physics.sloshing_response import sloshing_response
+from ringbalance.physics.sloshing_system import sloshing_system
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.sloshing_exact import (
     cosine_amplification,
     cosine_frequencies,
+    cosine_pressure_amplification,
     cosine_waves,
 )
 
@@ -111,6 +118,44 @@ def test_forced_swing_matches_the_spectral_one(disc: Disc, s: float) -> None:
     exact = cosine_amplification(waves, frequency_ratio=s)
     assert found.amplification.value[0] == pytest.approx(exact, rel=1e-4)
     assert found.damped_share[0] == 1.0
+    pressure = cosine_pressure_amplification(waves, frequency_ratio=s, depth=depth)
+    assert found.pressure_amplification.value[0] == pytest.approx(pressure, rel=1e-4)
+
+
+def test_the_mean_potential_on_the_wall_is_that_of_the_potential_itself(disc: Disc) -> None:
+    """With plates, phi solved for on the same mesh: int grad phi . grad v = int rot psi . grad v."""
+    cells, a = (8, 24), 35e-3
+    chamber = chamber_mesh(disc=disc, surface_radius=a, cells=cells)
+    system = sloshing_system(disc=disc, surface_radius=a, cells=cells)
+    grid, nodes = chamber.grid, chamber.mesh.doflocs
+    angles = np.arctan2(nodes[1, grid[0, 1:-1]], nodes[0, grid[0, 1:-1]])
+    half = disc.central_angle / 2 - np.arcsin(disc.plate_thickness / a)
+    middle = angles.mean()
+    psi = np.cos(np.pi / 2 * (angles - middle) / half) + 0.3 * np.sin(np.pi * (angles - middle) / half)
+    basis = Basis(chamber.mesh, ElementQuad2())
+    places = basis.doflocs.T
+    dofs = cKDTree(places).query(nodes.T)[1]
+    fixed = np.zeros(basis.N)
+    fixed[dofs[grid[0, 1:-1]]] = psi
+    edges = np.unique(dofs[np.concatenate([grid[0], grid[-1], grid[:, 0], grid[:, -1]])])
+    stream = solve(*condense(laplace.assemble(basis), x=fixed, D=edges))
+
+    @LinearForm
+    def turned(v: Any, w: Any) -> Any:
+        return w["psi"].grad[1] * v.grad[0] - w["psi"].grad[0] * v.grad[1]
+
+    load = turned.assemble(basis, psi=basis.interpolate(stream))
+    phi = solve(*condense(laplace.assemble(basis), load, D=np.array([0])))
+
+    def mean(row: int) -> float:
+        facets = chamber.mesh.facets_satisfying(
+            lambda x: np.abs(np.hypot(*x) - np.hypot(*nodes[:, grid[row, 0]])) < 1e-3 * (nodes.max())
+        )
+        own = FacetBasis(chamber.mesh, ElementQuad2(), facets=facets)
+        return float(np.sum(own.interpolate(phi) * own.dx) / np.sum(own.dx))
+
+    assert system.potential @ psi == pytest.approx(mean(-1) - mean(0), rel=1e-4)
+    assert abs(system.potential @ psi) > 1e-4
 
 
 def test_slow_forcing_only_tilts_the_surface(disc: Disc) -> None:

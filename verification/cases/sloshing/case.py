@@ -11,12 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.physics.sloshing import resonant_fills, sloshing_modes
-from ringbalance.physics.sloshing_response import sloshing_response
+from ringbalance.physics.sloshing_response import SloshingResponse, sloshing_response
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
 from ringbalance.verification.sloshing_exact import (
     cosine_amplification,
     cosine_frequencies,
+    cosine_pressure_amplification,
     cosine_waves,
 )
 
@@ -48,7 +49,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     Args:
         scene: the scene.
         level: "heavy" draws more fills.
-        defect: "coriolis_off_by_a_percent" or "forcing_backwards".
+        defect: "coriolis_off_by_a_percent", "forcing_backwards" or "pressure_swings_as_the_moment".
 
     Returns:
         Evidence.
@@ -66,12 +67,16 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "still": Found(value=_still_deviation(bare, depths)),
             "frequencies": Found(value=_frequency_deviation(bare, depths, _CORIOLIS.get(defect or "", 1.0))),
             "forced": Found(value=_forced_deviation(bare, depths, backwards=defect == "forcing_backwards")),
+            "pressure": Found(
+                value=_pressure_deviation(bare, depths, borrowed=defect == "pressure_swings_as_the_moment")
+            ),
         },
         numbers={
             "first": float(ratios[-1, 0]),
             "third": met.get(3, 0.0),
             "double": float(np.interp(2.0, swings[fills > 0.2], fills[fills > 0.2])),
             "equal": float(_swings(scene, np.array([scene.disc.initial_fill]))[0]),
+            "equal_pressure": float(_pressure_swings(scene, np.array([scene.disc.initial_fill]))[0]),
         },
         series=(_frequencies_figure(fills, ratios), _swings_figure(fills, swings)),
     )
@@ -113,8 +118,34 @@ def _forced_deviation(disc: Disc, depths: FloatArray, *, backwards: bool) -> flo
     return float(np.abs(found.amplification.value / np.array(exact) - 1).max())
 
 
+def _pressure_deviation(disc: Disc, depths: FloatArray, *, borrowed: bool) -> float:
+    found = sloshing_response(
+        disc=disc, fill_ratio=_FILLS, angular_velocity=1.0, kinematic_viscosity=0.0, gravity=0.0
+    )
+    exact = np.array(
+        [
+            cosine_pressure_amplification(
+                cosine_waves(central_angle=disc.central_angle, depth=float(h)),
+                frequency_ratio=1.0,
+                depth=float(h),
+            )
+            for h in depths
+        ]
+    )
+    taken = found.amplification if borrowed else found.pressure_amplification
+    return float(np.abs(taken.value / exact - 1).max())
+
+
 def _swings(scene: Scene, fills: FloatArray) -> FloatArray:
-    response = sloshing_response(
+    return _response(scene, fills).amplification.value
+
+
+def _pressure_swings(scene: Scene, fills: FloatArray) -> FloatArray:
+    return _response(scene, fills).pressure_amplification.value
+
+
+def _response(scene: Scene, fills: FloatArray) -> SloshingResponse:
+    return sloshing_response(
         disc=scene.disc,
         fill_ratio=fills,
         angular_velocity=scene.rotor.speed,
@@ -122,7 +153,6 @@ def _swings(scene: Scene, fills: FloatArray) -> FloatArray:
         gravity=scene.environment.gravity,
         cells=_COARSE,
     )
-    return response.amplification.value
 
 
 def _frequencies_figure(fills: FloatArray, ratios: FloatArray) -> Series:

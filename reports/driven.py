@@ -87,4 +87,4 @@ def _statuses(found: Record) -> list[str]:
     ]
 
 
-SECTION: Final = Section(name="driven", title="The second balancer", collect=collect, view=view)
+SECTION: Final = Section(name="driven", title="The second balancer", collect=collect, last=True, view=view)

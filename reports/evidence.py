@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import platform
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from datetime import date
 from importlib.metadata import PackageNotFoundError, version
@@ -33,7 +33,8 @@ from ringbalance.reports.sections import collected
 from ringbalance.scene import Scene, scene_table
 from ringbalance.verification import paper_numbers
 from ringbalance.verification.document import merge_saved, results_document
-from ringbalance.verification.runner import run_cases
+from ringbalance.verification.result import CaseResult
+from ringbalance.verification.runner import cases_under_way
 
 Record = dict[str, Any]
 Progress = Callable[[str], None]
@@ -86,20 +87,24 @@ def collect_evidence(
         SceneError: a scene that cannot be calibrated or simulated.
     """
     tell = progress or (lambda _: None)
-    tell("pressure field")
-    pressure = _pressure(scene)
-    tell("calibration")
-    calibration = calibrate(scene)
-    tell("closed loop")
-    runs = _closed_loop(scene, calibration)
-    tell("consequences")
-    consequences = consequences_document(find_consequences(scene, calibration.model, members=MEMBERS[level]))
-    tell("sections")
-    sections = collected(Work(scene=scene, calibration=calibration, level=level))
+    with cases_under_way(scene=scene, level=level, mutations=level == "heavy", workers=workers) as under_way:
+        tell("pressure field")
+        pressure = _pressure(scene)
+        tell("calibration")
+        calibration = calibrate(scene)
+        tell("closed loop")
+        runs = _closed_loop(scene, calibration)
+        tell("consequences")
+        members = MEMBERS[level]
+        consequences = consequences_document(find_consequences(scene, calibration.model, members=members))
+        tell("sections")
+        work = Work(scene=scene, calibration=calibration, level=level)
+        sections = collected(work, last=False)
+        tell("verification")
+        cases = merge_saved(_finished(under_way, tell), saved)
+    sections |= collected(work, last=True)
     # What a section measured by the clock does not reproduce.
     clocked = {name: record.pop("times") for name, record in sections.items() if "times" in record}
-    tell("verification")
-    cases = _verification(scene, level, saved, workers, tell)
     return {
         "format": FORMAT,
         "level": level,
@@ -170,18 +175,13 @@ def _closed_loop(scene: Scene, calibration: Calibration) -> Record:
     return {name: simulation_document(simulate(scene, model)) for name, model in models.items()}
 
 
-def _verification(
-    scene: Scene, level: Level, saved: Sequence[Mapping[str, Any]], workers: int, tell: Progress
-) -> list[Record]:
-    results = run_cases(
-        scene=scene,
-        level=level,
-        mutations=level == "heavy",
-        workers=workers,
-        progress=lambda result: tell(f"verification: {result.definition.title}"),
-    )
-    cases = [_without_time(case) for case in results_document(results)]
-    return merge_saved(cases, saved)
+def _finished(under_way: Iterator[CaseResult], tell: Progress) -> list[Record]:
+    """Records of the cases as they come."""
+    results = []
+    for result in under_way:
+        tell(f"verification: {result.definition.title}")
+        results.append(result)
+    return [_without_time(case) for case in results_document(results)]
 
 
 def _without_time(case: Record) -> Record:

@@ -45,16 +45,17 @@ SECTIONS: Final[tuple[Section, ...]] = (
 )
 
 
-def collected(work: Work) -> Record:
-    """The evidence of every section that has some of its own.
+def collected(work: Work, *, last: bool) -> Record:
+    """The evidence of the sections that have some of their own.
 
     Args:
         work: scene, calibration and level.
+        last: whether of those that are collected after the cases have run, or of the others.
 
     Returns:
         Records by section name.
     """
-    found = {section.name: section.collect(work) for section in SECTIONS}
+    found = {section.name: section.collect(work) for section in SECTIONS if section.last is last}
     return {name: record for name, record in found.items() if record is not None}
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import contextmanager
 from functools import lru_cache, partial
 from multiprocessing import get_context
 from typing import Literal
@@ -21,6 +22,8 @@ from ringbalance.verification.verdicts import Verdict, combine, judge_quantity
 
 Progress = Callable[[CaseResult], None]
 PAPER_SCENE = "liquid_ring_paper"
+DRIVEN = "eccentric_mass"
+"""The paper on driven masses."""
 
 
 @lru_cache(maxsize=1)
@@ -268,22 +271,75 @@ def run_cases(
         KeyError: an unknown case.
         SceneError: a balancer without liquid.
     """
-    scene = liquid_ring_scene(scene)
-    wanted = tuple(case_ids) or tuple(definition.id for definition in load_cases())
-    for case_id in wanted:
-        load_case(case_id)
-    run = partial(_run_whole, scene=scene, level=level, mutations=mutations)
     results = []
-    for result in map(run, wanted) if workers == 1 else _spread(run, wanted, workers):
-        results.append(result)
-        if progress is not None:
-            progress(result)
+    with cases_under_way(
+        case_ids, scene=scene, level=level, mutations=mutations, workers=workers
+    ) as under_way:
+        for result in under_way:
+            results.append(result)
+            if progress is not None:
+                progress(result)
     return tuple(results)
 
 
-def _spread(run: Callable[[str], CaseResult], wanted: Sequence[str], workers: int) -> Iterator[CaseResult]:
+@contextmanager
+def cases_under_way(
+    case_ids: Sequence[str] = (),
+    *,
+    scene: AnyScene,
+    level: Level = "light",
+    mutations: bool = False,
+    workers: int = 1,
+) -> Iterator[Iterator[CaseResult]]:
+    """Start several cases, and do something else while they run.
+
+    Args:
+        case_ids: of the catalogue; none for all.
+        scene: the scene at hand.
+        level: "light" leaves heavy cases `not run`.
+        mutations: whether to run each case's mutations too.
+        workers: processes; one runs here, each case when its result is asked for.
+
+    Yields:
+        Results, in the order asked for; leaving early leaves no process behind.
+
+    Raises:
+        KeyError: an unknown case.
+        SceneError: a balancer without liquid.
+    """
+    scene = liquid_ring_scene(scene)
+    wanted = tuple(case_ids) or tuple(definition.id for definition in load_cases())
+    run = partial(_run_whole, scene=scene, level=level, mutations=mutations)
+    order = _started_in(wanted)
+    if workers == 1:
+        yield map(run, wanted)
+        return
     pool = ProcessPoolExecutor(max_workers=workers, mp_context=get_context("spawn"))
     try:
-        yield from pool.map(run, wanted)
+        started = {group: pool.submit(_run_group, run, group) for group in order}
+        yield _in_order(started, wanted)
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+def _started_in(wanted: Sequence[str]) -> list[tuple[str, ...]]:
+    """Groups in the order of their start, first the one that takes longest when nothing is compiled yet.
+
+    The driven masses' cases run one compiled strategy: in one process it is compiled once.
+    """
+    driven = tuple(case for case in wanted if load_case(case).paper == DRIVEN)
+    rest = [(case,) for case in wanted if case not in driven]
+    return [driven, *rest] if driven else list(rest)
+
+
+def _run_group(run: Callable[[str], CaseResult], group: tuple[str, ...]) -> tuple[CaseResult, ...]:
+    return tuple(run(case) for case in group)
+
+
+def _in_order(
+    started: Mapping[tuple[str, ...], Future[tuple[CaseResult, ...]]], wanted: Sequence[str]
+) -> Iterator[CaseResult]:
+    home = {case: (group, place) for group in started for place, case in enumerate(group)}
+    for case in wanted:
+        group, place = home[case]
+        yield started[group].result()[place]

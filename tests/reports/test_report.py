@@ -21,7 +21,7 @@ from ringbalance.reports.render import render
 from ringbalance.reports.report import Report, write_report
 from ringbalance.reports.saved import heavy_cases, kept_document, saved_cases
 from ringbalance.scene import Scene, SceneError, bundled_scene
-from ringbalance.verification.runner import run_cases
+from ringbalance.verification.runner import cases_under_way
 
 Record = dict[str, Any]
 NO_OPENGL = OpenGL(available=False, window="", text="The 3-D pictures were left out: no OpenGL here.")
@@ -33,7 +33,7 @@ def few_cases() -> Iterator[None]:
     """Three cases instead of all, one check, one claim, one heavy; and consequences found once."""
 
     def run(**settings: Any) -> Any:
-        return run_cases(QUICK, **{**settings, "workers": 1})
+        return cases_under_way(QUICK, **{**settings, "workers": 1})
 
     def consequences(*arguments: Any, **_: Any) -> Any:
         if not found:
@@ -42,7 +42,7 @@ def few_cases() -> Iterator[None]:
 
     found: list[Any] = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(evidence_module, "run_cases", run)
+        patch.setattr(evidence_module, "cases_under_way", run)
         patch.setattr(evidence_module, "find_consequences", consequences)
         yield
 

@@ -46,6 +46,9 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         Evidence.
     """
     judged: list[Judged] = []
+    if defect is not None:
+        # A few scenes are enough for a mutation to show.
+        level = "light"
     count = SCENES if level == "heavy" else _LIGHT
     for number in range(count):
         judged += _of(random_scene(scene, number), quantities_of(number, level), defect)

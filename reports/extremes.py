@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from textwrap import fill
 from typing import Final
 
 import numpy as np
@@ -27,9 +28,14 @@ _COLOURS: Final = {
     Ending.REFUSED: (MUTED, 0.18),
     Ending.BROKEN: (PAPER, 1.0),
 }
-_SETTLED: Final = ("settled",)
-_UNSTABLE: Final = ("diverging", "drifting")
-_LEGEND: Final = 0.42
+_MARKS: Final = (
+    ("loop settles", ("settled",), "o", 3.0),
+    ("loop diverges or drifts", ("diverging", "drifting"), "x", 3.5),
+)
+"""Outcomes of the closed loop that a map tells by marks."""
+_LABEL: Final = 34
+"""Characters of an axis' label on one line."""
+_LEGEND: Final = 0.62
 """Inches above a map for its legend."""
 
 
@@ -144,9 +150,18 @@ def _map(name: str, columns: Record) -> Drawing:
                     alpha=strength,
                     linewidth=0,
                 )
-        for outcomes, marker, size in ((_SETTLED, "o", 3.0), (_UNSTABLE, "x", 3.5)):
+        for label, outcomes, marker, size in _MARKS:
             rows, cols = np.nonzero(np.isin(loops, outcomes))
-            axes.plot(xs[cols], ys[rows], marker, color=FOUND, markersize=size, markeredgewidth=0.9)
+            if rows.size:
+                axes.plot(
+                    xs[cols],
+                    ys[rows],
+                    marker,
+                    color=FOUND,
+                    markersize=size,
+                    markeredgewidth=0.9,
+                    label=label,
+                )
         for axis, target, edges in (("x", x, edges_x), ("y", y, edges_y)):
             if target.spacing == "log":
                 logarithmic(axes, axis)
@@ -162,7 +177,7 @@ def _map(name: str, columns: Record) -> Drawing:
         height=3.4,
         alt=f"Where the program answers over {x.title} and {y.title}, and where it refuses with a message.",
         caption=f"{x.title[0].upper()}{x.title[1:]} and {y.title}, all else as in the scene. "
-        "Dots: the loop settles; crosses: it diverges or drifts; neither: it ends in another way.",
+        "Unmarked: the loop ends in another way, most often because its time is up.",
     )
 
 
@@ -175,11 +190,13 @@ def _edges(axis: Axis, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float6
 
 
 def _label(axis: Axis) -> str:
-    return axis.title if axis.unit == "1" else f"{axis.title} in {axis.unit}"
+    told = axis.title if axis.unit == "1" else f"{axis.title} in {axis.unit.replace('^2', '²')}"
+    return fill(told, _LABEL)
 
 
 def _legend(figure: Figure, axes: Axes, present: list[Ending]) -> None:
-    handles = [Patch(color=_COLOURS[e][0], alpha=_COLOURS[e][1], linewidth=0, label=str(e)) for e in present]
+    cells = [Patch(color=_COLOURS[e][0], alpha=_COLOURS[e][1], linewidth=0, label=str(e)) for e in present]
+    handles = [*cells, *axes.get_legend_handles_labels()[0]]
     figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0, 1), ncols=2, borderaxespad=0.0)
     box, height = axes.get_position(), figure.get_figheight()
     axes.set_position((box.x0, box.y0, box.width, 1 - box.y0 - _LEGEND / height))

@@ -125,14 +125,15 @@ def _sloshing(scene: Scene) -> Term:
             estimated_contribution=0.0,
         )
     ripple, swing = gravity_ratio(scene), amplification(scene, scene.disc.max_fill_ratio / 2)
-    share = ripple * max(swing, 1.0)
+    share = ripple * (1 + 2 * max(swing, 1.0))
     above = share > scene.tolerance
     return Term(
         term="gravity ripple at 1x and sloshing",
         model="apart, by `ringbalance trade`; the means given here do not hold it" if above else LEFT_OUT,
         why=(
             f"tilt g/(omega^2 a) = {_percent(ripple)}, which the liquid's swing at 1x makes "
-            f"|1/(1 - 1/s^2)| = {swing:.2g} times as large at every speed; {_against(scene, share)}; "
+            f"n = |1/(1 - 1/s^2)| = {swing:.2g} times as large in the moment and about 1 + 2 max(1, n) times "
+            f"in the wall pressure, at every speed; {_against(scene, share)}; "
             "it vanishes in the mean over a turn"
         ),
         estimated_contribution=share,

@@ -9,6 +9,7 @@ from ringbalance.reports.equations import equation_svg
 from ringbalance.reports.numbers import MISSING, PLUS_MINUS, THIN_SPACE, number, percent, short, with_unit
 from ringbalance.reports.prose import typeset
 from ringbalance.reports.units import display_unit, given, shown
+from ringbalance.verification.catalogue import load_cases
 
 Record = dict[str, Any]
 
@@ -33,6 +34,12 @@ def anchor(case: Record) -> str:
         An id.
     """
     return f"case-{str(case['id']).replace('_', '-')}"
+
+
+def typeset_equations() -> None:
+    """Set the equations of every case once, which takes seconds, before a page asks for them."""
+    for definition in load_cases():
+        _equations({"id": definition.id, "equations": definition.equations})
 
 
 def _sentence(value: Any) -> str:

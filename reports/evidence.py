@@ -27,6 +27,7 @@ from ringbalance.reduced_model.calibration import Calibration, calibrate
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.flow_law import FlowLaw, Regime
 from ringbalance.reduced_model.paper_law import paper_model
+from ringbalance.reports.case_view import typeset_equations
 from ringbalance.reports.fields import chamber_field, mesh_record, pressure_profile
 from ringbalance.reports.section import Level, Work
 from ringbalance.reports.sections import collected
@@ -100,6 +101,9 @@ def collect_evidence(
         tell("sections")
         work = Work(scene=scene, calibration=calibration, level=level)
         sections = collected(work, last=False)
+        tell("equations")
+        # While the cases still run, there is time for what the page will need.
+        typeset_equations()
         tell("verification")
         cases = merge_saved(_finished(under_way, tell), saved)
     sections |= collected(work, last=True)

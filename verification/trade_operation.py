@@ -280,7 +280,7 @@ def settling_ladder(scene: Scene, *, book: LawBook) -> Ladder:
         )
         return np.array([found.settling_time or 0.0])
 
-    ladder = _ladder(
+    return _ladder(
         scene,
         book,
         quantity="settling_time",
@@ -290,10 +290,6 @@ def settling_ladder(scene: Scene, *, book: LawBook) -> Ladder:
         solve=solve,
         operations=OPERATIONS,
         sets=_sets(times, laws),
-    )
-    # Whole runs are dear: what the estimates call hopeless is not tried.
-    return replace(
-        ladder, contributions={n: replace(c, rough=False) for n, c in ladder.contributions.items()}
     )
 
 

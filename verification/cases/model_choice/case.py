@@ -1,7 +1,7 @@
 """Choices of models on random scenes, each judged by the highest rung and by the cheapest that would do.
 
 Light: the loss of the tube on twelve scenes and the chamber of one.  Heavy: chamber, loss and velocity on 300
-scenes, the mass moved by one operation on every tenth of them, the settling time on every thirtieth.
+scenes, the mass moved by one operation and the settling time on every tenth of them.
 """
 
 from __future__ import annotations
@@ -81,8 +81,8 @@ def quantities_of(number: int, level: Level) -> tuple[str, ...]:
     """
     if level == "light":
         return ("k", *CHAMBER) if number == _ALONE else ("k",)
-    more = ("transferred_mass",) if number % 10 == 0 else ()
-    return (*CHAMBER, "k", "velocity", *more, *(("settling_time",) if number % 30 == 0 else ()))
+    more = ("transferred_mass", "settling_time") if number % 10 == 0 else ()
+    return (*CHAMBER, "k", "velocity", *more)
 
 
 def _of(scene: Scene, quantities: tuple[str, ...], defect: str | None) -> list[Judged]:

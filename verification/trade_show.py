@@ -28,7 +28,7 @@ def trade_view(study: TradeStudy) -> RenderableType:
     """
     parts: list[RenderableType] = [Text(study.scene.name, style="bold"), _numbers(study), Text("")]
     for trade in study.trades:
-        parts += [*_trade(trade, study.choices[trade.ladder.quantity]), Text("")]
+        parts += [*_trade(trade, study.choices[trade.ladder.quantity], study.scene.tolerance), Text("")]
     parts.append(
         Text(
             f"cost: counted work by the committed model ({study.costs.fitted_on}); * on the Pareto front",
@@ -36,6 +36,12 @@ def trade_view(study: TradeStudy) -> RenderableType:
         )
     )
     return Group(*parts)
+
+
+def _own_tolerance(asked: float, taken: float) -> str:
+    if asked == taken:
+        return f"at this scene's tolerance of {taken:.0e}"
+    return f"at {taken:.0e}, the nearest to this scene's tolerance of {asked:.0e} that models are chosen for"
 
 
 def _numbers(study: TradeStudy) -> Table:
@@ -47,7 +53,7 @@ def _numbers(study: TradeStudy) -> Table:
     return table
 
 
-def _trade(trade: Trade, choices: Sequence[Choice]) -> Iterator[RenderableType]:
+def _trade(trade: Trade, choices: Sequence[Choice], asked: float) -> Iterator[RenderableType]:
     ladder = trade.ladder
     yield Text(ladder.title, style="bold")
     if not ladder.status.ok:
@@ -58,7 +64,7 @@ def _trade(trade: Trade, choices: Sequence[Choice]) -> Iterator[RenderableType]:
     yield Padding(Text(f"knee: {trade.knee}"), (0, 0, 0, 2))
     yield _chosen(choices)
     own = choices[-1]
-    yield Padding(Text(f"at this scene's tolerance of {own.tolerance:.0e}:", style="dim"), (0, 0, 0, 2))
+    yield Padding(Text(f"{_own_tolerance(asked, own.tolerance)}:", style="dim"), (0, 0, 0, 2))
     for reason in own.reasons:
         yield Padding(Text(reason), (0, 0, 0, 4))
 

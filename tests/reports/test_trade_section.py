@@ -91,3 +91,20 @@ def test_the_figure_draws_every_rung(evidence: Record) -> None:
 
 def test_without_a_trade_there_is_no_section() -> None:
     assert view({"times": {}}) is None
+
+
+@pytest.mark.parametrize(
+    ("asked", "told"),
+    [
+        (0.01, "this scene’s tolerance of 1.0 %"),
+        (
+            1e-10,
+            "1.0 × 10⁻⁶, the nearest to this scene’s tolerance of 1.0 × 10⁻¹⁰ that models are chosen for",
+        ),
+    ],
+)
+def test_a_tolerance_that_no_models_are_chosen_for_is_told(evidence: Record, asked: float, told: str) -> None:
+    evidence["trade"]["tolerance"] = asked
+    found = view(evidence)
+    assert found is not None
+    assert found["tolerance"].replace("\u202f", " ").replace("\u2009", " ") == told

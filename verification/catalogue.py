@@ -29,6 +29,7 @@ CASES: Final = (
     "friction_blend",
     "mixing_length",
     "model_choice",
+    "model_choice_many",
     "coverage",
     "bent_tube_3d",
     "extremes",

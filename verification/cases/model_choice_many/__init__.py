@@ -1,0 +1,1 @@
+"""Only the models that a scene requires, on three hundred scenes."""

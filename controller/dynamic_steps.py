@@ -167,8 +167,7 @@ class Stepper:
         method = self._method
         if method is None or method.t_bound != stop or method.t != time:
             method = self._method = self._from(state, time, stop)
-        method.step()
-        if method.status == "failed":
+        if not _steps(method):
             self._method = None
             return None
         dense, length = method.dense_output(), float(method.t) - time
@@ -179,3 +178,12 @@ class Stepper:
     def _from(self, state: FloatArray, time: float, stop: float) -> Radau:
         rates = self._rates
         return Radau(lambda _, y: rates(y), time, state, stop, rtol=RELATIVE_ERROR, atol=self._held)
+
+
+def _steps(method: Radau) -> bool:
+    """One step of the implicit method; False where it meets rates that it cannot follow."""
+    try:
+        method.step()
+    except (ValueError, np.linalg.LinAlgError):
+        return False
+    return bool(method.status != "failed")

@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 from ringbalance.controller.dynamic_column import Column, column_of
 from ringbalance.controller.dynamic_motion import Dynamics, Motion
 from ringbalance.controller.dynamic_passage import Passage, pass_time
-from ringbalance.controller.dynamic_steps import step
+from ringbalance.controller.dynamic_steps import Stepper, step
 from ringbalance.controller.liquid_ring import LiquidRing, initial_state
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.quadrature import quadrature
@@ -290,6 +290,20 @@ def test_a_creep_through_a_narrow_tube_takes_few_steps(
     assert found.motion.record.event is not Event.UNFINISHED
     assert found.fills == pytest.approx(exact.y[0], abs=3e-9)
     assert 0.25 < found.fills[2] < found.fills[1] < found.fills[0] < 0.3
+
+
+def test_where_the_implicit_method_finds_no_step_the_explicit_one_goes_on() -> None:
+    def rates(state: FloatArray) -> list[float]:
+        return [-1.0 if state[0] > 0.5 else math.nan]
+
+    stepper = Stepper(rates=rates, allowed=np.array([1e-10]), integral_error=1e-10)
+    stepper.take_as_stiff(True)
+    state, time = np.array([1.0]), 0.0
+    while time < 0.49999:
+        taken = stepper.take(state, time=time, stop=2.0, most=10_000)
+        state, time = taken.end, time + taken.length
+        assert state[0] == pytest.approx(1 - time, abs=1e-12)
+        assert taken.within(0.5)[0] == pytest.approx(1 - time + taken.length / 2, abs=1e-12)
 
 
 # --- in the loop ---

@@ -76,14 +76,15 @@ def map_drawings(tables: Mapping[str, Record]) -> list[Drawing]:
 def _rows(columns: Record) -> list[Record]:
     rows = []
     for index, title in enumerate(columns["axis"]):
-        unit = "" if columns["unit"][index] == "1" else f" {columns['unit'][index]}"
+        unit = "" if columns["unit"][index] == "1" else f" {columns['unit'][index]}".replace("^2", "²")
         again = index > 0 and columns["axis"][index - 1] == title
         ends = float(columns["from"][index]), float(columns["to"][index])
         rows.append(
             {
                 "title": "" if again else title,
                 "span": span_text(ends, unit),
-                "ending": outcome_text(str(columns["ending"][index]), str(columns["loop"][index])),
+                "ending": str(columns["ending"][index]).removesuffix(" with a message"),
+                "loop": str(columns["loop"][index]).replace("_", " "),
                 "said": typeset(shortened([str(columns["said"][index])])),
             }
         )

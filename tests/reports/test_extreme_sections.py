@@ -109,8 +109,9 @@ def test_the_extremes_say_how_far_and_what_is_beyond() -> None:
     slow, fast, fill = extremes.view(evidence())["rows"]
     assert (slow["title"], slow["span"]) == ("speed", "1.00 to 160 rpm")
     assert slow["said"].startswith("[rotor] speed")
-    assert (fast["title"], fast["ending"], fast["said"]) == ("", "solved; loop: time limit", "")
-    assert (fill["title"], fill["ending"]) == ("fill", "solved; loop: settled")
+    assert (fast["title"], fast["ending"], fast["loop"], fast["said"]) == ("", "solved", "time limit", "")
+    assert (fill["title"], fill["ending"], fill["loop"]) == ("fill", "solved", "settled")
+    assert slow["ending"] == "refused"
     assert "to" not in fill["span"]
 
 

@@ -50,8 +50,7 @@ class Section:
     collect: Callable[[Work], Record | None] = nothing
     """Plain numbers and texts for the evidence, under the section's name; None: nothing there."""
     last: bool = False
-    """Whether it is collected after the cases have run: when these have compiled what it needs, or when it
-    measures times."""
+    """Whether it is collected after the cases have run, which then have compiled what it needs."""
     view: Callable[[Record], Record | None] = everything
     """From the whole evidence to what the template calls `view`: texts, `Drawing`s; None: no such section."""
 

@@ -171,4 +171,4 @@ def front_figure(found: Record) -> Drawing:
     )
 
 
-SECTION: Final = Section(name="trade", title="Speed against accuracy", collect=collect, last=True, view=view)
+SECTION: Final = Section(name="trade", title="Speed against accuracy", collect=collect, view=view)

@@ -24,6 +24,9 @@ Progress = Callable[[CaseResult], None]
 PAPER_SCENE = "liquid_ring_paper"
 DRIVEN = "eccentric_mass"
 """The paper on driven masses."""
+Group = tuple[str, ...]
+"""Cases that run in one process, one after the other."""
+Started = dict[Group, Future[tuple[CaseResult, ...]]]
 
 
 @lru_cache(maxsize=1)
@@ -261,7 +264,7 @@ def run_cases(
         scene: the scene at hand.
         level: "light" leaves heavy cases `not run`.
         mutations: whether to run each case's mutations too.
-        workers: processes; one runs here, without starting any.
+        workers: processes, this one included; one starts no other.
         progress: called with each result as it comes, in order.
 
     Returns:
@@ -298,7 +301,8 @@ def cases_under_way(
         scene: the scene at hand.
         level: "light" leaves heavy cases `not run`.
         mutations: whether to run each case's mutations too.
-        workers: processes; one runs here, each case when its result is asked for.
+        workers: processes, this one included, which takes its share once results are asked for; one starts no
+            other.
 
     Yields:
         Results, in the order asked for; leaving early leaves no process behind.
@@ -310,19 +314,19 @@ def cases_under_way(
     scene = liquid_ring_scene(scene)
     wanted = tuple(case_ids) or tuple(definition.id for definition in load_cases())
     run = partial(_run_whole, scene=scene, level=level, mutations=mutations)
-    order = _started_in(wanted)
+    groups = _started_in(wanted)
     if workers == 1:
         yield map(run, wanted)
         return
-    pool = ProcessPoolExecutor(max_workers=workers, mp_context=get_context("spawn"))
+    pool = ProcessPoolExecutor(max_workers=workers - 1, mp_context=get_context("spawn"))
     try:
-        started = {group: pool.submit(_run_group, run, group) for group in order}
-        yield _in_order(started, wanted)
+        started = {group: pool.submit(_run_group, run, group) for group in groups}
+        yield _in_order(run, started, wanted)
     finally:
         pool.shutdown(cancel_futures=True)
 
 
-def _started_in(wanted: Sequence[str]) -> list[tuple[str, ...]]:
+def _started_in(wanted: Sequence[str]) -> list[Group]:
     """Groups in the order of their start, first the one that takes longest when nothing is compiled yet.
 
     The driven masses' cases run one compiled strategy: in one process it is compiled once.
@@ -332,14 +336,21 @@ def _started_in(wanted: Sequence[str]) -> list[tuple[str, ...]]:
     return [driven, *rest] if driven else list(rest)
 
 
-def _run_group(run: Callable[[str], CaseResult], group: tuple[str, ...]) -> tuple[CaseResult, ...]:
+def _run_group(run: Callable[[str], CaseResult], group: Group) -> tuple[CaseResult, ...]:
     return tuple(run(case) for case in group)
 
 
 def _in_order(
-    started: Mapping[tuple[str, ...], Future[tuple[CaseResult, ...]]], wanted: Sequence[str]
+    run: Callable[[str], CaseResult], started: Started, wanted: Sequence[str]
 ) -> Iterator[CaseResult]:
+    """Results as they come; while one is waited for, this process takes groups that none has begun."""
     home = {case: (group, place) for group in started for place, case in enumerate(group)}
+    own: dict[Group, tuple[CaseResult, ...]] = {}
     for case in wanted:
         group, place = home[case]
-        yield started[group].result()[place]
+        while group not in own and not started[group].done():
+            free = next((g for g in reversed(started) if g not in own and started[g].cancel()), None)
+            if free is None:
+                break
+            own[free] = _run_group(run, free)
+        yield (own[group] if group in own else started[group].result())[place]

@@ -5,13 +5,14 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping
+from concurrent.futures import Future
 from typing import Any
 
 import pytest
 
 from ringbalance.physics.results import Status, StatusCode
 from ringbalance.scene.models import Scene
-from ringbalance.verification import run_cases
+from ringbalance.verification import run_cases, runner
 from ringbalance.verification.case import CaseDefinition, parse_case
 from ringbalance.verification.evidence import Evidence, Found, Level, NotRunError, Reference
 from ringbalance.verification.runner import mutate_definition, overridden, run_case, run_definition
@@ -173,6 +174,32 @@ def test_an_interrupt_ends_the_run(paper_scene: Scene) -> None:
 
     with pytest.raises(KeyboardInterrupt):
         run_cases(QUICK, scene=paper_scene, progress=interrupt)
+
+
+def test_who_waits_takes_what_nobody_has_begun_and_keeps_the_order() -> None:
+    busy: Future[tuple[Any, ...]] = Future()
+    busy.set_running_or_notify_cancel()
+    started: dict[tuple[str, ...], Future[tuple[Any, ...]]] = {
+        ("slow", "slower"): busy,
+        ("one",): Future(),
+        ("two",): Future(),
+    }
+    taken: list[str] = []
+
+    def run(case: str) -> Any:
+        taken.append(case)
+        if len(taken) == 2:
+            busy.set_result(("slow elsewhere", "slower elsewhere"))
+        return f"{case} here"
+
+    found = list(runner._in_order(run, started, ("one", "slow", "two", "slower")))
+    assert found == ["one here", "slow elsewhere", "two here", "slower elsewhere"]
+    assert taken == ["two", "one"]
+
+
+def test_the_driven_masses_are_compiled_in_one_process() -> None:
+    groups = runner._started_in(("claim_01_volume", "driven_bound", "driven_fig4_imbalance"))
+    assert groups == [("driven_bound", "driven_fig4_imbalance"), ("claim_01_volume",)]
 
 
 @pytest.mark.heavy

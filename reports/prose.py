@@ -18,13 +18,14 @@ _GREEK: Final = {
     "phi": "φ",
     "pi": "π",
     "rho": "ρ",
+    "sigma": "σ",
     "theta": "θ",
 }
 _SUPERSCRIPTS: Final = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _SUBSCRIPTS: Final = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 _GREEK_WORD: Final = re.compile(rf"(?<![\w\\])({'|'.join(_GREEK)})(?![a-z])")
 _POWER: Final = re.compile(r"\^(?:\((-?\d+)\)|(-?\d+))(?!\d)")
-_INDEXED: Final = re.compile(r"\b([RVUxHp])(\d)(?:(')|(?!\w))")
+_INDEXED: Final = re.compile(r"\b(?:([RVUxHp])|([A-Za-z])_)(\d)(?:(')|(?!\w))")
 _EXPONENT: Final = re.compile(r"(?<=\d)e([+-]\d+)\b")
 _UNITS: Final = {
     r"\bum\b": "µm",
@@ -34,6 +35,8 @@ _UNITS: Final = {
     r"\bl/\(s\*bar\)": "l/(s\u202fbar)",
     r"\br_m\b": "rₘ",
     r"\br_p\b": "rₚ",
+    r"\bR_Omega\b": "R_Ω",
+    r"\bsqrt(?=\()": "√",
     r"\*([A-Za-z][A-Za-z ]*)\*": r"\1",
     r" \+- ": " ± ",
     r" - ": " − ",
@@ -63,4 +66,4 @@ def typeset(text: str) -> str:
 
 
 def _index(match: re.Match[str]) -> str:
-    return match[1] + match[2].translate(_SUBSCRIPTS) + ("′" if match[3] else "")
+    return (match[1] or match[2]) + match[3].translate(_SUBSCRIPTS) + ("′" if match[4] else "")

@@ -17,6 +17,10 @@ from ringbalance.scene.models import Scene
 
 FloatArray = npt.NDArray[np.float64]
 Document = dict[str, Any]
+Values = Mapping[str, float]
+"""By axis, in the axis' unit."""
+_TABLES: Final = ("environment", "gas", "sensor", "controller", "run", "accuracy")
+"""That a scene file may leave out."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,12 +159,10 @@ def varied(document: Mapping[str, Any], *, scene: Scene, values: Mapping[str, fl
         A new document; what hangs on a value follows it: two chambers for any central angle, bends that the
         bore can take, and a tube that reaches over the hump.
     """
-    changed = deepcopy(dict(document))
+    changed: Document = {table: {} for table in _TABLES} | deepcopy(dict(document))
     for axis in AXES:
         if axis.name in values:
-            _SETTERS[axis.name](changed, float(values[axis.name]), scene)
-    if "pressure" in values:
-        _set_pressure(changed, values["pressure"], values, scene)
+            _SETTERS[axis.name](changed, float(values[axis.name]), scene, values)
     return changed
 
 
@@ -243,26 +245,26 @@ def _toml(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 
-def _set_speed(document: Document, value: float, _: Scene) -> None:
+def _set_speed(document: Document, value: float, _: Scene, __: Values) -> None:
     document["rotor"]["speed"] = f"{value!r} rpm"
 
 
-def _set_fill(document: Document, value: float, _: Scene) -> None:
+def _set_fill(document: Document, value: float, _: Scene, __: Values) -> None:
     document["disc"] |= {"max_fill_ratio": value, "initial_fill": value / 2}
 
 
-def _set_plate(document: Document, value: float, scene: Scene) -> None:
-    angle = math.radians(float(str(document["disc"].get("central_angle", "90 deg")).split()[0]))
+def _set_plate(document: Document, value: float, scene: Scene, values: Values) -> None:
+    angle = math.radians(values["angle"]) if "angle" in values else scene.disc.central_angle
     closing = scene.disc.inner_radius * math.sin(min(angle, math.pi) / 2)
     document["disc"]["plate_thickness"] = f"{value * closing!r} m"
 
 
-def _set_angle(document: Document, value: float, _: Scene) -> None:
+def _set_angle(document: Document, value: float, _: Scene, __: Values) -> None:
     document["disc"] |= {"central_angle": f"{value!r} deg", "chambers": 2}
     document["controller"].pop("sequence", None)
 
 
-def _set_viscosity(document: Document, value: float, scene: Scene) -> None:
+def _set_viscosity(document: Document, value: float, scene: Scene, _: Values) -> None:
     liquid = scene.liquid
     document["liquid"] = {
         "density": f"{liquid.density!r} kg/m^3",
@@ -271,7 +273,7 @@ def _set_viscosity(document: Document, value: float, scene: Scene) -> None:
     }
 
 
-def _set_bore(document: Document, value: float, scene: Scene) -> None:
+def _set_bore(document: Document, value: float, scene: Scene, _: Values) -> None:
     tube = document["tube"]
     tube["bore"] = f"{value!r} mm"
     bends = [f"{max(1e3 * bend.radius, value)!r} mm" for bend in scene.tube.bends]
@@ -283,33 +285,32 @@ def _set_bore(document: Document, value: float, scene: Scene) -> None:
     tube["length"] = f"{1e3 * scene.tube.length + 4 * value!r} mm"
 
 
-def _set_roughness(document: Document, value: float, _: Scene) -> None:
-    bore = float(str(document["tube"]["bore"]).split()[0])
-    unit = str(document["tube"]["bore"]).split()[1]
-    document["tube"]["roughness"] = f"{value * bore!r} {unit}"
+def _set_roughness(document: Document, value: float, scene: Scene, values: Values) -> None:
+    bore = 1e-3 * values["bore"] if "bore" in values else scene.tube.bore
+    document["tube"]["roughness"] = f"{value * bore!r} m"
 
 
-def _set_pressure(document: Document, value: float, values: Mapping[str, float], scene: Scene) -> None:
+def _set_pressure(document: Document, value: float, scene: Scene, values: Values) -> None:
     speed = math.pi / 30 * values["speed"] if "speed" in values else scene.rotor.speed
     hump = scene.tube.hump_radius or scene.disc.inner_radius
     column = scene.liquid.density * speed**2 * (scene.disc.outer_radius**2 - hump**2) / 2
     document["gas"]["pressure"] = f"{value * column!r} Pa"
 
 
-def _set_period(document: Document, value: float, _: Scene) -> None:
+def _set_period(document: Document, value: float, _: Scene, __: Values) -> None:
     document["controller"]["period"] = f"{value!r} s"
 
 
-def _set_tolerance(document: Document, value: float, _: Scene) -> None:
+def _set_tolerance(document: Document, value: float, _: Scene, __: Values) -> None:
     document["accuracy"] = {"tolerance": f"{100 * value!r} %"}
 
 
-def _set_gravity(document: Document, value: float, _: Scene) -> None:
+def _set_gravity(document: Document, value: float, _: Scene, __: Values) -> None:
     document["environment"] = {**document.get("environment", {}), "gravity": f"{9.80665 * value!r} m/s^2"}
 
 
-def _later(_: Document, __: float, ___: Scene) -> None:
-    """What hangs on other values is set when those are known."""
+def _later(_: Document, __: float, ___: Scene, ____: Values) -> None:
+    """What hangs on the whole scene is set when that is made."""
 
 
 _SETTERS: Final = {
@@ -320,7 +321,7 @@ _SETTERS: Final = {
     "viscosity": _set_viscosity,
     "bore": _set_bore,
     "roughness": _set_roughness,
-    "pressure": _later,
+    "pressure": _set_pressure,
     "unbalance": _later,
     "gain": _later,
     "noise": _later,

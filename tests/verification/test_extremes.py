@@ -145,6 +145,22 @@ def test_the_papers_scene_is_solved(document: dict[str, Any]) -> None:
     assert 0 < found.residual < 1e-10
 
 
+@pytest.mark.parametrize("name", [axis.name for axis in AXES])
+def test_a_scene_of_little_more_than_a_disc_can_be_varied_along_every_axis(
+    document: dict[str, Any], name: str
+) -> None:
+    """Tables that a file leaves out, no hump, no bends, units close to their numbers."""
+    tube = {"bore": "1.5mm", "length": "120 mm"}
+    kept = {table: document[table] for table in ("disc", "liquid")}
+    short = Base(
+        document={**kept, "tube": tube, "gas": {"pressure": "0.7 MPa"}, "rotor": {"speed": "10000 rpm"}},
+        file="short.toml",
+    )
+    found = judge(short, {name: float(axis_of(name).at(0.5))})
+    assert found.violations == ()
+    assert found.loop
+
+
 def test_a_rotor_without_a_ring_is_refused_by_name(document: dict[str, Any], paper_scene: Scene) -> None:
     found = judge_point(varied(document, scene=paper_scene, values={"speed": 10.0}))
     assert found.ending is Ending.REFUSED

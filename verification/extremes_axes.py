@@ -161,7 +161,7 @@ def varied(document: Mapping[str, Any], *, scene: Scene, values: Mapping[str, fl
     """
     changed: Document = {table: {} for table in _TABLES} | deepcopy(dict(document))
     for axis in AXES:
-        if axis.name in values:
+        if axis.name in values and axis.name in _SETTERS:
             _SETTERS[axis.name](changed, float(values[axis.name]), scene, values)
     return changed
 
@@ -309,10 +309,6 @@ def _set_gravity(document: Document, value: float, _: Scene, __: Values) -> None
     document["environment"] = {**document.get("environment", {}), "gravity": f"{9.80665 * value!r} m/s^2"}
 
 
-def _later(_: Document, __: float, ___: Scene, ____: Values) -> None:
-    """What hangs on the whole scene is set when that is made."""
-
-
 _SETTERS: Final = {
     "speed": _set_speed,
     "fill": _set_fill,
@@ -322,10 +318,8 @@ _SETTERS: Final = {
     "bore": _set_bore,
     "roughness": _set_roughness,
     "pressure": _set_pressure,
-    "unbalance": _later,
-    "gain": _later,
-    "noise": _later,
     "period": _set_period,
     "tolerance": _set_tolerance,
     "gravity": _set_gravity,
 }
+"""What hangs on the whole scene, such as the unbalance, is set by `fitted` when that is made."""

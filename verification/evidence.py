@@ -125,6 +125,15 @@ class Evidence:
     status: Status = field(default_factory=Status)
 
 
+def no_reference(_scene: Scene) -> Mapping[str, Reference]:
+    """What a case's `reference` is where limits alone judge its quantities.
+
+    Returns:
+        Nothing.
+    """
+    return {}
+
+
 class CaseCode(Protocol):
     """The two functions of a case's `case.py`."""
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
@@ -17,15 +16,7 @@ from ringbalance.reduced_model.flow_law import Regime
 from ringbalance.scene.models import Scene
 from ringbalance.verification.calibrations import calibration_of
 from ringbalance.verification.comparison import from_half_width
-from ringbalance.verification.evidence import (
-    Axis,
-    Curve,
-    Evidence,
-    Found,
-    Level,
-    Reference,
-    Series,
-)
+from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series, no_reference
 from ringbalance.verification.paper_numbers import plate_uncertainty
 from ringbalance.verification.tube_running import driving_head, running_tube, tube_curve
 
@@ -38,16 +29,7 @@ _FILLS: Final = np.linspace(0.02, 1.0, 50)
 _HUMP: Final = "hump_radius"
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """None: deviations are judged against limits.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        Nothing.
-    """
-    return {}
+reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

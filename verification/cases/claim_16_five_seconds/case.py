@@ -14,7 +14,7 @@ from ringbalance.controller import Simulation
 from ringbalance.reduced_model.paper_law import paper_law
 from ringbalance.scene.models import Scene
 from ringbalance.verification.calibrations import calibration_of
-from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table
+from ringbalance.verification.evidence import Evidence, Found, Level, Table, no_reference
 from ringbalance.verification.loops import AMPLITUDES, amplitude_series, loop_scene, run_loop, settling
 
 _PERIODS: Final = (0.25, 0.5, 1.0)
@@ -22,16 +22,7 @@ _BOUND: Final = 5.0
 _WRONG: Final = math.radians(120)
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """None: the claim is a bound.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        Nothing.
-    """
-    return {}
+reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

@@ -5,14 +5,13 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
 
 from ringbalance.controller import Simulation
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table
+from ringbalance.verification.evidence import Evidence, Found, Level, Table, no_reference
 from ringbalance.verification.loops import (
     PHASES,
     amplitude_series,
@@ -28,16 +27,7 @@ _TRIAL: Final = {"first_trial": 0.02, "long_step": 0.1, "short_step": 0.005}
 _WRONG: Final = math.radians(120)
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """None: the claim is a comparison and two bounds.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        Nothing.
-    """
-    return {}
+reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

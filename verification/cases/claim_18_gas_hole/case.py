@@ -20,8 +20,8 @@ from ringbalance.verification.evidence import (
     Found,
     Level,
     NotRunError,
-    Reference,
     Series,
+    no_reference,
 )
 
 FloatArray = npt.NDArray[np.float64]
@@ -48,16 +48,7 @@ class _Cells:
     """Distance over which the surface passes a cell, m."""
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """None: the margins are judged against zero.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        Nothing.
-    """
-    return {}
+reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

@@ -3,7 +3,6 @@
 # ruff: noqa: ARG001 - every case answers to one interface
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -17,7 +16,7 @@ from ringbalance.physics.pressure_assembly import at_facets, facet_points, volum
 from ringbalance.physics.pressure_integrals import liquid_integrals, section_integrals
 from ringbalance.physics.pressure_surface import solve_with_gravity
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Evidence, Found, Level, Reference
+from ringbalance.verification.evidence import Evidence, Found, Level, no_reference
 from ringbalance.verification.gravity_study import tilted_liquid
 from ringbalance.verification.rings import ring_of
 
@@ -36,16 +35,7 @@ class _Balance:
     volume: float
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """None: residuals are judged against limits.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        Nothing.
-    """
-    return {}
+reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

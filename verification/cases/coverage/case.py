@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from ringbalance.scene.models import Scene
 from ringbalance.verification.coverage import QUANTITIES, Coverage, coverage, error_ratios, random_samples
-from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table
+from ringbalance.verification.evidence import Evidence, Found, Level, Table, no_reference
 
 _COUNT: Final = 240
 _SEED: Final = 20
@@ -20,16 +20,7 @@ _NAMES: Final = ("volume", "wall_pressure", "moment", "lambda")
 _FACTORS: Final = {None: 1.0, "half_widths_quartered": 0.25, "half_widths_padded": 100.0}
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """None: shares and medians are judged against limits.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        Nothing.
-    """
-    return {}
+reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

@@ -3,29 +3,18 @@
 # ruff: noqa: ARG001 - every case answers to one interface
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from ringbalance.controller.eccentric.figures_bound import motion_bound
 from ringbalance.controller.eccentric.figures_runs import figure_seven
 from ringbalance.controller.eccentric.parameters import plant_parameters
 from ringbalance.scene.models import Scene
 from ringbalance.verification.driven_masses import driven_scene
-from ringbalance.verification.evidence import Evidence, Found, Level, Reference
+from ringbalance.verification.evidence import Evidence, Found, Level, no_reference
 
 _RATE = 1.0
 """rad/s, of the masses against the rotor."""
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """No references: the printed words are limits.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        Nothing.
-    """
-    return {}
+reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

@@ -3,27 +3,16 @@
 # ruff: noqa: ARG001 - every case answers to one interface
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from ringbalance.controller.eccentric.figures_effort import FigureSix, figure_six
 from ringbalance.scene.models import Scene
 from ringbalance.verification.driven_masses import driven_scene
-from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
+from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series, no_reference
 
 _STEP = {"light": 4e-4, "heavy": 1e-4}
 """s, of the integration; the effort hangs on it by a thousandth."""
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """No references: the printed words are limits.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        Nothing.
-    """
-    return {}
+reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

@@ -3,29 +3,18 @@
 # ruff: noqa: ARG001 - every case answers to one interface
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from ringbalance.controller.eccentric.figures_runs import BalancingFigure, figure_eight, figure_seven
 from ringbalance.scene.models import Scene
 from ringbalance.verification.driven_masses import driven_scene, envelope, thinned
-from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
+from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series, no_reference
 
 _SHOWN = 12.0
 """s."""
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """No references: the printed words are limits.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        Nothing.
-    """
-    return {}
+reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

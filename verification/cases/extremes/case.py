@@ -4,13 +4,12 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
 from typing import Final
 
 from ringbalance.scene import bundled_scene
 from ringbalance.scene.files import cache_folder
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table
+from ringbalance.verification.evidence import Evidence, Found, Level, Table, no_reference
 from ringbalance.verification.extremes import (
     SIZES,
     Size,
@@ -41,16 +40,7 @@ _NUMBERS: Final = {
 }
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """No references: what must hold is its own.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        Nothing.
-    """
-    return {}
+reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

@@ -3,7 +3,7 @@
 # ruff: noqa: ARG001 - every case answers to one interface
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Final
@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from ringbalance.physics.tube_friction import friction_factor, friction_uncertainty
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
+from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series, no_reference
 from ringbalance.verification.published import read_rows
 
 FloatArray = npt.NDArray[np.float64]
@@ -39,16 +39,7 @@ class _Points:
     """95 % half-width, relative."""
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """None: deviations from the data are judged against limits.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        Nothing.
-    """
-    return {}
+reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

@@ -10,7 +10,7 @@ from typing import Final
 
 from ringbalance.physics.grid_convergence import GridConvergence, Verdict, gci
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table
+from ringbalance.verification.evidence import Evidence, Found, Level, Table, no_reference
 from ringbalance.verification.published import read_rows
 
 _FORMAL_ORDER: Final = 2.0
@@ -29,16 +29,7 @@ class _Column:
     printed: Mapping[str, tuple[float, ...]]
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """None: deviations are judged against limits.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        Nothing.
-    """
-    return {}
+reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

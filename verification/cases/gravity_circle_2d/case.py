@@ -1,30 +1,19 @@
 """Free surface and pressure with gravity across the shaft, two-dimensional."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Final
 
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Evidence, Level, Reference
+from ringbalance.verification.evidence import Evidence, Level, no_reference
 from ringbalance.verification.gravity_study import gravity_evidence, gravity_study
 
 _FILL_SHARE: Final = 0.8
 _LEVELS: Final = {"light": (1, 2, 4, 8), "heavy": (1, 2, 4, 8, 16)}
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """None: orders and errors are judged against limits.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        Nothing.
-    """
-    return {}
+reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

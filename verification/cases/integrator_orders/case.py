@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -22,7 +21,7 @@ from ringbalance.scene.models import Scene
 from ringbalance.verification.cases.integrator_orders.side_by_side import side_by_side, tapered_error
 from ringbalance.verification.cases.integrator_orders.slowed_law import SlowedLaw
 from ringbalance.verification.cases.integrator_orders.stall import stall_study
-from ringbalance.verification.evidence import Convergence, Evidence, Found, Level, Reference
+from ringbalance.verification.evidence import Convergence, Evidence, Found, Level, no_reference
 from ringbalance.verification.orders import OrderStudy, order_study
 
 FloatArray = npt.NDArray[np.float64]
@@ -42,16 +41,7 @@ def _kinked(fill_ratio: FloatArray, largest: float) -> FloatArray:
     return np.asarray(np.minimum(1.0, 0.5 + 0.5 * fill_ratio / (_KINK * largest)))
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """None: errors against the closed form are judged against limits.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        Nothing.
-    """
-    return {}
+reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

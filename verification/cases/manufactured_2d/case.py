@@ -1,26 +1,13 @@
 """Two-dimensional manufactured study, quadratic and straight geometry."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
 from __future__ import annotations
-
-from collections.abc import Mapping
 
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.evidence import Evidence, Level, Reference
+from ringbalance.verification.evidence import Evidence, Level, no_reference
 from ringbalance.verification.manufactured_evidence import manufactured_evidence
 
-
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """None: orders and errors are judged against limits.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        Nothing.
-    """
-    return {}
+reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

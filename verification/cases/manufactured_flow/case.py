@@ -3,7 +3,6 @@
 # ruff: noqa: ARG001 - every case answers to one interface
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
@@ -16,24 +15,15 @@ from ringbalance.verification.evidence import (
     Evidence,
     Found,
     Level,
-    Reference,
     Series,
+    no_reference,
 )
 from ringbalance.verification.manufactured_flow import FlowStudy, flow_study
 
 _AROUND: Final = {"light": (1, 2, 4, 8), "heavy": (1, 2, 4, 8, 16)}
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """None: orders and errors are judged against limits.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        Nothing.
-    """
-    return {}
+reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
@@ -17,7 +17,7 @@ from scipy.integrate import quad
 from ringbalance.physics.mixing_length import MixingLength, mixing_length, mixing_length_flow
 from ringbalance.physics.tube_friction import friction_factor, friction_uncertainty
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
+from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series, no_reference
 from ringbalance.verification.published import read_rows
 
 FloatArray = npt.NDArray[np.float64]
@@ -56,16 +56,7 @@ class _Points:
     """Darcy."""
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """None: deviations are judged against limits.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        Nothing.
-    """
-    return {}
+reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

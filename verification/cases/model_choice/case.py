@@ -6,11 +6,10 @@ The loss of the tube on twelve scenes and the chamber of one; `model_choice_many
 # ruff: noqa: ARG001 - every case answers to one interface
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Final
 
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Evidence, Level, Reference
+from ringbalance.verification.evidence import Evidence, Level, no_reference
 from ringbalance.verification.trade_choices import CHAMBER
 from ringbalance.verification.trade_evidence import choices_evidence
 
@@ -19,16 +18,7 @@ _ALONE: Final = 2
 """Number of the one scene whose chamber is judged."""
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """None: shares and ratios are judged against limits.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        Nothing.
-    """
-    return {}
+reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

@@ -7,11 +7,10 @@ tenth.
 # ruff: noqa: ARG001 - every case answers to one interface
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Final
 
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Evidence, Level, Reference
+from ringbalance.verification.evidence import Evidence, Level, no_reference
 from ringbalance.verification.trade_choices import CHAMBER
 from ringbalance.verification.trade_evidence import choices_evidence
 
@@ -21,16 +20,7 @@ _FEW: Final = 12
 _TENTH: Final = 10
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """None: shares and ratios are judged against limits.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        Nothing.
-    """
-    return {}
+reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

@@ -1,9 +1,7 @@
 """Natural frequencies of the ring against exact waves and sums of cosines, and the fills to avoid."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -13,7 +11,7 @@ import numpy.typing as npt
 from ringbalance.physics.sloshing import resonant_fills, sloshing_modes
 from ringbalance.physics.sloshing_response import SloshingResponse, sloshing_response
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
+from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series, no_reference
 from ringbalance.verification.sloshing_exact import (
     cosine_amplification,
     cosine_frequencies,
@@ -31,16 +29,7 @@ _COARSE: Final = ((8, 24), (4, 12), (2, 6))
 _CORIOLIS: Final = {"coriolis_off_by_a_percent": 1.01}
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """No references: deviations are judged by their size.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        Nothing.
-    """
-    return {}
+reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

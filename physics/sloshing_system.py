@@ -103,7 +103,6 @@ def sloshing_system(*, disc: Disc, surface_radius: float, cells: tuple[int, int]
     free = np.concatenate([kept, inner])
     walls = np.concatenate([grid[:, 0], grid[-1, 1:-1], grid[::-1, -1]])
     slip = stiffness[walls[1:-1]][:, free] @ extension
-    wall = _Line.of(nodes[:, grid[-1]])
     return SloshingSystem(
         kinetic=kinetic,
         coriolis=-surface.integral(_SLOPE, _SHAPE, np.ones_like(surface.stretch))[1:-1, 1:-1],
@@ -112,19 +111,17 @@ def sloshing_system(*, disc: Disc, surface_radius: float, cells: tuple[int, int]
         outflow=surface.outflow()[:, 1:-1],
         flux=surface.flux()[:, 1:-1],
         places=surface.places.reshape(2, -1),
-        potential=_even_growth(grid, surface, wall) @ (stiffness[:, free] @ extension),
+        potential=_even_growth(grid) @ (stiffness[:, free] @ extension),
         surface_mean=surface.mean()[1:-1],
-        wall_drive=wall.mean_place - surface.mean_place,
+        wall_drive=_Line.of(nodes[:, grid[-1]]).mean_place - surface.mean_place,
         unknowns=free.size,
     )
 
 
-def _even_growth(grid: IntArray, surface: _Line, wall: _Line) -> FloatArray:
-    """chi at all nodes: along each radius between its shares of the two arcs."""
-    inner, outer = surface.shares(), wall.shares()
-    along = np.linspace(0.0, 1.0, grid.shape[0])[:, None]
+def _even_growth(grid: IntArray) -> FloatArray:
+    """chi at all nodes: the share of the arc up to each, cells along an arc being of equal length."""
     chi = np.empty(grid.size)
-    chi[grid] = (1 - along) * inner + along * outer
+    chi[grid] = np.linspace(0.0, 1.0, grid.shape[1])
     return chi
 
 
@@ -168,10 +165,8 @@ class _Line:
 
     def mean(self) -> FloatArray:
         """Row that takes values at the nodes to their mean over the arc."""
-        local = np.einsum("iq,eq,q->ei", _SHAPE, self.stretch, _WEIGHT)
-        row = np.zeros(2 * self.stretch.shape[0] + 1)
-        for k, block in enumerate(local):
-            row[2 * k : 2 * k + 3] += block
+        # The shapes sum to one, so the columns of their mass matrix do to each one's integral.
+        row = self.integral(_SHAPE, _SHAPE, self.stretch).sum(axis=0)
         return np.asarray(row / row.sum(), dtype=np.float64)
 
     @property
@@ -179,10 +174,6 @@ class _Line:
         """Mean of x + i y over the arc."""
         x, y = np.einsum("feq,eq,q->f", self.places, self.stretch, _WEIGHT)
         return complex(x, y) / float(np.einsum("eq,q->", self.stretch, _WEIGHT))
-
-    def shares(self) -> FloatArray:
-        """Share of the arc up to each node; cells are of equal length."""
-        return np.linspace(0.0, 1.0, 2 * self.stretch.shape[0] + 1)
 
     def flux(self) -> FloatArray:
         """Values of q at the places, one row a place."""

@@ -49,23 +49,21 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     ratios = sloshing_modes(
         disc=scene.disc, fill_ratio=fills, modes=_MODES, cells=_COARSE
     ).frequency_ratio.value
-    swings = _swings(scene, fills)
+    swings = _response(scene, fills).amplification.value
+    equal = _response(scene, np.array([scene.disc.initial_fill]))
     met = dict(resonant_fills(disc=scene.disc, modes=_MODES))
     return Evidence(
         found={
             "still": Found(value=_still_deviation(bare, depths)),
             "frequencies": Found(value=_frequency_deviation(bare, depths, _CORIOLIS.get(defect or "", 1.0))),
-            "forced": Found(value=_forced_deviation(bare, depths, backwards=defect == "forcing_backwards")),
-            "pressure": Found(
-                value=_pressure_deviation(bare, depths, borrowed=defect == "pressure_swings_as_the_moment")
-            ),
+            **{name: Found(value=value) for name, value in _forced_deviations(bare, depths, defect).items()},
         },
         numbers={
             "first": float(ratios[-1, 0]),
             "third": met.get(3, 0.0),
             "double": float(np.interp(2.0, swings[fills > 0.2], fills[fills > 0.2])),
-            "equal": float(_swings(scene, np.array([scene.disc.initial_fill]))[0]),
-            "equal_pressure": float(_pressure_swings(scene, np.array([scene.disc.initial_fill]))[0]),
+            "equal": float(equal.amplification.value[0]),
+            "equal_pressure": float(equal.pressure_amplification.value[0]),
         },
         series=(_frequencies_figure(fills, ratios), _swings_figure(fills, swings)),
     )
@@ -94,43 +92,25 @@ def _frequency_deviation(disc: Disc, depths: FloatArray, factor: float) -> float
     return float(np.abs(found.frequency_ratio.value / exact - 1).max())
 
 
-def _forced_deviation(disc: Disc, depths: FloatArray, *, backwards: bool) -> float:
-    """Turning gravity backwards is the same as turning the Coriolis force of the reference round."""
+def _forced_deviations(disc: Disc, depths: FloatArray, defect: str | None) -> dict[str, float]:
+    """Of the swings of moment and wall pressure.
+
+    Turning gravity backwards is the same as turning the Coriolis force of the reference round.
+    """
     found = sloshing_response(
         disc=disc, fill_ratio=_FILLS, angular_velocity=1.0, kinematic_viscosity=0.0, gravity=0.0
     )
-    exact = []
+    moments, pressures = [], []
     for depth in depths:
         waves = cosine_waves(central_angle=disc.central_angle, depth=float(depth))
-        turned = replace(waves, mixed=-waves.mixed) if backwards else waves
-        exact.append(cosine_amplification(turned, frequency_ratio=1.0))
-    return float(np.abs(found.amplification.value / np.array(exact) - 1).max())
-
-
-def _pressure_deviation(disc: Disc, depths: FloatArray, *, borrowed: bool) -> float:
-    found = sloshing_response(
-        disc=disc, fill_ratio=_FILLS, angular_velocity=1.0, kinematic_viscosity=0.0, gravity=0.0
-    )
-    exact = np.array(
-        [
-            cosine_pressure_amplification(
-                cosine_waves(central_angle=disc.central_angle, depth=float(h)),
-                frequency_ratio=1.0,
-                depth=float(h),
-            )
-            for h in depths
-        ]
-    )
-    taken = found.amplification if borrowed else found.pressure_amplification
-    return float(np.abs(taken.value / exact - 1).max())
-
-
-def _swings(scene: Scene, fills: FloatArray) -> FloatArray:
-    return _response(scene, fills).amplification.value
-
-
-def _pressure_swings(scene: Scene, fills: FloatArray) -> FloatArray:
-    return _response(scene, fills).pressure_amplification.value
+        turned = replace(waves, mixed=-waves.mixed) if defect == "forcing_backwards" else waves
+        moments.append(cosine_amplification(turned, frequency_ratio=1.0))
+        pressures.append(cosine_pressure_amplification(turned, frequency_ratio=1.0, depth=float(depth)))
+    taken = found.amplification if defect == "pressure_swings_as_the_moment" else found.pressure_amplification
+    return {
+        "forced": float(np.abs(found.amplification.value / np.array(moments) - 1).max()),
+        "pressure": float(np.abs(taken.value / np.array(pressures) - 1).max()),
+    }
 
 
 def _response(scene: Scene, fills: FloatArray) -> SloshingResponse:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from textwrap import fill
 from typing import Final
 
@@ -56,7 +56,7 @@ def view(evidence: Record) -> Record:
         "ran": True,
         "text": typeset(case.get("explanation", "")),
         "date": case.get("date", ""),
-        "rows": _rows(tables["axes"]),
+        "rows": [{**row, "said": typeset(row["said"])} for row in axis_rows(tables["axes"])],
         "maps": map_drawings(tables),
     }
 
@@ -73,62 +73,42 @@ def map_drawings(tables: Mapping[str, Record]) -> list[Drawing]:
     return [_map(name, columns) for name, columns in tables.items() if name.startswith(MAP_PREFIX)]
 
 
-def _rows(columns: Record) -> list[Record]:
-    rows = []
-    for index, title in enumerate(columns["axis"]):
-        unit = "" if columns["unit"][index] == "1" else f" {columns['unit'][index]}".replace("^2", "²")
-        again = index > 0 and columns["axis"][index - 1] == title
-        ends = float(columns["from"][index]), float(columns["to"][index])
-        rows.append(
-            {
-                "title": "" if again else title,
-                "span": span_text(ends, unit),
-                "ending": str(columns["ending"][index]).removesuffix(" with a message"),
-                "loop": str(columns["loop"][index]).replace("_", " "),
-                "said": typeset(shortened([str(columns["said"][index])])),
-            }
-        )
-    return rows
-
-
-def span_text(ends: tuple[float, float], unit: str) -> str:
-    """First and last value of a stretch.
+def axis_rows(columns: Record) -> list[Record]:
+    """The stretches of every axis as texts.
 
     Args:
-        ends: the two.
-        unit: with a space before it; empty for none.
+        columns: of the table "axes" of `extremes_tables`.
 
     Returns:
-        "1 to 160 rpm", or one value where both are the same.
+        `title` (empty but for an axis' first), `span`, `ending`, `loop` and `said` of each.
     """
-    low, high = (number(end, digits=3) for end in ends)
-    return f"{low}{unit}" if low == high else f"{low} to {high}{unit}"
+    before = ["", *columns["axis"]]
+    return [
+        {
+            "title": "" if title == before[index] else title,
+            "span": _span(columns["from"][index], columns["to"][index], columns["unit"][index]),
+            "ending": str(columns["ending"][index]).removesuffix(" with a message"),
+            "loop": str(columns["loop"][index]).replace("_", " "),
+            "said": _shortened(str(columns["said"][index])),
+        }
+        for index, title in enumerate(columns["axis"])
+    ]
 
 
-def outcome_text(ending: str, loop: str) -> str:
-    """How points end along a stretch, in words.
-
-    Args:
-        ending: of calibration.
-        loop: outcome of the closed loop; empty where there is none.
-
-    Returns:
-        "solved; loop: settled", or the ending alone.
-    """
-    return f"{ending}; loop: {loop.replace('_', ' ')}" if loop else ending
+def _span(low: float, high: float, unit: str) -> str:
+    """First and last value of a stretch, or the one where both are the same."""
+    first, last = (number(float(end), digits=3) for end in (low, high))
+    told = first if first == last else f"{first} to {last}"
+    return told if unit == "1" else f"{told} {_shown(unit)}"
 
 
-def shortened(messages: Sequence[str]) -> str:
-    """The first of some messages, without the name of a file that nobody has.
+def _shown(unit: str) -> str:
+    return unit.replace("^2", "²")
 
-    Args:
-        messages: of the program; empty texts count as none.
 
-    Returns:
-        A sentence; empty for none.
-    """
-    first = next((text for text in messages if text), "").split("\n")[0]
-    return first.split(".toml: ", 1)[-1]
+def _shortened(message: str) -> str:
+    """The first line of a message, without the name of a file that nobody has."""
+    return message.split("\n")[0].split(".toml: ", 1)[-1]
 
 
 def _map(name: str, columns: Record) -> Drawing:
@@ -191,7 +171,7 @@ def _edges(axis: Axis, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float6
 
 
 def _label(axis: Axis) -> str:
-    told = axis.title if axis.unit == "1" else f"{axis.title} in {axis.unit.replace('^2', '²')}"
+    told = axis.title if axis.unit == "1" else f"{axis.title} in {_shown(axis.unit)}"
     return fill(told, _LABEL)
 
 

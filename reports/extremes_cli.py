@@ -16,7 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 from rich.progress import Progress as Bar
 from rich.table import Table
 
-from ringbalance.reports.extremes import map_drawings, outcome_text, shortened, span_text
+from ringbalance.reports.extremes import axis_rows, map_drawings
 from ringbalance.reports.figure_style import standalone
 from ringbalance.reports.numbers import number
 from ringbalance.scene.files import write_whole
@@ -72,16 +72,16 @@ def extremes(
             progress=progress,
             kept=None if out is None else out / KEPT,
         )
-    told = extremes_document(found)
+    told, tables = extremes_document(found), extremes_tables(found)
     if out is not None:
         write_whole(out / "extremes.json", json_format.dumps(told, allow_nan=False) + "\n")
-        for drawing in map_drawings(extremes_tables(found)):
+        for drawing in map_drawings(tables):
             write_whole(out / f"{drawing.name}.svg", standalone(drawing))
         console.print(f"written to {out}", highlight=False)
     if json:
         print(json_format.dumps(told, allow_nan=False))
     else:
-        _show(told)
+        _show(told, axis_rows(tables["axes"]))
     return BROKEN if broken(found) else DONE
 
 
@@ -93,7 +93,7 @@ def _progress(console: Console) -> Iterator[Progress]:
         yield lambda what, done, number: bar.update(task, completed=done, total=number, description=what)
 
 
-def _show(told: Record) -> None:
+def _show(told: Record, rows: list[Record]) -> None:
     console = Console()
     endings = ", ".join(f"{count} {ending}" for ending, count in told["endings"].items() if count)
     console.print(f"{told['judged']} points: {endings}", highlight=False)
@@ -103,17 +103,10 @@ def _show(told: Record) -> None:
         highlight=False,
     )
     table = Table(box=None, header_style="dim", padding=(0, 1))
-    for title in ("input", "stretch", "ends", "said"):
+    for title in ("input", "stretch", "answer", "loop", "said"):
         table.add_column(title, overflow="fold")
-    for axis in told["axes"]:
-        for place, span in enumerate(axis["spans"]):
-            unit = "" if axis["unit"] == "1" else f" {axis['unit']}"
-            table.add_row(
-                "" if place else axis["title"],
-                span_text((span["low"], span["high"]), unit),
-                outcome_text(span["ending"], span["loop"]),
-                escape(shortened([span["text"]])),
-            )
+    for row in rows:
+        table.add_row(*(escape(text) for text in row.values()))
     console.print(table, highlight=False)
     for fault in told["violations"]:
         console.print(Padding(f"{fault['violations']} at {fault['point']}", (0, 0, 0, 2)), style="red")

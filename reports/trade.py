@@ -23,7 +23,7 @@ from ringbalance.reports.numbers import MISSING, number, percent
 from ringbalance.reports.prose import typeset
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.scene.models import Scene
-from ringbalance.verification.trade import TradeStudy, held_tolerance, trade_document, trade_study
+from ringbalance.verification.trade import TradeStudy, tolerance_text, trade_document, trade_study
 
 _LEAST: Final = 1e-9
 """Error at which a rung that equals the highest is drawn."""
@@ -62,7 +62,7 @@ def view(evidence: Record) -> Record | None:
         return None
     times = (evidence["times"].get("trade") or {}).get("rungs", {})
     return {
-        "tolerance": _own_tolerance(found),
+        "tolerance": typeset(tolerance_text(found["tolerance"], _error)),
         "numbers": [
             {
                 "name": typeset(n["name"]),
@@ -74,13 +74,6 @@ def view(evidence: Record) -> Record | None:
         ],
         "quantities": [_quantity(q, times.get(q["quantity"], [])) for q in found["quantities"] if q["rungs"]],
     }
-
-
-def _own_tolerance(found: Record) -> str:
-    """The scene's, or the nearest to it that models are chosen for."""
-    asked, taken = found["tolerance"], held_tolerance(found["tolerance"])
-    told = f"this scene’s tolerance of {_error(asked)}"
-    return told if asked == taken else f"{_error(taken)}, the nearest to {told} that models are chosen for"
 
 
 def _quantity(found: Record, times: list[Record]) -> Record:

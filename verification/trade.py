@@ -171,6 +171,20 @@ def held_tolerance(tolerance: float) -> float:
     return min(max(tolerance, min(TOLERANCES)), max(TOLERANCES))
 
 
+def tolerance_text(tolerance: float, say: Callable[[float], str]) -> str:
+    """The tolerance that models are chosen for, beside the scene's own where that is out of range.
+
+    Args:
+        tolerance: the scene's.
+        say: writes a tolerance.
+
+    Returns:
+        "this scene's tolerance of 1 %", or the nearest to it that models are chosen for.
+    """
+    taken, told = held_tolerance(tolerance), f"this scene's tolerance of {say(tolerance)}"
+    return told if taken == tolerance else f"{say(taken)}, the nearest to {told} that models are chosen for"
+
+
 def trade_document(study: TradeStudy) -> Record:
     """A study as plain numbers and texts.
 

@@ -11,7 +11,7 @@ from rich.text import Text
 
 from ringbalance.reduced_model.ladder_choice import Choice
 from ringbalance.reduced_model.scene_numbers import scene_numbers
-from ringbalance.verification.trade import TradeStudy
+from ringbalance.verification.trade import TradeStudy, tolerance_text
 from ringbalance.verification.trade_measure import Measured, Trade
 
 _MICRO, _MILLI = 1e-6, 1e-3
@@ -38,12 +38,6 @@ def trade_view(study: TradeStudy) -> RenderableType:
     return Group(*parts)
 
 
-def _own_tolerance(asked: float, taken: float) -> str:
-    if asked == taken:
-        return f"at this scene's tolerance of {taken:.0e}"
-    return f"at {taken:.0e}, the nearest to this scene's tolerance of {asked:.0e} that models are chosen for"
-
-
 def _numbers(study: TradeStudy) -> Table:
     table = Table(box=None, header_style="dim", padding=(0, 1))
     for header in ("number", "value", "formula", "tells"):
@@ -63,9 +57,9 @@ def _trade(trade: Trade, choices: Sequence[Choice], asked: float) -> Iterator[Re
     yield _rungs(trade)
     yield Padding(Text(f"knee: {trade.knee}"), (0, 0, 0, 2))
     yield _chosen(choices)
-    own = choices[-1]
-    yield Padding(Text(f"{_own_tolerance(asked, own.tolerance)}:", style="dim"), (0, 0, 0, 2))
-    for reason in own.reasons:
+    own = tolerance_text(asked, lambda tolerance: f"{tolerance:.0e}")
+    yield Padding(Text(f"at {own}:", style="dim"), (0, 0, 0, 2))
+    for reason in choices[-1].reasons:
         yield Padding(Text(reason), (0, 0, 0, 4))
 
 

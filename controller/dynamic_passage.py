@@ -322,12 +322,11 @@ class _Run:
 
     def _weigh(self, moved: float) -> None:
         """Whether the next start can be more than round-off, and whether it asks for implicit steps."""
-        stiff = self.stepper.taken_as_stiff
-        creeping = self.stopped != -self.direction and not stiff
+        creeping = self.stopped != -self.direction and not self.stepper.stiff
         still = moved < (NOTHING_MOVED if creeping else LITTLE_MOVED)
         # A start that moved nothing will move nothing again, until a valve or a gas pressure does.
         self.balanced = self.dynamics.line is None and still
-        self.stepper.take_as_stiff(stiff or (creeping and moved < LITTLE_MOVED))
+        self.stepper.stiff |= creeping and moved < LITTLE_MOVED
         self.stopped = self.direction
 
     def _flip(self) -> None:
@@ -335,7 +334,7 @@ class _Run:
         switch = self.pending.pop(0)
         self.valves[switch.chamber] = switch.opens
         self.balanced, self.stopped = False, 0
-        self.stepper.take_as_stiff(False)
+        self.stepper.stiff = False
         if self.direction and not self.dynamics.inertia:
             self._note_regime()
             self.primed = self._found(self.state, primed=True).primed

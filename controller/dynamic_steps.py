@@ -104,30 +104,18 @@ class Stepper:
             integral_error: absolute error of those under the implicit method, which needs one for all.
         """
         self.steps = 0
+        self.stiff = False
+        """Whether the implicit method is used from the first step on."""
         self._rates = rates
         self._allowed = allowed
         self._held = np.where(np.isinf(allowed), integral_error, allowed)
         self._length = FIRST_STEP
         self._since = 0
-        self._stiff = False
         self._method: Radau | None = None
 
     def begin_anew(self) -> None:
         """The rates have jumped: go on with short steps."""
         self._length, self._since, self._method = FIRST_STEP, 0, None
-
-    def take_as_stiff(self, stiff: bool) -> None:
-        """Choose the implicit method from the first step on, or no longer.
-
-        Args:
-            stiff: whether to.
-        """
-        self._stiff, self._method = stiff, None
-
-    @property
-    def taken_as_stiff(self) -> bool:
-        """Whether the implicit method is used from the first step on."""
-        return self._stiff
 
     def take(self, state: FloatArray, *, time: float, stop: float, most: int) -> Taken:
         """One step from a state.
@@ -142,7 +130,7 @@ class Stepper:
             Taken.
         """
         self._since += 1
-        if self._stiff or self._since > STIFF_AFTER:
+        if self.stiff or self._since > STIFF_AFTER:
             found = self._implicit(state, time, stop)
             if found is not None:
                 return found

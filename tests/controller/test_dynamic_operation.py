@@ -297,7 +297,7 @@ def test_where_the_implicit_method_finds_no_step_the_explicit_one_goes_on() -> N
         return [-1.0 if state[0] > 0.5 else math.nan]
 
     stepper = Stepper(rates=rates, allowed=np.array([1e-10]), integral_error=1e-10)
-    stepper.take_as_stiff(True)
+    stepper.stiff = True
     state, time = np.array([1.0]), 0.0
     while time < 0.49999:
         taken = stepper.take(state, time=time, stop=2.0, most=10_000)

@@ -45,8 +45,7 @@ def thinned(values: npt.ArrayLike, *, count: int = _DRAWN) -> FloatArray:
         Values, shape (..., at most count).
     """
     array = np.asarray(values, dtype=np.float64)
-    at = np.unique(np.linspace(0, array.shape[-1] - 1, count).round().astype(np.int64))
-    return np.asarray(array[..., at], dtype=np.float64)
+    return np.asarray(array[..., _places(array.shape[-1], count)], dtype=np.float64)
 
 
 def envelope(values: npt.ArrayLike, *, count: int = _DRAWN) -> FloatArray:
@@ -60,5 +59,8 @@ def envelope(values: npt.ArrayLike, *, count: int = _DRAWN) -> FloatArray:
         Largest values, as many as `thinned` gives.
     """
     array = np.asarray(values, dtype=np.float64)
-    at = np.unique(np.linspace(0, array.size - 1, count).round().astype(np.int64))
-    return np.asarray(np.maximum.reduceat(array, at), dtype=np.float64)
+    return np.asarray(np.maximum.reduceat(array, _places(array.size, count)), dtype=np.float64)
+
+
+def _places(size: int, count: int) -> npt.NDArray[np.int64]:
+    return np.unique(np.linspace(0, size - 1, count).round().astype(np.int64))

@@ -194,8 +194,7 @@ def fitted(
     rotor["initial_vibration"] = _vibration(scene=scene, made=made, values=values)
     control["proportional"] = f"{values.get('gain', 1.0) * scene.controller.proportional!r} s/m"
     noise = values.get("noise", scene.sensor.amplitude_noise / scene.controller.limit)
-    amplitude = f"{noise * scene.controller.limit!r} m"
-    changed["sensor"] = {**changed.get("sensor", {}), "amplitude_noise": amplitude}
+    changed["sensor"]["amplitude_noise"] = f"{noise * scene.controller.limit!r} m"
     return changed
 
 
@@ -306,7 +305,7 @@ def _set_tolerance(document: Document, value: float, _: Scene, __: Values) -> No
 
 
 def _set_gravity(document: Document, value: float, _: Scene, __: Values) -> None:
-    document["environment"] = {**document.get("environment", {}), "gravity": f"{9.80665 * value!r} m/s^2"}
+    document["environment"]["gravity"] = f"{9.80665 * value!r} m/s^2"
 
 
 _SETTERS: Final = {

@@ -91,7 +91,7 @@ def judge(base: Base, point: Point) -> Judgement:
     document = varied(base.document, scene=scene, values=point)
     period = point.get("period", scene.controller.period)
     longest = PERIODS * period + GAS_TIME
-    document["run"] = {**document.get("run", {}), "time_limit": f"{longest!r} s"}
+    document["run"]["time_limit"] = f"{longest!r} s"
     try:
         document = fitted(document, scene=scene, made=_made(document, base.file), values=point)
     except SceneError as error:

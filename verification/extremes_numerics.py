@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Final
 
@@ -101,7 +100,7 @@ def at_step(scene: Scene, step: float) -> Judgement:
         law=law,
         fill=scene.disc.initial_fill,
         total=2 * scene.disc.initial_fill,
-        exchange_rate=math.pi / 4 * scene.tube.bore**2 / law.chamber_volume,
+        exchange_rate=law.tube_area / law.chamber_volume,
         gas_pressure=scene.gas.pressure,
         primed=False,
     )

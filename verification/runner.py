@@ -114,7 +114,7 @@ def _broken_down(definition: CaseDefinition) -> Verdict:
 def _outcome(
     definition: CaseDefinition, *, scene: Scene, level: Level, status: str, verdict: Verdict = Verdict.NOT_RUN
 ) -> CaseResult:
-    judged: AnyScene = driven_scene() if definition.paper == "eccentric_mass" else scene
+    judged: AnyScene = driven_scene() if definition.paper == DRIVEN else scene
     return CaseResult(
         definition=definition,
         verdict=verdict,

@@ -1,4 +1,4 @@
-"""A law to try integrators on: the paper's velocity times a share that depends on the fill."""
+"""Laws to try integrators on, made from the paper's; here its velocity times a share set by the fill."""
 
 from __future__ import annotations
 
@@ -15,18 +15,32 @@ FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class SlowedLaw:
-    """The paper's law, slower in the share of its velocity that a function of the fill gives."""
+class TrialLaw:
+    """What every such law has of the paper's."""
 
     name: str
     base: PaperLaw
-    share: Callable[[FloatArray, float], FloatArray]
-    """From x of the driven chamber and the largest x."""
 
     @property
     def max_fill_ratio(self) -> float:
         """Of the paper's law."""
         return self.base.max_fill_ratio
+
+    def table(self) -> Mapping[str, FloatArray]:
+        """Of the paper's law.
+
+        Returns:
+            Its arrays.
+        """
+        return self.base.table()
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlowedLaw(TrialLaw):
+    """The paper's law, slower in the share of its velocity that a function of the fill gives."""
+
+    share: Callable[[FloatArray, float], FloatArray]
+    """From x of the driven chamber and the largest x."""
 
     def evaluate(
         self,
@@ -55,11 +69,3 @@ class SlowedLaw:
         )
         share = self.share(np.asarray(fill_ratio, dtype=np.float64), self.max_fill_ratio)
         return replace(flow, velocity=flow.velocity * share)
-
-    def table(self) -> Mapping[str, FloatArray]:
-        """Of the paper's law.
-
-        Returns:
-            Its arrays.
-        """
-        return self.base.table()

@@ -12,7 +12,6 @@ steps end in the cycle d = +-kappa^2/4, in which that slope is zero, so that eve
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -24,6 +23,7 @@ from ringbalance.controller.explicit_segments import explicit_segments
 from ringbalance.controller.transfer import Drive
 from ringbalance.reduced_model.flow_law import Flow, Regime
 from ringbalance.reduced_model.paper_law import PaperLaw
+from ringbalance.verification.cases.integrator_orders.slowed_law import TrialLaw
 from ringbalance.verification.evidence import Axis, Curve, Series
 
 FloatArray = npt.NDArray[np.float64]
@@ -38,20 +38,10 @@ _CYCLES: Final = 5
 
 
 @dataclass(frozen=True, kw_only=True)
-class FullTube:
+class FullTube(TrialLaw):
     """The paper's law of a tube that stays full: beyond the stall it flows back."""
 
-    base: PaperLaw
-
-    @property
-    def name(self) -> str:
-        """ "full tube"."""
-        return "full tube"
-
-    @property
-    def max_fill_ratio(self) -> float:
-        """Of the paper's law."""
-        return self.base.max_fill_ratio
+    name: str = "full tube"
 
     def evaluate(
         self,
@@ -84,14 +74,6 @@ class FullTube:
             uncertainty=np.zeros_like(velocity),
             primed=np.ones_like(velocity, dtype=np.bool_),
         )
-
-    def table(self) -> Mapping[str, FloatArray]:
-        """Of the paper's law.
-
-        Returns:
-            Its arrays.
-        """
-        return self.base.table()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -21,6 +21,7 @@ from ringbalance.reports.fifty import collect, liquid_row
 from ringbalance.reports.numbers import number, percent
 from ringbalance.reports.section import Record, Work
 from ringbalance.reports.units import shown
+from ringbalance.scene.files import write_whole
 from ringbalance.verification.runner import paper_scene
 
 FloatArray = npt.NDArray[np.float64]
@@ -188,7 +189,7 @@ def main(arguments: list[str]) -> int:
         0.
     """
     path = Path(arguments[0])
-    path.write_text(filled(path.read_text(encoding="utf-8")), encoding="utf-8")
+    write_whole(path, filled(path.read_text(encoding="utf-8")))
     return 0
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from ringbalance.reduced_model.ladder_choice import Values, choose
 from ringbalance.reduced_model.rungs import Ladder
-from ringbalance.scene import bundled_scene, load_scene
+from ringbalance.scene import bundled_scene, load_scene, write_whole
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.verification.trade_choices import ladders_for
@@ -76,7 +76,7 @@ def main() -> None:
     parser.add_argument("--write", action="store_true")
     fresh = page(PAGE.read_text(encoding="utf-8"))
     if parser.parse_args().write:
-        PAGE.write_text(fresh, encoding="utf-8")
+        write_whole(PAGE, fresh)
     else:
         print(fresh)
 

@@ -122,40 +122,87 @@ def test_forced_swing_matches_the_spectral_one(disc: Disc, s: float) -> None:
     assert found.pressure_amplification.value[0] == pytest.approx(pressure, rel=1e-4)
 
 
-def test_the_mean_potential_on_the_wall_is_that_of_the_potential_itself(disc: Disc) -> None:
-    """With plates, phi solved for on the same mesh: int grad phi . grad v = int rot psi . grad v."""
-    cells, a = (8, 24), 35e-3
-    chamber = chamber_mesh(disc=disc, surface_radius=a, cells=cells)
-    system = sloshing_system(disc=disc, surface_radius=a, cells=cells)
-    grid, nodes = chamber.grid, chamber.mesh.doflocs
-    angles = np.arctan2(nodes[1, grid[0, 1:-1]], nodes[0, grid[0, 1:-1]])
-    half = disc.central_angle / 2 - np.arcsin(disc.plate_thickness / a)
-    middle = angles.mean()
-    psi = np.cos(np.pi / 2 * (angles - middle) / half) + 0.3 * np.sin(np.pi * (angles - middle) / half)
-    basis = Basis(chamber.mesh, ElementQuad2())
-    places = basis.doflocs.T
-    dofs = cKDTree(places).query(nodes.T)[1]
-    fixed = np.zeros(basis.N)
-    fixed[dofs[grid[0, 1:-1]]] = psi
-    edges = np.unique(dofs[np.concatenate([grid[0], grid[-1], grid[:, 0], grid[:, -1]])])
-    stream = solve(*condense(laplace.assemble(basis), x=fixed, D=edges))
+class Potential:
+    """phi of a stream function on the free surface of a chamber with plates, solved for on the same mesh."""
 
-    @LinearForm
-    def turned(v: Any, w: Any) -> Any:
-        return w["psi"].grad[1] * v.grad[0] - w["psi"].grad[0] * v.grad[1]
+    def __init__(self, disc: Disc, *, radius: float, cells: tuple[int, int]) -> None:
+        chamber = chamber_mesh(disc=disc, surface_radius=radius, cells=cells)
+        self.mesh, self.grid = chamber.mesh, chamber.grid
+        self.basis = Basis(self.mesh, ElementQuad2())
+        self.dofs = cKDTree(self.basis.doflocs.T).query(self.mesh.doflocs.T)[1]
 
-    load = turned.assemble(basis, psi=basis.interpolate(stream))
-    phi = solve(*condense(laplace.assemble(basis), load, D=np.array([0])))
+    def of(self, psi: Any) -> tuple[Any, Any]:
+        """int grad phi . grad v = int rot psi . grad v; psi and phi at all dofs."""
+        fixed = np.zeros(self.basis.N)
+        fixed[self.dofs[self.grid[0, 1:-1]]] = psi
+        rim = [self.grid[0], self.grid[-1], self.grid[:, 0], self.grid[:, -1]]
+        stiff = laplace.assemble(self.basis)
+        stream = solve(*condense(stiff, x=fixed, D=np.unique(self.dofs[np.concatenate(rim)])))
 
-    def mean(row: int) -> float:
-        facets = chamber.mesh.facets_satisfying(
-            lambda x: np.abs(np.hypot(*x) - np.hypot(*nodes[:, grid[row, 0]])) < 1e-3 * (nodes.max())
+        @LinearForm
+        def turned(v: Any, w: Any) -> Any:
+            return w["psi"].grad[1] * v.grad[0] - w["psi"].grad[0] * v.grad[1]
+
+        load = turned.assemble(self.basis, psi=self.basis.interpolate(stream))
+        return stream, solve(*condense(stiff, load, D=np.array([0])))
+
+    def mean(self, values: Any, row: int) -> float:
+        """Over the surface (0) or the outer wall (-1)."""
+        nodes = self.mesh.doflocs[:, self.grid[row, 0]]
+        facets = self.mesh.facets_satisfying(
+            lambda x: np.abs(np.hypot(*x) - np.hypot(*nodes)) < 1e-3 * self.mesh.doflocs.max()
         )
-        own = FacetBasis(chamber.mesh, ElementQuad2(), facets=facets)
-        return float(np.sum(own.interpolate(phi) * own.dx) / np.sum(own.dx))
+        own = FacetBasis(self.mesh, ElementQuad2(), facets=facets)
+        return float(np.sum(own.interpolate(values) * own.dx) / np.sum(own.dx))
 
-    assert system.potential @ psi == pytest.approx(mean(-1) - mean(0), rel=1e-4)
+
+def test_the_mean_potential_on_the_wall_is_that_of_the_potential_itself(disc: Disc) -> None:
+    cells, a = (8, 24), 35e-3
+    system = sloshing_system(disc=disc, surface_radius=a, cells=cells)
+    field = Potential(disc, radius=a, cells=cells)
+    x, y = field.mesh.doflocs[:, field.grid[0, 1:-1]]
+    angles = np.arctan2(y, x) - np.arctan2(y, x).mean()
+    half = disc.central_angle / 2 - np.arcsin(disc.plate_thickness / a)
+    psi = np.cos(np.pi / 2 * angles / half) + 0.3 * np.sin(np.pi * angles / half)
+    phi = field.of(psi)[1]
+    assert system.potential @ psi == pytest.approx(field.mean(phi, -1) - field.mean(phi, 0), rel=1e-4)
     assert abs(system.potential @ psi) > 1e-4
+
+
+def test_pressure_of_the_forced_waves_stands_on_surface_and_wall(disc: Disc) -> None:
+    """With plates: p' = G + c - i s phi - 2 psi is a q/(i s) all along the surface, and its mean is ours."""
+    cells, fill, s = (8, 24), 0.3, 0.8
+    a = float(surface_radius(disc=disc, fill_ratio=fill))
+    system = sloshing_system(disc=disc, surface_radius=a, cells=cells)
+    swinging = -(s**2) * system.kinetic + 2j * s * system.coriolis + system.centrifugal
+    psi = np.linalg.solve(swinging, 1j * s * (system.outflow[1] + 1j * system.outflow[2]))
+    field = Potential(disc, radius=a, cells=cells)
+    parts = [field.of(part) for part in (psi.real, psi.imag)]
+    stream, phi = (one + 1j * other for one, other in zip(*parts, strict=True))
+    scale = np.hypot(*field.mesh.doflocs).max()
+    drive = (field.basis.doflocs[0] + 1j * field.basis.doflocs[1]) / scale
+
+    def mean(values: Any, row: int) -> complex:
+        return field.mean(values.real, row) + 1j * field.mean(values.imag, row)
+
+    pressure = drive - 1j * s * phi - 2 * stream
+    pressure = pressure - mean(pressure, 0)
+    surface = field.dofs[field.grid[0]]
+    angle = np.angle(field.basis.doflocs[0][surface] + 1j * field.basis.doflocs[1][surface])
+    flux = -np.gradient(stream[surface], angle * a / scale)
+    inner = slice(8, -8)
+    error = pressure[surface] - a / scale * flux / (1j * s)
+    assert np.abs(error[inner]).max() < 0.02 * np.abs(pressure[surface]).max()
+    found = sloshing_response(
+        disc=disc,
+        fill_ratio=fill,
+        angular_velocity=OMEGA,
+        kinematic_viscosity=0.0,
+        gravity=9.81,
+        frequency_ratio=s,
+    )
+    still = mean(drive, -1) - mean(drive, 0)
+    assert found.pressure_amplification.value[0] == pytest.approx(abs(mean(pressure, -1) / still), rel=1e-3)
 
 
 def test_slow_forcing_only_tilts_the_surface(disc: Disc) -> None:

@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import pytest
 
-from ringbalance.reports import extremes, sloshing
+from ringbalance.reports import extremes, extremes_cli, sloshing
 from ringbalance.reports.section import Work
 from ringbalance.scene import Scene
 
@@ -124,3 +124,15 @@ def test_a_map_draws_every_ending_that_occurs_and_no_other() -> None:
 
 def test_extremes_that_were_not_run_say_so() -> None:
     assert extremes.view({"verification": [{"id": "extremes", "tables": []}]}) == {"ran": False}
+
+
+def test_a_table_named_in_a_message_is_not_taken_for_markup(capsys: pytest.CaptureFixture[str]) -> None:
+    told = {
+        "judged": 3,
+        "endings": {"solved": 2, "refused with a message": 1},
+        "worst_residual": 1e-13,
+        "worst_error_over_half_width": 0.8,
+        "violations": [],
+    }
+    extremes_cli._show(told, extremes.axis_rows(table()))
+    assert "[rotor]" in capsys.readouterr().out

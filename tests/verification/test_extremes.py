@@ -259,6 +259,28 @@ def test_judgements_of_another_scene_are_not_taken(base: Base, tmp_path: Path, c
     assert len(counting) == 2 * CHUNK
 
 
+def test_judgements_of_another_version_are_not_taken(
+    base: Base, tmp_path: Path, counting: list[Point], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    points, kept = design(count=CHUNK, seed=1), tmp_path / "kept.json"
+    judged(base, points, kept=kept)
+    monkeypatch.setattr(extremes_design, "_sources", lambda: "another version")
+    judged(base, points, kept=kept)
+    assert len(counting) == 2 * CHUNK
+
+
+def test_a_belief_about_the_rotor_follows_the_rotor(document: dict[str, Any], paper_scene: Scene) -> None:
+    control = {**document["controller"], "assumed_influence_coefficient": "0.02 um/(g*mm)"}
+    found = fitted_scene({**document, "controller": control}, paper_scene, fill=0.05)
+    wrong = replace(
+        paper_scene, controller=replace(paper_scene.controller, assumed_influence_coefficient=0.02)
+    )
+    believed = fitted_scene({**document, "controller": control}, wrong, fill=0.05)
+    assert full_vibration(found) == pytest.approx(full_vibration(paper_scene))
+    share = believed.controller.assumed_influence_coefficient / believed.rotor.influence_coefficient
+    assert share == pytest.approx(0.02 / paper_scene.rotor.influence_coefficient)
+
+
 def test_everything_is_told(base: Base, counting: list[Point]) -> None:
     size = Size(points=10, sweep=5, fineness=1.0, grid=3)
     found = find_extremes(base, size=size)

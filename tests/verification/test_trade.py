@@ -25,7 +25,7 @@ from ringbalance.verification import trade as trade_module
 from ringbalance.verification.trade import held_tolerance, thinned, trade_document, trade_study
 from ringbalance.verification.trade_choices import judge
 from ringbalance.verification.trade_measure import Clock, knee, measure, pareto_front
-from ringbalance.verification.trade_operation import moved_mass, operation_laws, time_models
+from ringbalance.verification.trade_operation import moved_mass, operation_laws, settling_ladder, time_models
 from ringbalance.verification.trade_scenes import random_scene
 
 
@@ -194,3 +194,9 @@ def test_every_quantity_of_the_paper_disc_keeps_every_tolerance(scene: Scene) ->
 def test_the_choice_does_not_change_from_run_to_run(scene: Scene) -> None:
     ladder = k_ladder(scene)
     assert choose(ladder, 0.1).rung.name == choose(k_ladder(scene), 0.1).rung.name
+
+
+def test_no_rung_of_the_settling_time_is_ruled_out_by_an_estimate(scene: Scene) -> None:
+    """Where no run settles the cheapest says so as well as any, and estimates cannot know."""
+    ladder = settling_ladder(scene, book=LawBook(scene, base_law(scene)))
+    assert all(contribution.rough for contribution in ladder.contributions.values())

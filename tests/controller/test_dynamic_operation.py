@@ -292,6 +292,30 @@ def test_a_creep_through_a_narrow_tube_takes_few_steps(
     assert 0.25 < found.fills[2] < found.fills[1] < found.fills[0] < 0.3
 
 
+def test_a_creep_near_its_balance_takes_few_steps(
+    scene: Scene, plant: Plant, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Slower than the error allowed to a step: explicit steps would stop it and start it anew without end."""
+    thick = replace(
+        scene,
+        liquid=replace(scene.liquid, name="custom", kinematic_viscosity=1e-3),
+        rotor=replace(scene.rotor, speed=250.0),
+        environment=replace(scene.environment, gravity=0.0),
+    )
+    own = plant(calibrate(thick).model, "tube inertia")
+    monkeypatch.setattr("ringbalance.controller.dynamic_passage.MAX_STEPS", 5000)
+    left = []
+    for offset in (1e-5, 1e-7):
+        found = pass_time(
+            own, fill=0.25 + offset, total=0.5, primed=True, motion=Motion(), instants=np.array([20.0])
+        )
+        assert found.motion.record.event is not Event.UNFINISHED
+        left.append((found.fill - 0.25) / offset)
+    # Laminar: the same share is left of any offset.
+    assert left[1] == pytest.approx(left[0], rel=1e-6)
+    assert 0.9 < left[0] < 0.99
+
+
 def test_where_the_implicit_method_finds_no_step_the_explicit_one_goes_on() -> None:
     def rates(state: FloatArray) -> list[float]:
         return [-1.0 if state[0] > 0.5 else math.nan]

@@ -50,8 +50,8 @@ def extremes(
     Args:
         scene: the scene file.
         json: print one JSON document instead of tables.
-        out: also write extremes.json and the stability maps to this folder; an interrupted run with the same
-            folder goes on where it stopped.
+        out: also write extremes.json and the stability maps to this folder; after an interrupted run with
+            the same folder the designed set goes on where it stopped.
         level: "heavy" judges thousands of points, for an hour or more.
         workers: processes; default one for each core, at most two.
 

@@ -6,13 +6,17 @@ PYTHON_IN_VENV := $(VENV)/bin/python
 SCENE ?= scenes/liquid_ring_paper.toml
 OUT ?= out
 WORKERS ?= 2
+# What differs between Python versions shows here; a minute or so, for `make test-versions`.
+SHORT_TESTS := tests/scene tests/mesh tests/architecture tests/test_public_names.py tests/test_cli.py \
+	tests/physics/test_pressure.py tests/physics/test_tube_loss.py tests/reduced_model/test_paper_law.py \
+	tests/reduced_model/test_hermite.py tests/controller/test_loop.py tests/controller/test_compiled.py
 CODE := scene mesh physics reduced_model controller verification reports tools benchmarks
 # One thread per process: the tests run side by side, and sums then come out the same on every machine.
 export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 
-.PHONY: help env report test test-heavy lint format bench lock clean
+.PHONY: help env report test test-faults test-heavy test-short test-versions lint format bench lock clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1\t\2/p' Makefile | expand -t 18
@@ -24,8 +28,17 @@ env: ## make .venv from requirements/lock.txt and see to off-screen OpenGL; noth
 report: env ## the report on SCENE (the paper's disc) into OUT (out/)
 	$(VENV)/bin/ringbalance report $(SCENE) --out $(OUT)
 
-test: lint ## lint, types and every test but the heavy ones
+test: lint ## lint, types and every test but the heavy ones and the faults
 	$(PYTHON_IN_VENV) -m pytest -n $(WORKERS)
+
+test-faults: env ## kills, damaged caches, odd environments: a few minutes, part of .ci/run
+	$(PYTHON_IN_VENV) -m pytest -n $(WORKERS) -m faults
+
+test-short: lint ## lint, types and a short selection of the tests
+	$(PYTHON_IN_VENV) -m pytest -n $(WORKERS) $(SHORT_TESTS)
+
+test-versions: env ## `make test-short` under every further supported Python of this machine, each in .venv-3.X
+	$(PYTHON_IN_VENV) tools/other_pythons.py
 
 test-heavy: env ## the tests that take long
 	$(PYTHON_IN_VENV) -m pytest -n $(WORKERS) -m heavy
@@ -43,14 +56,15 @@ format: env ## let ruff write what `make lint` asks for
 bench: ## timed comparisons, in an environment of their own with every extra (hundreds of MB)
 	@sh tools/make_env.sh $(BENCH_VENV) requirements/lock-all.txt
 	@sh tools/make_ngsolve.sh "$(CURDIR)/$(BENCH_VENV)/bin/python"
+	$(BENCH_VENV)/bin/python benchmarks/calibrate_command.py
 	$(BENCH_VENV)/bin/python benchmarks/pressure_field.py
 	$(BENCH_VENV)/bin/python benchmarks/tube_flow.py
 	$(BENCH_VENV)/bin/python benchmarks/closed_loop.py
 	$(BENCH_VENV)/bin/python benchmarks/eccentric_mass.py
 
-lock: env ## write the lock files anew from pyproject.toml (a change of dependencies only)
+lock: env ## rewrite the lock files from pyproject.toml (a change of dependencies only)
 	sh tools/make_lock.sh $(VENV)/bin/uv
 
 clean: ## remove what the other targets made, the environments included
-	rm -rf $(VENV) $(BENCH_VENV) out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) .venv-3.* $(BENCH_VENV) out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -not -path './.git/*' -prune -exec rm -rf {} +

@@ -8,7 +8,7 @@ go through `solve_ivp` with events for stall and empty, at the loosest tolerance
 law through its interface, as for a law of which nothing else is known.  Under the paper's law the fill is
 a parabola in time, which Runge-Kutta steps hit exactly, so solve_ivp has an easy time there, and the rival
 keeps no record.  Ours is timed in three ways: compiled and called from Python with numbers (`linear_fill`) or
-with a prepared scene (`prepare_run`), which are the ones that a target is set for; as a script meets it, with
+as an ensemble of one, which are the ones that a target is set for; as a script meets it, with
 all checks, choices and texts (`closed_form`, `simulate`); and among many (`simulate_ensemble`).  Times are
 the least of several rounds, by the wall's clock and by the processor's, which other work disturbs less.  The
 growth is measured after everything has been compiled, so that the peak memory of the process shows what
@@ -31,23 +31,14 @@ from rich.console import Console
 from rich.table import Table
 
 from ringbalance.reduced_model.calibration import calibrate
-from ringbalance.reduced_model.paper_law import paper_model
+from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.loader import bundled_scene, load_scene
 from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import liquid_ring_scene
 
 
 def compare(scene: Scene, *, repeats: int, members: int, console: Console) -> tuple[list[Line], Rivals]:
-    """All ratios.
-
-    Args:
-        scene: the scene.
-        repeats: timed rounds.
-        members: of the ensembles.
-        console: for progress.
-
-    Returns:
-        Lines and the rivals.
-    """
+    """All ratios. Args: `repeats`: timed rounds. `members`: of the ensembles. `console`: for progress."""
     paper = paper_model(scene)
     rivals = {
         "paper's law in numbers": loosest(scene, paper, in_numbers(scene, paper)),
@@ -70,14 +61,7 @@ def compare(scene: Scene, *, repeats: int, members: int, console: Console) -> tu
 
 
 def comparison(line: Line) -> dict[str, object]:
-    """One line of the document.
-
-    Args:
-        line: the comparison.
-
-    Returns:
-        A document for json.
-    """
+    """One line of the document. Returns: A document for json."""
     return {
         "what": line.what,
         "ours_s": line.ours._asdict(),
@@ -93,14 +77,8 @@ def document(
 ) -> dict[str, object]:
     """All that was measured.
 
-    Args:
-        lines: comparisons.
-        rivals: by name.
-        sizes: growth.
-        others: single times, s.
-
-    Returns:
-        A document for json.
+    Args: `lines`: comparisons. `rivals`: by name. `others`: single times, s.
+    Returns: A document for json.
     """
     return {
         "solve_ivp_rtol": {name: plain.tolerance for name, plain in rivals.items()},
@@ -114,14 +92,7 @@ def document(
 
 
 def show(lines: Sequence[Line], sizes: Sequence[Growth], others: dict[str, float], console: Console) -> None:
-    """Print tables.
-
-    Args:
-        lines: comparisons.
-        sizes: growth.
-        others: single times, s.
-        console: where to.
-    """
+    """Print tables. Args: `lines`: comparisons. `others`: single times, s. `console`: where to."""
     table = Table(title="beside solve_ivp at 1e-6 in fill")
     for name in ("what", "ours, us", "solve_ivp, us", "times faster", "asked for", "by processor time"):
         table.add_column(name)
@@ -160,7 +131,7 @@ def main() -> None:
     parser.add_argument("--largest", type=int, default=1_000_000)
     asked = parser.parse_args()
     told = Console(stderr=True)
-    scene = load_scene(bundled_scene("liquid_ring_paper"))
+    scene = liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper")))
     lines, rivals = compare(scene, repeats=asked.repeats, members=asked.members, console=told)
     sizes = growth(scene, asked.largest, told)
     told.print("consequences, and the first calls of fresh processes")

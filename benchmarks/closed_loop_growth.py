@@ -14,16 +14,16 @@ from dataclasses import dataclass
 
 from rich.console import Console
 
-from ringbalance.controller.consequences import find_consequences
-from ringbalance.controller.ensemble import simulate_ensemble
+from ringbalance.controller.ensemble.monte_carlo import simulate_ensemble
 from ringbalance.reduced_model.calibration import calibrate
-from ringbalance.reduced_model.paper_law import paper_model
+from ringbalance.reduced_model.law.paper_law import paper_model
+from ringbalance.reports.studies.consequences import find_consequences
 from ringbalance.scene.models import Scene
 
 FIRST_CALL = """
 import time
-from ringbalance.controller.ensemble import simulate_ensemble
-from ringbalance.reduced_model.paper_law import paper_model
+from ringbalance.controller.ensemble.monte_carlo import simulate_ensemble
+from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.loader import bundled_scene, load_scene
 scene = load_scene(bundled_scene("liquid_ring_paper"))
 start = time.process_time()
@@ -45,13 +45,8 @@ class Growth:
 def growth(scene: Scene, largest: int, console: Console) -> list[Growth]:
     """Ensembles by tens up to the largest.
 
-    Args:
-        scene: the scene.
-        largest: members.
-        console: for progress.
-
-    Returns:
-        One entry per size, smallest first.
+    Args: `largest`: members. `console`: for progress.
+    Returns: One entry per size, smallest first.
     """
     model, found, size = paper_model(scene), [], 1000
     while size <= largest:
@@ -73,8 +68,7 @@ def growth(scene: Scene, largest: int, console: Console) -> list[Growth]:
 def compile_seconds() -> tuple[float, float]:
     """First ensemble of a machine, and first one of a later process.
 
-    Returns:
-        Processor seconds with an empty folder of compiled code, and with a full one.
+    Returns: Processor seconds with an empty folder of compiled code, and with a full one.
     """
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-c", FIRST_CALL]
@@ -94,11 +88,7 @@ def compile_seconds() -> tuple[float, float]:
 def consequences_seconds(scene: Scene) -> float:
     """What a wrong k costs, ensembles and margins included.
 
-    Args:
-        scene: the scene.
-
-    Returns:
-        s, after a first one with few members.
+    Returns: s, after a first one with few members.
     """
     calibrated = calibrate(scene).model
     find_consequences(scene, calibrated, members=10)
@@ -110,11 +100,8 @@ def consequences_seconds(scene: Scene) -> float:
 def order_of_growth(sizes: Sequence[Growth]) -> float | None:
     """Exponent of the processor time over the number of members, between the two largest ensembles.
 
-    Args:
-        sizes: smallest first.
-
-    Returns:
-        1 for linear growth; None for a single size.
+    Args: `sizes`: smallest first.
+    Returns: 1 for linear growth; None for a single size.
     """
     if len(sizes) < 2:
         return None

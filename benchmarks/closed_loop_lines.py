@@ -11,15 +11,20 @@ from typing import NamedTuple
 import numpy as np
 from closed_loop_plain import Plain, plain_run
 
-from ringbalance.controller.closed_form import closed_form, has_closed_form
-from ringbalance.controller.compiled_transfer import linear_fill
-from ringbalance.controller.ensemble import ensemble_transfer, simulate_ensemble
+from ringbalance.controller.ensemble.compiled_transfer import linear_fill
+from ringbalance.controller.ensemble.monte_carlo import (
+    ensemble_transfer,
+    simulate_ensemble,
+    simulate_members,
+)
+from ringbalance.controller.ensemble.run import ensemble_plan
+from ringbalance.controller.ensemble.samples import members_alike
+from ringbalance.controller.liquid_ring.closed_form import closed_form, has_closed_form
+from ringbalance.controller.liquid_ring.quadrature import quadrature
+from ringbalance.controller.liquid_ring.transfer import Drive
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.prepared_run import prepare_run
-from ringbalance.controller.quadrature import quadrature
-from ringbalance.controller.transfer import Drive
-from ringbalance.reduced_model.model import BalancerModel
-from ringbalance.reduced_model.paper_law import PaperLaw
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.scene.models import Scene
 
 FILL_ERROR = 1e-6
@@ -38,14 +43,7 @@ class Seconds(NamedTuple):
     """Of all threads."""
 
     def per(self, count: int) -> Seconds:
-        """A share of it.
-
-        Args:
-            count: how many things one call does.
-
-        Returns:
-            Seconds for one of them.
-        """
+        """A share of it. Args: `count`: how many things one call does."""
         return Seconds(self.wall / count, self.processor / count)
 
 
@@ -73,13 +71,7 @@ class Line:
 def least_seconds(action: Callable[[], object], repeats: int, inner: int = 1) -> Seconds:
     """Least time of one call, which other work on the machine disturbs least.
 
-    Args:
-        action: what to time.
-        repeats: rounds, after one that warms caches.
-        inner: calls in a round.
-
-    Returns:
-        Seconds.
+    Args: `action`: what to time. `repeats`: rounds, after one that warms caches. `inner`: calls in a round.
     """
     action()
     rounds = []
@@ -94,12 +86,7 @@ def least_seconds(action: Callable[[], object], repeats: int, inner: int = 1) ->
 def drives_of(scene: Scene, model: BalancerModel) -> list[tuple[Drive, float]]:
     """Operations to judge a tolerance by: a usual one, and a long one from a full chamber.
 
-    Args:
-        scene: the scene.
-        model: the balancer.
-
-    Returns:
-        Drives with their gas times, s.
+    Returns: Drives with their valve-open times, s.
     """
     rate, total = model.tube_area / model.chamber_volume, 2 * scene.disc.initial_fill
     return [
@@ -121,16 +108,8 @@ def drives_of(scene: Scene, model: BalancerModel) -> list[tuple[Drive, float]]:
 def loosest(scene: Scene, model: BalancerModel, velocity: Callable[[float], float]) -> Plain:
     """The rival with the loosest tolerance whose fills are right to `FILL_ERROR`.
 
-    Args:
-        scene: the scene.
-        model: the balancer.
-        velocity: its right-hand side.
-
-    Returns:
-        Plain.
-
-    Raises:
-        RuntimeError: no tolerance reaches it.
+    Args: `velocity`: its right-hand side.
+    Raises: RuntimeError: no tolerance reaches it.
     """
     drives = drives_of(scene, model)
     integrator = closed_form if has_closed_form(model.flow) else quadrature
@@ -151,14 +130,8 @@ def loosest(scene: Scene, model: BalancerModel, velocity: Callable[[float], floa
 def operation_lines(scene: Scene, model: BalancerModel, rivals: Rivals, repeats: int) -> list[Line]:
     """One operation: in numbers, with its record, and in a batch.
 
-    Args:
-        scene: the scene.
-        model: the balancer.
-        rivals: by name.
-        repeats: timed rounds.
-
-    Returns:
-        Three lines for each rival.
+    Args: `rivals`: by name. `repeats`: timed rounds.
+    Returns: Three lines for each rival.
     """
     drive, duration = drives_of(scene, model)[0]
     instants, transfer = np.array([duration]), ensemble_transfer(scene, model)
@@ -193,14 +166,9 @@ def operation_lines(scene: Scene, model: BalancerModel, rivals: Rivals, repeats:
 def numbers_of(drive: Drive) -> tuple[float, ...]:
     """What `linear_fill` takes beside fill and time.
 
-    Args:
-        drive: of a law with a closed form.
-
-    Returns:
-        Six numbers.
-
-    Raises:
-        ValueError: another law.
+    Args: `drive`: of a law with a closed form.
+    Returns: Six numbers.
+    Raises: ValueError: another law.
     """
     law = drive.law
     if not isinstance(law, PaperLaw):
@@ -210,24 +178,19 @@ def numbers_of(drive: Drive) -> tuple[float, ...]:
 
 
 def run_lines(scene: Scene, model: BalancerModel, rivals: Rivals, repeats: int) -> list[Line]:
-    """A whole run with an exact sensor, everything recorded on our side.
+    """A whole run with an exact sensor: of an ensemble of one, and by `simulate` with its record.
 
-    Args:
-        scene: the scene.
-        model: the balancer.
-        rivals: by name.
-        repeats: timed rounds.
-
-    Returns:
-        Three lines for each rival.
+    Args: `rivals`: by name. `repeats`: timed rounds.
+    Returns: Three lines for each rival.
     """
     still = replace(scene, sensor=replace(scene.sensor, amplitude_noise=0.0, phase_noise=0.0))
-    prepared = prepare_run(still, model)
+    plan = ensemble_plan(scene=still, model=model, transfer=ensemble_transfer(still, model))
+    alone = members_alike(still, size=1)
     ours = (
-        ("a whole run", least_seconds(prepared.run, repeats, 20), 20),
+        ("a whole run", least_seconds(lambda: plan.run(alone, seed=0), repeats, 20), 20),
         (
             "a whole run, preparation and all",
-            least_seconds(lambda: prepare_run(still, model).run(), repeats, 5),
+            least_seconds(lambda: simulate_members(still, model), repeats, 5),
             None,
         ),
         ("a whole run by simulate", least_seconds(lambda: simulate(still, model), repeats), None),
@@ -243,13 +206,7 @@ def run_lines(scene: Scene, model: BalancerModel, rivals: Rivals, repeats: int) 
 
 
 def plain_runs(scene: Scene, model: BalancerModel, plain: Plain) -> None:
-    """Some noisy runs of the rival.
-
-    Args:
-        scene: the scene.
-        model: the balancer.
-        plain: the rival.
-    """
+    """Some noisy runs of the rival."""
     for seed in range(PLAIN_RUNS):
         plain_run(scene, model, plain, seed)
 
@@ -259,15 +216,8 @@ def ensemble_lines(
 ) -> list[Line]:
     """A noisy run among many, against a noisy run alone.
 
-    Args:
-        scene: the scene.
-        model: the balancer.
-        rivals: by name.
-        members: of the ensemble.
-        repeats: timed rounds.
-
-    Returns:
-        A line for each rival.
+    Args: `rivals`: by name. `repeats`: timed rounds.
+    Returns: A line for each rival.
     """
     simulate_ensemble(scene, model, 1, 0)
     ours = least_seconds(lambda: simulate_ensemble(scene, model, members, 0), repeats).per(members)
@@ -288,18 +238,13 @@ def ensemble_lines(
 def check_same(scene: Scene, model: BalancerModel, plain: Plain) -> None:
     """Make sure that all sides do the same work.
 
-    Args:
-        scene: with an exact sensor.
-        model: the balancer.
-        plain: the rival.
-
-    Raises:
-        RuntimeError: they do not end alike.
+    Args: `scene`: with an exact sensor. `plain`: the rival.
+    Raises: RuntimeError: they do not end alike.
     """
-    ours, quick = simulate(scene, model), prepare_run(scene, model).run()
+    ours, quick = simulate(scene, model), simulate_members(scene, model)
     end, samples = plain_run(scene, model, plain, 0)
     # A fill of 1e-6 in each operation is some 1e-9 m.
     if samples != len(ours.samples) or abs(abs(end) - ours.amplitude[-1]) > 1e-9:
         raise RuntimeError("the plain loop and simulate do not do the same")
-    if samples != quick.sample_time.size or abs(abs(end) - abs(quick.vibration[-1])) > 1e-9:
-        raise RuntimeError("the plain loop and the prepared run do not do the same")
+    if samples != quick.samples[0] or abs(abs(end) - quick.final_amplitude[0]) > 1e-9:
+        raise RuntimeError("the plain loop and an ensemble's member do not do the same")

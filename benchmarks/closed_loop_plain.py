@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ringbalance.controller.target_vector import components
-from ringbalance.reduced_model.model import BalancerModel
-from ringbalance.reduced_model.paper_law import PaperLaw
+from ringbalance.controller.algorithms.target_vector import components
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.scene.models import Scene
 
 
@@ -30,14 +30,10 @@ class Plain:
     """rtol of solve_ivp."""
 
     def operate(self, fill: float, duration: float) -> float:
-        """Fill of the driven chamber after a gas time, by solve_ivp with events for empty and stall.
+        """Fill of the driven chamber after a valve-open time, by solve_ivp with events for empty and stall.
 
-        Args:
-            fill: x at the start.
-            duration: s.
-
-        Returns:
-            x at the end.
+        Args: `fill`: x at the start. `duration`: s.
+        Returns: x at the end.
         """
 
         def rhs(_: float, x: Sequence[float]) -> list[float]:
@@ -65,15 +61,9 @@ class Plain:
 def in_numbers(scene: Scene, model: BalancerModel) -> Callable[[float], float]:
     """Eq. 19 in plain numbers, the cheapest right-hand side that Python has.
 
-    Args:
-        scene: the scene.
-        model: the balancer by the paper's law.
-
-    Returns:
-        Velocity from the fill ratio.
-
-    Raises:
-        ValueError: another law.
+    Args: `model`: the balancer by the paper's law.
+    Returns: Velocity from the fill ratio.
+    Raises: ValueError: another law.
     """
     law, pressure, total = model.flow, scene.gas.pressure, 2 * scene.disc.initial_fill
     if not isinstance(law, PaperLaw):
@@ -85,12 +75,7 @@ def in_numbers(scene: Scene, model: BalancerModel) -> Callable[[float], float]:
 def by_the_law(scene: Scene, model: BalancerModel) -> Callable[[float], float]:
     """The flow law through its interface, as for a law of which nothing else is known.
 
-    Args:
-        scene: the scene.
-        model: the balancer.
-
-    Returns:
-        Velocity from the fill ratio.
+    Returns: Velocity from the fill ratio.
     """
     total, largest = 2 * scene.disc.initial_fill, model.flow.max_fill_ratio
 
@@ -110,14 +95,8 @@ def by_the_law(scene: Scene, model: BalancerModel) -> Callable[[float], float]:
 def plain_run(scene: Scene, model: BalancerModel, plain: Plain, seed: int) -> tuple[complex, int]:
     """One target-vector run as one would write it oneself.
 
-    Args:
-        scene: the scene.
-        model: the balancer.
-        plain: how an operation is carried through.
-        seed: of the noise.
-
-    Returns:
-        Vibration at the end, m, and the number of samples.
+    Args: `plain`: how an operation is carried through. `seed`: of the noise.
+    Returns: Vibration at the end, m, and the number of samples.
     """
     settings, sensor, random = scene.controller, scene.sensor, np.random.default_rng(seed)
     exact = sensor.amplitude_noise == sensor.phase_noise == 0

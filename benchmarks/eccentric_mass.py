@@ -1,4 +1,4 @@
-"""The paper's run-up with two driven masses, all filters on: compiled, and the same functions uncompiled.
+"""The paper's run-up with two eccentric masses, all filters on: compiled, and the same functions uncompiled.
 
 The whole run of 250 s in steps of 1 ms, with sensors, both filters, supervisor, regulator and the plant's
 stick and slip, is timed compiled (best of three, after the compiler has done its work).  The first few
@@ -22,8 +22,8 @@ from dataclasses import replace
 import numpy as np
 
 import ringbalance
-from ringbalance.controller.eccentric.run import simulate_eccentric
-from ringbalance.controller.eccentric.run_record import EccentricRun
+from ringbalance.controller.eccentric_mass.run import simulate_eccentric
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
 
 LONGEST = 1.0
@@ -33,28 +33,13 @@ LEAST_RATIO = 50.0
 
 
 def paper_run_up(time_limit: float | None = None) -> EccentricScene:
-    """The paper's scene.
-
-    Args:
-        time_limit: s; None for the scene's own.
-
-    Returns:
-        The scene.
-    """
+    """The paper's scene."""
     scene = eccentric_scene(load_scene(bundled_scene("eccentric_mass_paper")))
     return scene if time_limit is None else replace(scene, run=replace(scene.run, time_limit=time_limit))
 
 
 def best(scene: EccentricScene, repeats: int) -> tuple[float, EccentricRun]:
-    """Best time of a few runs.
-
-    Args:
-        scene: to be run.
-        repeats: runs.
-
-    Returns:
-        Processor time, s, and the last run.
-    """
+    """Best time of a few runs. Returns: Processor time, s, and the last run."""
     times = []
     for _ in range(repeats):
         begin = time.process_time()
@@ -66,11 +51,8 @@ def best(scene: EccentricScene, repeats: int) -> tuple[float, EccentricRun]:
 def plain(stretch: float) -> dict[str, float]:
     """The same stretch with numba switched off, in a process of its own.
 
-    Args:
-        stretch: simulated time, s.
-
-    Returns:
-        Its time and what the rotor does at the end.
+    Args: `stretch`: simulated time, s.
+    Returns: Its time and what the rotor does at the end.
     """
     command = [sys.executable, __file__, "--child", "--stretch", str(stretch)]
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
@@ -80,11 +62,7 @@ def plain(stretch: float) -> dict[str, float]:
 
 
 def import_loads_the_compiler() -> bool:
-    """Whether `import ringbalance` brings numba in.
-
-    Returns:
-        True when it does.
-    """
+    """Whether `import ringbalance` brings numba in. Returns: True when it does."""
     code = "import ringbalance, sys; sys.exit('numba' in sys.modules)"
     return subprocess.run([sys.executable, "-c", code], check=False).returncode != 0
 
@@ -92,12 +70,8 @@ def import_loads_the_compiler() -> bool:
 def stretch_times(stretch: float, repeats: int) -> dict[str, float]:
     """Time a stretch, as this process runs functions, without what a run of ten steps takes.
 
-    Args:
-        stretch: simulated time, s.
-        repeats: runs, of which the best counts.
-
-    Returns:
-        Its time per step and what the rotor does at the end.
+    Args: `stretch`: simulated time, s. `repeats`: runs, of which the best counts.
+    Returns: Its time per step and what the rotor does at the end.
     """
     few = paper_run_up(10e-3)
     before, _ = best(few, repeats)
@@ -109,11 +83,8 @@ def stretch_times(stretch: float, repeats: int) -> dict[str, float]:
 def measure(stretch: float) -> dict[str, float | bool | str]:
     """Time everything.
 
-    Args:
-        stretch: simulated time that the plain functions are given, s.
-
-    Returns:
-        Times, their ratio, and whether both sides did the same.
+    Args: `stretch`: simulated time that the plain functions are given, s.
+    Returns: Times, their ratio, and whether both sides did the same.
     """
     begin = time.process_time()
     simulate_eccentric(paper_run_up(0.01))
@@ -138,11 +109,7 @@ def measure(stretch: float) -> dict[str, float | bool | str]:
 
 
 def main() -> int:
-    """Print the measurement.
-
-    Returns:
-        Exit code: 0 when every target is reached.
-    """
+    """Print the measurement. Returns: Exit code: 0 when every target is reached."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--stretch", type=float, default=4.0)
     parser.add_argument("--json", action="store_true")

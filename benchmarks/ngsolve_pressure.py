@@ -20,11 +20,7 @@ SETTINGS = tuple((order, size) for size in (0.6, 0.3, 0.2, 0.15, 0.1) for order 
 def geometry(disc: Disc) -> OCCGeometry:
     """The liquid of one chamber in units of the outer radius, its free surface by name.
 
-    Args:
-        disc: the disc.
-
-    Returns:
-        The solid.
+    Returns: The solid.
     """
     unit, low = disc.outer_radius, -disc.axial_width / 2 / disc.outer_radius
 
@@ -61,14 +57,9 @@ def _exact(problem: str, surface: float) -> tuple[ng.CoefficientFunction, ng.Coe
 def solve(mesh: ng.Mesh, problem: str, order: int, surface: float) -> tuple[ng.GridFunction, int]:
     """Assemble and solve.
 
-    Args:
-        mesh: curved to the order.
-        problem: "physical" or "made_up".
-        order: of the elements.
-        surface: radius of the free surface in units of R2.
-
-    Returns:
-        The solution and its number of unknowns.
+    Args: `mesh`: curved to the order. `problem`: "physical" or "made_up". `order`: of the elements.
+        `surface`: radius of the free surface in units of R2.
+    Returns: The solution and its number of unknowns.
     """
     pressure, source = _exact(problem, surface)
     flux = ng.CF((pressure.Diff(ng.x), pressure.Diff(ng.y), pressure.Diff(ng.z)))
@@ -95,14 +86,8 @@ def solve(mesh: ng.Mesh, problem: str, order: int, surface: float) -> tuple[ng.G
 def trial(disc: Disc, problem: str, order: int, size: float) -> Trial:
     """Mesh, solve and judge once.
 
-    Args:
-        disc: the disc.
-        problem: "physical" or "made_up".
-        order: of elements and geometry.
-        size: largest cell, in units of R2.
-
-    Returns:
-        The trial.
+    Args: `problem`: "physical" or "made_up". `order`: of elements and geometry. `size`: largest cell, in
+        units of R2.
     """
     surface = paper_surface(disc) / disc.outer_radius
     start = time.process_time()

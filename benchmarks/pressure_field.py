@@ -13,6 +13,9 @@ extra `bench`) our side comes out alone, and says so.
 from __future__ import annotations
 
 import os
+from functools import partial
+from importlib import import_module
+from types import ModuleType
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[_name] = "1"
@@ -33,11 +36,12 @@ from rich.console import Console
 from rich.table import Table
 
 from ringbalance.mesh.chamber import chamber_mesh, default_cells
-from ringbalance.physics.pressure import solve_pressure
+from ringbalance.physics.pressure.solve import solve_pressure
 from ringbalance.scene.models import Disc
 
+rival: ModuleType | None
 try:
-    import ngsolve_pressure as rival
+    rival = import_module("ngsolve_pressure")
 except ImportError:
     rival = None
 
@@ -49,16 +53,7 @@ CELLS = {
 
 
 def our_trial(disc: Disc, problem: str, cells: tuple[int, ...]) -> Trial:
-    """Mesh, solve and judge once.
-
-    Args:
-        disc: the disc.
-        problem: one of `PROBLEMS`.
-        cells: along radius, angle and axis.
-
-    Returns:
-        The trial.
-    """
+    """Mesh, solve and judge once. Args: `cells`: along radius, angle and axis."""
     start = time.process_time()
     chamber = chamber_mesh(disc=disc, surface_radius=paper_surface(disc), cells=cells)
     meshed = time.process_time()
@@ -78,23 +73,12 @@ def our_trial(disc: Disc, problem: str, cells: tuple[int, ...]) -> Trial:
 def trials(disc: Disc, problem: str, repeats: int, console: Console) -> list[Trial]:
     """All settings of both solvers, medians over interleaved repeats.
 
-    Args:
-        disc: the disc.
-        problem: one of `PROBLEMS`.
-        repeats: number of timed rounds, after one that warms caches.
-        console: for progress.
-
-    Returns:
-        One trial per setting.
+    Args: `repeats`: number of timed rounds, after one that warms caches. `console`: for progress.
+    Returns: One trial per setting.
     """
-    makers: list[Callable[[], Trial]] = [
-        lambda cells=cells: our_trial(disc, problem, cells) for cells in CELLS[problem]
-    ]
+    makers: list[Callable[[], Trial]] = [partial(our_trial, disc, problem, cells) for cells in CELLS[problem]]
     if rival is not None:
-        makers += [
-            lambda order=order, size=size: rival.trial(disc, problem, order, size)
-            for order, size in rival.SETTINGS
-        ]
+        makers += [partial(rival.trial, disc, problem, order, size) for order, size in rival.SETTINGS]
     rounds = []
     for k in range(repeats + 1):
         console.print(f"{problem}: round {k} of {repeats}")
@@ -113,12 +97,8 @@ def _median(same: Sequence[Trial]) -> Trial:
 def at_equal_error(found: Sequence[Trial], disc: Disc) -> list[dict[str, Any]]:
     """Fastest setting of each solver at each target, and at the error of the default mesh.
 
-    Args:
-        found: trials of one problem.
-        disc: the disc; gives the default mesh.
-
-    Returns:
-        Rows with the two trials and the ratios of NGSolve's times to ours.
+    Args: `found`: trials of one problem.
+    Returns: Rows with the two trials and the ratios of NGSolve's times to ours.
     """
     standard = "x".join(map(str, default_cells(disc=disc, dimension=3)))
     default = next(t for t in found if t.setting == standard)
@@ -141,14 +121,13 @@ def _fastest(found: Sequence[Trial], solver: str, target: float) -> Trial | None
 
 
 def _row(kind: str, target: float, ours: Trial | None, theirs: Trial | None) -> dict[str, Any]:
-    both = ours is not None and theirs is not None
     return {
         "kind": kind,
         "target": target,
         "ringbalance": asdict(ours) if ours else None,
         "ngsolve": asdict(theirs) if theirs else None,
-        "solve_ratio": theirs.solve_seconds / ours.solve_seconds if both else None,
-        "total_ratio": _total(theirs) / _total(ours) if both else None,
+        "solve_ratio": theirs.solve_seconds / ours.solve_seconds if ours and theirs else None,
+        "total_ratio": _total(theirs) / _total(ours) if ours and theirs else None,
     }
 
 
@@ -159,13 +138,8 @@ def _total(trial: Trial) -> float:
 def document(repeats: int, largest: int, console: Console) -> dict[str, Any]:
     """The whole benchmark.
 
-    Args:
-        repeats: of every timing.
-        largest: number of unknowns not to be passed.
-        console: for progress.
-
-    Returns:
-        A record that JSON can hold.
+    Args: `repeats`: of every timing. `largest`: number of unknowns not to be passed. `console`: for progress.
+    Returns: A record that JSON can hold.
     """
     disc = paper_disc()
     found = {problem: trials(disc, problem, repeats, console) for problem in PROBLEMS}
@@ -196,12 +170,7 @@ def _cell(trial: dict[str, Any] | None) -> list[str]:
 
 
 def show(result: dict[str, Any], console: Console) -> None:
-    """Print the tables.
-
-    Args:
-        result: of `document`.
-        console: where.
-    """
+    """Print the tables. Args: `result`: of `document`. `console`: where."""
     if result["ngsolve"] is None:
         console.print("NGSolve is not installed (extra `bench`): one side only.")
     for problem, rows in result["equal_error"].items():
@@ -236,11 +205,7 @@ def show(result: dict[str, Any], console: Console) -> None:
 
 
 def main() -> int:
-    """Run as asked on the command line.
-
-    Returns:
-        Exit code.
-    """
+    """Run as asked on the command line. Returns: Exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--json", action="store_true", help="one JSON document instead of tables")
     parser.add_argument("--repeats", type=int, default=5)

@@ -20,7 +20,7 @@ from pressure_problems import paper_disc, paper_surface, relative_error, right_h
 from rich.console import Console
 
 from ringbalance.mesh.chamber import chamber_mesh
-from ringbalance.physics.pressure import solve_pressure
+from ringbalance.physics.pressure.solve import solve_pressure
 
 CELLS = ((8, 24, 4), (12, 36, 6), (16, 48, 8), (24, 72, 12), (32, 96, 16), (44, 130, 22))
 
@@ -46,11 +46,8 @@ class Size:
 def one_size(cells: tuple[int, ...]) -> Size:
     """Solve once on one mesh.
 
-    Args:
-        cells: along radius, angle and axis.
-
-    Returns:
-        What it took.
+    Args: `cells`: along radius, angle and axis.
+    Returns: What it took.
     """
     disc = paper_disc()
     start = time.process_time()
@@ -80,12 +77,8 @@ def _peak_megabytes() -> float:
 def growth(largest: int, console: Console) -> list[dict[str, Any]]:
     """Cost over sizes.
 
-    Args:
-        largest: number of unknowns not to be passed.
-        console: for progress.
-
-    Returns:
-        One row per size.
+    Args: `largest`: number of unknowns not to be passed. `console`: for progress.
+    Returns: One row per size.
     """
     rows = []
     for cells in CELLS:
@@ -101,11 +94,8 @@ def growth(largest: int, console: Console) -> list[dict[str, Any]]:
 def exponent(rows: Sequence[dict[str, Any]]) -> float | None:
     """Slope of log time over log unknowns where multigrid is used.
 
-    Args:
-        rows: of `growth`.
-
-    Returns:
-        The slope; None with fewer than two such rows.
+    Args: `rows`: of `growth`.
+    Returns: The slope; None with fewer than two such rows.
     """
     large = [row for row in rows if row["iterations"]]
     if len(large) < 2:

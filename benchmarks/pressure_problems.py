@@ -10,16 +10,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from ringbalance.mesh.chamber import ChamberMesh
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.physics.pressure import PressureProblem, PressureSolution
-from ringbalance.physics.pressure_assembly import at_cells, volume_points
+from ringbalance.physics.pressure.assembly import at_cells, volume_points
+from ringbalance.physics.pressure.solve import PressureProblem, PressureSolution
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loader import bundled_scene, load_scene
 from ringbalance.scene.models import Disc
-
-FloatArray = npt.NDArray[np.float64]
+from ringbalance.scene.narrowing import liquid_ring_scene
 
 PROBLEMS = ("physical", "made_up")
 FILL_RATIO = 0.25
@@ -42,34 +41,20 @@ class Trial:
 
 
 def paper_disc() -> Disc:
-    """The liquid-ring paper's disc.
-
-    Returns:
-        The disc of the bundled scene.
-    """
-    return load_scene(bundled_scene("liquid_ring_paper")).disc
+    """The liquid-ring paper's disc. Returns: The disc of the bundled scene."""
+    return liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper"))).disc
 
 
 def paper_surface(disc: Disc) -> float:
-    """Radius of its free surface at a quarter full.
-
-    Args:
-        disc: the disc.
-
-    Returns:
-        m.
-    """
+    """Radius of its free surface at a quarter full. Returns: m."""
     return float(surface_radius(disc=disc, fill_ratio=FILL_RATIO))
 
 
 def made_up(x: FloatArray) -> FloatArray:
     """The made-up part of the second pressure.
 
-    Args:
-        x: places in units of R2, shape (3, ...).
-
-    Returns:
-        exp(x) sin(2 y + 0.3) cos(1.5 z + 0.2), shape (...).
+    Args: `x`: places in units of R2, shape (3, ...).
+    Returns: exp(x) sin(2 y + 0.3) cos(1.5 z + 0.2), shape (...).
     """
     return np.asarray(np.exp(x[0]) * np.sin(2 * x[1] + 0.3) * np.cos(1.5 * x[2] + 0.2))
 
@@ -77,27 +62,18 @@ def made_up(x: FloatArray) -> FloatArray:
 def exact(problem: str, x: FloatArray, surface: float) -> FloatArray:
     """Exact pressure.
 
-    Args:
-        problem: one of `PROBLEMS`.
-        x: places in units of R2, shape (3, ...).
-        surface: radius of the free surface in the same unit.
-
-    Returns:
-        Pressure in units of rho omega^2 R2^2, shape (...).
+    Args: `x`: places in units of R2, shape (3, ...). `surface`: radius of the free surface in the same unit.
+    Returns: Pressure in units of rho omega^2 R2^2, shape (...).
     """
     square = (x[0] ** 2 + x[1] ** 2) / 2
-    return square - surface**2 / 2 if problem == "physical" else square + made_up(x)
+    return np.asarray(square - surface**2 / 2 if problem == "physical" else square + made_up(x))
 
 
 def gradient(problem: str, x: FloatArray) -> FloatArray:
     """Gradient of the exact pressure.
 
-    Args:
-        problem: one of `PROBLEMS`.
-        x: places in units of R2, shape (3, ...).
-
-    Returns:
-        The shape of `x`.
+    Args: `x`: places in units of R2, shape (3, ...).
+    Returns: The shape of `x`.
     """
     slope = np.stack([x[0], x[1], np.zeros_like(x[0])])
     if problem == "physical":
@@ -116,12 +92,7 @@ def gradient(problem: str, x: FloatArray) -> FloatArray:
 def right_hand_sides(problem: str, disc: Disc) -> PressureProblem:
     """The problem as our solver takes it, in metres.
 
-    Args:
-        problem: one of `PROBLEMS`.
-        disc: the disc.
-
-    Returns:
-        Right-hand sides; pressures stay in units of rho omega^2 R2^2.
+    Returns: Right-hand sides; pressures stay in units of rho omega^2 R2^2.
     """
     unit, surface = disc.outer_radius, paper_surface(disc) / disc.outer_radius
     rate = 0.0 if problem == "physical" else 1 - 4 - 2.25
@@ -133,16 +104,7 @@ def right_hand_sides(problem: str, disc: Disc) -> PressureProblem:
 
 
 def relative_error(problem: str, chamber: ChamberMesh, solution: PressureSolution) -> float:
-    """Error of our solution.
-
-    Args:
-        problem: one of `PROBLEMS`.
-        chamber: its mesh.
-        solution: the solution.
-
-    Returns:
-        |p_h - p| / |p| in L2 over the mesh.
-    """
+    """Error of our solution. Returns: |p_h - p| / |p| in L2 over the mesh."""
     volume = volume_points(chamber.mesh)
     surface = float(chamber.surface_radius.mean()) / chamber.length_scale
     true = exact(problem, volume.points, surface)

@@ -18,9 +18,10 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Any
 
-from ringbalance.physics.navier_stokes_benchmarks import cylinder_flow, cylinder_forces, cylinder_mesh
+from ringbalance.verification.reference.flow_benchmarks import cylinder_flow, cylinder_forces, cylinder_mesh
 
 DRAG = 5.57953523384
 OURS = ((6, 8, 8), (8, 10, 12), (10, 12, 14), (12, 16, 16), (14, 18, 18), (16, 18, 24), (20, 20, 30))
@@ -43,14 +44,8 @@ class Run:
 def timed(program: str, mesh: str, solve: Callable[[], tuple[float, int]], repeats: int = 3) -> Run:
     """Best time of a few runs of one solve.
 
-    Args:
-        program: name.
-        mesh: description.
-        solve: gives the drag coefficient and the number of unknowns.
-        repeats: runs.
-
-    Returns:
-        The run.
+    Args: `program`: name. `mesh`: description. `solve`: gives the drag coefficient and the number of
+        unknowns.
     """
     times = []
     for _ in range(repeats):
@@ -64,16 +59,9 @@ def timed(program: str, mesh: str, solve: Callable[[], tuple[float, int]], repea
 def ours(*, around: int, across: int, along: int) -> tuple[float, int]:
     """Drag coefficient and unknowns of this program.
 
-    Args:
-        around: cells on a quarter of the cylinder.
-        across: from the cylinder to the wall.
-        along: down the channel.
-
-    Returns:
-        Drag coefficient, unknowns.
-
-    Raises:
-        RuntimeError: Newton's method failed.
+    Args: `around`: cells on a quarter of the cylinder. `across`: from the cylinder to the wall. `along`: down
+        the channel.
+    Raises: RuntimeError: Newton's method failed.
     """
     mesh = cylinder_mesh(around=around, across=across, along=along, shape="quad")
     system, solution = cylinder_flow(mesh=mesh)
@@ -98,16 +86,9 @@ def _their_mesh(ngsolve: Any, order: int, size: float) -> Any:
 def theirs(*, order: int, size: float, inverse: str) -> tuple[float, int]:
     """Drag coefficient and unknowns of NGSolve.
 
-    Args:
-        order: of the velocity; the pressure has one less.
-        size: largest cell, m.
-        inverse: name of its direct solver.
-
-    Returns:
-        Drag coefficient, unknowns.
-
-    Raises:
-        RuntimeError: Newton's method failed.
+    Args: `order`: of the velocity; the pressure has one less. `size`: largest cell, m. `inverse`: name of its
+        direct solver.
+    Raises: RuntimeError: Newton's method failed.
     """
     ng = importlib.import_module("ngsolve")
     mesh = _their_mesh(ng, order, size)
@@ -136,8 +117,7 @@ def theirs(*, order: int, size: float, inverse: str) -> tuple[float, int]:
 def their_solver() -> str | None:
     """Fastest of NGSolve's direct solvers that this build has for matrices without symmetry.
 
-    Returns:
-        Its name; None when NGSolve is not installed.
+    Returns: Its name; None when NGSolve is not installed.
     """
     try:
         importlib.import_module("ngsolve")
@@ -158,12 +138,8 @@ def their_solver() -> str | None:
 def first_within(runs: Sequence[Callable[[], Run]], target: float) -> list[Run]:
     """Runs up to the first whose error is within the target.
 
-    Args:
-        runs: from coarse to fine.
-        target: of the relative drag error.
-
-    Returns:
-        All runs made.
+    Args: `runs`: from coarse to fine. `target`: of the relative drag error.
+    Returns: All runs made.
     """
     done: list[Run] = []
     for run in runs:
@@ -189,18 +165,14 @@ def _their_run(order: int, size: float, inverse: str) -> Run:
 
 
 def main() -> int:
-    """Run the comparison and print it.
-
-    Returns:
-        Exit code 0.
-    """
+    """Run the comparison and print it. Returns: Exit code 0."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--target", type=float, default=5e-5, help="relative error of the drag coefficient")
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
-    runs = first_within([lambda c=c: _our_run(c) for c in OURS], arguments.target)
+    runs = first_within([partial(_our_run, c) for c in OURS], arguments.target)
     inverse = their_solver()
     if inverse is None:
         print("NGSolve cannot be imported: one side only", file=sys.stderr)
@@ -209,9 +181,7 @@ def main() -> int:
         ng.SetNumThreads(1)
         for order in (2, 3):
             meshes = [size for o, size in THEIRS if o == order]
-            runs += first_within(
-                [lambda h=h, o=order: _their_run(o, h, inverse) for h in meshes], arguments.target
-            )
+            runs += first_within([partial(_their_run, order, h, inverse) for h in meshes], arguments.target)
     good = [run for run in runs if run.drag_error <= arguments.target]
     if arguments.json:
         print(json.dumps({"target": arguments.target, "runs": [asdict(r) for r in runs]}, allow_nan=False))

@@ -6,11 +6,11 @@ import math
 from typing import Final
 
 from ringbalance.mesh.geometry import chamber_volume
-from ringbalance.reduced_model.model import BalancerModel
+from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.models import Scene
-from ringbalance.scene.working_rules import period_covers_lag
+from ringbalance.scene.rules.working import period_covers_lag
 
 VOLUME_TOLERANCE: Final = 0.05
 """Relative: a flat-strip volume or an input's spread passes, another disc does not."""
@@ -19,12 +19,7 @@ VOLUME_TOLERANCE: Final = 0.05
 def check_fit(scene: Scene, model: BalancerModel) -> None:
     """Refuse a model that was made for another disc.
 
-    Args:
-        scene: the scene.
-        model: the balancer.
-
-    Raises:
-        SceneError: largest fill or chamber volume of the scene and of the model do not agree.
+    Raises: SceneError: largest fill or chamber volume of the scene and of the model do not agree.
     """
     faults = [*_fill_faults(scene, model), *_volume_faults(scene, model)]
     if faults:
@@ -34,12 +29,8 @@ def check_fit(scene: Scene, model: BalancerModel) -> None:
 def check_settings(scene: Scene) -> None:
     """Refuse settings that a loaded scene cannot have, but one changed in Python can.
 
-    Args:
-        scene: the scene.
-
-    Raises:
-        SceneError: a gain, limit, time or pressure that is not a number, zero or negative where that has no
-            meaning, or a period shorter than the valve's lag.
+    Raises: SceneError: a gain, limit, time or pressure that is not a number, zero or negative where that has
+        no meaning, or a period shorter than the valve's lag.
     """
     faults = [
         scene_fault(scene=scene, table=table, key=key, problem=problem, allowed=allowed)

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ringbalance.controller.compare_rotor import OneRotor, own_scene, rotor_of, scene_on
-from ringbalance.controller.eccentric.run import simulate_eccentric
+from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.loop import simulate
-from ringbalance.reduced_model.model import BalancerModel
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.selection.registry import ModelUsed
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.models import Scene
@@ -39,6 +40,8 @@ class Side:
     """Largest amplitude from the start of balancing on, m zero-to-peak."""
     status: str
     """How the run ended and what to do next."""
+    models_used: tuple[ModelUsed, ...] = ()
+    """Of a liquid ring: every physical term, with its model and its estimated contribution."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,16 +57,9 @@ class Comparison:
 def compare(first: AnyScene, second: AnyScene, *, model_of: ModelOf) -> Comparison:
     """Put two balancers on the rotor of the first scene, and let each balance it.
 
-    Args:
-        first: its rotor, vibration sensor and limit hold for both.
-        second: its balancer only.
-        model_of: makes the model of a liquid ring, such as `lambda scene: calibrate(scene).model`.
-
-    Returns:
-        Comparison.
-
-    Raises:
-        SceneError: a balancer that cannot work on that rotor.
+    Args: `first`: its rotor, vibration sensor and limit hold for both. `second`: its balancer only.
+        `model_of`: makes the model of a liquid ring, such as `lambda scene: calibrate(scene).model`.
+    Raises: SceneError: a balancer that cannot work on that rotor.
     """
     rotor = rotor_of(first)
     try:
@@ -71,14 +67,14 @@ def compare(first: AnyScene, second: AnyScene, *, model_of: ModelOf) -> Comparis
         guest = scene_on(rotor, second)
         one, other = _side(rotor, own_scene(first), model_of), _side(rotor, guest, model_of)
     except SceneError as error:
-        raise SceneError(_placed(rotor, fault) for fault in error.faults) from error
+        raise SceneError(_placed(first, fault) for fault in error.faults) from error
     return Comparison(rotor=rotor, sides=(one, other))
 
 
-def _placed(rotor: OneRotor, fault: Fault) -> Fault:
-    if fault.file == rotor.source:
+def _placed(first: AnyScene, fault: Fault) -> Fault:
+    if fault.file == first.file:
         return fault
-    return replace(fault, problem=f"on the rotor of {rotor.source}: {fault.problem}")
+    return replace(fault, problem=f"on the rotor of {first.source}: {fault.problem}")
 
 
 def _side(rotor: OneRotor, scene: AnyScene, model_of: ModelOf) -> Side:
@@ -97,6 +93,7 @@ def _liquid_side(scene: Scene, model: BalancerModel) -> Side:
         energy=run.energy,
         worst_amplitude=float(np.max(run.amplitude)),
         status=run.status,
+        models_used=run.models_used,
     )
 
 
@@ -118,11 +115,9 @@ def _driven_side(rotor: OneRotor, scene: EccentricScene) -> Side:
 def comparison_document(comparison: Comparison) -> dict[str, Any]:
     """Turn a comparison into plain numbers, lists and text, all in SI; lists run along `scenes`.
 
-    Args:
-        comparison: of two balancers.
-
-    Returns:
-        Document that `json.dumps(..., allow_nan=False)` accepts; `time_s` is null for what did not settle.
+    Args: `comparison`: of two balancers.
+    Returns: Document that `json.dumps(..., allow_nan=False)` accepts; `time_s` is null for what did not
+        settle.
     """
     sides, rotor = comparison.sides, comparison.rotor
     return {
@@ -137,6 +132,7 @@ def comparison_document(comparison: Comparison) -> dict[str, Any]:
         "energy_J": [side.energy for side in sides],
         "worst_amplitude_m": [side.worst_amplitude for side in sides],
         "status": [side.status for side in sides],
+        "models_used": [[asdict(used) for used in side.models_used] for side in sides],
         "rotor": {
             "source": rotor.source,
             "speed_rad_s": rotor.speed,

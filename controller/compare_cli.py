@@ -13,17 +13,28 @@ from rich.table import Table
 from ringbalance.controller.compare import Comparison, Side, comparison_document
 from ringbalance.controller.compare import compare as compare_scenes
 from ringbalance.reduced_model.calibration import calibrate
-from ringbalance.reduced_model.loading import load_model
-from ringbalance.reduced_model.model import BalancerModel
-from ringbalance.reduced_model.paper_law import paper_model
+from ringbalance.reduced_model.law.loading import load_model
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.paper_law import paper_model
+from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.models import Scene
+from ringbalance.scene.platform.progress import activity
+from ringbalance.scene.platform.terminal import results_console
 
 SETTLED = 0
 NOT_SETTLED = 1
 
 
-def compare(first: Path, second: Path, *, law: str = "calibrated", json: bool = False) -> int:
+def compare(
+    first: Path,
+    second: Path,
+    *,
+    law: str = "calibrated",
+    json: bool = False,
+    tolerance: str | None = None,
+    models: Models | None = None,
+) -> int:
     """Run two balancers on one rotor, that of the first scene.
 
     Args:
@@ -31,6 +42,8 @@ def compare(first: Path, second: Path, *, law: str = "calibrated", json: bool = 
         second: another scene file; only its balancer counts.
         law: of a liquid ring: "calibrated", "paper", or a file written by `ringbalance calibrate --save`.
         json: print one JSON document instead of a table.
+        tolerance: in place of that of both scenes, such as "0.5 %" or 0.005.
+        models: "finest" models every term that has a model, whatever the tolerance.
 
     Returns:
         Exit code: 0 both settled, 1 not both; the result is printed either way.
@@ -44,13 +57,13 @@ def compare(first: Path, second: Path, *, law: str = "calibrated", json: bool = 
             return calibrate(scene).model
         return paper_model(scene) if law == "paper" else load_model(Path(law))
 
-    told = load_scene(first), load_scene(second)
-    with Console(stderr=True).status("both balancers on one rotor ..."):
+    told = [with_tolerance(load_scene(path), tolerance=tolerance, models=models) for path in (first, second)]
+    with activity("compare", "both balancers on one rotor ..."):
         found = compare_scenes(*told, model_of=model_of)
     if json:
         print(json_format.dumps(comparison_document(found), allow_nan=False))
     else:
-        _show(found, Console())
+        _show(found, results_console())
     return SETTLED if all(side.settled for side in found.sides) else NOT_SETTLED
 
 

@@ -3,7 +3,7 @@
 What a balancer knows of a rotor at constant speed is its vibration before balancing and its vibration per
 unbalance, V = alpha (U_0 + U_balancer).  One rotor therefore means: the same speed, the same complex alpha,
 the same U_0, the same sensor and the same amplitude to come below.  A liquid-ring scene gives alpha outright.
-A scene with driven masses gives it by mass, stiffness and damping,
+A scene with eccentric masses gives it by mass, stiffness and damping,
 
     alpha = W^2 / (K_B - M W^2 + j C_B W),
 
@@ -17,20 +17,20 @@ import cmath
 import math
 from dataclasses import dataclass, replace
 
-from ringbalance.controller.eccentric.parameters import plant_parameters
-from ringbalance.controller.eccentric.plant_speed import profile_arrays, speed_at
-from ringbalance.controller.eccentric.plant_whirl import influence as rotor_influence
+from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
+from ringbalance.controller.eccentric_mass.plant.speed import profile_arrays, speed_at
+from ringbalance.controller.eccentric_mass.plant.whirl import influence as rotor_influence
 from ringbalance.controller.rotor import influence, initial_vibration, wrapped
-from ringbalance.reduced_model.gravity import check_ring
+from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.scene.eccentric_models import EccentricRotor, EccentricScene, SpeedPoint
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
 
 FINEST_SHARE = 0.01
-"""Noise that a filter believes in, at the least, as a share of the amplitude to come below."""
+"""Noise that a filter assumes, at the least, as a share of the amplitude to come below."""
 SETTLED_WHIRL = 12.0
-"""Time constants of the free whirl after which a run with driven masses starts to balance."""
+"""Time constants of the free whirl after which a run with eccentric masses starts to balance."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,14 +61,8 @@ class OneRotor:
 def rotor_of(scene: AnyScene) -> OneRotor:
     """Take the rotor out of a scene.
 
-    Args:
-        scene: of any kind; of driven masses it counts the speed at which their strategy starts.
-
-    Returns:
-        OneRotor.
-
-    Raises:
-        SceneError: the rotor stands still, turns backwards, or does not vibrate at all.
+    Args: `scene`: of any kind; of eccentric masses it counts the speed at which their strategy starts.
+    Raises: SceneError: the rotor stands still, turns backwards, or does not vibrate at all.
     """
     found = _liquid_rotor(scene) if isinstance(scene, Scene) else _driven_rotor(scene)
     if found.amplitude == 0:
@@ -114,12 +108,9 @@ def _driven_rotor(scene: EccentricScene) -> OneRotor:
 def own_scene(scene: AnyScene) -> AnyScene:
     """Make a scene ready to balance its own rotor in a comparison.
 
-    Args:
-        scene: of any kind.
-
-    Returns:
-        A liquid ring's scene as it is; driven masses at the constant speed at which their strategy starts,
-        opposite each other, and in the rotor's steady vibration before they start.
+    Args: `scene`: of any kind.
+    Returns: A liquid ring's scene as it is; eccentric masses at the constant speed at which their strategy
+        starts, opposite each other, and in the rotor's steady vibration before they start.
     """
     if isinstance(scene, Scene):
         return scene
@@ -130,21 +121,16 @@ def own_scene(scene: AnyScene) -> AnyScene:
 def scene_on(rotor: OneRotor, scene: AnyScene) -> AnyScene:
     """Put a scene's balancer on another scene's rotor.
 
-    Args:
-        rotor: the rotor.
-        scene: of any kind; its own rotor, sensor noise and limit are replaced.
-
-    Returns:
-        The scene at constant speed, before balancing in the rotor's own steady vibration.
-
-    Raises:
-        SceneError: the rotor cannot be this scene's.
+    Args: `scene`: of any kind; its own rotor, sensor noise and limit are replaced.
+    Returns: The scene at constant speed, before balancing in the rotor's own steady vibration.
+    Raises: SceneError: the rotor cannot be this scene's.
     """
     return _liquid_on(rotor, scene) if isinstance(scene, Scene) else _driven_on(rotor, scene)
 
 
 def _liquid_on(rotor: OneRotor, scene: Scene) -> Scene:
-    """Gas times are rescaled to the same gas time per unbalance; a wrong belief stays as wrong as it was."""
+    """Valve-open times are rescaled to the same valve-open time per unbalance; a wrong assumption stays as
+    wrong as it was."""
     own, control = scene.rotor, scene.controller
     coefficient, lag = abs(rotor.influence), -cmath.phase(rotor.influence)
     share = coefficient / own.influence_coefficient
@@ -175,7 +161,8 @@ def _liquid_on(rotor: OneRotor, scene: Scene) -> Scene:
 
 
 def _driven_on(rotor: OneRotor, scene: EccentricScene) -> EccentricScene:
-    """The rotor's mass, stiffness and damping follow from alpha; a wrong belief stays as wrong as it was."""
+    """The rotor's mass, stiffness and damping follow from alpha; a wrong assumption stays as wrong as it
+    was."""
     before, masses = scene.rotor, scene.masses
     whole = before.mass + 2 * masses.mass if rotor.mass is None else rotor.mass
     dynamic = rotor.speed**2 / rotor.influence
@@ -243,5 +230,5 @@ def _check_rotor(rotor: OneRotor, scene: EccentricScene, found: EccentricRotor) 
 
 
 def _refusal(scene: AnyScene, table: str, key: str, problem: str, allowed: str) -> SceneError:
-    fault = Fault(file=scene.source, table=table, key=key, value="", problem=problem, allowed=allowed)
+    fault = Fault(file=scene.file, table=table, key=key, value="", problem=problem, allowed=allowed)
     return SceneError([fault])

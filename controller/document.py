@@ -6,11 +6,9 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from ringbalance.controller.simulation import Injection, Sample, Simulation
-
-FloatArray = npt.NDArray[np.float64]
+from ringbalance.reduced_model.selection.registry import neglected_in_injections
 
 
 def simulation_document(simulation: Simulation) -> dict[str, Any]:
@@ -18,12 +16,7 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
 
     `time_s`, `amplitude_m`, `phase_rad` and each list of `fill_ratio` run together and hold the true state;
     what the sensor showed is under `samples`, null where a sample was dropped or not a number.
-
-    Args:
-        simulation: the run.
-
-    Returns:
-        Document that `json.dumps(..., allow_nan=False)` accepts.
+    Returns: Document that `json.dumps(..., allow_nan=False)` accepts.
     """
     return {
         "balancer": simulation.balancer,
@@ -45,7 +38,10 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         "noise_floor_m": simulation.noise_floor,
         "samples": _samples(simulation.samples),
         "terms_modelled": list(simulation.terms_modelled),
-        "models_used": [asdict(term) for term in simulation.terms],
+        "tolerance": simulation.tolerance,
+        "models_used": [asdict(used) for used in simulation.models_used],
+        "neglected": asdict(neglected_in_injections(simulation.models_used)),
+        "model_status": {"code": str(simulation.model_status.code), "text": simulation.model_status.text},
     }
 
 

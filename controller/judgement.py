@@ -8,12 +8,11 @@ from itertools import pairwise
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-from ringbalance.controller.algorithm import Measurement, usable
+from ringbalance.controller.algorithms.algorithm import Measurement, usable
+from ringbalance.controller.formulas.stopping import has_risen, has_turned
 from ringbalance.controller.simulation import Sample
-
-FloatArray = npt.NDArray[np.float64]
+from ringbalance.scene.arrays import FloatArray
 
 ROUND_OFF: Final = 1e-9
 """Relative to the initial amplitude: a smaller rise is arithmetic."""
@@ -24,13 +23,8 @@ def noise_floor(*, amplitude_noise: float, initial_amplitude: float) -> float:
     """Rise of the amplitude between two samples that noise alone does not explain.
 
     3 sqrt(2) sigma: three standard deviations of the difference of two samples.
-
-    Args:
-        amplitude_noise: sigma, m.
-        initial_amplitude: m; a billionth of it guards against round-off.
-
-    Returns:
-        m.
+    Args: `amplitude_noise`: sigma, m. `initial_amplitude`: m; a billionth of it guards against round-off.
+    Returns: m.
     """
     return NOISE_DEVIATIONS * math.sqrt(2) * amplitude_noise + ROUND_OFF * initial_amplitude
 
@@ -38,40 +32,26 @@ def noise_floor(*, amplitude_noise: float, initial_amplitude: float) -> float:
 def rose(before: Measurement, after: Measurement, *, floor: float) -> bool:
     """Whether the amplitude rose by more than the noise floor.
 
-    Args:
-        before: earlier sample.
-        after: later sample.
-        floor: m.
-
-    Returns:
-        True when it did.
+    Args: `before`: earlier sample. `after`: later sample. `floor`: m.
+    Returns: True when it did.
     """
-    return after.amplitude - before.amplitude > floor
+    return has_risen(before.amplitude, after.amplitude, floor)
 
 
 def turned(before: Measurement, after: Measurement, *, limit: float) -> bool:
     """Whether the residual turned by more than 90 degrees and is still above the limit.
 
-    Args:
-        before: earlier sample.
-        after: later sample.
-        limit: m.
-
-    Returns:
-        True when it did; a jump of the phase by a whole turn is no turn.
+    Args: `before`: earlier sample. `after`: later sample. `limit`: m.
+    Returns: True when it did; a jump of the phase by a whole turn is no turn.
     """
-    return after.amplitude > limit and math.cos(after.phase - before.phase) < 0
+    return after.amplitude > limit and has_turned(before.phase, after.phase)
 
 
 def overshoots(samples: Sequence[Sample], *, limit: float) -> int:
     """Times that the residual turned by more than 90 degrees between usable samples while above the limit.
 
-    Args:
-        samples: of one run, in order.
-        limit: m.
-
-    Returns:
-        The number.
+    Args: `samples`: of one run, in order. `limit`: m.
+    Returns: The number.
     """
     seen = [s.measurement for s in samples if usable(s.measurement, needs_phase=True)]
     return sum(turned(a, b, limit=limit) for a, b in pairwise(seen) if a is not None and b is not None)
@@ -80,12 +60,8 @@ def overshoots(samples: Sequence[Sample], *, limit: float) -> int:
 def misadjustments(samples: Sequence[Sample], *, floor: float) -> int:
     """Operations after which the measured amplitude was higher by more than the noise floor.
 
-    Args:
-        samples: of one run, in order; one without a usable amplitude is passed over.
-        floor: m.
-
-    Returns:
-        The number.
+    Args: `samples`: of one run, in order; one without a usable amplitude is passed over. `floor`: m.
+    Returns: The number.
     """
     count, before, operated = 0, None, False
     for sample in samples:
@@ -99,13 +75,8 @@ def misadjustments(samples: Sequence[Sample], *, floor: float) -> int:
 def settling_time(*, time: FloatArray, amplitude: FloatArray, limit: float) -> float | None:
     """Instant from which on the amplitude stays at or below the limit.
 
-    Args:
-        time: s, shape (m,), ascending.
-        amplitude: m, shape (m,).
-        limit: m.
-
-    Returns:
-        s, one of the recorded instants; None when the last amplitude is above the limit.
+    Args: `time`: s, shape (m,), ascending. `amplitude`: m, shape (m,). `limit`: m.
+    Returns: s, one of the recorded instants; None when the last amplitude is above the limit.
     """
     above = np.flatnonzero(amplitude > limit)
     if above.size == 0:

@@ -8,37 +8,40 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
-from ringbalance.controller.algorithm import Command, Controller, Measurement, usable
-from ringbalance.controller.algorithms import controller_of
+from ringbalance.controller.algorithms.algorithm import Command, Controller, Measurement, usable
+from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.checks import check_fit, check_settings
-from ringbalance.controller.closed_form import closed_form, has_closed_form
+from ringbalance.controller.formulas.stopping import Cause, stop_cause
 from ringbalance.controller.judgement import misadjustments, noise_floor, overshoots, rose, settling_time
-from ringbalance.controller.liquid_ring import Advance, DiscState, LiquidRing, initial_state, longest
-from ringbalance.controller.outcome import Cause, Facts, outcome_of, status_text
-from ringbalance.controller.quadrature import quadrature
+from ringbalance.controller.liquid_ring.closed_form import closed_form, has_closed_form
+from ringbalance.controller.liquid_ring.plant import Advance, DiscState, LiquidRing, initial_state, longest
+from ringbalance.controller.liquid_ring.quadrature import quadrature
+from ringbalance.controller.liquid_ring.transfer import Integrator
+from ringbalance.controller.outcome import Facts, outcome_of, status_text
 from ringbalance.controller.rotor import chamber_letters, disc_unbalance, vibration
 from ringbalance.controller.sensor import Sensor, noisy_sensor
 from ringbalance.controller.simulation import Injection, Outcome, Sample, Simulation
-from ringbalance.controller.terms import Choice, choices, dynamics_of, terms
-from ringbalance.controller.transfer import Integrator
-from ringbalance.reduced_model.gravity import check_ring
-from ringbalance.reduced_model.model import BalancerModel, CompleteLaw, balancer_model
+from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
+from ringbalance.reduced_model.chamber.gravity import check_ring
+from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw, balancer_model
+from ringbalance.reduced_model.selection.chamber_models import chamber_status
+from ringbalance.reduced_model.selection.registry import ModelUsed
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
-FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[float, float], None]
 """Called with the simulated time and the time limit, s."""
 
 GAS_POINTS: Final = 8
-"""Instants recorded within one command's gas time."""
+"""Instants recorded within one command's valve-open time."""
 DRIFT_POINTS: Final = 4
 """Instants recorded within a wait during which liquid may run back."""
 TAIL_POINTS: Final = 12
-"""The same where terms are modelled, so that an operation goes on after its valve has closed."""
+"""The same where terms are modelled, so that an operation continues after its valve has closed."""
 RUNGE_KUTTA: Final = "runge_kutta"
-MAX_SAMPLES: Final = 100_000
+MAX_SAMPLES: Final = 10_000
+"""Of one run: a command costs some hundredths of a second to work out and to carry through time."""
 IDLE_OPERATIONS: Final = 3
 """Commands in a row, beyond one for each chamber, whose longest injection may move nothing."""
 
@@ -58,28 +61,22 @@ def simulate(
 
     Sample, step of the controller, gas into the commanded chambers (all pairs in parallel), gas off, wait of
     one period, next sample; until nothing can change any more, the run cannot succeed, or the time is up.
-
     Args:
         scene: rotor, sensor, controller settings, gas pressure, seed and time limit.
         model: flow law and moments of the balancer.
         flow_law: in place of `model`, a law that carries its own moments and volumes.
         controller: the algorithm; default the one that the scene names.
         integrator: how operations are carried through time by the flow law alone; default the closed form
-            when the law has one, else the quadrature.  With one given no further term is modelled.
+            when the law has one, else the quadrature. With one given no further term is modelled.
         sensor: what the controller sees; default the scene's noise from the scene's seed.
         progress: called once per sample; None for silence.
         modelled: of "tube inertia", "gas filling" and "valve lag" those to model; default those whose
             estimated contribution is above the scene's tolerance.
-
-    Returns:
-        Simulation; its status says how the run ended and what to do next.
-
-    Raises:
-        SceneError: an algorithm that this program does not have, settings without a meaning, a rotor too
-            slow to form a ring, or a model made for another disc.
-        ValueError: both a model and a flow law, or neither; terms to model beside an integrator, or ones
-            that the scene or the law gives no numbers for.
-
+    Returns: Simulation; its status says how the run ended and what to do next.
+    Raises: SceneError: an algorithm that this program does not have, settings without a meaning, a rotor too
+        slow to form a ring, or a model made for another disc.
+    Raises: ValueError: both a model and a flow law, or neither; terms to model beside an integrator, or ones
+        that the scene or the law gives no numbers for.
     Source: section 5 and Fig. 5 of the liquid-ring paper.
     """
     check_settings(scene)
@@ -90,8 +87,8 @@ def simulate(
         raise ValueError("an integrator carries the flow law alone: give it, or terms to model")
     quasi_steady = integrator or (closed_form if has_closed_form(balancer.flow) else quadrature)
     asked = () if integrator is not None else modelled
-    chosen = choices(scene=scene, model=balancer, asked=asked)
-    dynamics = dynamics_of(scene=scene, model=balancer, chosen=chosen)
+    used = run_models(scene=scene, model=balancer, asked=asked)
+    dynamics = dynamics_of(scene=scene, model=balancer, modelled=terms_modelled(used))
     run = _Run(
         scene=scene,
         plant=LiquidRing(
@@ -108,7 +105,7 @@ def simulate(
     )
     cause = run.go(progress or _silent)
     name = getattr(quasi_steady, "__name__", "custom") if dynamics is None else RUNGE_KUTTA
-    return _record(run, cause, integrator=name, chosen=chosen)
+    return _record(run, cause, integrator=name, used=used)
 
 
 def _one_of(model: BalancerModel | None, flow_law: CompleteLaw | None) -> BalancerModel:
@@ -166,7 +163,7 @@ class _Run:
             self.samples.append(Sample(time=self.time, measurement=measurement, command=command))
             self._watch(measurement)
             cause = self._cause(command)
-            if cause is not None:
+            if cause is not Cause.NONE:
                 return cause
             self._gas(command)
         return Cause.SAMPLES
@@ -184,21 +181,19 @@ class _Run:
             self.rises = self.rises + 1 if higher else 0
         self.last_usable, self.operated = measurement, False
 
-    def _cause(self, command: Command) -> Cause | None:
-        if self._diverges():
-            return Cause.RISING
-        if self.idle >= IDLE_OPERATIONS + self.plant.chambers:
-            return Cause.IDLE
-        if command.resting and self.exact and self.state.rests:
-            return Cause.AT_REST
-        return Cause.TIME if self.remaining <= 0 else None
-
-    def _diverges(self) -> bool:
-        """More rises in a row than tolerated, or as many and higher than at the start."""
-        spare = self.controller.rises_tolerated - self.rises
+    def _cause(self, command: Command) -> Cause:
         first, last = self.samples[0].measurement, self.last_usable
-        higher = first is not None and last is not None and rose(first, last, floor=self.floor)
-        return spare < 0 or (spare == 0 and higher)
+        return Cause(
+            stop_cause(
+                self.rises,
+                self.controller.rises_tolerated,
+                first is not None and last is not None and rose(first, last, floor=self.floor),
+                self.idle,
+                IDLE_OPERATIONS + self.plant.chambers,
+                command.resting and self.exact and self.state.rests,
+                self.remaining,
+            )
+        )
 
     def _gas(self, command: Command) -> None:
         """All valves of a command open together; after the last one has closed the loop waits."""
@@ -256,7 +251,7 @@ class _Run:
         self.fills.append(fill_ratio)
 
 
-def _record(run: _Run, cause: Cause, *, integrator: str, chosen: tuple[Choice, ...]) -> Simulation:
+def _record(run: _Run, cause: Cause, *, integrator: str, used: tuple[ModelUsed, ...]) -> Simulation:
     """Judge a finished run and freeze it."""
     time, fills = np.concatenate(run.times), np.concatenate(run.fills, axis=1)
     moment = disc_unbalance(moment=run.plant.model.moment, fill_ratio=fills)
@@ -283,8 +278,10 @@ def _record(run: _Run, cause: Cause, *, integrator: str, chosen: tuple[Choice, .
         noise_floor=run.floor,
         limit=run.scene.controller.limit,
         energy=math.fsum(injection.operation.energy for injection in facts.injections),
-        terms_modelled=tuple(choice.term for choice in chosen if choice.modelled),
-        terms=terms(scene=run.scene, model=run.plant.model, integrator=integrator, chosen=chosen),
+        terms_modelled=terms_modelled(used),
+        models_used=used,
+        tolerance=run.scene.tolerance,
+        model_status=chamber_status(run.scene),
     )
 
 

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import Final
 
+from ringbalance.controller.formulas.stopping import NOTICEABLE, Cause, has_grown
 from ringbalance.controller.judgement import NOISE_DEVIATIONS
-from ringbalance.controller.liquid_ring import NOTICEABLE, DiscState, LiquidRing
-from ringbalance.controller.reach import largest_pair_moment, starting_pressure, unreachable_moment
+from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
+from ringbalance.controller.liquid_ring.reach import (
+    largest_pair_moment,
+    starting_pressure,
+    unreachable_moment,
+)
+from ringbalance.controller.liquid_ring.transfer import Event
 from ringbalance.controller.rotor import influence, initial_vibration
 from ringbalance.controller.simulation import Injection, Outcome, Sample
-from ringbalance.controller.transfer import Event
 from ringbalance.scene.models import Scene
 
 MICROMETRE: Final = 1e-6
@@ -28,20 +32,6 @@ LEAST_PRESSURE: Final = 1.0
 """Gauge, Pa, at which the search for a pressure that starts a flow begins without one."""
 NO_SAMPLE: Final = "no usable sample"
 """Reason that every algorithm gives for doing nothing on a dropped sample or a NaN."""
-
-
-class Cause(StrEnum):
-    """Why the loop stopped cycling."""
-
-    AT_REST = "at_rest"
-    """The controller rests, the sensor is exact and no liquid can move: nothing will change."""
-    TIME = "time"
-    IDLE = "idle"
-    """Several commands in a row whose longest injection moved no liquid."""
-    RISING = "rising"
-    """The amplitude rose after more operations in a row than the algorithm can explain."""
-    SAMPLES = "samples"
-    """The bound on the number of samples."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,18 +88,14 @@ class Facts:
 def outcome_of(facts: Facts) -> Outcome:
     """Classify how a run ended.
 
-    Args:
-        facts: of the run.
-
-    Returns:
-        Outcome; SETTLED only when the true amplitude ends at or below the limit and stays there: because
+    Returns: Outcome; SETTLED only when the true amplitude ends at or below the limit and stays there: because
         nothing can change any more, or over at least the last five samples (over all, if there are fewer).
     """
     limit = facts.scene.controller.limit
     if facts.settling_time is not None and facts.settling_time <= facts.confirmed_from:
         return Outcome.SETTLED
     higher = facts.final_amplitude > facts.initial_amplitude + facts.noise_floor
-    if facts.cause is Cause.RISING or (facts.cause is Cause.IDLE and higher):
+    if has_grown(facts.cause, higher):
         return Outcome.DRIFTING if facts.drift > NOTICEABLE else Outcome.DIVERGING
     if facts.unreachable_amplitude > limit:
         return Outcome.CAPACITY_EXCEEDED
@@ -149,7 +135,7 @@ def _out_of_time(facts: Facts) -> Outcome:
     if NOISE_DEVIATIONS * facts.scene.sensor.amplitude_noise > facts.scene.controller.limit:
         return Outcome.NOISE
     last = facts.samples[-1].command
-    if not last.resting and not last.valves and last.reason.startswith("the gas time"):
+    if not last.resting and not last.valves and last.reason.startswith("the valve-open time"):
         return Outcome.GAS_TIME_TOO_SHORT
     return Outcome.TIME_LIMIT
 
@@ -157,12 +143,7 @@ def _out_of_time(facts: Facts) -> Outcome:
 def status_text(facts: Facts, outcome: Outcome) -> str:
     """One or two sentences: how the run ended, with its numbers, and what to do next.
 
-    Args:
-        facts: of the run.
-        outcome: as classified.
-
-    Returns:
-        Text.
+    Args: `outcome`: as classified.
     """
     return _TEXTS[outcome](facts)
 
@@ -173,7 +154,11 @@ def _um(length: float) -> str:
 
 def _settled(facts: Facts) -> str:
     many = facts.overshoots > MANY_OVERSHOOTS
-    cure = f"{facts.overshoots} overshoots: lower controller.proportional" if many else "nothing to do"
+    cure = (
+        f"{facts.overshoots} overshoots: lower controller.proportional"
+        if many
+        else "no further correction needed"
+    )
     return (
         f"settled: not above the limit of {_um(facts.scene.controller.limit)} from "
         f"{facts.settling_time:.4g} s on, {_um(facts.final_amplitude)} at the end; {cure}"
@@ -272,7 +257,7 @@ def _too_short(facts: Facts) -> str:
             "controller.minimum_gas_time or controller.limit, or use a larger or faster valve"
         )
     return (
-        f"{_not_settled(facts)}; the commanded gas times have fallen below the valves' minimum of "
+        f"{_not_settled(facts)}; the commanded valve-open times have fallen below the valves' minimum of "
         f"{facts.scene.controller.minimum_gas_time * 1e3:.4g} ms: raise controller.proportional, lower "
         "controller.minimum_gas_time or raise controller.limit"
     )
@@ -294,8 +279,9 @@ def _no_samples(facts: Facts) -> str:
 
 def _too_many(facts: Facts) -> str:
     return (
-        f"{_not_settled(facts)}; stopped after {len(facts.samples)} samples: raise controller.period or "
-        "lower run.time_limit"
+        f"{_not_settled(facts)}; stopped after {len(facts.samples)} samples, the most that one run takes, "
+        f"before its time limit of {facts.scene.run.time_limit:.4g} s: raise controller.period or lower "
+        "run.time_limit"
     )
 
 

@@ -7,24 +7,20 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ringbalance.controller.algorithm import Measurement
-from ringbalance.scene import models
+from ringbalance.controller.algorithms.algorithm import Measurement
+from ringbalance.scene import loop_models
 
 Sensor = Callable[[float, complex], Measurement | None]
 """Takes the time (s) and the vibration (m, complex); None is a dropped sample."""
 
 
-def noisy_sensor(*, sensor: models.Sensor, seed: int) -> Sensor:
+def noisy_sensor(*, sensor: loop_models.Sensor, seed: int) -> Sensor:
     """A sensor with independent Gaussian noise on amplitude and phase.
 
     An amplitude that noise would make negative is folded back, as a rectifying instrument shows it.
-
-    Args:
-        sensor: standard deviations, m and rad; zero: exact.
-        seed: of numpy's default generator; the same seed gives the same noise.
-
-    Returns:
-        Sensor; every call takes the next pair of random numbers.
+    Args: `sensor`: standard deviations, m and rad; zero: exact. `seed`: of numpy's default generator; the
+        same seed gives the same noise.
+    Returns: Sensor; every call takes the next pair of random numbers.
     """
     random = np.random.default_rng(seed)
 

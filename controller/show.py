@@ -7,15 +7,14 @@ from collections.abc import Iterable
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from ringbalance.controller.liquid_ring.transfer import Event
 from ringbalance.controller.simulation import Injection, Simulation
-from ringbalance.controller.transfer import Event
-
-FloatArray = npt.NDArray[np.float64]
+from ringbalance.reduced_model.selection.registry import neglected_in_injections
+from ringbalance.scene.arrays import FloatArray
 
 BARS: Final = "▁▂▃▄▅▆▇█"
 SPARK_WIDTH: Final = 60
@@ -25,23 +24,15 @@ DECADES: Final = 3.0
 
 
 def show(simulation: Simulation, *, console: Console) -> None:
-    """Print a run: summary, amplitude over time, injections.
-
-    Args:
-        simulation: the run.
-        console: where to.
-    """
+    """Print a run: summary, amplitude over time, injections. Args: `console`: where to."""
     console.print(Group(*_parts(simulation)))
 
 
 def sparkline(values: FloatArray) -> str:
     """Draw values as a line of bars, logarithmic over three decades below the largest.
 
-    Args:
-        values: shape (m,), at least zero.
-
-    Returns:
-        m characters; all of the lowest bar when every value is zero.
+    Args: `values`: shape (m,), at least zero.
+    Returns: m characters; all of the lowest bar when every value is zero.
     """
     top = float(np.max(values, initial=0.0))
     if top == 0:
@@ -58,6 +49,9 @@ def _parts(simulation: Simulation) -> Iterable[RenderableType]:
     if simulation.injections:
         yield _injections(simulation.injections)
     yield _terms(simulation)
+    yield Text(neglected_in_injections(simulation.models_used).text, style="dim")
+    if not simulation.model_status.ok:
+        yield Text(simulation.model_status.text, style="yellow")
 
 
 def _summary(simulation: Simulation) -> Table:
@@ -71,7 +65,7 @@ def _summary(simulation: Simulation) -> Table:
         ("settling time", when),
         ("amplitude", f"{_um(simulation.amplitude[0])} -> {_um(simulation.amplitude[-1])}"),
         ("limit", _um(simulation.limit)),
-        ("gas time", f"{_gas_time(simulation):.3f} s in {len(simulation.injections)} injections"),
+        ("valve-open time", f"{_gas_time(simulation):.3f} s in {len(simulation.injections)} injections"),
         ("gas energy", f"{simulation.energy:.4g} J"),
         ("overshoots", str(simulation.overshoots)),
         ("misadjustments", str(simulation.misadjustments)),
@@ -118,8 +112,8 @@ def _terms(simulation: Simulation) -> Table:
     table = Table(title="terms", title_justify="left")
     for name in ("term", "model", "why"):
         table.add_column(name)
-    for term in simulation.terms:
-        table.add_row(term.term, term.model, term.why)
+    for used in simulation.models_used:
+        table.add_row(used.term, used.model, used.why)
     return table
 
 

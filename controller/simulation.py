@@ -6,14 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
-import numpy as np
-import numpy.typing as npt
-
-from ringbalance.controller.algorithm import Command, Measurement
-from ringbalance.controller.liquid_ring import Operation
-from ringbalance.reduced_model.ladder import Term
-
-FloatArray = npt.NDArray[np.float64]
+from ringbalance.controller.algorithms.algorithm import Command, Measurement
+from ringbalance.controller.liquid_ring.plant import Operation
+from ringbalance.physics.results import Status
+from ringbalance.reduced_model.selection.registry import ModelUsed
+from ringbalance.scene.arrays import FloatArray
 
 
 class Outcome(StrEnum):
@@ -91,7 +88,11 @@ class Simulation:
     """m."""
     energy: float
     """Work of the driving gas against the surroundings over all injections, J."""
-    terms: tuple[Term, ...]
-    """Physical terms modelled and left out."""
+    models_used: tuple[ModelUsed, ...]
+    """Every physical term, with its model and its estimated contribution."""
+    tolerance: float
+    """At which the models were selected."""
+    model_status: Status
+    """Whether the models of the chamber hold over the range of fills."""
     terms_modelled: tuple[str, ...]
     """Names of the terms that are modelled beyond the flow law; empty: it alone carries the operations."""

@@ -15,8 +15,7 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 from skfem import MeshHex1, MeshHex2, MeshQuad1, MeshQuad2
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
+from ringbalance.scene.arrays import FloatArray, IntArray
 
 # Corner of the section (0 to 3) and end of the slab for each vertex, in scikit-fem's order.
 _HEXAHEDRON = ((2, 1), (2, 0), (1, 1), (3, 1), (1, 0), (3, 0), (0, 1), (0, 0))
@@ -56,14 +55,7 @@ class SweptTube:
 
 
 def stations(*, segments: Sequence[Segment]) -> FloatArray:
-    """Arc lengths of all nodes along a path, mid-nodes included.
-
-    Args:
-        segments: of the path.
-
-    Returns:
-        Shape (2 cells + 1,).
-    """
+    """Arc lengths of all nodes along a path, mid-nodes included. Returns: Shape (2 cells + 1,)."""
     at = [0.0]
     for segment in segments:
         steps = segment.ratio ** (np.linspace(0, 1, segment.cells) if segment.cells > 1 else np.zeros(1))
@@ -76,12 +68,8 @@ def stations(*, segments: Sequence[Segment]) -> FloatArray:
 def path_points(*, segments: Sequence[Segment], arc_length: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Points of a path and its unit tangents.
 
-    Args:
-        segments: of the path.
-        arc_length: shape (n,), from 0 to the path's length.
-
-    Returns:
-        Points and tangents, each of shape (2, n).
+    Args: `arc_length`: shape (n,), from 0 to the path's length.
+    Returns: Points and tangents, each of shape (2, n).
     """
     s = np.asarray(arc_length, dtype=np.float64)
     place, tangent = np.zeros((2, s.size)), np.zeros((2, s.size))
@@ -139,16 +127,10 @@ def _boundaries(section: Any, prism: Any, slabs: int) -> dict[str, IntArray]:
 def swept_tube(*, section: Any, segments: Sequence[Segment]) -> SweptTube:
     """Mesh of a tube along a path.
 
-    Args:
-        section: `skfem.MeshQuad2` in (y, z) with named boundaries.
-        segments: of the path.
-
-    Returns:
-        The mesh and its structure.
-
-    Raises:
-        ValueError: no segments, a length or a number of cells that is not positive, or an arc so tight that
-            the section would reach its centre.
+    Args: `section`: `skfem.MeshQuad2` in (y, z) with named boundaries.
+    Returns: The mesh and its structure.
+    Raises: ValueError: no segments, a length or a number of cells that is not positive, or an arc so tight
+        that the section would reach its centre.
     """
     reach = float(np.abs(section.doflocs[0]).max())
     if not segments or any(s.length <= 0.0 or s.cells < 1 or s.ratio <= 0.0 for s in segments):

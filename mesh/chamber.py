@@ -20,10 +20,9 @@ import numpy.typing as npt
 from skfem import MeshHex1, MeshHex2, MeshQuad1, MeshQuad2
 
 from ringbalance.mesh.geometry import half_angle
+from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.models import Disc
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 Geometry = Literal["quadratic", "straight"]
 SurfaceFunction = Callable[[FloatArray, FloatArray], FloatArray]
 
@@ -66,13 +65,8 @@ class ChamberMesh:
 def default_cells(*, disc: Disc, dimension: int = 2) -> tuple[int, ...]:
     """Numbers of cells that keep pressure and moment within 1e-6: 8 x 24 (x 4) for a chamber of 90 degrees.
 
-    Args:
-        disc: the disc; only its central angle counts.
-        dimension: 2 or 3.
-
-    Returns:
-        Cells along the radius, the angle and, in three dimensions, the axis; all divisible by four.
-
+    Args: `disc`: the disc; only its central angle counts. `dimension`: 2 or 3.
+    Returns: Cells along the radius, the angle and, in three dimensions, the axis; all divisible by four.
     Source: an arc of angle h drawn by one quadratic cell leaves its circle by R (h/2)^4 / 32.
     """
     angular = 4 * max(2, int(np.ceil(disc.central_angle / (np.pi / 12) - 1e-9)))
@@ -89,21 +83,16 @@ def chamber_mesh(
     """Mesh of the liquid between a free surface, concentric or not, and the walls of one chamber.
 
     Args:
-        disc: the disc.
-        surface_radius: a, m: one number; or its values at the surface nodes, shape (2 angular cells + 1,
-            and 2 axial cells + 1 in three dimensions); or a function of the angle (rad) and the axial
-            coordinate (m), zero in two dimensions.
+        surface_radius: a, m: one number; or its values at the surface nodes, shape (2 angular cells + 1, and
+            2 axial cells + 1 in three dimensions); or a function of the angle (rad) and the axial coordinate
+            (m), zero in two dimensions.
         cells: along the radius, the angle and, for a three-dimensional mesh, the axis; default
             `default_cells` in two dimensions.
         geometry: "quadratic" puts mid-nodes on the arcs, "straight" half-way between their neighbours.
-
-    Returns:
-        The mesh, with boundaries free_surface, outer_wall, plate_left (at the larger angle), plate_right and,
-        in three dimensions, end_front (at B/2) and end_back.
-
-    Raises:
-        ValueError: cells that are not two or three positive numbers, or a surface that does not lie between
-            the plate's edge and the outer radius everywhere.
+    Returns: The mesh, with boundaries free_surface, outer_wall, plate_left (at the larger angle), plate_right
+        and, in three dimensions, end_front (at B/2) and end_back.
+    Raises: ValueError: cells that are not two or three positive numbers, or a surface that does not lie
+        between the plate's edge and the outer radius everywhere.
     """
     counts = tuple(int(n) for n in (cells or default_cells(disc=disc)))
     if len(counts) not in (2, 3) or min(counts) < 1:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,9 +12,9 @@ import numpy.typing as npt
 from skfem import Mesh
 from skfem.io.meshio import to_meshio
 
-from ringbalance.scene.files import write_whole
-
-FloatArray = npt.NDArray[np.float64]
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.platform.drafts import draft_folder
+from ringbalance.scene.platform.files import write_whole
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,19 +36,10 @@ def write_vtu(
 ) -> Path:
     """Write a mesh in metres with its boundary names and nodal fields, whole or not at all.
 
-    Args:
-        path: of the file, ending in .vtu.
-        mesh: coordinates in units of `length_scale`.
-        length_scale: m.
-        fields: nodal values by name, shape (nodes,) each, in SI units.
-
-    Returns:
-        The path.
-
-    Raises:
-        ValueError: another ending, or a field that is not one finite value per node.
-        OSError: the file cannot be written.
-
+    Args: `path`: of the file, ending in .vtu. `mesh`: coordinates in units of `length_scale`. `length_scale`:
+        m. `fields`: nodal values by name, shape (nodes,) each, in SI units.
+    Raises: ValueError: another ending, or a field that is not one finite value per node.
+    Raises: OSError: the file cannot be written.
     Source: VTK XML through meshio; scikit-fem stores each boundary as cell data "skfem:b:<name>".
     """
     if path.suffix != ".vtu":
@@ -58,8 +48,9 @@ def write_vtu(
     for name, value in nodal.items():
         if value.shape != (mesh.doflocs.shape[1],) or not np.all(np.isfinite(value)):
             raise ValueError(f"field {name!r} must hold one finite value per node")
-    with tempfile.TemporaryDirectory() as folder:
-        draft = Path(folder) / path.name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with draft_folder(path.parent) as folder:
+        draft = folder / path.name
         stored = to_meshio(mesh.scaled(length_scale), nodal)
         # VTK has no points in the plane; meshio would say so on the console.
         stored.points = np.pad(stored.points, ((0, 0), (0, 3 - stored.points.shape[1])))
@@ -70,15 +61,9 @@ def write_vtu(
 def read_vtu(path: Path) -> StoredMesh:
     """Read a mesh and its nodal fields back from a file that `write_vtu` wrote.
 
-    Args:
-        path: of the file.
-
-    Returns:
-        The mesh, in metres, with its boundary names, and the fields.
-
-    Raises:
-        OSError: the file cannot be read.
-        ValueError: it names no boundary, so it is not one of ours.
+    Returns: The mesh, in metres, with its boundary names, and the fields.
+    Raises: OSError: the file cannot be read.
+    Raises: ValueError: it names no boundary, so it is not one of ours.
     """
     out: list[object] = ["point_data"]
     mesh = Mesh.load(path, out=out)

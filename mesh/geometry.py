@@ -9,21 +9,15 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def half_angle(*, disc: Disc, radius: npt.ArrayLike) -> FloatArray:
     """Half-angle of the liquid's space at a radius, alpha(r) = theta/2 - asin(t/r).
 
-    Args:
-        disc: the disc.
-        radius: r, m, any shape; at least the plate thickness.
-
-    Returns:
-        alpha, rad, the shape of `radius`.
-
+    Args: `radius`: r, m, any shape; at least the plate thickness.
+    Returns: alpha, rad, the shape of `radius`.
     Source: geometry of Fig. 2(b) of the liquid-ring paper; exact.
     """
     r = np.asarray(radius, dtype=np.float64)
@@ -40,14 +34,8 @@ def liquid_area(*, disc: Disc, surface_radius: npt.ArrayLike) -> FloatArray:
     """Cross-section between a concentric surface and the outer wall.
 
     A(a) = [theta r^2/2 - r^2 asin(t/r) - t sqrt(r^2 - t^2)] from a to R2.
-
-    Args:
-        disc: the disc.
-        surface_radius: a, m, any shape, within [R1, R2].
-
-    Returns:
-        Area, m^2, the shape of `surface_radius`.
-
+    Args: `surface_radius`: a, m, any shape, within [R1, R2].
+    Returns: Area, m^2, the shape of `surface_radius`.
     Source: integral of 2 r alpha(r); the paper's Eq. 3 is its flat-strip approximation, O(t^3) away.
     """
     a = np.asarray(surface_radius, dtype=np.float64)
@@ -60,14 +48,8 @@ def liquid_first_moment(*, disc: Disc, surface_radius: npt.ArrayLike) -> FloatAr
 
     int x dA = [2 sin(theta/2)/3 (r^2 - t^2)^(3/2) - cos(theta/2) t r^2] from a to R2; times rho B it is the
     moment U of a chamber, without finite elements.
-
-    Args:
-        disc: the disc.
-        surface_radius: a, m, any shape, within [R1, R2].
-
-    Returns:
-        First moment, m^3, the shape of `surface_radius`.
-
+    Args: `surface_radius`: a, m, any shape, within [R1, R2].
+    Returns: First moment, m^3, the shape of `surface_radius`.
     Source: integral of 2 r^2 sin(alpha(r)); with t = 0 and times rho B it is Eq. 7 of the liquid-ring paper.
     """
     a, outer, t = np.asarray(surface_radius, dtype=np.float64), disc.outer_radius, disc.plate_thickness
@@ -82,12 +64,7 @@ def liquid_first_moment(*, disc: Disc, surface_radius: npt.ArrayLike) -> FloatAr
 def chamber_volume(*, disc: Disc) -> float:
     """Volume of one chamber between its plates, V = B A(R1).
 
-    Args:
-        disc: the disc.
-
-    Returns:
-        Volume, m^3.
-
+    Returns: Volume, m^3.
     Source: Eq. 4 of the liquid-ring paper, with the exact area.
     """
     return float(disc.axial_width * liquid_area(disc=disc, surface_radius=disc.inner_radius))
@@ -96,16 +73,9 @@ def chamber_volume(*, disc: Disc) -> float:
 def surface_radius(*, disc: Disc, fill_ratio: npt.ArrayLike) -> FloatArray:
     """Radius of the concentric free surface at a fill ratio: A(a) = x A(R1), by safeguarded Newton steps.
 
-    Args:
-        disc: the disc.
-        fill_ratio: x, any shape, within [0, 1].
-
-    Returns:
-        a, m, the shape of `fill_ratio`; R2 for an empty chamber, R1 for a full one.
-
-    Raises:
-        ValueError: a fill ratio outside [0, 1].
-
+    Args: `fill_ratio`: x, any shape, within [0, 1].
+    Returns: a, m, the shape of `fill_ratio`; R2 for an empty chamber, R1 for a full one.
+    Raises: ValueError: a fill ratio outside [0, 1].
     Source: inverse of the exact area; gravity left out.
     """
     x = np.asarray(fill_ratio, dtype=np.float64)

@@ -5,10 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from skfem import Mesh
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,13 +25,7 @@ def mesh_quality(mesh: Mesh) -> MeshQuality:
     """Quality of a mesh of quadratic quadrilaterals or hexahedra, judged at the nodes of every cell.
 
     scaled Jacobian = det(J) / prod_b |J_b| with J_b = dx/dX_b, aspect = max_b |J_b| / min_b |J_b|.
-
-    Args:
-        mesh: scikit-fem mesh, coordinates in any unit.
-
-    Returns:
-        Its quality.
-
+    Args: `mesh`: scikit-fem mesh, coordinates in any unit.
     Source: the scaled Jacobian of the Verdict library (Knupp et al., SAND2007-1751), at all nodes of a
     quadratic cell instead of its corners alone.
     """

@@ -6,10 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-import numpy as np
-import numpy.typing as npt
-
-FloatArray = npt.NDArray[np.float64]
+from ringbalance.scene.arrays import FloatArray
 
 
 class StatusCode(StrEnum):
@@ -46,7 +43,7 @@ class Statistics:
 
 @dataclass(frozen=True, kw_only=True)
 class Estimate:
-    """Values with their uncertainty: arrays of one shape, SI, 95 % half-widths."""
+    """Values with their uncertainty: arrays of one shape, SI, expanded uncertainties (95 %)."""
 
     value: FloatArray
     uncertainty: FloatArray

@@ -7,23 +7,21 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-from ringbalance.physics.tube_loss import TubeLoss, tube_loss
-from ringbalance.physics.tube_range import VELOCITIES
-from ringbalance.reduced_model.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.chamber_calibration import ChamberCalibration, calibrate_chamber
-from ringbalance.reduced_model.gravity import check_ring
-from ringbalance.reduced_model.ladder import Term, models_used
-from ringbalance.reduced_model.law_building import calibrated_law
-from ringbalance.reduced_model.model import BalancerModel, balancer_model
-from ringbalance.reduced_model.operating_point import OperatingPoint, operating_point
-from ringbalance.reduced_model.paper_law import PaperLaw, paper_law
-from ringbalance.reduced_model.tube_heads import tube_heads
+from ringbalance.physics.tube.loss import TubeLoss, tube_loss
+from ringbalance.physics.tube.range import VELOCITIES
+from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, calibrate_chamber
+from ringbalance.reduced_model.chamber.gravity import check_ring
+from ringbalance.reduced_model.law.building import calibrated_law
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.law.model import BalancerModel, balancer_model
+from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_law
+from ringbalance.reduced_model.selection.registry import ModelUsed, models_used
+from ringbalance.reduced_model.tube.heads import tube_heads
+from ringbalance.reduced_model.tube.operating_point import OperatingPoint, operating_point
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
-
-FloatArray = npt.NDArray[np.float64]
 
 VELOCITY_POINTS: Final = 47
 IDENTIFIABILITY: Final = (
@@ -47,10 +45,10 @@ class Calibration:
     """Eq. 19 of the liquid-ring paper, for comparison."""
     operating_point: OperatingPoint
     """At equal fills under the scene's gas pressure."""
-    models_used: tuple[Term, ...]
-    """Every physical term: modelled how, or left out, and what it is worth."""
+    models_used: tuple[ModelUsed, ...]
+    """Every physical term, with its model and its estimated contribution."""
     identifiability: str
-    """What measurements can and cannot tell."""
+    """What measurements can and cannot identify."""
     statistics: Mapping[str, float]
     """Counted work and measured interpolation errors; no wall times, so they reproduce."""
 
@@ -63,17 +61,10 @@ class Calibration:
 def calibrate(scene: AnyScene) -> Calibration:
     """Calibrate a scene's balancer: lambda, k(u) and the flow law, with uncertainties.
 
-    Args:
-        scene: the scene.
-
-    Returns:
-        Calibration.
-
-    Raises:
-        SceneError: a rotor too slow for the liquid to form a ring, or a balancer without liquid.
-        ValueError: a tube whose bends do not fit into its length.
-
-    Source: finite elements for the chamber and the laminar tube, correlations beyond; see the parts.
+    Raises: SceneError: a rotor too slow for the liquid to form a ring, or a balancer without liquid.
+    Raises: ValueError: a tube whose bends do not fit into its length.
+    Source: closed forms for the chamber, checked by finite elements; tables of finite elements for the
+        laminar tube, correlations beyond; see the parts.
     """
     scene = liquid_ring_scene(scene)
     check_ring(scene)
@@ -87,10 +78,11 @@ def calibrate(scene: AnyScene) -> Calibration:
         flow_law=law,
         paper_law=paper_law(scene),
         operating_point=point,
-        models_used=models_used(scene=scene, chamber=chamber, law=law, point=point),
+        models_used=models_used(scene),
         identifiability=IDENTIFIABILITY,
         statistics={
-            "finite_element_solves": float(len(chamber.ring.cells) * np.count_nonzero(chamber.fill_ratio)),
+            "closed_form_fills": float(np.count_nonzero(chamber.fill_ratio)),
+            "finite_element_solves": float(chamber.check.solves),
             "unknowns": float(chamber.statistics.unknowns),
             "relative_residual": chamber.statistics.relative_residual,
             "tube_table_nodes": float(heads.head.value.size),
@@ -114,13 +106,8 @@ def _tube(scene: Scene, velocity: FloatArray) -> TubeLoss:
 def lambda_over_fill(*, calibration: Calibration, fill_ratio: FloatArray) -> FloatArray:
     """lambda(x) per transferred mass, [U(x) - U(x_max - x)]/(rho V (x - x_max/2)), its limit at the centre.
 
-    Args:
-        calibration: the calibration.
-        fill_ratio: x, shape (n,), within [0, max_fill_ratio].
-
-    Returns:
-        lambda, m, shape (n,).
-
+    Args: `fill_ratio`: x, shape (n,), within [0, max_fill_ratio].
+    Returns: lambda, m, shape (n,).
     Source: definition; per difference of the two chambers' masses it is half of that.
     """
     law, chamber = calibration.flow_law, calibration.chamber
@@ -138,12 +125,7 @@ def lambda_over_fill(*, calibration: Calibration, fill_ratio: FloatArray) -> Flo
 def lambda_variation(*, calibration: Calibration) -> float:
     """Variation of lambda over the fill range, (largest - smallest)/value at the centre.
 
-    Args:
-        calibration: the calibration.
-
-    Returns:
-        Relative variation.
-
+    Returns: Relative variation.
     Source: definition; the liquid-ring paper states 0.7 %.
     """
     x = np.linspace(0.0, calibration.flow_law.max_fill_ratio, 101)

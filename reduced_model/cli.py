@@ -5,23 +5,34 @@ from __future__ import annotations
 import json as json_format
 from pathlib import Path
 
-from rich.console import Console
-
 from ringbalance.reduced_model.calibration import calibrate as calibrate_scene
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.show import calibration_view
+from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.loader import load_scene
+from ringbalance.scene.platform.files import check_file
+from ringbalance.scene.platform.progress import activity
+from ringbalance.scene.platform.terminal import messages_console, results_console
 
 DONE = 0
 
 
-def calibrate(scene: Path, *, json: bool = False, save: Path | None = None) -> int:
+def calibrate(
+    scene: Path,
+    *,
+    json: bool = False,
+    save: Path | None = None,
+    tolerance: str | None = None,
+    models: Models | None = None,
+) -> int:
     """Calibrate a disc: lambda, k(u) and the flow law, with uncertainties.
 
     Args:
         scene: the scene file.
         json: print one JSON document instead of tables.
         save: also write the flow law to this file, for `simulate --law`.
+        tolerance: in place of the scene's, such as "0.5 %" or 0.005.
+        models: "finest" models every term that has a model, whatever the tolerance.
 
     Returns:
         Exit code 0.
@@ -30,15 +41,16 @@ def calibrate(scene: Path, *, json: bool = False, save: Path | None = None) -> i
         SceneError: a scene that cannot be used.
         OSError: the law's file cannot be written.
     """
-    told = load_scene(scene)
-    progress = Console(stderr=True)
-    with progress.status("finite elements over the fill range, losses of the tube ..."):
+    told = with_tolerance(load_scene(scene), tolerance=tolerance, models=models)
+    if save is not None:
+        check_file(save)
+    with activity("calibrate", "pressure and moment over the fill range, losses of the tube ..."):
         found = calibrate_scene(told)
     if json:
         print(json_format.dumps(calibration_document(found), allow_nan=False))
     else:
-        Console().print(calibration_view(found))
+        results_console().print(calibration_view(found))
     if save is not None:
         found.flow_law.save(save)
-        progress.print(f"law written to {save}", highlight=False)
+        messages_console().print(f"law written to {save}", highlight=False)
     return DONE

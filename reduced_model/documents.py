@@ -9,12 +9,12 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration import Calibration, lambda_over_fill, lambda_variation
-from ringbalance.reduced_model.chamber_calibration import Curve
-from ringbalance.reduced_model.flow_law import Regime
-
-FloatArray = npt.NDArray[np.float64]
+from ringbalance.reduced_model.chamber.calibration import Curve
+from ringbalance.reduced_model.chamber.element_check import CHECKED, ElementCheck
+from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.paper import formulas as paper
+from ringbalance.scene.arrays import FloatArray
 
 PRESSURE_FACTORS: Final = (0.5, 0.75, 1.0, 1.25, 1.5, 2.0)
 """Gas pressures of the law's table, over the scene's own."""
@@ -23,29 +23,26 @@ PRESSURE_FACTORS: Final = (0.5, 0.75, 1.0, 1.25, 1.5, 2.0)
 def calibration_document(calibration: Calibration) -> dict[str, Any]:
     """Lay a calibration out as plain lists, numbers and texts.
 
-    `*_uncertainty` are 95 % half-widths.  Those of wall pressure, moment and lambda hold for the scene's
-    inputs as they stand (grid convergence, round-off and left-out gravity); what uncertain inputs add stands
-    beside them (`*_input_uncertainty`), and the two combine as the root of the sum of squares.  Those of k
-    and of velocities hold everything.  The law's rows run along `gas_pressure_Pa`, its columns along
-    `fill_ratio`, for a tube that is empty beforehand.
-
-    Args:
-        calibration: the calibration.
-
-    Returns:
-        The document, in SI units and gauge pressures; no value is NaN or infinite.
-
+    `*_uncertainty` are expanded uncertainties (95 %).  Those of wall pressure, moment and lambda hold for the
+    scene's inputs as they stand (rounding, quadrature, what the check by finite elements contradicts,
+    left-out gravity and terms without a model); what uncertain inputs add stands beside them
+    (`*_input_uncertainty`), and the two combine as the root of the sum of squares.  Those of k and of
+    velocities hold everything.  The law's rows run along
+    `gas_pressure_Pa`, its columns along `fill_ratio`, for a tube that is empty beforehand.
+    Returns: The document, in SI units and gauge pressures; no value is NaN or infinite.
     Source: combination after ASME V&V 20-2009.
     """
     scene = calibration.scene
     return {
         "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
         "chamber": _chamber(calibration),
+        "check": _check(calibration.chamber.check),
         "lambda": _lambda(calibration),
         "tube": _tube(calibration),
         "law": _law(calibration),
         "operating_point": _operating_point(calibration),
         "identifiability": calibration.identifiability,
+        "tolerance": scene.tolerance,
         "models_used": [asdict(term) for term in calibration.models_used],
         "status": {"code": str(calibration.chamber.status.code), "text": calibration.chamber.status.text},
         "statistics": dict(calibration.statistics),
@@ -64,6 +61,7 @@ def _curve(curve: Curve, at: list[int], name: str, unit: str) -> dict[str, Any]:
         f"{name}_uncertainty_parts": {
             "numerical": _listed(curve.numerical[at]),
             "left_out_gravity": _listed(curve.left_out[at]),
+            "unmodelled_terms": _listed(curve.unmodelled[at]),
         },
     }
 
@@ -89,16 +87,30 @@ def _chamber(calibration: Calibration) -> dict[str, Any]:
     )
 
 
+def _check(check: ElementCheck) -> dict[str, Any]:
+    """Finite elements at a few fills; differences are closed form less finite elements."""
+    found: dict[str, Any] = {
+        "by": "finite elements",
+        "gravity": check.gravity,
+        "fill_ratio": _listed(check.elements.fill_ratio),
+        "cells": [list(cells) for cells in check.elements.cells],
+        "finite_element_solves": check.solves,
+        "agrees": check.status.ok,
+        "excess": check.excess,
+    }
+    for name, unit in zip(CHECKED, ("Pa", "kg_m", "kg_m2"), strict=True):
+        estimate = getattr(check.elements, name)
+        found[f"{name}_{unit}"] = _listed(estimate.value)
+        found[f"{name}_uncertainty"] = _listed(estimate.uncertainty)
+        found[f"{name}_difference"] = _listed(check.difference[name])
+    return found
+
+
 def paper_columns(calibration: Calibration, fill_ratio: FloatArray) -> Mapping[str, FloatArray]:
     """What the liquid-ring paper gives for wall pressure and moment at fill ratios.
 
-    Args:
-        calibration: the calibration.
-        fill_ratio: x, shape (n,).
-
-    Returns:
-        "wall_pressure_paper_Pa" and "moment_paper_kg_m", shape (n,), by the paper's own volume.
-
+    Args: `fill_ratio`: x, shape (n,).
+    Returns: "wall_pressure_paper_Pa" and "moment_paper_kg_m", shape (n,), by the paper's own volume.
     Source: Eqs. 3, 4, 7 and 12.
     """
     scene = calibration.scene

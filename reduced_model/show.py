@@ -14,8 +14,8 @@ from rich.text import Text
 
 from ringbalance.reduced_model.calibration import Calibration, lambda_variation
 from ringbalance.reduced_model.documents import PRESSURE_FACTORS, paper_columns
-from ringbalance.reduced_model.flow_law import Regime
-from ringbalance.reduced_model.operating_point import OperatingPoint
+from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.tube.operating_point import OperatingPoint
 
 _MARKS: Final = MappingProxyType(
     {
@@ -30,11 +30,7 @@ _MARKS: Final = MappingProxyType(
 def calibration_view(calibration: Calibration) -> RenderableType:
     """Summary, chamber, tube, law and models of a calibration, for a rich console.
 
-    Args:
-        calibration: the calibration.
-
-    Returns:
-        Something that a rich console prints.
+    Returns: Something that a rich console prints.
     """
     return Group(
         _summary(calibration),
@@ -94,7 +90,7 @@ def _summary_rows(calibration: Calibration) -> Iterator[tuple[str, str]]:
     yield "full siphon stalls", f"at {_mpa(point.stall)} when empty (Eq. 19: {_mpa(point.stall_paper)})"
     if point.priming_vented is not None:
         yield (
-            "over the hump",
+            "over the siphon crest",
             f"{_mpa(point.priming_vented)} vented, driven chamber empty; "
             f"{_mpa(point.priming_trapped)} trapped, equal fills",
         )
@@ -113,9 +109,13 @@ def _point_text(point: OperatingPoint) -> str:
 
 
 def _margin_text(point: OperatingPoint) -> str:
-    """How far a full siphon's pressure over the hump is from tearing there."""
+    """How far a full siphon's pressure over the crest is from separation there."""
     margin, width = point.cavitation_margin or 0.0, point.cavitation_margin_uncertainty or 0.0
-    told = "the column holds over the hump" if margin > 0 else "a full siphon would tear over the hump"
+    told = (
+        "the column holds over the siphon crest"
+        if margin > 0
+        else "a full siphon would separate over the siphon crest"
+    )
     if abs(margin) < width:
         told += ", within its uncertainty either way"
     return f"{margin / 1e6:+.3f} ± {width / 1e6:.3f} MPa above {_mpa(point.cavity_pressure)}: {told}"
@@ -123,7 +123,7 @@ def _margin_text(point: OperatingPoint) -> str:
 
 def _chamber_table(calibration: Calibration) -> Table:
     chamber, at = calibration.chamber, list(calibration.chamber.reported)
-    table = _table("Chamber", "fill", "R1' mm", "p FE MPa", "Eq. 12", "off %", "U FE g mm", "Eq. 7", "off %")
+    table = _table("Chamber", "fill", "R1' mm", "p MPa", "Eq. 12", "off %", "U g mm", "Eq. 7", "off %")
     columns = paper_columns(calibration, chamber.fill_ratio[at])
     paper_pressure, paper_moment = columns["wall_pressure_paper_Pa"], columns["moment_paper_kg_m"]
     for row, i in enumerate(at):
@@ -171,7 +171,9 @@ def _short(value: float) -> str:
 def _law_table(calibration: Calibration) -> Table:
     x = np.linspace(0, calibration.flow_law.max_fill_ratio, 5)
     table = _table("Velocity from an empty tube, m/s (Eq. 19)", "MPa", *(f"x = {v:.3g}" for v in x))
-    table.caption = "* separated at the hump, r reverse, - blocked; x is the driven chamber's fill ratio"
+    table.caption = (
+        "* separated at the siphon crest, r reverse, - blocked; x is the driven chamber's fill ratio"
+    )
     for factor in PRESSURE_FACTORS:
         p = factor * calibration.scene.gas.pressure
         flow = calibration.flow_law.evaluate(fill_ratio=x, gas_pressure=p)

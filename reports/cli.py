@@ -3,32 +3,48 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
 from rich.console import Console
 
-from ringbalance.reports.evidence import Progress
-from ringbalance.reports.pictures import finish_drawing, start_drawing, stop_drawing, write_fields
-from ringbalance.reports.report import Report, move_into_place, staging, write_report
+from ringbalance.reports.pictures.process import (
+    FOLDERS,
+    finish_drawing,
+    start_drawing,
+    stop_drawing,
+    write_fields,
+)
+from ringbalance.reports.report import Report, write_report
 from ringbalance.reports.section import Level
 from ringbalance.reports.summary import lead_sentence, loop_sentence
-from ringbalance.scene import liquid_ring_scene, load_scene
+from ringbalance.scene import liquid_ring_scene, load_scene, read_scene
+from ringbalance.scene.accuracy import Models, with_tolerance
+from ringbalance.scene.platform.files import staged
+from ringbalance.scene.platform.progress import activity
+from ringbalance.scene.platform.terminal import messages_console
 
 DONE: Final = 0
 NOT_SOUND: Final = 1
 MOST_WORKERS: Final = 2
 
 
-def report(scene: Path, *, out: Path = Path("out"), level: Level = "light") -> int:
+def report(
+    scene: Path,
+    *,
+    out: Path = Path("out"),
+    level: Level = "light",
+    tolerance: str | None = None,
+    models: Models | None = None,
+) -> int:
     """Verify, calibrate, simulate and draw: everything, into one HTML file.
 
     Args:
         scene: the scene file.
         out: folder for report.html, evidence.json, figures/ and fields/.
         level: "heavy" also runs the cases that take long.
+        tolerance: in place of the scene's, such as "0.5 %" or 0.005.
+        models: "finest" models every term that has a model, whatever the tolerance.
 
     Returns:
         Exit code: 0; 1 when a code-verification case failed, or the loop settled under neither law; the
@@ -38,16 +54,16 @@ def report(scene: Path, *, out: Path = Path("out"), level: Level = "light") -> i
         SceneError: a scene that cannot be used; nothing is written.
         OSError: the folder cannot be written.
     """
-    told = load_scene(scene)
-    console = Console(stderr=True)
-    with _stages(console) as progress:
+    told, text = read_scene(scene)
+    console = messages_console()
+    with activity("report", "reading") as shown:
         finished = write_report(
-            told,
+            with_tolerance(told, tolerance=tolerance, models=models),
             out,
             level=level,
-            scene_text=scene.read_text(encoding="utf-8"),
+            scene_text=text,
             workers=min(MOST_WORKERS, os.cpu_count() or 1),
-            progress=progress,
+            progress=shown.show,
         )
     _summarise(console, finished)
     print(finished.page)
@@ -69,30 +85,18 @@ def plot(scene: Path, *, out: Path = Path("out")) -> int:
         OSError: the folder cannot be written.
     """
     told = liquid_ring_scene(load_scene(scene))
-    console = Console(stderr=True)
-    with staging(out) as stage, _stages(console) as progress:
-        progress("pressure fields")
+    console = messages_console()
+    with staged(out, folders=FOLDERS) as stage, activity("plot", "pressure fields") as shown:
         drawing = start_drawing(scene=told, fields=write_fields(scene=told, folder=stage), folder=stage)
         try:
-            progress("pictures")
+            shown.show("pictures")
             pictures = finish_drawing(drawing)
         finally:
             stop_drawing(drawing)
-        move_into_place(stage, out)
     if not pictures["drawn"]:
         console.print(pictures["text"], markup=False, highlight=False)
     print(out)
     return DONE if pictures["drawn"] else NOT_SOUND
-
-
-@contextmanager
-def _stages(console: Console) -> Iterator[Progress]:
-    """A spinner that names the stage; without a terminal, one line a stage."""
-    if not console.is_terminal:
-        yield lambda stage: None if ": " in stage else console.print(stage, markup=False, highlight=False)
-        return
-    with console.status("reading") as status:
-        yield lambda stage: status.update(stage)
 
 
 def _summarise(console: Console, finished: Report) -> None:

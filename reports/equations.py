@@ -35,11 +35,7 @@ class Equation:
 
 @cache
 def equations() -> Mapping[str, Equation]:
-    """The displayed equations of the report's sections, by name.
-
-    Returns:
-        Equations.
-    """
+    """The displayed equations of the report's sections, by name."""
     text = files("ringbalance.reports").joinpath("templates", "equations.toml").read_text(encoding="utf-8")
     return {name: Equation(**entry) for name, entry in tomllib.loads(text).items()}
 
@@ -48,16 +44,9 @@ def equations() -> Mapping[str, Equation]:
 def equation_svg(latex: str, words: str, name: str) -> str:
     """One equation as an SVG element in the current text colour, sized in the text's em.
 
-    Args:
-        latex: the equation.
-        words: what it says, for those who cannot see it.
-        name: prefix of every id within, so that two equations on one page do not share glyphs.
-
-    Returns:
-        The SVG element.
-
-    Raises:
-        ValueError: LaTeX that cannot be set.
+    Args: `words`: what it says, for those who cannot see it. `name`: prefix of every id within, so that two
+        equations on one page do not share glyphs.
+    Raises: ValueError: LaTeX that cannot be set.
     """
     try:
         text = Latex(latex, size=16, color="currentColor").svg()
@@ -74,11 +63,8 @@ def equation_svg(latex: str, words: str, name: str) -> str:
 def share_glyphs(page: str) -> str:
     """Keeps one copy of each glyph for all equations of a page: equations are mostly the same letters.
 
-    Args:
-        page: HTML with equations of `equation_svg`, and the line GLYPHS where the copies shall stand.
-
-    Returns:
-        The page with the same look and a fraction of the bytes.
+    Args: `page`: HTML with equations of `equation_svg`, and the line GLYPHS where the copies shall stand.
+    Returns: The page with the same look and a fraction of the bytes.
     """
     names: dict[str, str] = {}
     renamed: dict[str, str] = {}

@@ -16,21 +16,18 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller import (
-    consequences_document,
-    find_consequences,
-    simulate,
-    simulation_document,
-)
-from ringbalance.reduced_model import paper
+from ringbalance.controller.document import simulation_document
+from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.calibration import Calibration, calibrate
 from ringbalance.reduced_model.documents import calibration_document
-from ringbalance.reduced_model.flow_law import FlowLaw, Regime
-from ringbalance.reduced_model.paper_law import paper_model
-from ringbalance.reports.case_view import typeset_equations
-from ringbalance.reports.fields import chamber_field, mesh_record, pressure_profile
+from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
+from ringbalance.reduced_model.law.paper_law import paper_model
+from ringbalance.reduced_model.paper import formulas as paper
+from ringbalance.reports.pages.cases import typeset_equations
+from ringbalance.reports.pictures.fields import chamber_field, mesh_record, pressure_profile
 from ringbalance.reports.section import Level, Work
 from ringbalance.reports.sections import collected
+from ringbalance.reports.studies.consequences import consequences_document, find_consequences
 from ringbalance.scene import Scene, scene_table
 from ringbalance.verification import paper_numbers
 from ringbalance.verification.document import merge_saved, results_document
@@ -74,18 +71,13 @@ def collect_evidence(
     """Run everything that a report rests on, pictures excepted, and gather it in one JSON-able document.
 
     Args:
-        scene: the scene.
         level: "light" leaves heavy cases to `saved`, else `not run`.
         scene_text: the scene file's own text, for the appendix; empty where there is none.
         saved: case records of earlier runs, each with its `date`; one on another scene is not used.
         workers: processes for the verification cases.
         progress: called with the name of each stage; None for silence.
-
-    Returns:
-        The document; no value in it is NaN or infinite.
-
-    Raises:
-        SceneError: a scene that cannot be calibrated or simulated.
+    Returns: The document; no value in it is NaN or infinite.
+    Raises: SceneError: a scene that cannot be calibrated or simulated.
     """
     tell = progress or (lambda _: None)
     with cases_under_way(scene=scene, level=level, mutations=level == "heavy", workers=workers) as under_way:
@@ -133,8 +125,7 @@ def collect_evidence(
 def versions() -> Record:
     """Versions of this program, of Python and of the packages that numbers come from.
 
-    Returns:
-        Versions by name; a package that is not installed is left out.
+    Returns: Versions by name; a package that is not installed is left out.
     """
     found = {"ringbalance": _version("ringbalance") or "not installed", "python": platform.python_version()}
     return found | {name: told for name in PACKAGES if (told := _version(name))}
@@ -213,9 +204,9 @@ def _operating_point(scene: Scene, calibration: Calibration) -> Record:
 
 
 def _threshold_uncertainties(point: Record, calibration: Calibration) -> Record:
-    """95 % half-widths of the pressures at which flow begins and stalls."""
+    """Expanded uncertainties (95 %) of the pressures at which flow begins and stalls."""
     law = calibration.flow_law
-    level = float(law.wall_pressure_spread(law.max_fill_ratio))
+    level = float(law.wall_pressure_uncertainty(law.max_fill_ratio))
     scale = math.hypot(law.inputs.relative_density, 2 * law.inputs.relative_speed)
 
     def width(pressure: float | None, own: float) -> float | None:

@@ -17,14 +17,7 @@ _LARGEST_PLAIN = 6
 
 
 def power_of_ten(exponent: int) -> str:
-    """Power of ten in plain text, such as 10⁻³.
-
-    Args:
-        exponent: the exponent.
-
-    Returns:
-        Text.
-    """
+    """Power of ten in plain text, such as 10⁻³."""
     return f"10{str(exponent).translate(_SUPERSCRIPTS)}"
 
 
@@ -52,15 +45,9 @@ def _exact(value: float) -> Decimal:
 def number(value: float | None, *, digits: int = 4) -> str:
     """A number to a count of significant digits; scientific when it is very large or very small.
 
-    Args:
-        value: the number; None where there is none.
-        digits: significant digits, at least 1.
-
-    Returns:
-        Text, with a dash for None.
-
-    Raises:
-        ValueError: a value that is not finite.
+    Args: `value`: the number; None where there is none. `digits`: significant digits, at least 1.
+    Returns: Text, with a dash for None.
+    Raises: ValueError: a value that is not finite.
     """
     if value is None:
         return MISSING
@@ -80,15 +67,9 @@ def number(value: float | None, *, digits: int = 4) -> str:
 def short(value: float | None, *, digits: int = 6) -> str:
     """A number that was set rather than found: no trailing zeros.
 
-    Args:
-        value: the number; None where there is none.
-        digits: most significant digits.
-
-    Returns:
-        Text, with a dash for None.
-
-    Raises:
-        ValueError: a value that is not finite.
+    Args: `value`: the number; None where there is none. `digits`: most significant digits.
+    Returns: Text, with a dash for None.
+    Raises: ValueError: a value that is not finite.
     """
     body, times, power = number(value, digits=digits).partition(f"{THIN_SPACE}×")
     trimmed = body.rstrip("0").rstrip(".") if "." in body else body
@@ -98,15 +79,9 @@ def short(value: float | None, *, digits: int = 6) -> str:
 def fixed(value: float, decimals: int) -> str:
     """A number to a count of decimals, for a column that shares them.
 
-    Args:
-        value: the number.
-        decimals: at least zero.
-
-    Returns:
-        Text.
-
-    Raises:
-        ValueError: a value that is not finite.
+    Args: `decimals`: at least zero.
+    Returns: Text.
+    Raises: ValueError: a value that is not finite.
     """
     return _plain(_exact(value), decimals)
 
@@ -114,15 +89,9 @@ def fixed(value: float, decimals: int) -> str:
 def half_width_exponent(half_width: float) -> int:
     """Decimal place to which a half-width is shown: two digits when it begins with 1 or 2, else one.
 
-    Args:
-        half_width: positive, finite.
-
-    Returns:
-        Exponent of ten of the last digit shown.
-
-    Raises:
-        ValueError: a half-width that is not positive and finite.
-
+    Args: `half_width`: positive, finite.
+    Returns: Exponent of ten of the last digit shown.
+    Raises: ValueError: a half-width that is not positive and finite.
     Source: at most two digits, as the GUM (JCGM 100:2008, 7.2.6) asks.
     """
     if not half_width > 0:
@@ -139,16 +108,10 @@ def half_width_exponent(half_width: float) -> int:
 def measured(value: float | None, half_width: float | None, *, digits: int = 4) -> str:
     """Value ± half-width, both to the digits that the half-width leaves standing.
 
-    Args:
-        value: the value; None where there is none.
-        half_width: at 95 %, in the value's unit; None or zero where there is none.
-        digits: significant digits of the value when there is no half-width.
-
-    Returns:
-        Text without unit, such as 72.04 ± 0.03 or (1.20 ± 0.05) × 10⁻⁶.
-
-    Raises:
-        ValueError: a value or half-width that is not finite, or a negative half-width.
+    Args: `value`: the value; None where there is none. `half_width`: at 95 %, in the value's unit; None or
+        zero where there is none. `digits`: significant digits of the value when there is no half-width.
+    Returns: Text without unit, such as 72.04 ± 0.03 or (1.20 ± 0.05) × 10⁻⁶.
+    Raises: ValueError: a value or half-width that is not finite, or a negative half-width.
     """
     if value is None or not half_width:
         return number(value, digits=digits)
@@ -170,16 +133,10 @@ def measured(value: float | None, half_width: float | None, *, digits: int = 4) 
 def percent(fraction: float | None, *, digits: int = 2, signed: bool = False) -> str:
     """A fraction as a percentage.
 
-    Args:
-        fraction: dimensionless; None where there is none.
-        digits: significant digits.
-        signed: whether a positive one gets its plus sign.
-
-    Returns:
-        Text with the percent sign.
-
-    Raises:
-        ValueError: a fraction that is not finite.
+    Args: `fraction`: dimensionless; None where there is none. `digits`: significant digits. `signed`: whether
+        a positive one gets its plus sign.
+    Returns: Text with the percent sign.
+    Raises: ValueError: a fraction that is not finite.
     """
     if fraction is None:
         return MISSING
@@ -190,11 +147,6 @@ def percent(fraction: float | None, *, digits: int = 2, signed: bool = False) ->
 def with_unit(text: str, unit: str) -> str:
     """A number's text with its unit, which never breaks onto the next line.
 
-    Args:
-        text: the number as text.
-        unit: as it is shown; empty or "1" where there is none.
-
-    Returns:
-        Text.
+    Args: `unit`: as it is shown; empty or "1" where there is none.
     """
     return text if unit in {"", "1"} or text == MISSING else f"{text}{THIN_SPACE}{unit}"

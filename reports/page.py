@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from ringbalance.reports import summary
-from ringbalance.reports.case_view import case_view
 from ringbalance.reports.equations import equation_svg, equations
-from ringbalance.reports.figure_style import Drawing
-from ringbalance.reports.figures import page_figures
-from ringbalance.reports.page_tables import (
+from ringbalance.reports.figures.sections import page_figures
+from ringbalance.reports.figures.style import Drawing
+from ringbalance.reports.pages.cases import case_view
+from ringbalance.reports.pages.tables import (
     chamber_table,
     drag_table,
     loop_notes,
@@ -39,15 +39,9 @@ class PageContent:
 def page_content(evidence: Record, *, pictures: Mapping[str, bytes] | None = None) -> PageContent:
     """Turn the evidence into texts, tables and figures.
 
-    Args:
-        evidence: the document of `collect_evidence`.
-        pictures: PNG bytes by the file names that the evidence lists; a picture that is missing is left out.
-
-    Returns:
-        The content of the page.
-
-    Raises:
-        KeyError: an evidence document that lacks a part.
+    Args: `evidence`: the document of `collect_evidence`. `pictures`: PNG bytes by the file names that the
+        evidence lists; a picture that is missing is left out.
+    Raises: KeyError: an evidence document that lacks a part.
     """
     claims = [
         {**case_view(case), "elsewhere": summary.elsewhere(case, evidence)}

@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from ringbalance.reports import summary
 from ringbalance.reports.equations import GLYPHS, share_glyphs
-from ringbalance.reports.figure_style import DARK, LIGHT
+from ringbalance.reports.figures.style import DARK, LIGHT
 from ringbalance.reports.page import PageContent, page_content
 
 Record = dict[str, Any]
@@ -20,28 +20,16 @@ Record = dict[str, Any]
 def render(evidence: Record, *, pictures: Mapping[str, bytes] | None = None) -> str:
     """One self-contained HTML page.
 
-    Args:
-        evidence: the document of `collect_evidence`.
-        pictures: PNG bytes by the file names that the evidence lists; a picture that is missing is left out.
-
-    Returns:
-        HTML that needs no other file and no network; the same evidence gives the same bytes.
-
-    Raises:
-        KeyError: an evidence document that lacks a part.
+    Args: `evidence`: the document of `collect_evidence`. `pictures`: PNG bytes by the file names that the
+        evidence lists; a picture that is missing is left out.
+    Returns: HTML that needs no other file and no network; the same evidence gives the same bytes.
+    Raises: KeyError: an evidence document that lacks a part.
     """
     return render_page(page_content(evidence, pictures=pictures))
 
 
 def render_page(content: PageContent) -> str:
-    """Fills the templates.
-
-    Args:
-        content: of `page_content`.
-
-    Returns:
-        HTML.
-    """
+    """Fills the templates. Returns: HTML."""
     environment = jinja2.Environment(
         loader=jinja2.FunctionLoader(_template),
         autoescape=True,

@@ -3,26 +3,32 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from ringbalance.reports.evidence import Progress, collect_evidence
-from ringbalance.reports.figure_style import standalone
-from ringbalance.reports.opengl import OpenGL
+from ringbalance.reports.figures.style import standalone
 from ringbalance.reports.page import page_content
-from ringbalance.reports.pictures import finish_drawing, start_drawing, stop_drawing, write_fields
+from ringbalance.reports.pictures.opengl import OpenGL
+from ringbalance.reports.pictures.process import (
+    FOLDERS,
+    finish_drawing,
+    start_drawing,
+    stop_drawing,
+    write_fields,
+)
 from ringbalance.reports.render import render_page
 from ringbalance.reports.saved import saved_cases
 from ringbalance.reports.section import Level
 from ringbalance.scene import AnyScene, liquid_ring_scene
+from ringbalance.scene.platform.files import staged
 
 Record = dict[str, Any]
+
+FILES: Final = ("evidence.json", "report.html")
+"""Of a report, the page last: where it is, all else is."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,26 +66,21 @@ def write_report(
     """Verify, calibrate, simulate and draw a scene into one folder.
 
     Args:
-        scene: the scene.
         out: folder for report.html, evidence.json, figures/ and fields/; made when there is none.
         level: "heavy" runs the cases that take long, "light" takes them from earlier evidence.
         scene_text: the scene file's own text, for the appendix.
         workers: processes for the verification cases; more than one needs an importable main module.
         progress: called with the name of each stage; None for silence.
         opengl: what this machine can draw with; None: it is asked.
-
-    Returns:
-        The report.
-
-    Raises:
-        SceneError: a scene that cannot be calibrated or simulated, or a balancer without liquid; nothing is
-            written.
-        OSError: the folder cannot be written, or holds an evidence.json that is none.
+    Raises: SceneError: a scene that cannot be calibrated or simulated, or a balancer without liquid; nothing
+        is written.
+    Raises: OSError: the folder cannot be written, or holds an evidence.json that is none; known before the
+        work.
     """
     scene = liquid_ring_scene(scene)
     folder, start = Path(out), time.perf_counter()
     saved = saved_cases(folder)
-    with staging(folder) as stage:
+    with staged(folder, files=FILES, folders=FOLDERS) as stage:
         drawing = start_drawing(
             scene=scene, fields=write_fields(scene=scene, folder=stage), folder=stage, opengl=opengl
         )
@@ -94,7 +95,6 @@ def write_report(
         _tell(progress, "page")
         evidence["times"]["total_s"] = round(time.perf_counter() - start, 1)
         evidence = _write_page(evidence, stage)
-        move_into_place(stage, folder)
     return Report(page=folder / "report.html", evidence=evidence)
 
 
@@ -116,41 +116,3 @@ def _write_page(evidence: Record, stage: Path) -> Record:
         (figures / f"{drawing.name}.svg").write_text(standalone(drawing), encoding="utf-8")
     (stage / "report.html").write_text(render_page(content), encoding="utf-8")
     return kept
-
-
-@contextmanager
-def staging(folder: Path) -> Iterator[Path]:
-    """A folder beside the one that is wanted, gone again at the end whatever happens.
-
-    Args:
-        folder: where the files shall stand in the end.
-
-    Yields:
-        The folder to write into.
-
-    Raises:
-        OSError: no folder can be made there.
-    """
-    if folder.exists() and not folder.is_dir():
-        raise NotADirectoryError(f"{folder} is a file, not a folder")
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}.") as stage:
-        yield Path(stage)
-
-
-def move_into_place(stage: Path, folder: Path) -> None:
-    """Move every finished file to where it belongs, the page last.
-
-    Args:
-        stage: holds the finished files.
-        folder: shall hold them; files of other names in it are left alone.
-
-    Raises:
-        OSError: the folder cannot be written.
-    """
-    finished = sorted(path for path in stage.rglob("*") if path.is_file())
-    for path in sorted(finished, key=lambda path: path.name == "report.html"):
-        target = folder / path.relative_to(stage)
-        target.parent.mkdir(parents=True, exist_ok=True)
-        path.chmod(0o644)
-        os.replace(path, target)

@@ -6,22 +6,38 @@ import json
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final
+
+from ringbalance.scene.faults import toml_text
 
 Record = dict[str, Any]
 
 PACKAGED: Final = "heavy_evidence.json"
 NOT_RUN: Final = "not run"
+_TEXTS: Final = (
+    "id",
+    "kind",
+    "verdict",
+    "title",
+    "claim",
+    "explanation",
+    "consequence",
+    "status",
+    "scene_sha256",
+)
+_LISTS: Final = ("quantities", "series", "convergence", "tables", "mutations", "equations", "doubts")
+_KINDS: Final[Mapping[str, type]] = MappingProxyType(
+    dict.fromkeys(_TEXTS, str) | dict.fromkeys(_LISTS, list) | {"reference": dict, "numbers": dict}
+)
+"""Of a heavy case's record, which a report may take over."""
+_NAMES: Final[Mapping[type, str]] = MappingProxyType({str: "a text", list: "a list", dict: "an object"})
 
 
 def heavy_cases(document: Mapping[str, Any]) -> list[Record]:
     """The heavy cases that an evidence document holds, each stamped with the date on which it was run.
 
-    Args:
-        document: of `collect_evidence`, or what `kept_document` made of it.
-
-    Returns:
-        Case records.
+    Args: `document`: of `collect_evidence`, or what `kept_document` made of it.
     """
     date = document.get("times", {}).get("date", "")
     return [
@@ -34,11 +50,8 @@ def heavy_cases(document: Mapping[str, Any]) -> list[Record]:
 def kept_document(document: Mapping[str, Any]) -> Record:
     """What is worth keeping of an evidence document for later reports.
 
-    Args:
-        document: of `collect_evidence` at the heavy level.
-
-    Returns:
-        Format, versions and the heavy cases with their dates.
+    Args: `document`: of `collect_evidence` at the heavy level.
+    Returns: Format, versions and the heavy cases with their dates.
     """
     return {
         "format": document["format"],
@@ -50,14 +63,9 @@ def kept_document(document: Mapping[str, Any]) -> Record:
 def saved_cases(folder: Path | None = None) -> list[Record]:
     """All heavy results at hand, the oldest first: those of the program, and those of a report's folder.
 
-    Args:
-        folder: of an earlier report; None for none.
-
-    Returns:
-        Case records, each with its date and the hash of its scene.
-
-    Raises:
-        OSError: an evidence file that cannot be read, or is none.
+    Args: `folder`: of an earlier report; None for none.
+    Returns: Case records, each with its date and the hash of its scene.
+    Raises: OSError: an evidence file that cannot be read, or is none.
     """
     found = _packaged()
     if folder is not None and (folder / "evidence.json").is_file():
@@ -70,9 +78,38 @@ def _packaged() -> list[Record]:
     return heavy_cases(json.loads(source.read_text(encoding="utf-8"))) if source.is_file() else []
 
 
-def _read(path: Path) -> Mapping[str, Any]:
+def _read(path: Path) -> Record:
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise OSError(f"{path} is not an evidence file; move it away: {error}") from error
-    return document if isinstance(document, dict) else {}
+        document = json.loads(path.read_bytes())
+        problem = _problem(document)
+    except (ValueError, RecursionError) as error:
+        problem = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
+    if problem:
+        raise OSError(
+            f"{path} is not an evidence file: {problem}; its heavy results would be kept, so move it away or "
+            "choose another folder"
+        )
+    return dict(document)
+
+
+def _problem(document: Any) -> str:
+    """What a report could not work with in an evidence document; empty when there is nothing."""
+    # NaN and infinity, which no evidence holds, raise ValueError.
+    json.dumps(document, allow_nan=False)
+    if not isinstance(document, dict):
+        return "it holds no object"
+    times, cases = document.get("times", {}), document.get("verification", [])
+    if not isinstance(times, dict) or not isinstance(times.get("date", ""), str):
+        return '"times" is no object with a date'
+    if not isinstance(cases, list) or not all(isinstance(case, dict) for case in cases):
+        return '"verification" is no list of cases'
+    for place, case in enumerate(cases):
+        kinds = _KINDS if case.get("cost") == "heavy" else {}
+        for key, kind in kinds.items():
+            if not isinstance(case.get(key), kind):
+                return f'"{key}" of verification[{place}] is {_shown(case.get(key))}, not {_NAMES[kind]}'
+    return ""
+
+
+def _shown(value: Any) -> str:
+    return "missing" if value is None else toml_text(value)

@@ -23,19 +23,11 @@ class Work:
 
 
 def nothing(_work: Work) -> None:
-    """Collects no evidence of its own.
-
-    Returns:
-        None.
-    """
+    """Collects no evidence of its own."""
 
 
 def everything(_evidence: Record) -> Record:
-    """Needs nothing but what every template sees.
-
-    Returns:
-        An empty record.
-    """
+    """Needs nothing but what every template sees. Returns: An empty record."""
     return {}
 
 

@@ -7,18 +7,15 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from ringbalance.reports import (
-    consequence_view,
-    driven,
-    extremes,
-    fifty,
-    hump,
-    inside,
-    paper_again,
-    sloshing,
-    trade,
-)
-from ringbalance.reports.figure_style import Drawing
+from ringbalance.reports.figures.style import Drawing
+from ringbalance.reports.pages import consequences as consequence_view
+from ringbalance.reports.pages import drag_coefficient as fifty
+from ringbalance.reports.pages import eccentric_mass as driven
+from ringbalance.reports.pages import extremes, sloshing
+from ringbalance.reports.pages import model_selection as trade
+from ringbalance.reports.pages import paper_figures as paper_again
+from ringbalance.reports.pages import siphon_crest as hump
+from ringbalance.reports.pages import tube_flow as inside
 from ringbalance.reports.section import Record, Section, Work
 
 SECTIONS: Final[tuple[Section, ...]] = (
@@ -48,12 +45,9 @@ SECTIONS: Final[tuple[Section, ...]] = (
 def collected(work: Work, *, last: bool) -> Record:
     """The evidence of the sections that have some of their own.
 
-    Args:
-        work: scene, calibration and level.
-        last: whether of those that are collected after the cases have run, or of the others.
-
-    Returns:
-        Records by section name.
+    Args: `work`: scene, calibration and level. `last`: whether of those that are collected after the cases
+        have run, or of the others.
+    Returns: Records by section name.
     """
     found = {section.name: section.collect(work) for section in SECTIONS if section.last is last}
     return {name: record for name, record in found.items() if record is not None}
@@ -62,11 +56,8 @@ def collected(work: Work, *, last: bool) -> Record:
 def viewed(evidence: Record) -> list[Record]:
     """What each section shows, in the page's order, without those that have nothing to show.
 
-    Args:
-        evidence: the document of `collect_evidence`.
-
-    Returns:
-        `name`, `title`, `template` and `view` of each.
+    Args: `evidence`: the document of `collect_evidence`.
+    Returns: `name`, `title`, `template` and `view` of each.
     """
     views = [(section, section.view(evidence)) for section in SECTIONS]
     return [
@@ -77,14 +68,7 @@ def viewed(evidence: Record) -> list[Record]:
 
 
 def drawings_in(content: Any) -> list[Drawing]:
-    """Every drawing within nested records and lists, in their order.
-
-    Args:
-        content: of a view.
-
-    Returns:
-        Drawings.
-    """
+    """Every drawing within nested records and lists, in their order. Args: `content`: of a view."""
     if isinstance(content, Drawing):
         return [content]
     if isinstance(content, dict):

@@ -68,11 +68,8 @@ class LoopRow:
 def tone(verdict: str) -> str:
     """Colour group of a verdict.
 
-    Args:
-        verdict: as in the evidence.
-
-    Returns:
-        Name of the group; the page never shows a colour without the word.
+    Args: `verdict`: as in the evidence.
+    Returns: Name of the group; the page never shows a colour without the word.
     """
     return _TONES.get(verdict, "open")
 
@@ -80,12 +77,7 @@ def tone(verdict: str) -> str:
 def claims(evidence: Record, *, paper: str = "liquid_ring") -> list[Record]:
     """Cases that judge one paper, in its order.
 
-    Args:
-        evidence: the document.
-        paper: "liquid_ring" or "eccentric_mass".
-
-    Returns:
-        Case records.
+    Args: `evidence`: the document. `paper`: "liquid_ring" or "eccentric_mass".
     """
     found = [
         case
@@ -96,26 +88,14 @@ def claims(evidence: Record, *, paper: str = "liquid_ring") -> list[Record]:
 
 
 def checks(evidence: Record) -> list[Record]:
-    """Cases that judge this program's own solvers.
-
-    Args:
-        evidence: the document.
-
-    Returns:
-        Case records.
-    """
+    """Cases that judge this program's own solvers. Args: `evidence`: the document."""
     return [case for case in evidence["verification"] if case["kind"] != "claim"]
 
 
 def verdict_counts(cases: list[Record], verdicts: tuple[str, ...]) -> list[Count]:
     """Number of cases under each verdict, in a fixed order, without the empty ones.
 
-    Args:
-        cases: case records.
-        verdicts: order in which to list.
-
-    Returns:
-        Counts.
+    Args: `verdicts`: order in which to list.
     """
     tally = Counter(case["verdict"] for case in cases)
     return [Count(verdict=v, tone=tone(v), count=tally[v]) for v in verdicts if tally[v]]
@@ -124,11 +104,8 @@ def verdict_counts(cases: list[Record], verdicts: tuple[str, ...]) -> list[Count
 def lead_sentence(evidence: Record) -> str:
     """The whole result in two sentences, counted from the verdicts.
 
-    Args:
-        evidence: the document.
-
-    Returns:
-        Prose.
+    Args: `evidence`: the document.
+    Returns: Prose.
     """
     counts = verdict_counts(claims(evidence), CLAIM_VERDICTS)
     parts = [f"{item.count} {'is' if item.count == 1 else 'are'} {item.verdict}" for item in counts]
@@ -153,12 +130,8 @@ def _series(parts: list[str]) -> str:
 def elsewhere(case: Record, evidence: Record) -> bool:
     """Whether a case was judged on another disc than the report's, such as the paper's own.
 
-    Args:
-        case: its record.
-        evidence: the document.
-
-    Returns:
-        True when its numbers are not those of the report's scene.
+    Args: `evidence`: the document.
+    Returns: True when its numbers are not those of the report's scene.
     """
     judged = case.get("scene_sha256")
     return bool(judged) and judged != evidence["scene"]["sha256"]
@@ -167,11 +140,8 @@ def elsewhere(case: Record, evidence: Record) -> bool:
 def headlines(evidence: Record) -> list[Record]:
     """Claims worth a line in the summary: judged on this disc and so marked, else those that did not hold.
 
-    Args:
-        evidence: the document.
-
-    Returns:
-        Case records.
+    Args: `evidence`: the document.
+    Returns: Case records.
     """
     every = [case for case in claims(evidence) if not elsewhere(case, evidence)]
     marked = [case for case in every if case.get("headline")]
@@ -179,13 +149,10 @@ def headlines(evidence: Record) -> list[Record]:
 
 
 def key_numbers(evidence: Record) -> list[KeyNumber]:
-    """The calibrated numbers with their 95 % half-widths.
+    """The calibrated numbers with their expanded uncertainties (95 %).
 
-    Args:
-        evidence: the document.
-
-    Returns:
-        Numbers in reading order.
+    Args: `evidence`: the document.
+    Returns: Numbers in reading order.
     """
     point, paper, calibration = evidence["operating_point"], evidence["paper"], evidence["calibration"]
     return [
@@ -255,7 +222,7 @@ def _priming_number(point: Record, paper: Record) -> list[KeyNumber]:
     parts = shown_apart(point["priming_pressure_vented_Pa"], "Pa", point["priming_uncertainty"])
     low = given(paper["working_range_Pa"][0], "Pa")
     trapped = shown(point["priming_pressure_trapped_Pa"], "Pa")
-    note = f"Over the hump, gas vented, driven chamber empty. Gas trapped, equal fills: {trapped}."
+    note = f"Over the siphon crest, gas vented, driven chamber empty. Gas trapped, equal fills: {trapped}."
     return [_key("Priming pressure", parts, f"works from {low}", note)]
 
 
@@ -280,11 +247,8 @@ def _gas_time(run: Record) -> str:
 def loop_rows(evidence: Record) -> list[LoopRow]:
     """The closed loop under both laws, line by line.
 
-    Args:
-        evidence: the document.
-
-    Returns:
-        Rows; a law that was not run shows a dash.
+    Args: `evidence`: the document.
+    Returns: Rows; a law that was not run shows a dash.
     """
     runs = evidence["closed_loop"]
 
@@ -295,7 +259,7 @@ def loop_rows(evidence: Record) -> list[LoopRow]:
     return [
         row("Settling time", _settling),
         row("Gas operations", lambda run: str(len(run["injections"]))),
-        row("Gas time in all", _gas_time),
+        row("Valve-open time in all", _gas_time),
         row("Final amplitude", lambda run: shown(run["amplitude_m"][-1], "m", digits=2)),
         row("Overshoots", lambda run: str(run["overshoots"])),
         row("Misadjustments", lambda run: str(run["misadjustments"])),
@@ -306,11 +270,8 @@ def loop_rows(evidence: Record) -> list[LoopRow]:
 def loop_sentence(evidence: Record) -> str:
     """What changes in the closed loop, in one sentence.
 
-    Args:
-        evidence: the document.
-
-    Returns:
-        A sentence made of the runs' own numbers.
+    Args: `evidence`: the document.
+    Returns: A sentence made of the runs' own numbers.
     """
     runs = evidence["closed_loop"]
     if not set(_LAWS) <= runs.keys():

@@ -18,7 +18,7 @@ class DisplayUnit:
     """Smallest magnitude, SI, from which this unit is the one to show."""
 
 
-_LADDERS: dict[str, tuple[DisplayUnit, ...]] = {
+_DISPLAY_UNITS: dict[str, tuple[DisplayUnit, ...]] = {
     "m": (
         DisplayUnit(symbol="nm", factor=1e9),
         DisplayUnit(symbol="µm", factor=1e6, start=1e-8),
@@ -51,38 +51,28 @@ _LADDERS: dict[str, tuple[DisplayUnit, ...]] = {
 
 
 def display_unit(unit: str, *values: float | None) -> DisplayUnit:
-    """The rung of a unit's ladder that suits the largest of some values.
+    """The display unit that suits the largest of some values.
 
-    Args:
-        unit: SI unit, such as "Pa" or "kg m"; one that is not known is kept as it is.
-        values: in that unit; None is skipped.
-
-    Returns:
-        The unit to show, with its factor.
+    Args: `unit`: SI unit, such as "Pa" or "kg m"; one that is not known is kept as it is. `values`: in that
+        unit; None is skipped.
+    Returns: The unit to show, with its factor.
     """
-    ladder = _LADDERS.get(unit)
-    if ladder is None:
+    units = _DISPLAY_UNITS.get(unit)
+    if units is None:
         return DisplayUnit(symbol=unit, factor=1.0)
     largest = max((abs(value) for value in values if value is not None), default=0.0)
     # 0.1 MPa may arrive as 99 999.999 999: the last bits must not choose the unit.
-    fitting = [rung for rung in ladder if rung.start <= largest * (1 + 1e-9)]
-    return fitting[-1] if largest else ladder[-1]
+    fitting = [display for display in units if display.start <= largest * (1 + 1e-9)]
+    return fitting[-1] if largest else units[-1]
 
 
 def shown(value: float | None, unit: str, half_width: float | None = None, *, digits: int = 4) -> str:
     """An SI quantity as text in the unit that suits its size, with its half-width if there is one.
 
-    Args:
-        value: in `unit`; None where there is none.
-        unit: SI unit.
-        half_width: 95 %, in `unit`.
-        digits: significant digits when there is no half-width.
-
-    Returns:
-        Text, such as (72.04 ± 0.03) mm.
-
-    Raises:
-        ValueError: a value that is not finite.
+    Args: `value`: in `unit`; None where there is none. `half_width`: 95 %, in `unit`. `digits`: significant
+        digits when there is no half-width.
+    Returns: Text, such as (72.04 ± 0.03) mm.
+    Raises: ValueError: a value that is not finite.
     """
     text, symbol = shown_apart(value, unit, half_width, digits=digits)
     wants_brackets = "±" in text and bool(symbol) and not text.startswith("(")
@@ -94,38 +84,24 @@ def shown_apart(
 ) -> tuple[str, str]:
     """As `shown`, with number and unit apart, for a page that sets them in different type.
 
-    Args:
-        value: in `unit`; None where there is none.
-        unit: SI unit.
-        half_width: 95 %, in `unit`.
-        digits: significant digits when there is no half-width.
-
-    Returns:
-        The number's text, without brackets, and the unit's symbol.
-
-    Raises:
-        ValueError: a value that is not finite.
+    Args: `value`: in `unit`; None where there is none. `unit`: SI unit. `half_width`: 95 %, in `unit`.
+        `digits`: significant digits when there is no half-width.
+    Returns: The number's text, without brackets, and the unit's symbol.
+    Raises: ValueError: a value that is not finite.
     """
-    rung = display_unit(unit, value)
+    display = display_unit(unit, value)
     if value is None:
         return number(None), ""
-    width = None if half_width is None else half_width * rung.factor
-    return measured(value * rung.factor, width, digits=digits), rung.symbol
+    width = None if half_width is None else half_width * display.factor
+    return measured(value * display.factor, width, digits=digits), display.symbol
 
 
 def given(value: float | None, unit: str, *, digits: int = 6) -> str:
     """An SI quantity that was set, not found: as short as it may be.
 
-    Args:
-        value: in `unit`; None where there is none.
-        unit: SI unit.
-        digits: most significant digits.
-
-    Returns:
-        Text, such as 0.7 MPa or 0.25.
-
-    Raises:
-        ValueError: a value that is not finite.
+    Args: `value`: in `unit`; None where there is none. `digits`: most significant digits.
+    Returns: Text, such as 0.7 MPa or 0.25.
+    Raises: ValueError: a value that is not finite.
     """
-    rung = display_unit(unit, value)
-    return with_unit(short(None if value is None else value * rung.factor, digits=digits), rung.symbol)
+    display = display_unit(unit, value)
+    return with_unit(short(None if value is None else value * display.factor, digits=digits), display.symbol)

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from ringbalance.face import compare as compare
     from ringbalance.face import simulate as simulate
-    from ringbalance.reduced_model import calibrate as calibrate
-    from ringbalance.reduced_model import load_law as load_law
-    from ringbalance.reduced_model import paper_law as paper_law
+    from ringbalance.reduced_model.calibration import calibrate as calibrate
+    from ringbalance.reduced_model.law.loading import load_law as load_law
+    from ringbalance.reduced_model.law.paper_law import paper_law as paper_law
     from ringbalance.reports.report import write_report as write_report
     from ringbalance.scene import SceneError as SceneError
     from ringbalance.scene import bundled_scene as bundled_scene
@@ -25,11 +25,11 @@ __version__ = "0.1.0"
 _HOME = {
     "SceneError": "ringbalance.scene",
     "bundled_scene": "ringbalance.scene",
-    "calibrate": "ringbalance.reduced_model",
+    "calibrate": "ringbalance.reduced_model.calibration",
     "compare": "ringbalance.face",
-    "load_law": "ringbalance.reduced_model",
+    "load_law": "ringbalance.reduced_model.law.loading",
     "load_scene": "ringbalance.scene",
-    "paper_law": "ringbalance.reduced_model",
+    "paper_law": "ringbalance.reduced_model.law.paper_law",
     "run_cases": "ringbalance.verification.runner",
     "simulate": "ringbalance.face",
     "write_report": "ringbalance.reports.report",

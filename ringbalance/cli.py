@@ -11,10 +11,14 @@ import os
 import sys
 import traceback
 from collections.abc import Sequence
+from contextlib import suppress
+from inspect import signature
 
-from cyclopts import App, CycloptsError, Parameter, UnknownCommandError
+from cyclopts import App, CycloptsError, MissingArgumentError, Parameter, UnknownCommandError
 
 import ringbalance
+from ringbalance.signals import interrupts
+from ringbalance.streams import discard_unwritten, drop_unusable_size, interpreter_error, prepare_streams
 
 DONE = 0
 BAD_INPUT = 2
@@ -37,16 +41,29 @@ COMMANDS = {
     ),
     "compare": ("ringbalance.controller.compare_cli:compare", "Two balancers on one rotor, side by side."),
     "trade": (
-        "ringbalance.verification.trade_cli:trade",
-        "Speed against accuracy: ladders of models measured, and the rungs that a tolerance needs.",
+        "ringbalance.verification.selection_studies.cli:trade",
+        "Speed against accuracy: model hierarchies measured, and the models that a tolerance needs.",
     ),
     "extremes": (
-        "ringbalance.reports.extremes_cli:extremes",
-        "Where answers end, what is said beyond, and whether all holds in between.",
+        "ringbalance.reports.pages.extremes_cli:extremes",
+        "Limits of validity: where results stop, what is reported beyond, and whether the invariants hold "
+        "inside.",
     ),
     "plot": ("ringbalance.reports.cli:plot", "The off-screen 3-D pictures alone."),
+    "cache": (
+        "ringbalance.controller.compilation.cli:cache",
+        "The compiled code that is kept between runs: where, how much, and --clear to remove it.",
+    ),
 }
-THREAD_COUNTS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+THREAD_COUNTS = (
+    "OPENBLAS_NUM_THREADS",
+    "OMP_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "BLIS_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+    "NUMEXPR_NUM_THREADS",
+)
+EXAMPLE_SCENES = ("my_disc.toml", "other_disc.toml")
 
 
 def build_app() -> App:
@@ -56,7 +73,8 @@ def build_app() -> App:
         help="Are the closed formulas of a liquid-ring rotor balancer to be trusted, for your disc?",
         help_epilogue=(
             "Exit codes: 0 done; 1 a code-verification case failed or a run did not settle (the result is "
-            "still written); 2 bad input; 130 interrupted."
+            "still written); 2 bad input, or output that cannot be written; 130 interrupted; 141 the "
+            "reader of standard output went away."
         ),
         version=ringbalance.__version__,
         default_parameter=Parameter(negative=()),
@@ -69,10 +87,14 @@ def build_app() -> App:
 
 
 def _say(text: str) -> None:
-    print(text, file=sys.stderr)
+    # Where messages cannot be written the exit code is all that is left.
+    with suppress(OSError):
+        print(text, file=sys.stderr, flush=True)
 
 
 def _usage_fault(error: CycloptsError) -> str:
+    if isinstance(error, MissingArgumentError) and error.argument is not None and error.argument.required:
+        return _missing(error)
     if not isinstance(error, UnknownCommandError) or not error.unused_tokens:
         return str(error)
     # cyclopts would import every command's module to say this.
@@ -80,6 +102,18 @@ def _usage_fault(error: CycloptsError) -> str:
     near = difflib.get_close_matches(word, COMMANDS, n=1)
     guess = f', did you mean "{near[0]}"?' if near else "."
     return f'unknown command "{word}"{guess} Commands: {", ".join(COMMANDS)}.'
+
+
+def _missing(error: MissingArgumentError) -> str:
+    required = [
+        parameter.name.upper()
+        for parameter in signature(error.target or build_app).parameters.values()
+        if parameter.default is parameter.empty and parameter.kind is parameter.POSITIONAL_OR_KEYWORD
+    ]
+    missing = error.argument.field_info.names[0].upper() if error.argument else ""
+    command = " ".join(("ringbalance", *(error.command_chain or ())))
+    examples = " ".join(EXAMPLE_SCENES[: len(required)])
+    return f"{missing} is missing: {command} {' '.join(required)}, for example {command} {examples}."
 
 
 def _refusal(error: OSError) -> str:
@@ -101,7 +135,12 @@ def _run(arguments: Sequence[str] | None) -> int:
 def _run_guarded(arguments: Sequence[str] | None) -> int:
     try:
         return _run(arguments)
-    except (SystemExit, BrokenPipeError):
+    except (BrokenPipeError, KeyboardInterrupt):
+        raise
+    except SystemExit as stop:
+        # A rich console, such as that of `--help`, exits when nobody reads it.
+        if isinstance(stop.__context__, BrokenPipeError):
+            raise stop.__context__ from None
         raise
     except CycloptsError as error:
         _say(f"ringbalance: {_usage_fault(error)}")
@@ -120,18 +159,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: the words after the program's name; default those of the process.
 
     Returns:
-        Exit code: 0 done; 1 a code-verification case failed or a run did not settle; 2 bad input; 130
-        interrupted; 141 the reader of standard output went away.
+        Exit code: 0 done; 1 a code-verification case failed or a run did not settle; 2 bad input, or output
+        that cannot be written; 130 interrupted; 141 the reader of standard output went away.
     """
-    # Before numpy is imported: one thread gives the same sums on every machine.
-    for name in THREAD_COUNTS:
-        os.environ.setdefault(name, "1")
+    # Before numpy is imported, and whatever the user set: one thread gives the same sums on every machine.
+    os.environ.update(dict.fromkeys(THREAD_COUNTS, "1"))
+    drop_unusable_size(os.environ)
+    if refusal := prepare_streams() or interpreter_error():
+        _say(f"ringbalance: {refusal}")
+        return BAD_INPUT
     try:
-        return _run_guarded(arguments)
+        with interrupts():
+            return _run_guarded(arguments)
     except KeyboardInterrupt:
         _say("ringbalance: interrupted; nothing was left half-written")
         return INTERRUPTED
     except BrokenPipeError:
-        # The interpreter flushes once more on its way out, and would complain.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return BROKEN_PIPE
+    finally:
+        discard_unwritten()

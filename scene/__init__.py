@@ -1,13 +1,18 @@
-"""Scene files: from TOML with units to frozen, validated, SI-only records, or every fault at once."""
+"""Scene files: from TOML with units to frozen, validated, SI-only records, or every error at once."""
+
+if not __name__.startswith("ringbalance."):
+    raise ImportError(
+        f"import ringbalance.{__name__}, not {__name__}: under two names each class exists twice"
+    )
 
 from ringbalance.scene.describe import Row, scene_fault, scene_table
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.faults import Fault, SceneError
-from ringbalance.scene.files import write_whole
 from ringbalance.scene.liquids import KnownLiquid, known_liquids, liquid_at
-from ringbalance.scene.loader import bundled_scene, load_scene, scene_from
+from ringbalance.scene.loader import bundled_scene, load_scene, read_scene, scene_from
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene, eccentric_scene, liquid_ring_scene
+from ringbalance.scene.platform.files import write_whole
 
 __all__ = [
     "AnyScene",
@@ -23,6 +28,7 @@ __all__ = [
     "liquid_at",
     "liquid_ring_scene",
     "load_scene",
+    "read_scene",
     "scene_fault",
     "scene_from",
     "scene_table",

@@ -1,88 +1,58 @@
-"""A scene file without faults becomes the frozen records that the other rooms read."""
+"""A scene file without errors becomes the frozen records that the other rooms read."""
 
 from __future__ import annotations
 
 from dataclasses import fields
-from typing import Any, TypeVar
+from pathlib import PurePath
+from typing import Any
 
-from ringbalance.scene.models import (
-    Bend,
-    ControllerSettings,
-    Disc,
-    Environment,
-    Gas,
-    InputUncertainty,
-    Liquid,
-    Rotor,
-    RunSettings,
-    Scene,
-    Sensor,
-    Tube,
-)
-from ringbalance.scene.reading import Reading
-from ringbalance.scene.uncertain import UNCERTAIN
-
-Record = TypeVar("Record")
+from ringbalance.scene.eccentric_models import EccentricScene
+from ringbalance.scene.keys.reading import Reading
+from ringbalance.scene.keys.schema import ECCENTRIC_MASS
+from ringbalance.scene.models import InputUncertainty, Scene
+from ringbalance.scene.narrowing import AnyScene
+from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 
 
-def built(reading: Reading, *, source: str, sha256: str) -> Scene:
+def built(reading: Reading, *, file: str, sha256: str) -> AnyScene:
     """Build the scene.
 
-    Args:
-        reading: complete and without faults.
-        source: file name without its folder.
-        sha256: of the file's bytes.
-
-    Returns:
-        The scene, in SI.
+    Args: `reading`: complete and without errors. `file`: its file, as it was named. `sha256`: of the file's
+        bytes.
+    Returns: The scene, in SI.
     """
-    values = reading.values
-    vibration = values["rotor.initial_vibration"]
-    bends = tuple(Bend(angle=bend.angle, radius=bend.radius) for bend in values["tube.bends"])
-    return Scene(
-        name=values["name"],
-        disc=record(Disc, reading, "disc"),
-        liquid=record(Liquid, reading, "liquid"),
-        tube=record(Tube, reading, "tube", bends=bends),
-        gas=record(Gas, reading, "gas"),
-        environment=record(Environment, reading, "environment"),
-        rotor=record(
-            Rotor,
-            reading,
-            "rotor",
-            initial_amplitude=vibration.amplitude,
-            initial_phase=vibration.phase,
-        ),
-        sensor=record(Sensor, reading, "sensor"),
-        controller=record(ControllerSettings, reading, "controller"),
-        uncertainty=_uncertainty(reading),
-        run=record(RunSettings, reading, "run"),
-        tolerance=values["accuracy.tolerance"],
-        source=source,
-        sha256=sha256,
-        defaulted=defaulted(reading),
-    )
+    parts: dict[str, Any] = {
+        **_records(reading),
+        "name": reading.values["name"],
+        "tolerance": reading.values["accuracy.tolerance"],
+        "source": PurePath(file).name,
+        "file": file,
+        "sha256": sha256,
+        "defaulted": _defaulted(reading),
+    }
+    if reading.schema is ECCENTRIC_MASS:
+        return EccentricScene(**parts)
+    return Scene(**parts, uncertainty=_uncertainty(reading))
 
 
-def record(kind: type[Record], reading: Reading, table: str, **others: Any) -> Record:
-    """Fill a record from the table whose keys its fields are named after; an absent key is None.
-
-    Args:
-        kind: the record.
-        reading: complete and without faults.
-        table: name of the table.
-        others: fields that are no keys, or need more than their key's value.
-
-    Returns:
-        The record.
-    """
-    names = [field.name for field in fields(kind)]  # type: ignore[arg-type]
-    values = {name: reading.values.get(f"{table}.{name}") for name in names}
-    return kind(**{**values, **others})
+def _records(reading: Reading) -> dict[str, Any]:
+    """A record of each table; its fields are named after keys, and an absent key is None."""
+    values: dict[str, Any] = dict(reading.values)
+    vibration = values.get("rotor.initial_vibration")
+    if vibration is not None:
+        values["rotor.initial_amplitude"] = vibration.amplitude
+        values["rotor.initial_phase"] = vibration.phase
+    return {
+        name: table.record(
+            **{field.name: values.get(f"{name}.{field.name}") for field in fields(table.record)}
+        )
+        for name, table in reading.schema.tables.items()
+        if table.record is not None
+    }
 
 
 def _uncertainty(reading: Reading) -> tuple[InputUncertainty, ...]:
-    given = ((key, reading.values.get(f"uncertainty.{key}")) for key in UNCERTAIN)
+    given = ((key, reading.values.get(f"uncertainty.{key}")) for key in UNCERTAIN_QUANTITIES)
     return tuple(
         InputUncertainty(quantity=key, half_width=spread[0], relative=spread[1])
         for key, spread in given
@@ -90,15 +60,8 @@ def _uncertainty(reading: Reading) -> tuple[InputUncertainty, ...]:
     )
 
 
-def defaulted(reading: Reading) -> tuple[str, ...]:
-    """List the paths whose value is a default; what was looked up for a known liquid is none.
-
-    Args:
-        reading: complete and without faults.
-
-    Returns:
-        Paths, "table.key".
-    """
+def _defaulted(reading: Reading) -> tuple[str, ...]:
+    """Paths "table.key" whose value is a default; what was looked up for a known liquid is none."""
     return tuple(
         path for path in reading.values if not reading.given(path) and not path.startswith("liquid.")
     )

@@ -141,7 +141,7 @@ DIMENSIONS: Mapping[str, Dimension] = MappingProxyType(
             largest=1e9,
         ),
         "gain": Dimension(
-            name="a gain (gas time per vibration)",
+            name="a gain (valve-open time per vibration)",
             example="0.08 s/um",
             units=_ratios(_units({"s": 1, "ms": "1e-3", "min": 60}), _VIBRATION),
             smallest=1e-9,

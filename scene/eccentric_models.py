@@ -1,233 +1,143 @@
-"""The frozen, validated, SI-only records of a scene with two driven eccentric masses.
+"""The frozen, validated, SI-only records of a scene with two eccentric masses.
 
 Angles are radians in the rotor's frame, positive with the rotation; amplitudes are zero-to-peak.  A walk is
-the standard deviation gathered within 1 s, so its square is a spectral density: unit^2 / s.
+the standard deviation gathered within 1 s, so its square is a spectral density: unit^2 / s.  What a
+field's key takes and means stands in its annotation, see `ringbalance.scene.keys.declaration`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
 
-from ringbalance.scene.models import RunSettings
+from ringbalance.scene.eccentric_control_models import (
+    FineTuning,
+    FrictionFilter,
+    ImbalanceFilter,
+    Lqr,
+    Supervisor,
+)
+from ringbalance.scene.keys.declaration import listed, needed, standard, unused
+from ringbalance.scene.keys.fields import NOT_NEGATIVE, POSITIVE, quantity
+from ringbalance.scene.keys.quantities import (
+    Angle,
+    Angles,
+    Arms,
+    Damping,
+    Inertia,
+    Length,
+    Mass,
+    PositiveLength,
+    PositiveMass,
+    PositiveTime,
+    Rate,
+    Stiffness,
+    Teeth,
+    Turn,
+    Velocity,
+)
+from ringbalance.scene.loop_models import RunSettings
 
 Frame = Literal["rotor", "laboratory"]
-Discretisation = Literal["exact", "euler"]
-FrictionCompensation = Literal["break_away", "printed", "none"]
-Strategy = Literal["whole", "locked"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class SpeedPoint:
     """One corner of the speed profile."""
 
-    time: float
-    """s."""
-    speed: float
-    """rad/s."""
+    time: Annotated[float, quantity("time", NOT_NEGATIVE), needed("from the start of the run")]
+    speed: Annotated[
+        float, quantity("speed"), needed("of the rotor; negative against the sense in which angles count")
+    ]
 
 
 @dataclass(frozen=True, kw_only=True)
 class EccentricRotor:
     """A rigid planar rotor on an isotropic linear bearing."""
 
-    mass: float
-    """m_r, with the imbalance, without the driven masses, kg."""
-    stiffness: float
-    """K_B, N/m."""
-    damping: float
-    """C_B, N s/m."""
-    speed_profile: tuple[SpeedPoint, ...]
-    """Corners in order of time; linear in between, constant outside."""
+    mass: Annotated[
+        PositiveMass, needed("m_r of the rotor with its imbalance, without the two eccentric masses")
+    ]
+    stiffness: Annotated[Stiffness, needed("K_B of the isotropic bearing")]
+    damping: Annotated[Damping, needed("C_B of the isotropic bearing")]
+    speed_profile: Annotated[
+        tuple[SpeedPoint, ...],
+        needed("list of { time, speed }; the speed is linear in between, and constant before and after"),
+        listed('[{ time = "0 s", speed = "100 rpm" }, ...]'),
+    ]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Imbalance:
     """The imbalance of the rotor."""
 
-    mass: float
-    """m_im, kg; a part of the rotor's mass."""
-    radius: float
-    """r_im, m."""
-    phase: float
-    """phi_m in the rotor's frame, rad."""
+    mass: Annotated[Mass, needed("m_im; a part of the rotor's mass")]
+    radius: Annotated[PositiveLength, needed("r_im, of the imbalance")]
+    phase: Annotated[Turn, needed("phi_m, of the imbalance in the rotor's frame")]
 
 
 @dataclass(frozen=True, kw_only=True)
-class DrivenMasses:
+class EccentricMasses:
     """Two equal masses on one circular track."""
 
-    mass: float
-    """m_b of each, kg."""
-    guide_radius: float
-    """r_b, m."""
-    arc_length: float
-    """l of each along the track, m."""
-    initial_angle: tuple[float, float]
-    """phi at the start, rad."""
-    friction_arm: tuple[float, float]
-    """mu_f of each, m: friction torque = mu_f m_b r_b (W + phi')^2."""
+    mass: Annotated[PositiveMass, needed("m_b of each")]
+    guide_radius: Annotated[PositiveLength, needed("r_b of the circular track")]
+    arc_length: Annotated[PositiveLength, needed("l of each along the track: the masses cannot come closer")]
+    initial_angle: Annotated[
+        Angles, standard(["0 deg", "180 deg"], "phi of each at the start, in the rotor's frame")
+    ]
+    friction_arm: Annotated[
+        Arms,
+        standard(
+            ["0 mm", "0 mm"],
+            "mu_f of each, a length: friction torque = mu_f m_b r_b (rotor speed + mass's own speed)^2",
+        ),
+    ]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Motor:
-    """Motor and gears of one driven mass."""
+    """Motor and gears of one eccentric mass."""
 
-    torque_constant: float
-    """K_i, N m/A."""
-    back_emf_constant: float
-    """K_m, V s/rad."""
-    resistance: float
-    """R_m, ohm."""
-    motor_inertia: float
-    """J_1, kg m^2."""
-    gear_inertia: float
-    """J_2, kg m^2."""
-    teeth: tuple[int, int, int]
-    """N_1, N_2, N_3."""
-    maximum_voltage: float | None
-    """V; None for no limit."""
+    torque_constant: Annotated[
+        float, quantity("torque_constant", POSITIVE), needed("K_i, motor torque per current")
+    ]
+    back_emf_constant: Annotated[
+        float, quantity("voltage_per_speed", NOT_NEGATIVE), needed("K_m, voltage per speed of the motor")
+    ]
+    resistance: Annotated[float, quantity("resistance", POSITIVE), needed("R_m of the winding")]
+    motor_inertia: Annotated[Inertia, needed("J_1 of motor and gear A")]
+    gear_inertia: Annotated[Inertia, needed("J_2 of gear B")]
+    teeth: Annotated[Teeth, needed("N_1 of gear A on the motor, N_2 of gear B, N_3 of the fixed gear C")]
+    maximum_voltage: Annotated[
+        float | None, quantity("voltage", POSITIVE), unused("no limit", "a larger command is cut to this")
+    ]
 
 
 @dataclass(frozen=True, kw_only=True)
 class EccentricSensor:
     """What is measured, how well and how often."""
 
-    frame: Frame
-    position_noise: float
-    """Standard deviation, m."""
-    velocity_noise: float
-    """Standard deviation, m/s."""
-    encoder_noise: float
-    """Standard deviation, rad."""
-    encoder_rate_noise: float
-    """Standard deviation, rad/s."""
-    step: float
-    """Time between two samples, the step of the whole loop, s."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class ImbalanceFilter:
-    """The Kalman filter of rotor and unbalance."""
-
-    step: float
-    """s; a multiple of the sensor's."""
-    discretisation: Discretisation
-    position_noise: float
-    """Standard deviation believed, m, above zero."""
-    velocity_noise: float
-    """Standard deviation believed, m/s, above zero."""
-    velocity_walk: float
-    """m/s within 1 s."""
-    unbalance_walk: float
-    """kg m within 1 s."""
-    initial_position: float
-    """Standard deviation, m."""
-    initial_velocity: float
-    """Standard deviation, m/s."""
-    initial_unbalance: float
-    """Standard deviation of each component, kg m."""
-    gate: float
-    """Relative standard deviation of the unbalance at which the estimate is taken."""
-    assumed_mass: float
-    """Rotor's mass as believed, without the driven masses, kg."""
-    assumed_stiffness: float
-    """N/m."""
-    assumed_damping: float
-    """N s/m."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class FrictionFilter:
-    """The extended Kalman filter of the friction arms, and the drive meanwhile."""
-
-    step: float
-    """s; a multiple of the sensor's."""
-    discretisation: Discretisation
-    rate_noise: float
-    """Standard deviation believed, rad/s, above zero."""
-    rate_walk: float
-    """rad/s within 1 s."""
-    friction_walk: float
-    """m within 1 s."""
-    initial_rate: float
-    """Standard deviation, rad/s."""
-    initial_friction: float
-    """Standard deviation, m."""
-    drive_speed: float
-    """Of both masses along the track, rad/s."""
-    speed_gain: float
-    """gamma, V s/rad."""
-    pair_gain: float
-    """Voltage per error of the 180 degrees between the masses, V/rad."""
-    stall_share: float
-    """Share of `drive_speed` below which a warning is due."""
-    gate: float
-    """Relative standard deviation of the friction arm at which the estimate is taken."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Lqr:
-    """The regulator that moves the masses to their targets."""
-
-    state_weight: float
-    """q; Q = q diag(0.1, 0.1, 0.01, 0.01) on rad and rad/s."""
-    input_weight: float
-    """r; R = r diag(0.1, 0.1) on N m."""
-    step: float
-    """Time for which a voltage is held, s; a multiple of the sensor's."""
-    friction_compensation: FrictionCompensation
-
-
-@dataclass(frozen=True, kw_only=True)
-class FineTuning:
-    """The search by trial."""
-
-    step: float
-    """First trial move, rad."""
-    stop: float
-    """Smallest trial move, rad."""
-    wait: float
-    """After a move, s."""
-    average: float
-    """Time of averaging, s."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Supervisor:
-    """Order, gates and limits of the stages."""
-
-    strategy: Strategy
-    start: float
-    """Beginning of the first stage, s."""
-    limit: float
-    """Amplitude below which no fine tuning is needed, zero-to-peak, m."""
-    lowest_speed: float
-    """Of the rotor, below which the imbalance is not estimated, rad/s."""
-    arrival_angle: float
-    """rad."""
-    arrival_rate: float
-    """rad/s."""
-    imbalance_time: float
-    """Longest, s."""
-    friction_time: float
-    """Longest, s."""
-    positioning_time: float
-    """Longest, s."""
-    fine_tuning_time: float
-    """Longest, s."""
-    target_error: tuple[float, float]
-    """Added to each target, rad."""
+    frame: Annotated[
+        Frame, standard("rotor", "frame in which the sensors measure the rotor's position and velocity")
+    ]
+    position_noise: Annotated[Length, standard("0 mm", "standard deviation of each measured coordinate")]
+    velocity_noise: Annotated[Velocity, standard("0 mm/s", "standard deviation of each measured velocity")]
+    encoder_noise: Annotated[Angle, standard("0 deg", "standard deviation of the measured angle of a mass")]
+    encoder_rate_noise: Annotated[
+        Rate, standard("0 rad/s", "standard deviation of the measured speed of a mass")
+    ]
+    step: Annotated[PositiveTime, standard("1 ms", "time between two samples, the step of the whole loop")]
 
 
 @dataclass(frozen=True, kw_only=True)
 class EccentricScene:
-    """All that a run with two driven masses needs, in SI units."""
+    """All that a run with two eccentric masses needs, in SI units."""
 
     name: str
     rotor: EccentricRotor
     imbalance: Imbalance
-    masses: DrivenMasses
+    masses: EccentricMasses
     motor: Motor
     sensor: EccentricSensor
     imbalance_filter: ImbalanceFilter
@@ -239,7 +149,9 @@ class EccentricScene:
     tolerance: float
     """Relative: bounds the discretisation in time."""
     source: str
-    """File name without its folder; for messages and the evidence."""
+    """File name without its folder; for the evidence, which is the same wherever the file stands."""
+    file: str = field(compare=False)
+    """The file as it was named; for messages."""
     sha256: str
     """Of the scene file's bytes."""
     defaulted: tuple[str, ...] = ()

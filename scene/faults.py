@@ -1,4 +1,4 @@
-"""What is wrong with a scene file: one sentence per fault, all faults of a file together."""
+"""What is wrong with a scene file: one sentence per error, all errors of a file together."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 MISSING = "missing"
+MOST_SHOWN = 50
+"""Errors that the message of a `SceneError` lists; more are counted."""
 _LONGEST_VALUE = 60
 _LONGEST_LIST = 10
 _DEEPEST = 4
@@ -16,14 +18,14 @@ _DEEPEST = 4
 
 @dataclass(frozen=True, kw_only=True)
 class Fault:
-    """One fault of a scene file, with all that is needed to put it right."""
+    """One error of a scene file, with all that is needed to put it right."""
 
     file: str
     """The scene file, as it was named."""
     table: str
     """Table in the file, such as "disc"; empty for the top level and for the file itself."""
     key: str
-    """Key in the table; empty when the whole table or file is at fault."""
+    """Key in the table; empty when the whole table or file is in error."""
     value: str
     """What stands there, as TOML has it; "missing" when nothing does; empty when it does not apply."""
     problem: str
@@ -32,7 +34,7 @@ class Fault:
     """What would be accepted; empty when the problem says it all."""
 
     def __str__(self) -> str:
-        """The fault on one line: file: [table] key = value: what is wrong; allowed: ..."""
+        """The error on one line: file: [table] key = value: what is wrong; allowed: ..."""
         end = f"; allowed: {self.allowed}" if self.allowed else ""
         return f"{self.file}: {self._place()}{self.problem}{end}"
 
@@ -48,28 +50,28 @@ class Fault:
 class SceneError(Exception):
     """A scene that cannot be used; `faults` holds everything that is wrong with it.
 
-    Args:
-        faults: one or more faults; their lines together are the message.
+    Args: `faults`: one or more errors; the lines of the first fifty, and the number of the others, are the
+        message.
     """
 
     def __init__(self, faults: Iterable[Fault]) -> None:
         self.faults: tuple[Fault, ...] = tuple(faults)
-        super().__init__("\n".join(str(fault) for fault in self.faults))
+        lines = [str(fault) for fault in self.faults[:MOST_SHOWN]]
+        more = len(self.faults) - len(lines)
+        if more:
+            lines.append(f"{self.faults[0].file}: and {more} more; correct these first")
+        super().__init__("\n".join(lines))
 
     def __reduce__(self) -> tuple[type[SceneError], tuple[tuple[Fault, ...]]]:
-        """Rebuild from the faults, so that the error survives the way back from a worker process."""
+        """Rebuild from the list of errors, so that the error survives the way back from a worker process."""
         return type(self), (self.faults,)
 
 
 def closest(word: str, known: Iterable[str]) -> str:
     """Find the known word that was probably meant.
 
-    Args:
-        word: what was written.
-        known: the words that exist.
-
-    Returns:
-        One of them, or an empty string when nothing is close.
+    Args: `word`: what was written. `known`: the words that exist.
+    Returns: One of them, or an empty string when nothing is close.
     """
     folded = {name.casefold(): name for name in known}
     close = difflib.get_close_matches(word.casefold()[:_LONGEST_VALUE], list(folded), n=1, cutoff=0.6)
@@ -79,12 +81,8 @@ def closest(word: str, known: Iterable[str]) -> str:
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """Suggest the known word that was probably meant.
 
-    Args:
-        word: what was written.
-        known: the words that exist.
-
-    Returns:
-        ' (did you mean "x"?)' or an empty string when nothing is close.
+    Args: `word`: what was written. `known`: the words that exist.
+    Returns: ' (did you mean "x"?)' or an empty string when nothing is close.
     """
     found = closest(word, known)
     return f' (did you mean "{found}"?)' if found else ""
@@ -93,11 +91,8 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 def toml_text(value: object) -> str:
     """Write a value as it would stand in a TOML file, shortened to fit a line.
 
-    Args:
-        value: anything a TOML file can hold.
-
-    Returns:
-        One line of printable text.
+    Args: `value`: anything a TOML file can hold.
+    Returns: One line of printable text.
     """
     text = _toml_text(value, depth=0)
     return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 4] + " ..."
@@ -128,11 +123,8 @@ def _nested(value: Mapping[Any, Any] | Sequence[Any], *, depth: int) -> str:
 def toml_key(key: str) -> str:
     """Write a key as it would stand in a TOML file: bare where it can be, else quoted.
 
-    Args:
-        key: any key.
-
-    Returns:
-        One line of printable text.
+    Args: `key`: any key.
+    Returns: One line of printable text.
     """
     bare = key.isascii() and key.replace("_", "a").replace("-", "a").isalnum()
     return key if bare and len(key) <= _LONGEST_VALUE else _quoted(key[:_LONGEST_VALUE])

@@ -53,9 +53,9 @@ class KnownLiquid:
     temperatures: tuple[float, ...]
     """K, rising: one for which there are data, or several between which they are interpolated."""
     density_uncertainty: float
-    """95 % half-width, relative."""
+    """Expanded uncertainty (95 %), relative."""
     viscosity_uncertainty: float
-    """95 % half-width, relative."""
+    """Expanded uncertainty (95 %), relative."""
     source: str
 
     @property
@@ -67,33 +67,23 @@ class KnownLiquid:
     def holds(self, temperature: float) -> bool:
         """Tell whether there are data for a temperature.
 
-        Args:
-            temperature: K.
-
-        Returns:
-            True within the data, give or take 0.01 K.
+        Args: `temperature`: K.
+        Returns: True within the data, plus or minus 0.01 K.
         """
         low, high = self.temperatures[0], self.temperatures[-1]
         return low - _SAME_TEMPERATURE <= temperature <= high + _SAME_TEMPERATURE
 
 
 def known_liquids() -> tuple[KnownLiquid, ...]:
-    """List the liquids that a scene can name.
-
-    Returns:
-        The liquids in the order of the data file.
-    """
+    """List the liquids that a scene can name. Returns: The liquids in the order of the data file."""
     return tuple(liquid for liquid, _ in _library().values())
 
 
 def find_liquid(*, name: str) -> KnownLiquid | None:
     """Look a liquid up by any of its names.
 
-    Args:
-        name: such as "Silicone oil 100 cSt".
-
-    Returns:
-        The liquid; None when no liquid has that name.
+    Args: `name`: such as "Silicone oil 100 cSt".
+    Returns: The liquid; None when no liquid has that name.
     """
     plain = _plain(name)
     return next((liquid for liquid in known_liquids() if plain in map(_plain, _names(liquid))), None)
@@ -102,11 +92,8 @@ def find_liquid(*, name: str) -> KnownLiquid | None:
 def unknown_liquid(*, name: str) -> FieldError:
     """Say that a liquid is not known, and which ones are.
 
-    Args:
-        name: what was written.
-
-    Returns:
-        The error, to be raised or reported.
+    Args: `name`: what was written.
+    Returns: The error, to be raised or reported.
     """
     names = [each for liquid in known_liquids() for each in _names(liquid)]
     held = ", ".join(f'"{liquid.name}"' for liquid in known_liquids())
@@ -121,17 +108,9 @@ def liquid_at(*, name: str, temperature: float) -> Liquid:
 
     Between two temperatures of the data the density is linear in T and the logarithm of the kinematic
     viscosity is linear in 1/T; the vapour pressure is linear in T.  Water is calculated.
-
-    Args:
-        name: any of the liquid's names.
-        temperature: K.
-
-    Returns:
-        The liquid with its uncertainties.
-
-    Raises:
-        FieldError: an unknown name, or a temperature outside the data.
-
+    Args: `name`: any of the liquid's names. `temperature`: K.
+    Returns: The liquid with its uncertainties.
+    Raises: FieldError: an unknown name, or a temperature outside the data.
     Source: the rows of `data/fluid_properties.csv`, each with its own; water, `water_properties`.
     """
     liquid = find_liquid(name=name)

@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import hashlib
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from importlib import resources
 from os import PathLike
-from pathlib import Path, PurePath
+from pathlib import Path
 from typing import Any
 
 from ringbalance.scene.build import built
-from ringbalance.scene.checks import cross_faults
-from ringbalance.scene.defaults import completed
-from ringbalance.scene.eccentric import built_eccentric, read_eccentric
-from ringbalance.scene.eccentric_schema import EccentricTables
 from ringbalance.scene.faults import Fault, SceneError, closest, did_you_mean, toml_text
+from ringbalance.scene.keys.defaults import completed
+from ringbalance.scene.keys.reading import Reading, read_document
+from ringbalance.scene.keys.requirements import missing_faults
+from ringbalance.scene.keys.schema import BALANCERS, ECCENTRIC_MASS, LIQUID_RING, Schema
 from ringbalance.scene.narrowing import AnyScene
-from ringbalance.scene.reading import Reading, Schema, read_document, table_names
-from ringbalance.scene.requirements import missing_faults
-from ringbalance.scene.schema import BALANCERS
+from ringbalance.scene.rules.checks import ECCENTRIC_CHECKS, cross_faults, failed_checks
 from ringbalance.scene.working_liquid import with_liquid
 
 _LARGEST_FILE = 2**20
@@ -28,50 +26,52 @@ _LARGEST_FILE = 2**20
 def load_scene(path: str | PathLike[str]) -> AnyScene:
     """Read a scene file (TOML), with its units, defaults and cross-checks.
 
-    Args:
-        path: the file.
+    Returns: The scene, in SI.
+    Raises: SceneError: the file cannot be read, or anything in it is wrong; all of it is said at once.
+    """
+    return read_scene(path)[0]
 
-    Returns:
-        The scene, in SI.
 
-    Raises:
-        SceneError: the file cannot be read, or anything in it is wrong; all of it is said at once.
+def read_scene(path: str | PathLike[str]) -> tuple[AnyScene, str]:
+    """Read a scene file once, for its scene and its text: a pipe gives its bytes only once.
+
+    Returns: The scene, and the file's own text.
+    Raises: SceneError: as `load_scene`.
     """
     name = str(path)
     file = name if name.isprintable() else toml_text(name)
-    return scene_from(content=_content(name, file), file=file)
+    content = _content(name, file)
+    return scene_from(content=content, file=file), content.decode("utf-8-sig")
 
 
 def scene_from(*, content: bytes, file: str) -> AnyScene:
     """Make a scene from the bytes of a scene file.
 
-    Args:
-        content: the file's bytes, UTF-8.
-        file: its name, for messages and the scene's `source`.
-
-    Returns:
-        The scene, in SI.
-
-    Raises:
-        SceneError: anything in it is wrong; all of it is said at once.
+    Args: `content`: the file's bytes, UTF-8. `file`: its name, for messages and the scene's `source`.
+    Returns: The scene, in SI.
+    Raises: SceneError: anything in it is wrong; all of it is said at once.
     """
     document = _document(content, file)
     reading, found = _READ[_kind(document)](document, file=file)
     if found:
-        raise SceneError(sorted(found, key=lambda fault: _place(fault, reading.schema)))
-    source, sha256 = PurePath(file).name, hashlib.sha256(content).hexdigest()
-    if reading.schema is EccentricTables:
-        return built_eccentric(reading, source=source, sha256=sha256)
-    return built(reading, source=source, sha256=sha256)
+        raise SceneError(_sorted(found, reading.schema))
+    sha256 = hashlib.sha256(content).hexdigest()
+    return built(reading, file=file, sha256=sha256)
 
 
 def _read_liquid_ring(document: Mapping[str, Any], *, file: str) -> tuple[Reading, tuple[Fault, ...]]:
-    reading, faults = read_document(document, file=file)
+    reading, faults = read_document(document, file=file, schema=LIQUID_RING)
     reading, liquid_faults = with_liquid(completed(reading))
     return reading, (*faults, *missing_faults(reading), *liquid_faults, *cross_faults(reading))
 
 
-_READ = {"liquid_ring": _read_liquid_ring, "eccentric_mass": read_eccentric}
+def _read_eccentric_mass(document: Mapping[str, Any], *, file: str) -> tuple[Reading, tuple[Fault, ...]]:
+    reading, faults = read_document(document, file=file, schema=ECCENTRIC_MASS)
+    reading = completed(reading)
+    return reading, (*faults, *missing_faults(reading), *failed_checks(reading, ECCENTRIC_CHECKS))
+
+
+_READ = {"liquid_ring": _read_liquid_ring, "eccentric_mass": _read_eccentric_mass}
 
 
 def _kind(document: Mapping[str, Any]) -> str:
@@ -83,14 +83,9 @@ def _kind(document: Mapping[str, Any]) -> str:
 def bundled_scene(name: str) -> Path:
     """Find a scene that comes with the program.
 
-    Args:
-        name: such as "liquid_ring_paper".
-
-    Returns:
-        Path of the file.
-
-    Raises:
-        SceneError: there is no scene of that name.
+    Args: `name`: such as "liquid_ring_paper".
+    Returns: Path of the file.
+    Raises: SceneError: there is no scene of that name.
     """
     folder = Path(str(resources.files("ringbalance.scenes")))
     names = sorted(path.stem for path in folder.glob("*.toml"))
@@ -101,16 +96,17 @@ def bundled_scene(name: str) -> Path:
     return folder / f"{stem}.toml"
 
 
-def _place(fault: Fault, schema: Schema) -> tuple[int, int]:
-    """Faults stand in the order of the reference of the scene file; what it does not know comes last."""
-    tables = ("", *table_names(schema))
-    table = tables.index(fault.table) if fault.table in tables else len(tables)
-    model: Any = schema if not fault.table else None
-    if fault.table in tables[1:]:
-        model = schema.model_fields[fault.table].annotation
-    keys = list(model.model_fields) if model is not None else []
-    key = fault.key.split("[")[0].split(".")[0]
-    return table, keys.index(key) if key in keys else len(keys)
+def _sorted(faults: Iterable[Fault], schema: Schema) -> list[Fault]:
+    """Errors in the order of the reference of the scene file; what it does not know comes last."""
+    tables = ("", *schema.tables)
+    keys = {"": schema.names_at(()), **{name: list(table.keys) for name, table in schema.tables.items()}}
+
+    def place(fault: Fault) -> tuple[int, int]:
+        known, key = keys.get(fault.table, []), fault.key.split("[")[0].split(".")[0]
+        table = tables.index(fault.table) if fault.table in keys else len(tables)
+        return table, known.index(key) if key in known else len(known)
+
+    return sorted(faults, key=place)
 
 
 def _whole(file: str, problem: str, allowed: str = "", *, key: str = "", value: str = "") -> Fault:

@@ -2,61 +2,160 @@
 
 A scene is made by `ringbalance.scene.load_scene`, which turns units into SI and refuses what is impossible;
 these records carry no defaults of their own that a file could contradict.  Angles are radians, positive with
-the rotation; amplitudes are zero-to-peak; gas pressures are gauge, vapour pressures absolute.
+the rotation; amplitudes are zero-to-peak; gas pressures are gauge, vapour pressures absolute.  What a field's
+key takes and means, and its default, stand in its annotation, see `ringbalance.scene.keys.declaration`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
+
+from ringbalance.scene.keys.declaration import UNCERTAIN, derived, listed, needed, shown, standard, unused
+from ringbalance.scene.keys.derivations import even_number_of_chambers, half, radius_of_edge, same
+from ringbalance.scene.keys.fields import (
+    NOT_NEGATIVE,
+    POSITIVE,
+    Bounds,
+    chamber_count,
+    number,
+    quantity,
+    share,
+)
+from ringbalance.scene.keys.quantities import (
+    FillRatio,
+    Length,
+    OneLine,
+    PositiveAngle,
+    PositiveLength,
+    PositivePressure,
+    Pressure,
+    Temperature,
+    Time,
+)
+from ringbalance.scene.loop_models import ControllerSettings, Rotor, RunSettings, Sensor
 
 HumpGas = Literal["vented", "trapped"]
 Entrance = Literal["sharp", "rounded", "projecting"]
 Shaft = Literal["horizontal", "vertical"]
 GasProcess = Literal["isothermal", "adiabatic"]
-ControllerKind = Literal["target_vector", "trial", "law_based"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Disc:
     """The balancing disc: equal annular chambers between radial plates."""
 
-    outer_radius: float
-    """R2, m."""
-    inner_radius: float
-    """R1, m."""
-    axial_width: float
-    """B, m."""
-    central_angle: float
-    """theta of one chamber between its bounding radii, rad."""
-    chambers: int
-    """Number of chambers, even; chamber i is centred at i * 2 pi / chambers."""
-    plate_thickness: float
-    """Strip a plate takes on each side of a chamber, m."""
-    max_fill_ratio: float
-    """Liquid of a pair of opposite chambers, as a share of one chamber's volume."""
-    initial_fill: float
-    """Fill ratio of every chamber at the start."""
+    outer_radius: Annotated[
+        PositiveLength, needed("R2 of the chambers"), UNCERTAIN, shown("outer radius R2", "mm")
+    ]
+    inner_radius: Annotated[
+        PositiveLength, needed("R1 of the chambers"), UNCERTAIN, shown("inner radius R1", "mm")
+    ]
+    axial_width: Annotated[
+        PositiveLength,
+        needed("B, inner width of the chambers along the shaft"),
+        UNCERTAIN,
+        shown("axial width B", "mm"),
+    ]
+    central_angle: Annotated[
+        PositiveAngle,
+        needed(
+            "theta of one chamber between its bounding radii; at most 360 deg / chambers, and wide enough "
+            "for an opening between the plates at inner_radius of 1/2000 of outer_radius - inner_radius"
+        ),
+        UNCERTAIN,
+        shown("central angle of a chamber", "deg"),
+    ]
+    chambers: Annotated[
+        int,
+        chamber_count(),
+        derived(
+            "360 deg / central_angle, when that is an even number",
+            "number of chambers",
+            even_number_of_chambers,
+            "disc.central_angle",
+        ),
+        shown("chambers"),
+    ]
+    plate_thickness: Annotated[
+        Length,
+        standard(
+            "0 mm",
+            "strip that a plate takes on each side of a chamber, so half of the plate between two chambers",
+        ),
+        UNCERTAIN,
+        shown("plate thickness t", "mm", note="on each side of a chamber"),
+    ]
+    max_fill_ratio: Annotated[
+        FillRatio,
+        standard(
+            0.5,
+            "liquid of a pair of opposite chambers, as a share of the volume of one chamber; "
+            "at least a ring of 1e-8 outer_radius in depth",
+        ),
+        shown("greatest fill ratio", note="liquid of a pair, per chamber volume"),
+    ]
+    initial_fill: Annotated[
+        FillRatio,
+        derived(
+            "half of max_fill_ratio, the only value allowed",
+            "fill ratio of every chamber at the start",
+            half,
+            "disc.max_fill_ratio",
+        ),
+        shown("fill ratio at the start"),
+    ]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Liquid:
     """The balancing liquid at its working temperature."""
 
-    name: str
-    """Name as given, or "custom"."""
-    temperature: float | None
-    """K; None when the properties were given outright without one."""
-    density: float
-    """kg/m^3."""
-    kinematic_viscosity: float
-    """m^2/s."""
-    vapour_pressure: float
-    """Pa, absolute."""
+    name: Annotated[
+        OneLine,
+        unused(
+            "density and kinematic_viscosity are needed",
+            "a known liquid (see below), or a label for a custom one",
+        ),
+        shown("liquid"),
+    ]
+    temperature: Annotated[
+        Temperature | None,
+        derived(
+            "needed for a known liquid, unless its data are for one temperature only", "of the liquid at work"
+        ),
+        shown("temperature", "degC", absent="not given"),
+    ]
+    density: Annotated[
+        float,
+        quantity("density", POSITIVE),
+        derived(
+            "that of the known liquid",
+            "given outright, which wins; its uncertainty is then 0 unless [uncertainty] has one",
+        ),
+        UNCERTAIN,
+        shown("density", "kg/m^3"),
+    ]
+    kinematic_viscosity: Annotated[
+        float,
+        quantity("kinematic_viscosity", POSITIVE),
+        derived(
+            "that of the known liquid",
+            "given outright, which wins; its uncertainty is then 0 unless [uncertainty] has one",
+        ),
+        UNCERTAIN,
+        shown("kinematic viscosity", "mm^2/s"),
+    ]
+    vapour_pressure: Annotated[
+        Pressure,
+        derived("that of the known liquid; 0 Pa for a custom one", "absolute"),
+        UNCERTAIN,
+        shown("vapour pressure", "kPa", note="absolute"),
+    ]
     density_uncertainty: float
-    """95 % half-width, relative to the density."""
+    """Expanded uncertainty (95 %), relative to the density."""
     viscosity_uncertainty: float
-    """95 % half-width, relative to the kinematic viscosity."""
+    """Expanded uncertainty (95 %), relative to the kinematic viscosity."""
     source: str
     """Where the properties come from, for the report."""
 
@@ -65,151 +164,186 @@ class Liquid:
 class Bend:
     """One smooth bend of the connecting tube."""
 
-    angle: float
-    """rad."""
-    radius: float
-    """Of the centre line, m."""
+    angle: Annotated[float, quantity("angle", POSITIVE), needed("angle the bend turns through")]
+    radius: Annotated[float, quantity("length", POSITIVE), needed("radius of its centre line")]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Tube:
-    """The connecting tube from the port of one chamber, over a hump, to the port of the opposite one."""
+    """The connecting tube from the port of one chamber, over a crest, to the port of the opposite one."""
 
-    bore: float
-    """Inner diameter d, m."""
-    port_radius: float
-    """Radius at which both ends open, m."""
-    hump_radius: float | None
-    """Smallest radius on the path, m; None: the paper's straight Eq. 18, always a full siphon."""
-    hump_position: float
-    """Share of the path at which the hump lies, from the driven chamber."""
-    hump_gas: HumpGas
-    """Bound used for the priming pressure."""
-    length: float
-    """Of the centre line with its bends, m."""
-    roughness: float
-    """Absolute, m."""
-    entrance: Entrance
-    entrance_radius: float
-    """Of a rounded entrance, m; zero otherwise."""
-    bends: tuple[Bend, ...]
-    """In order along the path from the driven chamber."""
-    extra_loss: float
-    """Further loss coefficient on the tube's velocity head."""
-    drag_coefficient: float | None
-    """k by decree, as the paper has it; None: k is calculated."""
+    bore: Annotated[PositiveLength, needed("inner diameter d"), UNCERTAIN, shown("bore d", "mm")]
+    port_radius: Annotated[
+        PositiveLength,
+        derived(
+            "outer_radius",
+            "radius at which both ends of the tube open into their chambers",
+            same,
+            "disc.outer_radius",
+        ),
+        UNCERTAIN,
+        shown("port radius", "mm"),
+    ]
+    hump_radius: Annotated[
+        PositiveLength | None,
+        unused(
+            "the straight tube of the paper's Eq. 18: always a full siphon",
+            "smallest radius on the path from port to port",
+        ),
+        UNCERTAIN,
+        shown("siphon crest radius", "mm", absent="none: always a full siphon"),
+    ]
+    hump_position: Annotated[
+        float,
+        share(Bounds(above=0, below=1), example=0.5),
+        standard(0.5, "share of the path, from the driven chamber, at which the siphon crest lies"),
+        shown("siphon crest position", note="share of the path"),
+    ]
+    hump_gas: Annotated[
+        HumpGas,
+        standard(
+            "vented",
+            "bound used for the priming pressure: gas beyond the siphon crest is vented, or must be pushed "
+            "out",
+        ),
+        shown("gas beyond the siphon crest"),
+    ]
+    length: Annotated[
+        PositiveLength,
+        derived(
+            "needed; with drag_coefficient the shortest path from port over siphon crest to port",
+            "length of the centre line, bends included",
+        ),
+        UNCERTAIN,
+        shown("length", "mm", note="bends included"),
+    ]
+    roughness: Annotated[
+        Length,
+        standard("1.5 um", "absolute roughness of the wall; that of drawn tubing when left out"),
+        UNCERTAIN,
+        shown("roughness", "um"),
+    ]
+    entrance: Annotated[
+        Entrance, standard("sharp", "shape of the edge at which the liquid enters"), shown("entrance")
+    ]
+    entrance_radius: Annotated[
+        PositiveLength,
+        derived(
+            "needed with a rounded entrance, not allowed otherwise",
+            "radius of the rounded edge",
+            radius_of_edge,
+            "tube.entrance",
+        ),
+    ]
+    bends: Annotated[
+        tuple[Bend, ...],
+        standard([], "list of { angle, radius } in order from the driven chamber"),
+        listed('[{ angle = "90 deg", radius = "3 mm" }, ...]'),
+        shown("bends"),
+    ]
+    extra_loss: Annotated[
+        float,
+        number(NOT_NEGATIVE),
+        standard(0.0, "any further loss coefficient, on the velocity head in the tube"),
+        UNCERTAIN,
+        shown("further loss coefficient"),
+    ]
+    drag_coefficient: Annotated[
+        float | None,
+        number(POSITIVE),
+        unused("k is calculated from the tube and the liquid", "prescribes k, as the paper does"),
+        UNCERTAIN,
+        shown("drag coefficient k", absent="calculated"),
+    ]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Gas:
     """The driving gas; None marks a term that the scene does not ask for."""
 
-    pressure: float
-    """Gauge, in the driven chamber while its valve is open, Pa."""
-    ambient_pressure: float
-    """Absolute, Pa."""
-    temperature: float
-    """K."""
-    conductance: float | None
-    """ISO 6358 sonic conductance C, m^3/(s Pa)."""
-    critical_ratio: float | None
-    """ISO 6358 critical pressure ratio b."""
-    dead_volume: float | None
-    """Between valve and chamber, m^3."""
-    valve_lag: float | None
-    """s."""
-    process: GasProcess
-    """Whether a chamber's gas keeps its temperature while it fills and vents, or takes no heat."""
+    pressure: Annotated[
+        Pressure,
+        needed("gauge pressure in the driven chamber while its valve is open"),
+        UNCERTAIN,
+        shown("gas pressure", "MPa", note="gauge"),
+    ]
+    ambient_pressure: Annotated[
+        PositivePressure,
+        standard("101.325 kPa", "absolute pressure of the surroundings"),
+        UNCERTAIN,
+        shown("ambient pressure", "kPa", note="absolute"),
+    ]
+    temperature: Annotated[
+        Temperature, standard("20 degC", "of the gas before the valve"), shown("gas temperature", "degC")
+    ]
+    conductance: Annotated[
+        float | None,
+        quantity("conductance", POSITIVE),
+        unused(
+            "the chamber fills at once",
+            "sonic conductance C (ISO 6358) of valve and line; needs critical_ratio",
+        ),
+        UNCERTAIN,
+        shown("sonic conductance C", "l/(s*bar)", absent="none: the chamber fills at once"),
+    ]
+    critical_ratio: Annotated[
+        float | None,
+        share(Bounds(above=0, below=1), example=0.3),
+        unused(
+            "the chamber fills at once",
+            "critical pressure ratio b (ISO 6358) of valve and line; needs conductance",
+        ),
+        UNCERTAIN,
+        shown("critical pressure ratio b"),
+    ]
+    dead_volume: Annotated[
+        float | None,
+        quantity("volume", NOT_NEGATIVE),
+        unused("no volume besides the chamber's", "gas volume between valve and chamber"),
+        UNCERTAIN,
+        shown("dead volume", "ml"),
+    ]
+    valve_lag: Annotated[
+        Time | None,
+        unused("the valves open and close at once", "time from the command to the valve's motion"),
+        UNCERTAIN,
+        shown("valve lag", "ms"),
+    ]
+    process: Annotated[
+        GasProcess,
+        standard(
+            "isothermal",
+            "whether a chamber's gas keeps its temperature while it fills and vents, or takes no heat; "
+            "matters with conductance only",
+        ),
+        shown("gas in the chambers", note="matters with a conductance only"),
+    ]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Environment:
     """Gravity and how the shaft lies in it."""
 
-    shaft: Shaft
-    gravity: float
-    """m/s^2; zero for none."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Rotor:
-    """The rotor as the balancer sees it: V1 = V0 + K U with K = influence_coefficient at minus lag_angle."""
-
-    speed: float
-    """Angular velocity omega, rad/s."""
-    influence_coefficient: float
-    """kappa, m of vibration per kg m of unbalance."""
-    lag_angle: float
-    """rad, by which the vibration lags behind the unbalance."""
-    initial_amplitude: float
-    """m, zero-to-peak."""
-    initial_phase: float
-    """rad, of the vibration."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Sensor:
-    """Standard deviations of the vibration measurement; zero: exact."""
-
-    amplitude_noise: float
-    """m."""
-    phase_noise: float
-    """rad."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class ControllerSettings:
-    """What the scene says of the control algorithm."""
-
-    kind: ControllerKind
-    limit: float
-    """Amplitude below which the controller rests, m."""
-    period: float
-    """Wait after the gas closes before the next sample, s."""
-    proportional: float
-    """Kc, s of gas per m of amplitude."""
-    integral_time: float | None
-    """Ti, s; None: no integral part."""
-    derivative_time: float
-    """Td, s."""
-    minimum_gas_time: float
-    """s; a shorter command is not executed."""
-    maximum_gas_time: float
-    """s; a longer command is cut."""
-    assumed_influence_coefficient: float
-    """What the controller believes, m/(kg m)."""
-    assumed_lag_angle: float
-    """What the controller believes, rad."""
-    sequence: tuple[str, ...]
-    """Trial algorithm: order of the chambers."""
-    first_trial: float
-    """Trial algorithm: gas time of a chamber's first trial, s."""
-    long_step: float
-    """Trial algorithm: gas time while the amplitude is large, s."""
-    short_step: float
-    """Trial algorithm: gas time below `fine_below`, s."""
-    fine_below: float
-    """Trial algorithm: amplitude below which short steps are used, m."""
+    shaft: Annotated[
+        Shaft, standard("horizontal", "how the shaft lies in the field of gravity"), shown("shaft")
+    ]
+    gravity: Annotated[
+        float,
+        quantity("acceleration", NOT_NEGATIVE),
+        standard("9.80665 m/s^2", "acceleration of gravity; zero for none"),
+        shown("gravity", "m/s^2"),
+    ]
 
 
 @dataclass(frozen=True, kw_only=True)
 class InputUncertainty:
-    """95 % half-width of one scene quantity."""
+    """Expanded uncertainty (95 %) of one scene quantity."""
 
     quantity: str
     """Key, such as "bore" or "lag_angle"."""
     half_width: float
     """Relative when `relative`, else SI."""
     relative: bool
-
-
-@dataclass(frozen=True, kw_only=True)
-class RunSettings:
-    """Seed and end of a simulation."""
-
-    seed: int
-    time_limit: float
-    """s."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -227,10 +361,12 @@ class Scene:
     controller: ControllerSettings
     uncertainty: tuple[InputUncertainty, ...]
     run: RunSettings
-    tolerance: float
+    tolerance: Annotated[float, shown("tolerance", "%", dimension="share")]
     """Relative: bounds discretisation and left-out terms."""
     source: str
-    """File name without its folder; for messages and the evidence."""
+    """File name without its folder; for the evidence, which is the same wherever the file stands."""
+    file: str = field(compare=False)
+    """The file as it was named; for messages."""
     sha256: str
     """Of the scene file's bytes."""
     defaulted: tuple[str, ...] = ()

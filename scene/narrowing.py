@@ -14,14 +14,9 @@ AnyScene: TypeAlias = Scene | EccentricScene
 def liquid_ring_scene(scene: AnyScene) -> Scene:
     """Take a scene whose balancer is a liquid ring.
 
-    Args:
-        scene: of any kind.
-
-    Returns:
-        The same scene.
-
-    Raises:
-        SceneError: it has another balancer.
+    Args: `scene`: of any kind.
+    Returns: The same scene.
+    Raises: SceneError: it has another balancer.
     """
     if isinstance(scene, Scene):
         return scene
@@ -30,16 +25,11 @@ def liquid_ring_scene(scene: AnyScene) -> Scene:
 
 
 def eccentric_scene(scene: AnyScene) -> EccentricScene:
-    """Take a scene whose balancer is two driven eccentric masses.
+    """Take a scene whose balancer is two eccentric masses.
 
-    Args:
-        scene: of any kind.
-
-    Returns:
-        The same scene.
-
-    Raises:
-        SceneError: it has another balancer.
+    Args: `scene`: of any kind.
+    Returns: The same scene.
+    Raises: SceneError: it has another balancer.
     """
     if isinstance(scene, EccentricScene):
         return scene
@@ -50,5 +40,5 @@ def eccentric_scene(scene: AnyScene) -> EccentricScene:
 
 def _wrong_kind(scene: AnyScene, problem: str, allowed: str) -> SceneError:
     value = f'"{scene.balancer}"'
-    fault = Fault(file=scene.source, table="", key="balancer", value=value, problem=problem, allowed=allowed)
+    fault = Fault(file=scene.file, table="", key="balancer", value=value, problem=problem, allowed=allowed)
     return SceneError([fault])

@@ -12,20 +12,13 @@ def shortest_path(*, port_radius: float, hump_radius: float | None, separation: 
     projection along the shaft is no longer than itself, so the plane is enough.
 
     - no hump: the chord, 2 r_p sin(psi/2);
-    - the chord passes inside the hump's circle, r_p cos(psi/2) < r_m: the taut string around that circle,
+    - the chord passes inside the crest's circle, r_p cos(psi/2) < r_m: the taut string around that circle,
       2 sqrt(r_p^2 - r_m^2) + r_m (psi - 2 acos(r_m/r_p));
     - else the longer of the chord and of the way in and out, 2 (r_p - r_m).
-
-    Args:
-        port_radius: r_p, m.
-        hump_radius: r_m, m, at most r_p; None for a path that may go anywhere.
-        separation: psi, rad, within [0, pi].
-
-    Returns:
-        Length, m.
-
+    Args: `port_radius`: r_p, m. `hump_radius`: r_m, m, at most r_p; None for a path that may go anywhere.
+        `separation`: psi, rad, within [0, pi].
+    Returns: Length, m.
     Range: the last case is a bound that is not reached; the others are lengths of actual paths.
-
     Source: elementary geometry (shortest path around a circle).
     """
     chord = 2 * port_radius * math.sin(separation / 2)

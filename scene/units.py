@@ -44,9 +44,7 @@ _SPELLINGS = MappingProxyType(
 class FieldError(ValueError):
     """A value that a key cannot take.
 
-    Args:
-        problem: what is wrong with it.
-        allowed: what would be accepted.
+    Args: `problem`: what is wrong with it. `allowed`: what would be accepted.
     """
 
     def __init__(self, problem: str, allowed: str) -> None:
@@ -58,11 +56,8 @@ class FieldError(ValueError):
 def unit_names(dimension: str) -> str:
     """List the units of a dimension, as a message shows them.
 
-    Args:
-        dimension: a key of `DIMENSIONS`.
-
-    Returns:
-        The names with commas between.
+    Args: `dimension`: a key of `DIMENSIONS`.
+    Returns: The names with commas between.
     """
     return ", ".join(DIMENSIONS[dimension].units)
 
@@ -71,17 +66,9 @@ def parse_quantity(text: object, dimension: str) -> float:
     """Read a quantity such as "44.5 mm" into SI.
 
     SI value = (number + offset) factor, rounded once; angles and speeds times pi after that.
-
-    Args:
-        text: a number and a unit; the space between may be left out.
-        dimension: a key of `DIMENSIONS`.
-
-    Returns:
-        The value in SI, finite.
-
-    Raises:
-        FieldError: not such a quantity; the error says what is wrong and which units exist.
-
+    Args: `text`: a number and a unit; the space between may be left out. `dimension`: a key of `DIMENSIONS`.
+    Returns: The value in SI, finite.
+    Raises: FieldError: not such a quantity; the error says what is wrong and which units exist.
     Range: magnitudes up to `Dimension.largest`; a temperature above absolute zero.
     """
     kind = DIMENSIONS[dimension]
@@ -98,14 +85,8 @@ def parse_quantity(text: object, dimension: str) -> float:
 def format_quantity(value: float, dimension: str, unit: str, *, digits: int = 6) -> str:
     """Write an SI value in a unit, for people.
 
-    Args:
-        value: SI.
-        dimension: a key of `DIMENSIONS`.
-        unit: one of its units.
-        digits: significant digits.
-
-    Returns:
-        Such as "44.5 mm".
+    Args: `dimension`: a key of `DIMENSIONS`. `digits`: significant digits.
+    Returns: Such as "44.5 mm".
     """
     entry = DIMENSIONS[dimension].units[unit]
     number = value / float(entry.factor) / (math.pi if entry.pi else 1.0) - float(entry.offset)

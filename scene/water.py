@@ -15,17 +15,10 @@ _ATMOSPHERIC_PRESSURE = 101325.0
 def water_properties(*, temperature: float) -> tuple[float, float, float]:
     """Properties of water at atmospheric pressure.
 
-    Args:
-        temperature: K.
-
-    Returns:
-        Density, kg/m^3; kinematic viscosity, m^2/s; vapour pressure, Pa absolute.
-
-    Raises:
-        ValueError: a temperature at which water is not liquid.
-
+    Args: `temperature`: K.
+    Returns: Density, kg/m^3; kinematic viscosity, m^2/s; vapour pressure, Pa absolute.
+    Raises: ValueError: a temperature at which water is not liquid.
     Range: `COLDEST` to `HOTTEST`, 101 325 Pa; at 10 MPa the density is 0.5 % higher, which is left out.
-
     Source: density and vapour pressure, Wagner and Pruss, J. Phys. Chem. Ref. Data 31 (2002) 387 (IAPWS-95);
         viscosity, Huber et al., J. Phys. Chem. Ref. Data 38 (2009) 101 (IAPWS 2008); package `chemicals`.
     """

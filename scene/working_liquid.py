@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from ringbalance.scene.faults import Fault
+from ringbalance.scene.keys.reading import Reading
 from ringbalance.scene.liquids import KnownLiquid, find_liquid, liquid_at, unknown_liquid
 from ringbalance.scene.models import Liquid
-from ringbalance.scene.reading import Reading, allowed_at
 
 _DENSITY, _VISCOSITY, _VAPOUR = "liquid.density", "liquid.kinematic_viscosity", "liquid.vapour_pressure"
 _OUTRIGHT = "density and kinematic_viscosity given outright"
@@ -16,11 +16,8 @@ _OUTRIGHT = "density and kinematic_viscosity given outright"
 def with_liquid(reading: Reading) -> tuple[Reading, tuple[Fault, ...]]:
     """Settle the liquid's properties; what is given outright wins over the known liquid's.
 
-    Args:
-        reading: what the file says.
-
-    Returns:
-        The same with the liquid's values, as far as they can be known, and what is wrong with the table.
+    Args: `reading`: what the file says.
+    Returns: The same with the liquid's values, as far as they can be known, and what is wrong with the table.
     """
     if "liquid" in reading.broken or not reading.given("liquid"):
         return reading, ()
@@ -46,7 +43,7 @@ def _faults(reading: Reading, liquid: KnownLiquid | None) -> tuple[Fault, ...]:
         allowed = f"a known liquid's name with its temperature, or {_OUTRIGHT}"
         return (reading.fault("liquid.name", problem="the liquid is not named", allowed=allowed),)
     path = _DENSITY if reading.lacks(_DENSITY) else _VISCOSITY
-    allowed = f"{allowed_at(tuple(path.split('.')))}; or the name of a known liquid"
+    allowed = f"{reading.allowed(path)}; or the name of a known liquid"
     return (reading.fault(path, problem="it is needed for a liquid without a known name", allowed=allowed),)
 
 

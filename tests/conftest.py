@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import pytest
 from hypothesis import settings
@@ -26,4 +26,4 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 @pytest.fixture(scope="session")
 def paper_scene() -> Scene:
     """The liquid-ring paper's disc, as bundled."""
-    return ringbalance.load_scene(ringbalance.bundled_scene("liquid_ring_paper"))
+    return cast("Scene", ringbalance.load_scene(ringbalance.bundled_scene("liquid_ring_paper")))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import json
 import signal
 import subprocess
@@ -13,7 +14,7 @@ from types import ModuleType
 
 import pytest
 
-from ringbalance import cli
+from ringbalance import cli, plain_text
 from ringbalance.scene import Fault, SceneError, bundled_scene
 
 PAPER = str(bundled_scene("liquid_ring_paper"))
@@ -66,7 +67,8 @@ def broken_scene(tmp_path: Path) -> Path:
     [
         (["reprt"], ["reprt", '"report"']),
         (["calibrate", PAPER, "--jsn"], ["--jsn", "--json"]),
-        (["calibrate"], ["scene"]),
+        (["calibrate"], ["SCENE is missing: ringbalance calibrate SCENE"]),
+        (["compare", "a.toml"], ["SECOND is missing: ringbalance compare FIRST SECOND"]),
         (["verify", "--level", "extreme"], ["extreme", "light", "heavy"]),
         (["verify", "no_such_case"], ["no_such_case"]),
         (["simulate", PAPER, "--law", "no_such_law.json"], ["no_such_law.json"]),
@@ -78,8 +80,8 @@ def test_wrong_usage(words: list[str], told: list[str]) -> None:
 
 
 @pytest.mark.parametrize("command", ["calibrate", "simulate", "report", "plot"])
-def test_a_broken_scene_is_told_in_one_message(command: str, broken_scene: Path, tmp_path: Path) -> None:
-    more = ["--out", tmp_path / "out"] if command in {"report", "plot"} else []
+def test_a_broken_scene_is_reported_in_one_message(command: str, broken_scene: Path, tmp_path: Path) -> None:
+    more: list[str | Path] = ["--out", tmp_path / "out"] if command in {"report", "plot"} else []
     found = run(command, broken_scene, *more)
     assert_bad_input(found, "broken.toml", "outer_radiuss", "outer_radius", "furlongs", "chambers = 3")
     assert not (tmp_path / "out").exists()
@@ -196,7 +198,7 @@ def test_an_unwritable_file_is_bad_input(
     assert "law.json" in capsys.readouterr().err
 
 
-def test_what_the_machine_refuses_is_told_with_its_place(
+def test_what_the_machine_refuses_is_reported_with_its_place(
     command: Callable[[BaseException | int], int], capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert command(OSError(28, "No space left on device")) == 2
@@ -208,5 +210,27 @@ def test_a_fault_of_the_program_is_not_hidden(command: Callable[[BaseException |
         command(ZeroDivisionError())
 
 
-def test_version_is_told() -> None:
+def test_the_package_runs_as_a_module() -> None:
+    command = [sys.executable, "-m", "ringbalance", "--version"]
+    assert subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip() == "0.1.0"
+
+
+@pytest.mark.parametrize(
+    ("text", "encoding", "written"),
+    [
+        ("λ ± 3 µm", "ascii", "lambda +/- 3 um"),
+        ("λ ± 3 µm", "cp1252", "lambda ± 3 µm"),
+        ("ρω²", "ascii", "rho omega^2"),
+        ("10⁻⁹ m²", "ascii", "10^-9 m^2"),
+        ("90°, 20 ℃, −1 – 2", "ascii", "90deg, 20 degC, -1 - 2"),
+        ("λₘ ≤ √2 · Ω", "ascii", "lambda_m <= sqrt2 * Omega"),
+        ("▁▃█ Kä漢", "ascii", "138 Ka?"),
+    ],
+)
+def test_characters_that_an_encoding_lacks_are_replaced(text: str, encoding: str, written: str) -> None:
+    codecs.register_error(plain_text.ERRORS, plain_text.replace)
+    assert text.encode(encoding, plain_text.ERRORS).decode(encoding) == written
+
+
+def test_version_is_reported() -> None:
     assert run("--version").stdout.strip() == "0.1.0"

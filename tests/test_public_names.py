@@ -21,7 +21,7 @@ def promised_for_type_checkers() -> dict[str, str]:
     return {alias.name: node.module or "" for node in imports for alias in node.names}
 
 
-def test_type_checkers_are_told_what_is_loaded() -> None:
+def test_type_checkers_see_what_is_loaded() -> None:
     assert promised_for_type_checkers() == rb._HOME
 
 
@@ -48,3 +48,15 @@ def test_a_saved_law_runs_as_the_fresh_one(paper_scene: Scene, tmp_path: Path) -
         np.testing.assert_array_equal(run.amplitude, fresh.amplitude)
     paper = rb.simulate(scene, flow_law=rb.paper_law(scene))
     assert not np.array_equal(paper.amplitude, fresh.amplitude)
+
+
+def test_simulate_models_the_terms_asked_for(paper_scene: Scene) -> None:
+    scene = dataclasses.replace(paper_scene, run=dataclasses.replace(paper_scene.run, time_limit=2.0))
+    law = rb.calibrate(scene).flow_law
+    assert rb.simulate(scene, flow_law=law, modelled=[]).terms_modelled == ()
+    assert rb.simulate(scene, flow_law=law, modelled=["tube inertia"]).terms_modelled == ("tube inertia",)
+    with pytest.raises(ValueError, match="surface tension"):
+        rb.simulate(scene, flow_law=law, modelled=["surface tension"])
+    eccentric = rb.load_scene(rb.bundled_scene("driven_masses_small"))
+    with pytest.raises(ValueError, match="leave modelled out"):
+        rb.simulate(eccentric, modelled=["tube inertia"])  # type: ignore[arg-type]

@@ -9,7 +9,7 @@ import runpy
 import sys
 from pathlib import Path
 
-PROBE = Path(__file__).resolve().parents[1] / "reports" / "opengl.py"
+PROBE = Path(__file__).resolve().parents[1] / "reports" / "pictures" / "opengl.py"
 
 
 def main() -> int:

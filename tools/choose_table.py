@@ -1,4 +1,4 @@
-"""Write the tables of docs/how-to-choose.md anew: the rung that each tolerance needs, measured.
+"""Rewrite the tables of docs/how-to-choose.md: the model that each tolerance needs, measured.
 
 python tools/choose_table.py            prints the page with fresh tables
 python tools/choose_table.py --write    puts it into docs/how-to-choose.md
@@ -12,12 +12,12 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-from ringbalance.reduced_model.ladder_choice import Values, choose
-from ringbalance.reduced_model.rungs import Ladder
+from ringbalance.reduced_model.selection.choice import Values, choose
+from ringbalance.reduced_model.selection.models import ModelHierarchy
 from ringbalance.scene import bundled_scene, load_scene, write_whole
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.verification.trade_choices import ladders_for
+from ringbalance.verification.selection_studies.choices import hierarchies_for
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "how-to-choose.md"
 TOLERANCES = (0.1, 1e-2, 1e-3, 1e-4)
@@ -27,7 +27,7 @@ QUICK = ("wall_pressure", "moment", "k")
 
 
 def scenes() -> dict[str, tuple[Scene, tuple[str, ...]]]:
-    """Scenes of the page with the quantities that are told of each."""
+    """Scenes of the page with the quantities that are listed for each."""
     paper = liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper")))
     oil = liquid_ring_scene(load_scene(bundled_scene("silicone_oil_100cst")))
     slow = replace(paper, rotor=replace(paper.rotor, speed=600 * math.pi / 30))
@@ -39,28 +39,32 @@ def scenes() -> dict[str, tuple[Scene, tuple[str, ...]]]:
     }
 
 
-def row(ladder: Ladder) -> str:
-    """One row: a quantity with the rung for each tolerance and its measured error."""
-    values, points = Values(ladder), tuple(range(len(ladder.points)))
+def row(hierarchy: ModelHierarchy) -> str:
+    """One row: a quantity with the model for each tolerance and its measured error."""
+    values, points = Values(hierarchy), tuple(range(len(hierarchy.points)))
     cells = []
     for tolerance in TOLERANCES:
-        rung = choose(ladder, tolerance, values=values).rung
-        error = values.error(rung, ladder.top, points)
-        told = "as the top" if error < 3e-8 else f"{error:.0e}"
-        cells.append(f"{rung.name} ({told})")
-    return f"| {ladder.title} | " + " | ".join(cells) + f" | {ladder.top_uncertainty:.0e} |"
+        fidelity = choose(hierarchy, tolerance, values=values).fidelity
+        error = values.error(fidelity, hierarchy.top, points)
+        told = "as the finest" if error < 3e-8 else f"{error:.0e}"
+        cells.append(f"{fidelity.name} ({told})")
+    return f"| {hierarchy.title} | " + " | ".join(cells) + f" | {hierarchy.top_uncertainty:.0e} |"
 
 
 def table(name: str, *, only: tuple[str, ...] | None = None) -> list[str]:
     """Rows of one scene's table."""
     scene, quantities = scenes()[name]
     wanted = tuple(q for q in quantities if only is None or q in only)
-    return [row(ladder) for ladder in ladders_for(scene, wanted)]
+    return [row(hierarchy) for hierarchy in hierarchies_for(scene, wanted)]
 
 
 def page(text: str) -> str:
     """The page with fresh tables."""
-    head = "| quantity | " + " | ".join(f"{100 * t:g} %" for t in TOLERANCES) + " | top known to |"
+    head = (
+        "| quantity | "
+        + " | ".join(f"{100 * t:g} %" for t in TOLERANCES)
+        + " | uncertainty of the finest model |"
+    )
     rule = "|---" * (len(TOLERANCES) + 2) + "|"
 
     def fresh(match: re.Match[str]) -> str:

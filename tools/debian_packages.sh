@@ -12,7 +12,9 @@ debian_packages() {
         fi
         echo "apt-get could not install them."
     fi
-    echo "$what is missing; install it with:"
-    echo "    sudo apt-get update && sudo apt-get install -y --no-install-recommends $*"
+    # A bare Debian has no sudo.
+    if command -v sudo >/dev/null; then sudo="sudo " how=with; else sudo="" how="as root with"; fi
+    echo "$what is missing; install it $how:"
+    echo "    ${sudo}apt-get update && ${sudo}apt-get install -y --no-install-recommends $*"
     return 1
 }

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Writes the lock files anew: exact versions and hashes, no host. uv.lock names hosts and stays out of git.
+# Rewrites the lock files: exact versions and hashes, no host. uv.lock names hosts and stays out of git.
 #   tools/make_lock.sh UV
 set -eu
 uv=$1

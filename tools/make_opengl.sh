@@ -10,4 +10,4 @@ exec </dev/null
 missing=$("$1" check_opengl.py) && exit 0
 # shellcheck disable=SC2086
 debian_packages "off-screen OpenGL" $missing && "$1" check_opengl.py >/dev/null && exit 0
-echo "Going on without off-screen OpenGL: the report comes out without its 3-D pictures, and says so."
+echo "Continuing without off-screen OpenGL: the report comes out without its 3-D pictures, and says so."

@@ -10,12 +10,5 @@ from ringbalance.scene.models import Scene
 
 @lru_cache(maxsize=16)
 def calibration_of(scene: Scene) -> Calibration:
-    """Calibrate a scene.
-
-    Args:
-        scene: the scene.
-
-    Returns:
-        Calibration.
-    """
+    """Calibrate a scene."""
     return calibrate(scene)

@@ -59,7 +59,7 @@ class Quantity(_Record):
 
 
 class Mutation(_Record):
-    """A defect that must change the verdict: built into the computation by name, or a changed scene."""
+    """A mutation that must change the verdict: built into the computation by name, or a changed scene."""
 
     id: Identifier
     what: Text
@@ -77,6 +77,8 @@ class CaseDefinition(_Record):
     """Whose claim it is, or whose balancer a check belongs to."""
     number: int | None = None
     """Of the claim, from 1 in each paper."""
+    order: int | None = None
+    """Position in the report of a case that is no claim; claims go by their number."""
     kind: Kind
     title: Text
     claim: Text
@@ -91,7 +93,7 @@ class CaseDefinition(_Record):
     equations: tuple[Text, ...]
     reference: ReferenceText
     judged_on: Literal["scene", "paper"] = "scene"
-    """Whether the scene at hand is judged, or always the paper's own disc, or rotor with driven masses."""
+    """Whether the scene at hand is judged, or always the paper's own disc, or rotor with eccentric masses."""
     headline: bool = False
     cost: Literal["light", "heavy"] = "light"
     quantity: tuple[Quantity, ...] = Field(min_length=1)
@@ -105,11 +107,8 @@ class CaseDefinition(_Record):
     def consequence_of(self, verdict: Verdict) -> str:
         """The sentence for a designer that goes with a verdict.
 
-        Args:
-            verdict: of the case.
-
-        Returns:
-            The sentence, placeholders still in it.
+        Args: `verdict`: of the case.
+        Returns: The sentence, placeholders still in it.
         """
         return self.consequence.get(verdict.value, self.consequence.get("default", ""))
 
@@ -117,6 +116,10 @@ class CaseDefinition(_Record):
     def _hold_together(self) -> Self:
         if (self.number is None) == (self.kind == "claim"):
             raise ValueError("a claim has a number, and nothing else has one")
+        if (self.order is None) != (self.kind == "claim"):
+            raise ValueError(
+                "a case that is no claim has an order, its position in the report; a claim has none"
+            )
         _unique("quantity", [quantity.name for quantity in self.quantity])
         _unique("must_fail", [mutation.id for mutation in self.must_fail])
         for quantity in self.quantity:
@@ -158,15 +161,8 @@ def _unique(what: str, names: list[str]) -> None:
 def parse_case(text: str, *, source: str) -> CaseDefinition:
     """Read a case.toml.
 
-    Args:
-        text: of the file.
-        source: name of the file, for messages.
-
-    Returns:
-        CaseDefinition.
-
-    Raises:
-        CaseError: text that is not TOML, or not a case; all faults at once.
+    Args: `text`: of the file. `source`: name of the file, for messages.
+    Raises: CaseError: text that is not TOML, or not a case; all faults at once.
     """
     try:
         return CaseDefinition.model_validate(tomllib.loads(text))

@@ -1,4 +1,4 @@
-"""All cases, in the order in which they are reported; a case that stands here is never dropped."""
+"""All cases, found by their folders, in the order in which they are reported."""
 
 from __future__ import annotations
 
@@ -12,56 +12,14 @@ from ringbalance.verification import cases
 from ringbalance.verification.case import CaseDefinition, parse_case
 from ringbalance.verification.evidence import CaseCode
 
-CASES: Final = (
-    "manufactured_2d",
-    "manufactured_3d",
-    "gravity_circle_2d",
-    "gravity_paraboloid_3d",
-    "conservation",
-    "manufactured_flow",
-    "rotating_section",
-    "developing_flow",
-    "sloshing",
-    "gci_celik2008",
-    "gci_behaviour",
-    "independent_routes",
-    "integrator_orders",
-    "friction_blend",
-    "mixing_length",
-    "model_choice",
-    "model_choice_many",
-    "coverage",
-    "bent_tube_3d",
-    "extremes",
-    "claim_01_volume",
-    "claim_02_ring_radius",
-    "claim_03_chamber_moment",
-    "claim_04_disc_capacity",
-    "claim_05_density",
-    "claim_06_wall_pressure",
-    "claim_07_bernoulli",
-    "claim_08_velocity_departure",
-    "claim_09_drag_coefficient",
-    "claim_10_working_pressure",
-    "claim_11_lambda",
-    "claim_12_correction_mass",
-    "claim_13_explicit_segments",
-    "claim_14_trial_algorithm",
-    "claim_15_proportional_gain",
-    "claim_16_five_seconds",
-    "claim_17_faster",
-    "claim_18_gas_hole",
-    "claim_19_denser_liquid",
-    "claim_20_rectangular_element",
-    "driven_fig4_imbalance",
-    "driven_fig5_friction",
-    "driven_fig6_effort",
-    "driven_fig7_positioning",
-    "driven_fig8_fine_tuning",
-    "driven_fig9_run_up",
-    "driven_bound",
-)
-"""Ids, which are the names of their folders: numerical verification first, then claims, paper by paper."""
+_PAPERS: Final = ("liquid_ring", "eccentric_mass")
+
+
+@lru_cache(maxsize=1)
+def case_ids() -> tuple[str, ...]:
+    """Ids of all cases: the names of the folders that hold a case.toml, sorted."""
+    folders = (item for item in files(cases).iterdir() if item.is_dir())
+    return tuple(sorted(item.name for item in folders if (item / "case.toml").is_file()))
 
 
 class UnknownCaseError(KeyError):
@@ -74,14 +32,8 @@ class UnknownCaseError(KeyError):
 def case_code(case_id: str) -> CaseCode:
     """The two functions of a case.
 
-    Args:
-        case_id: its id.
-
-    Returns:
-        Its `case.py`.
-
-    Raises:
-        UnknownCaseError: no case of that id; the text names the nearest one.
+    Returns: Its `case.py`.
+    Raises: UnknownCaseError: no case of that id; the text names the nearest one.
     """
     _check_known(case_id)
     return cast(CaseCode, getattr(cases, f"{case_id}_code"))
@@ -91,15 +43,8 @@ def case_code(case_id: str) -> CaseCode:
 def load_case(case_id: str) -> CaseDefinition:
     """The text and criteria of a case.
 
-    Args:
-        case_id: its id.
-
-    Returns:
-        CaseDefinition.
-
-    Raises:
-        UnknownCaseError: no case of that id.
-        CaseError: its case.toml is not what a case must be.
+    Raises: UnknownCaseError: no case of that id.
+    Raises: CaseError: its case.toml is not what a case must be.
     """
     _check_known(case_id)
     path = files(cases) / case_id / "case.toml"
@@ -110,18 +55,23 @@ def load_case(case_id: str) -> CaseDefinition:
 
 
 def load_cases() -> tuple[CaseDefinition, ...]:
-    """All cases of the catalogue.
+    """All cases.
 
-    Returns:
-        Definitions, numerical verification first, then the claims by number.
+    Returns: Definitions in the report's order: first by `order`, then the claims by paper and number.
     """
-    return tuple(load_case(case_id) for case_id in CASES)
+    return tuple(sorted(map(load_case, case_ids()), key=_place))
+
+
+def _place(definition: CaseDefinition) -> tuple[bool, int, int, str]:
+    claim = definition.kind == "claim"
+    position = definition.number if claim else definition.order
+    return claim, _PAPERS.index(definition.paper) if claim else 0, position or 0, definition.id
 
 
 def _check_known(case_id: str) -> None:
-    if case_id in CASES:
+    if case_id in case_ids():
         return
-    near = _by_number(case_id) or difflib.get_close_matches(case_id, CASES, n=1, cutoff=0.5)
+    near = _by_number(case_id) or difflib.get_close_matches(case_id, case_ids(), n=1, cutoff=0.5)
     guess = f', did you mean "{near[0]}"?' if near else "."
     raise UnknownCaseError(f'unknown case "{case_id}"{guess} `ringbalance verify --list` names them all.')
 
@@ -130,4 +80,4 @@ def _by_number(case_id: str) -> list[str]:
     """A claim may be asked for by its number alone."""
     number = re.fullmatch(r"(?:claim)?_?0*(\d+)\w*", case_id)
     wanted = f"claim_{int(number[1]):02d}_" if number else None
-    return [known for known in CASES if wanted and known.startswith(wanted)]
+    return [known for known in case_ids() if wanted and known.startswith(wanted)]

@@ -10,11 +10,12 @@ from typing import Final
 
 from rich.console import Console
 from rich.padding import Padding
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Table
 from rich.text import Text
 
 from ringbalance.scene import load_scene
+from ringbalance.scene.platform.progress import Activity, activity
+from ringbalance.scene.platform.terminal import messages_console, results_console
 from ringbalance.verification.case import CaseDefinition
 from ringbalance.verification.catalogue import UnknownCaseError, load_case, load_cases
 from ringbalance.verification.document import comparison_half_width, definition_document, results_document
@@ -52,7 +53,7 @@ def verify(
         cases: ids of the cases; none for all.
         scene: scene file; default the liquid-ring paper's disc.
         list_: name the cases and run none.
-        mutations: also build in each case's defects, which must change its verdict.
+        mutations: also build in each case's mutations, which must change its verdict.
         level: "heavy" runs the cases that take long too.
         json: print one JSON document instead of a table.
         workers: processes to spread the cases over.
@@ -64,7 +65,7 @@ def verify(
     Raises:
         SceneError: the scene file is not a scene.
     """
-    progress = Console(stderr=True)
+    progress = messages_console()
     try:
         definitions = [load_case(case) for case in cases] if cases else list(load_cases())
     except UnknownCaseError as error:
@@ -74,15 +75,15 @@ def verify(
         _print_list(definitions, json=json)
         return DONE
     given = paper_scene() if scene is None else load_scene(scene)
-    with _bar(progress) as bar:
-        task = bar.add_task("cases", total=len(definitions))
+    ids = [definition.id for definition in definitions]
+    with activity("verify", f"0 of {len(ids)} cases") as shown:
         results = run_cases(
-            [definition.id for definition in definitions],
+            ids,
             scene=given,
             level=level,
             mutations=mutations,
             workers=workers,
-            progress=lambda result: bar.update(task, advance=1, description=result.definition.id),
+            progress=lambda result: _show_done(shown, ids, result.definition.id),
         )
     if json:
         print(dumps(results_document(results), allow_nan=False))
@@ -92,7 +93,7 @@ def verify(
 
 
 def exit_code(results: Sequence[CaseResult]) -> int:
-    """Exit code of a run: a refuted claim is a result, a failed code verification is a fault.
+    """Exit code of a run: a refuted claim is a result, a failed code verification is an error.
 
     Args:
         results: of the cases.
@@ -107,9 +108,9 @@ def exit_code(results: Sequence[CaseResult]) -> int:
     return FAILED if failed else DONE
 
 
-def _bar(console: Console) -> Progress:
-    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("{task.description}"))
-    return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+def _show_done(shown: Activity, ids: Sequence[str], last: str) -> None:
+    done = ids.index(last) + 1
+    shown.show(f"{done} of {len(ids)} cases, {last} done", done=done, total=len(ids))
 
 
 def _print_list(definitions: Sequence[CaseDefinition], *, json: bool) -> None:
@@ -122,7 +123,7 @@ def _print_list(definitions: Sequence[CaseDefinition], *, json: bool) -> None:
         table.add_column(header)
     for d in definitions:
         table.add_row(d.id, d.kind.replace("_", " ") + _numbered(d), d.cost, d.title)
-    Console().print(table)
+    results_console().print(table)
 
 
 def _numbered(definition: CaseDefinition) -> str:
@@ -130,7 +131,7 @@ def _numbered(definition: CaseDefinition) -> str:
 
 
 def _print_results(results: Sequence[CaseResult]) -> None:
-    console = Console()
+    console = results_console()
     for result in results:
         _print_case(console, result)
     counts = Counter(result.verdict for result in results)

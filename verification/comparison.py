@@ -1,7 +1,7 @@
 """The comparison of a found number with a reference: error against validation uncertainty (ASME V&V 20).
 
 E = S - D is compared with u_val = sqrt(u_num^2 + u_input^2 + u_D^2).  All u are standard uncertainties; the
-half-width 2 u_val covers 95 %.  An error inside it cannot be told from none; one outside it can.
+half-width 2 u_val covers 95 %.  An error inside it cannot be distinguished from none; one outside it can.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class Comparison:
 
     @property
     def half_width(self) -> float:
-        """2 u_val, the 95 % half-width that |E| is compared with."""
+        """2 u_val, the expanded uncertainty (95 %) that |E| is compared with."""
         return COVERAGE_FACTOR * self.validation_uncertainty
 
     @property
@@ -44,21 +44,12 @@ def compare(
     """Compare a found number with a reference.
 
     E = S - D, u_val = sqrt(u_num^2 + u_input^2 + u_D^2)
-
-    Args:
-        found: S.
-        reference: D, in the unit of S.
-        numerical: u_num, standard, in the unit of S.
-        input_: u_input, standard, in the unit of S.
-        reference_uncertainty: u_D, standard, in the unit of S.
-
-    Returns:
-        Comparison.  A few units in the last place of the larger number are added to the half-width, for
+    Args: `found`: S. `reference`: D, in the unit of S. `numerical`: u_num, standard, in the unit of S.
+        `input_`: u_input, standard, in the unit of S. `reference_uncertainty`: u_D, standard, in the unit of
+        S.
+    Returns: Comparison. A few units in the last place of the larger number are added to the half-width, for
         round-off.
-
-    Raises:
-        ValueError: a number that is not finite, or a negative uncertainty.
-
+    Raises: ValueError: a number that is not finite, or a negative uncertainty.
     Source: ASME V&V 20-2009, sections 1 and 6; independent uncertainties.
     """
     parts = (numerical, input_, reference_uncertainty)
@@ -69,13 +60,10 @@ def compare(
 
 
 def from_half_width(half_width: float) -> float:
-    """Standard uncertainty from a 95 % half-width.
+    """Standard uncertainty from an expanded uncertainty (95 %).
 
-    Args:
-        half_width: of the 95 % interval.
-
-    Returns:
-        half_width / 2.
+    Args: `half_width`: of the 95 % interval.
+    Returns: half_width / 2.
     """
     return half_width / COVERAGE_FACTOR
 
@@ -84,13 +72,9 @@ def from_rounding(last_digit: float) -> float:
     """Standard uncertainty of a printed number: all within half a unit of its last digit is equally likely.
 
     u = last_digit / (2 sqrt(3))
-
-    Args:
-        last_digit: value of one unit of the last digit printed, in the number's unit.
-
-    Returns:
-        Standard uncertainty; its 95 % half-width, 0.58 of the last digit, covers the whole rounding interval.
-
+    Args: `last_digit`: value of one unit of the last digit printed, in the number's unit.
+    Returns: Standard uncertainty; its expanded uncertainty (95 %), 0.58 of the last digit, covers the whole
+    rounding interval.
     Source: rectangular distribution, GUM (JCGM 100:2008), 4.3.7.
     """
     return last_digit / (2 * math.sqrt(3))

@@ -11,14 +11,12 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from ringbalance.mesh.geometry import chamber_volume, half_angle, surface_radius
-from ringbalance.physics.ring import RingQuantities, ring_quantities
+from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc
-from ringbalance.verification.exact_chamber import exact_moment, exact_wall_pressure
-
-FloatArray = npt.NDArray[np.float64]
+from ringbalance.verification.reference.exact_chamber import exact_moment, exact_wall_pressure
 
 QUANTITIES: Final = ("liquid_volume", "wall_pressure", "moment", "moment_per_volume")
 _CHAMBERS: Final = (2, 4, 6, 8, 10)
@@ -55,12 +53,8 @@ class Coverage:
 def random_samples(*, count: int, seed: int) -> tuple[Sample, ...]:
     """Discs of all proportions that the program accepts, with fills from thin to the largest.
 
-    Args:
-        count: number of samples.
-        seed: of the generator.
-
-    Returns:
-        Samples, the same for the same seed.
+    Args: `count`: number of samples. `seed`: of the generator.
+    Returns: Samples, the same for the same seed.
     """
     generator = np.random.default_rng(seed)
     return tuple(_sample(generator) for _ in range(count))
@@ -94,14 +88,9 @@ def _sample(generator: np.random.Generator) -> Sample:
 def error_ratios(*, samples: tuple[Sample, ...]) -> FloatArray:
     """Solve every sample and compare its errors with its half-widths.
 
-    Args:
-        samples: the discs and fills.
-
-    Returns:
-        |error| over half-width, shape (samples, quantities); -1 where the error is at round-off.
-
-    Raises:
-        RuntimeError: a sample that could not be solved.
+    Args: `samples`: the discs and fills.
+    Returns: |error| over half-width, shape (samples, quantities); -1 where the error is at round-off.
+    Raises: RuntimeError: a sample that could not be solved.
     """
     return np.array([_ratios(sample) for sample in samples])
 
@@ -109,12 +98,9 @@ def error_ratios(*, samples: tuple[Sample, ...]) -> FloatArray:
 def coverage(*, ratios: FloatArray, width_factor: float = 1.0) -> Mapping[str, Coverage]:
     """How often half-widths hold, and how tight they are.
 
-    Args:
-        ratios: of `error_ratios`.
-        width_factor: multiplies every half-width; anything but 1 is a deliberate fault.
-
-    Returns:
-        Coverage of each of `QUANTITIES`.
+    Args: `ratios`: of `error_ratios`. `width_factor`: multiplies every half-width; anything but 1 is a
+        deliberate error.
+    Returns: Coverage of each of `QUANTITIES`.
     """
     scaled = np.where(ratios < 0, ratios, ratios / width_factor)
     return {name: _judge(scaled[:, index]) for index, name in enumerate(QUANTITIES)}

@@ -20,12 +20,8 @@ Document = dict[str, Any]
 def case_document(result: CaseResult) -> Document:
     """One case's result as a JSON-able record; SI units, or the unit named beside the number.
 
-    Args:
-        result: of the case.
-
-    Returns:
-        id, kind, verdict, quantities (name, unit, value, reference, error, uncertainty, limit, verdict and
-        more) and all that a report shows of the case.
+    Returns: id, kind, verdict, quantities (name, unit, value, reference, error, uncertainty, limit, verdict
+        and more) and all that a report shows of the case.
     """
     definition = result.definition
     return {
@@ -70,11 +66,7 @@ def case_document(result: CaseResult) -> Document:
 def definition_document(definition: CaseDefinition) -> Document:
     """What a list of cases says of one of them.
 
-    Args:
-        definition: of the case.
-
-    Returns:
-        id, kind, number, title, claim, cost and the ids of its mutations.
+    Returns: id, kind, number, title, claim, cost and the ids of its mutations.
     """
     return {
         "id": definition.id,
@@ -89,13 +81,9 @@ def definition_document(definition: CaseDefinition) -> Document:
 
 
 def comparison_half_width(result: QuantityResult) -> float | None:
-    """95 % half-width of the comparison that decided a quantity.
+    """Expanded uncertainty (95 %) of the comparison that decided a quantity.
 
-    Args:
-        result: of the quantity.
-
-    Returns:
-        2 u_val; zero where nothing uncertain entered; None where the case was not run.
+    Returns: 2 u_val; zero where nothing uncertain entered; None where the case was not run.
     """
     found, comparison = result.found, result.comparison
     if found is None or comparison is None:
@@ -211,26 +199,16 @@ def _numbers(values: npt.ArrayLike) -> list[float | None]:
 
 
 def results_document(results: Iterable[CaseResult]) -> list[Document]:
-    """Results of several cases as JSON-able records.
-
-    Args:
-        results: of the cases.
-
-    Returns:
-        One record per case, in order.
-    """
+    """Results of several cases as JSON-able records. Returns: One record per case, in order."""
     return [case_document(result) for result in results]
 
 
 def merge_saved(document: Sequence[Document], saved: Sequence[Mapping[str, Any]]) -> list[Document]:
     """Put earlier results of heavy cases where this run has none.
 
-    Args:
-        document: of this run.
-        saved: records of an earlier run, each with the `date` that it was stamped with.
-
-    Returns:
-        The records, a heavy case that was not run replaced by the earlier result on the same scene, if any.
+    Args: `saved`: records of an earlier run, each with the `date` that it was stamped with.
+    Returns: The records, a heavy case that was not run replaced by the earlier result on the same scene, if
+        any.
     """
     earlier = {(case["id"], case["scene_sha256"]): dict(case) for case in saved}
     return [_merged(case, earlier.get((case["id"], case["scene_sha256"]))) for case in document]

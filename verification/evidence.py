@@ -7,20 +7,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
-import numpy as np
-import numpy.typing as npt
-
 from ringbalance.physics.results import Status
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
-FloatArray = npt.NDArray[np.float64]
 Level = Literal["light", "heavy"]
 CurveStyle = Literal["paper", "found", "reference"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Reference:
-    """The number that a judged quantity is held against; SI, in the unit that the case's text names."""
+    """The number that a judged quantity is compared with; SI, in the unit that the case's text names."""
 
     value: float
     uncertainty: float = 0.0
@@ -66,7 +63,7 @@ class Curve:
     values: FloatArray
     style: CurveStyle = "found"
     uncertainty: FloatArray | None = None
-    """95 % half-width."""
+    """Expanded uncertainty (95 %)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,7 +93,7 @@ class Convergence:
     observed_order: Sequence[float] = ()
     """Of each pair of levels, or of each triplet where there is no exact value."""
     gci: float | None = None
-    """95 % half-width of the finest value, relative to it."""
+    """Expanded uncertainty (95 %) of the finest value, relative to it."""
     geometry: str = ""
     """ "quadratic" or "straight" where it matters."""
     note: str = ""
@@ -126,11 +123,7 @@ class Evidence:
 
 
 def no_reference(_scene: Scene) -> Mapping[str, Reference]:
-    """What a case's `reference` is where limits alone judge its quantities.
-
-    Returns:
-        Nothing.
-    """
+    """What a case's `reference` is where limits alone judge its quantities. Returns: Nothing."""
     return {}
 
 
@@ -138,26 +131,18 @@ class CaseCode(Protocol):
     """The two functions of a case's `case.py`."""
 
     def reference(self, scene: Scene) -> Mapping[str, Reference]:
-        """What the judged quantities are held against.
+        """What the judged quantities are compared with.
 
-        Args:
-            scene: the scene that the case is judged on.
-
-        Returns:
-            References by the names of the case's quantities; one that is not named has none.
+        Args: `scene`: the scene that the case is judged on.
+        Returns: References by the names of the case's quantities; one that is not named has none.
         """
         ...
 
     def compute(self, scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         """What the program finds.
 
-        Args:
-            scene: the scene that the case is judged on.
-            level: how much work may be done.
-            defect: name of a mutation to build in on purpose; None for none.
-
-        Returns:
-            Evidence.
+        Args: `scene`: the scene that the case is judged on. `level`: how much work may be done. `defect`:
+            name of a mutation to build in on purpose; None for none.
         """
         ...
 

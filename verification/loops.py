@@ -9,10 +9,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller import Simulation, simulate
-from ringbalance.reduced_model.model import BalancerModel
-from ringbalance.reduced_model.paper_law import paper_model
-from ringbalance.scene.models import ControllerKind, Scene
+from ringbalance.controller.loop import simulate
+from ringbalance.controller.simulation import Simulation
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.paper_law import paper_model
+from ringbalance.scene.loop_models import ControllerKind
+from ringbalance.scene.models import Scene
 from ringbalance.verification.calibrations import calibration_of
 from ringbalance.verification.evidence import Axis, Curve, Series
 
@@ -33,15 +35,9 @@ def loop_scene(
 ) -> Scene:
     """A scene set up for one run of section 6.
 
-    Args:
-        scene: the scene.
-        kind: of the controller.
-        amplitude: of the initial vibration, m.
-        phase: of the initial vibration, rad.
-        settings: further controller settings, SI.
-
-    Returns:
-        The scene with an exact sensor: the paper's simulation names no noise.
+    Args: `amplitude`: of the initial vibration, m. `phase`: of the initial vibration, rad. `settings`:
+        further controller settings, SI.
+    Returns: The scene with an exact sensor: the paper's simulation names no noise.
     """
     return dataclasses.replace(
         scene,
@@ -53,15 +49,7 @@ def loop_scene(
 
 @lru_cache(maxsize=512)
 def run_loop(scene: Scene, law: str = "paper") -> Simulation:
-    """One closed-loop run.
-
-    Args:
-        scene: the scene.
-        law: "paper" or "calibrated".
-
-    Returns:
-        Simulation.
-    """
+    """One closed-loop run. Args: `law`: "paper" or "calibrated"."""
     return simulate(scene, _model(scene, law))
 
 
@@ -81,11 +69,8 @@ def _plain(scene: Scene) -> Scene:
 def sampled_amplitudes(run: Simulation) -> np.ndarray:
     """Amplitudes that the controller saw, in order.
 
-    Args:
-        run: a closed-loop run.
-
-    Returns:
-        m, shape (samples,).
+    Args: `run`: a closed-loop run.
+    Returns: m, shape (samples,).
     """
     seen = [sample.measurement.amplitude for sample in run.samples if sample.measurement is not None]
     return np.array(seen)
@@ -94,11 +79,8 @@ def sampled_amplitudes(run: Simulation) -> np.ndarray:
 def settling(run: Simulation) -> float:
     """Settling time, infinite where the run did not settle.
 
-    Args:
-        run: a closed-loop run.
-
-    Returns:
-        s.
+    Args: `run`: a closed-loop run.
+    Returns: s.
     """
     return math.inf if run.settling_time is None else run.settling_time
 
@@ -106,13 +88,7 @@ def settling(run: Simulation) -> float:
 def amplitude_series(name: str, runs: dict[str, Simulation], *, points: int = 400) -> Series:
     """Amplitude against time of several runs, on one time axis.
 
-    Args:
-        name: of the figure.
-        runs: by the name of their curve.
-        points: of the time axis.
-
-    Returns:
-        Series.
+    Args: `name`: of the figure. `runs`: by the name of their curve.
     """
     longest = max(float(run.time[-1]) for run in runs.values())
     time = np.linspace(0.0, longest, points)

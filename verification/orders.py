@@ -37,16 +37,10 @@ class OrderStudy:
 def order_study(*, size: Sequence[float], error: Sequence[float]) -> OrderStudy:
     """Observed orders p = ln(e_i / e_(i+1)) / ln(h_i / h_(i+1)).
 
-    Args:
-        size: h, coarse to fine, strictly falling; at least two.
-        error: magnitudes, relative, one per level.
-
-    Returns:
-        OrderStudy.
-
-    Raises:
-        ValueError: lengths that differ, sizes that do not fall, errors that are negative or not finite, or at
-            round-off, where no order can be seen.
+    Args: `size`: h, coarse to fine, strictly falling; at least two. `error`: magnitudes, relative, one per
+        level.
+    Raises: ValueError: lengths that differ, sizes that do not fall, errors that are negative or not finite,
+        or at round-off, where no order can be seen.
     """
     h, e = np.asarray(size, dtype=np.float64), np.asarray(error, dtype=np.float64)
     if h.shape != e.shape or h.size < 2:
@@ -62,17 +56,10 @@ def order_study(*, size: Sequence[float], error: Sequence[float]) -> OrderStudy:
 def extrapolate(*, coarse: float, fine: float, ratio: float, order: float) -> float:
     """Richardson extrapolation, S = f + (f - c)/(ratio^order - 1).
 
-    Args:
-        coarse: c, value on the coarser level.
-        fine: f, value on the finer level.
-        ratio: h_coarse / h_fine, above one.
-        order: formal order, positive.
-
-    Returns:
-        Extrapolated value.
-
-    Raises:
-        ValueError: a ratio that is not above one, or an order that is not positive.
+    Args: `coarse`: c, value on the coarser level. `fine`: f, value on the finer level. `ratio`: h_coarse /
+        h_fine, above one. `order`: formal order, positive.
+    Returns: Extrapolated value.
+    Raises: ValueError: a ratio that is not above one, or an order that is not positive.
     """
     if not (ratio > 1 and order > 0):
         raise ValueError("the ratio must be above one and the order positive")

@@ -65,11 +65,7 @@ PLATE_QUANTITY: Final = "plate_thickness"
 def at_paper_density(scene: Scene) -> Scene:
     """A scene with the density of Table 1 in place of the liquid's own.
 
-    Args:
-        scene: the scene.
-
-    Returns:
-        The scene with 1000 kg/m^3.
+    Returns: The scene with 1000 kg/m^3.
     """
     return dataclasses.replace(scene, liquid=dataclasses.replace(scene.liquid, density=DENSITY))
 
@@ -79,12 +75,7 @@ def plate_uncertainty(scene: Scene) -> float:
 
     From the scene's own statement, where it makes one.  Otherwise a disc whose volume prints as the paper's
     67.7 ml has its thickness inferred from that number, and inherits its rounding.
-
-    Args:
-        scene: the scene.
-
-    Returns:
-        u(t), m; zero where the scene gives the thickness as exact.
+    Returns: u(t), m; zero where the scene gives the thickness as exact.
     """
     disc = scene.disc
     for stated in scene.uncertainty:
@@ -100,11 +91,7 @@ def plate_uncertainty(scene: Scene) -> float:
 def with_plate(disc: Disc, thickness: float) -> Disc:
     """A disc with another plate thickness.
 
-    Args:
-        disc: the disc.
-        thickness: t, m.
-
-    Returns:
-        The changed disc.
+    Args: `thickness`: t, m.
+    Returns: The changed disc.
     """
     return dataclasses.replace(disc, plate_thickness=thickness)

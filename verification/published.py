@@ -6,18 +6,14 @@ import csv
 from collections.abc import Mapping
 from importlib.resources import files
 
-from ringbalance.physics.grid_convergence import GridConvergence, Verdict
+from ringbalance.physics.convergence.grid import GridConvergence, Verdict
 
 
 def read_rows(case_id: str, name: str) -> tuple[Mapping[str, str], ...]:
     """Rows of a case's tabulated reference.
 
-    Args:
-        case_id: whose data it is.
-        name: of the file in the case's data folder.
-
-    Returns:
-        One mapping per row, column name to text.
+    Args: `case_id`: whose data it is. `name`: of the file in the case's data folder.
+    Returns: One mapping per row, column name to text.
     """
     path = files("ringbalance.verification.cases") / case_id / "data" / name
     lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
@@ -27,11 +23,7 @@ def read_rows(case_id: str, name: str) -> tuple[Mapping[str, str], ...]:
 def conclusive(convergence: GridConvergence) -> bool:
     """Whether a sequence of values may be judged at all.
 
-    Args:
-        convergence: of the sequence.
-
-    Returns:
-        True when it converges steadily or has reached round-off; a number from a sequence that oscillates,
-        grows or is not asymptotic makes its case inconclusive.
+    Returns: True when it converges steadily or has reached round-off; a number from a sequence that
+        oscillates, grows or is not asymptotic makes its case inconclusive.
     """
     return convergence.verdict in (Verdict.MONOTONE, Verdict.ROUND_OFF)

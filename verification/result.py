@@ -77,14 +77,9 @@ class CaseResult:
     def filled(self, text: str) -> str:
         """A text of the case with its numbers put in.
 
-        Args:
-            text: with placeholders.
-
-        Returns:
-            The text; empty when the case was not run and the text needs numbers.
-
-        Raises:
-            ValueError: the text asks for a number that the evidence does not hold.
+        Args: `text`: with placeholders.
+        Returns: The text; empty when the case was not run and the text needs numbers.
+        Raises: ValueError: the text asks for a number that the evidence does not hold.
         """
         if self.evidence is None and "{" in text:
             return ""

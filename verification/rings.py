@@ -5,20 +5,15 @@ from __future__ import annotations
 import dataclasses
 from functools import lru_cache
 
-import numpy as np
-import numpy.typing as npt
-
+from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
 from ringbalance.physics.results import Estimate
-from ringbalance.physics.ring import RingQuantities, ring_quantities
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import Convergence, Found
-from ringbalance.verification.exact_chamber import exact_moment
 from ringbalance.verification.paper_numbers import plate_uncertainty, with_plate
 from ringbalance.verification.published import conclusive
+from ringbalance.verification.reference.exact_chamber import exact_moment
 from ringbalance.verification.sensitivity import input_uncertainty
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @lru_cache(maxsize=64)
@@ -27,15 +22,7 @@ def ring(
 ) -> RingQuantities:
     """Finite-element totals without gravity.
 
-    Args:
-        disc: the disc.
-        density: rho, kg/m^3.
-        angular_velocity: omega, rad/s.
-        fills: fill ratios.
-        dimension: 2 or 3.
-
-    Returns:
-        RingQuantities.
+    Args: `density`: rho, kg/m^3. `angular_velocity`: omega, rad/s. `fills`: fill ratios. `dimension`: 2 or 3.
     """
     return ring_quantities(
         disc=disc,
@@ -49,13 +36,7 @@ def ring(
 def ring_of(scene: Scene, fills: tuple[float, ...], *, dimension: int = 2) -> RingQuantities:
     """Finite-element totals of a scene's disc, liquid and speed, without gravity.
 
-    Args:
-        scene: the scene.
-        fills: fill ratios.
-        dimension: 2 or 3.
-
-    Returns:
-        RingQuantities.
+    Args: `fills`: fill ratios. `dimension`: 2 or 3.
     """
     return ring(
         disc=scene.disc,
@@ -69,14 +50,9 @@ def ring_of(scene: Scene, fills: tuple[float, ...], *, dimension: int = 2) -> Ri
 def found_of(quantities: RingQuantities, name: str, index: int, *, input_: float = 0.0) -> Found:
     """One number of a ring with its uncertainties.
 
-    Args:
-        quantities: of the ring.
-        name: "liquid_volume", "wall_pressure", "moment" or "moment_per_volume".
-        index: of the fill ratio.
-        input_: standard uncertainty from the inputs, in the number's unit.
-
-    Returns:
-        Found; not conclusive where the meshes do not converge steadily.
+    Args: `name`: "liquid_volume", "wall_pressure", "moment" or "moment_per_volume". `index`: of the fill
+        ratio. `input_`: standard uncertainty from the inputs, in the number's unit.
+    Returns: Found; not conclusive where the meshes do not converge steadily.
     """
     estimate: Estimate = getattr(quantities, name)
     return Found(
@@ -90,27 +66,19 @@ def found_of(quantities: RingQuantities, name: str, index: int, *, input_: float
 def scaled(found: Found, factor: float) -> Found:
     """A found number times a constant.
 
-    Args:
-        found: the number.
-        factor: the constant, positive.
-
-    Returns:
-        The product with its uncertainties.
+    Args: `factor`: the constant, positive.
+    Returns: The product with its uncertainties.
     """
     return dataclasses.replace(
         found, value=found.value * factor, numerical=found.numerical * factor, input=found.input * factor
     )
 
 
-def moment_spread(scene: Scene, fill_ratio: float) -> float:
+def moment_standard_uncertainty(scene: Scene, fill_ratio: float) -> float:
     """What the plate thickness's uncertainty does to a chamber's moment at a given fill ratio.
 
-    Args:
-        scene: the scene.
-        fill_ratio: x.
-
-    Returns:
-        Standard uncertainty, kg m.
+    Args: `fill_ratio`: x.
+    Returns: Standard uncertainty, kg m.
     """
 
     def moment(thickness: float) -> float:
@@ -123,14 +91,9 @@ def moment_spread(scene: Scene, fill_ratio: float) -> float:
 def mesh_table(quantities: RingQuantities, name: str, unit: str, index: int) -> Convergence:
     """Convergence of one number of a ring over its meshes.
 
-    Args:
-        quantities: of the ring.
-        name: "liquid_volume", "wall_pressure", "moment" or "moment_per_volume".
-        unit: SI.
-        index: of the fill ratio.
-
-    Returns:
-        Convergence, coarse to fine.
+    Args: `name`: "liquid_volume", "wall_pressure", "moment" or "moment_per_volume". `unit`: SI. `index`: of
+        the fill ratio.
+    Returns: Convergence, coarse to fine.
     """
     record = quantities.convergence[name][index]
     values = quantities.mesh_values[name][::-1, index]

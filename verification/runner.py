@@ -5,17 +5,17 @@ from __future__ import annotations
 import dataclasses
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import Future
 from contextlib import contextmanager
 from functools import lru_cache, partial
-from multiprocessing import get_context
 from typing import Literal
 
 from ringbalance.scene import AnyScene, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.models import Scene
+from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification.case import NEEDS_REFERENCE, CaseDefinition, Mutation, Quantity
 from ringbalance.verification.catalogue import case_code, load_case, load_cases
-from ringbalance.verification.driven_masses import driven_scene
+from ringbalance.verification.eccentric_mass.curves import driven_scene
 from ringbalance.verification.evidence import CaseCode, Evidence, Level, NotRunError, Reference
 from ringbalance.verification.result import CaseResult, MutationResult, QuantityResult
 from ringbalance.verification.verdicts import Verdict, combine, judge_quantity
@@ -23,7 +23,7 @@ from ringbalance.verification.verdicts import Verdict, combine, judge_quantity
 Progress = Callable[[CaseResult], None]
 PAPER_SCENE = "liquid_ring_paper"
 DRIVEN = "eccentric_mass"
-"""The paper on driven masses."""
+"""The paper on eccentric masses."""
 Group = tuple[str, ...]
 """Cases that run in one process, one after the other."""
 Started = dict[Group, Future[tuple[CaseResult, ...]]]
@@ -31,28 +31,18 @@ Started = dict[Group, Future[tuple[CaseResult, ...]]]
 
 @lru_cache(maxsize=1)
 def paper_scene() -> Scene:
-    """The liquid-ring paper's own disc.
-
-    Returns:
-        The bundled scene.
-    """
+    """The liquid-ring paper's own disc. Returns: The bundled scene."""
     return liquid_ring_scene(load_scene(bundled_scene(PAPER_SCENE)))
 
 
 def run_case(case_id: str, *, scene: Scene, level: Level = "light", defect: str | None = None) -> CaseResult:
     """Run one case and judge it.
 
-    Args:
-        case_id: of the catalogue.
-        scene: the scene at hand; a case on the paper's own numbers takes the paper's disc instead.
-        level: "light" leaves heavy cases unrun.
-        defect: id of one of the case's mutations, to be built in on purpose.
-
-    Returns:
-        CaseResult; a case that cannot be run is `not run`, with the reason in its status.
-
-    Raises:
-        KeyError: an unknown case or mutation.
+    Args: `case_id`: of the catalogue. `scene`: the scene at hand; a case on the paper's own numbers takes the
+        paper's disc instead. `level`: "light" leaves heavy cases unrun. `defect`: id of one of the case's
+        mutations, to be built in on purpose.
+    Returns: CaseResult; a case that cannot be run is `not run`, with the reason in its status.
+    Raises: KeyError: an unknown case or mutation.
     """
     definition = load_case(case_id)
     return run_definition(
@@ -70,18 +60,9 @@ def run_definition(
 ) -> CaseResult:
     """Run and judge one case given by its text and its code, on the scene exactly as given.
 
-    Args:
-        definition: the case's text.
-        code: its two functions.
-        scene: the scene to judge.
-        level: "light" leaves heavy cases unrun.
-        defect: id of a mutation.
-
-    Returns:
-        CaseResult.
-
-    Raises:
-        KeyError: an unknown mutation.
+    Args: `definition`: the case's text. `code`: its two functions. `level`: "light" leaves heavy cases unrun.
+        `defect`: id of a mutation.
+    Raises: KeyError: an unknown mutation.
     """
     start = time.perf_counter()
     outcome = partial(_outcome, definition, scene=scene, level=level)
@@ -141,15 +122,8 @@ def _mutation(definition: CaseDefinition, defect: str) -> Mutation:
 def overridden(scene: Scene, overrides: Mapping[str, float | Literal["absent"]]) -> Scene:
     """A scene with some of its quantities changed.
 
-    Args:
-        scene: the scene.
-        overrides: SI values by "table.quantity", such as "disc.plate_thickness"; "absent" for None.
-
-    Returns:
-        The changed scene.
-
-    Raises:
-        ValueError: a table or quantity that a scene does not have.
+    Args: `overrides`: SI values by "table.quantity", such as "disc.plate_thickness"; "absent" for None.
+    Raises: ValueError: a table or quantity that a scene does not have.
     """
     for path, value in overrides.items():
         table, _, key = path.partition(".")
@@ -196,13 +170,8 @@ def _judge_one(
 def run_mutations(case_id: str, *, scene: Scene, level: Level = "light") -> tuple[MutationResult, ...]:
     """Run a case once with each of its mutations.
 
-    Args:
-        case_id: of the catalogue.
-        scene: the scene at hand.
-        level: "light" leaves out mutations and cases that are heavy.
-
-    Returns:
-        One result per mutation that was run.
+    Args: `case_id`: of the catalogue. `level`: "light" leaves out mutations and cases that are heavy.
+    Returns: One result per mutation that was run.
     """
     definition = load_case(case_id)
     return mutate_definition(definition, case_code(case_id), scene=_scene_of(definition, scene), level=level)
@@ -213,14 +182,9 @@ def mutate_definition(
 ) -> tuple[MutationResult, ...]:
     """Run a case given by its text and its code once with each of its mutations.
 
-    Args:
-        definition: the case's text.
-        code: its two functions.
-        scene: the scene to judge.
-        level: "light" leaves out mutations and cases that are heavy.
-
-    Returns:
-        One result per mutation that was run.
+    Args: `definition`: the case's text. `code`: its two functions. `scene`: the scene to judge. `level`:
+        "light" leaves out mutations and cases that are heavy.
+    Returns: One result per mutation that was run.
     """
     if definition.cost == "heavy" and level == "light":
         return ()
@@ -259,20 +223,12 @@ def run_cases(
 ) -> tuple[CaseResult, ...]:
     """Run several cases.
 
-    Args:
-        case_ids: of the catalogue; none for all.
-        scene: the scene at hand.
-        level: "light" leaves heavy cases `not run`.
-        mutations: whether to run each case's mutations too.
-        workers: processes, this one included; one starts no other.
-        progress: called with each result as it comes, in order.
-
-    Returns:
-        Results, in the order asked for; an interrupt ends the run and leaves no process behind.
-
-    Raises:
-        KeyError: an unknown case.
-        SceneError: a balancer without liquid.
+    Args: `case_ids`: of the catalogue; none for all. `level`: "light" leaves heavy cases `not run`.
+        `mutations`: whether to run each case's mutations too. `workers`: processes, this one included; one
+        starts no other. `progress`: called with each result as it comes, in order.
+    Returns: Results, in the order asked for; an interrupt ends the run and leaves no process behind.
+    Raises: KeyError: an unknown case.
+    Raises: SceneError: a balancer without liquid.
     """
     results = []
     with cases_under_way(
@@ -296,20 +252,12 @@ def cases_under_way(
 ) -> Iterator[Iterator[CaseResult]]:
     """Start several cases, and do something else while they run.
 
-    Args:
-        case_ids: of the catalogue; none for all.
-        scene: the scene at hand.
-        level: "light" leaves heavy cases `not run`.
-        mutations: whether to run each case's mutations too.
-        workers: processes, this one included, which takes its share once results are asked for; one starts no
-            other.
-
-    Yields:
-        Results, in the order asked for; leaving early leaves no process behind.
-
-    Raises:
-        KeyError: an unknown case.
-        SceneError: a balancer without liquid.
+    Args: `case_ids`: of the catalogue; none for all. `level`: "light" leaves heavy cases `not run`.
+        `mutations`: whether to run each case's mutations too. `workers`: processes, this one included, which
+        takes its share once results are asked for; one starts no other.
+    Yields: Results, in the order asked for; leaving early leaves no process behind.
+    Raises: KeyError: an unknown case.
+    Raises: SceneError: a balancer without liquid.
     """
     scene = liquid_ring_scene(scene)
     wanted = tuple(case_ids) or tuple(definition.id for definition in load_cases())
@@ -318,18 +266,15 @@ def cases_under_way(
     if workers == 1:
         yield map(run, wanted)
         return
-    pool = ProcessPoolExecutor(max_workers=workers - 1, mp_context=get_context("spawn"))
-    try:
+    with Workers(workers - 1) as pool:
         started = {group: pool.submit(_run_group, run, group) for group in groups}
-        yield _in_order(run, started, wanted)
-    finally:
-        pool.shutdown(cancel_futures=True)
+        yield _in_order(run, pool, started, wanted)
 
 
 def _started_in(wanted: Sequence[str]) -> list[Group]:
     """Groups in the order of their start, first the one that takes longest when nothing is compiled yet.
 
-    The driven masses' cases run one compiled strategy: in one process it is compiled once.
+    The eccentric masses' cases run one compiled strategy: in one process it is compiled once.
     """
     driven = tuple(case for case in wanted if load_case(case).paper == DRIVEN)
     rest = [(case,) for case in wanted if case not in driven]
@@ -341,7 +286,7 @@ def _run_group(run: Callable[[str], CaseResult], group: Group) -> tuple[CaseResu
 
 
 def _in_order(
-    run: Callable[[str], CaseResult], started: Started, wanted: Sequence[str]
+    run: Callable[[str], CaseResult], pool: Workers, started: Started, wanted: Sequence[str]
 ) -> Iterator[CaseResult]:
     """Results as they come; while one is waited for, this process takes groups that none has begun."""
     home = {case: (group, place) for group in started for place, case in enumerate(group)}
@@ -353,4 +298,6 @@ def _in_order(
             if free is None:
                 break
             own[free] = _run_group(run, free)
-        yield (own[group] if group in own else started[group].result())[place]
+        if group not in own:
+            own[group] = pool.result(started[group], partial(_run_group, run, group))
+        yield own[group][place]

@@ -37,14 +37,9 @@ _PLACEHOLDER = re.compile(r"\{([a-z][a-z0-9_]*)(?::([^:{}]*))?(?::([^{}]*))?\}")
 def placeholders(text: str) -> tuple[str, ...]:
     """Names of the numbers that a text asks for.
 
-    Args:
-        text: of a case.
-
-    Returns:
-        Names, in order of appearance.
-
-    Raises:
-        ValueError: a unit that is not known, or braces that are not a placeholder.
+    Args: `text`: of a case.
+    Returns: Names, in order of appearance.
+    Raises: ValueError: a unit that is not known, or braces that are not a placeholder.
     """
     for match in _PLACEHOLDER.finditer(text):
         if (match[2] or "") not in _UNITS:
@@ -58,16 +53,10 @@ def placeholders(text: str) -> tuple[str, ...]:
 def fill(text: str, numbers: Mapping[str, float]) -> str:
     """Put numbers into a text.
 
-    Args:
-        text: with placeholders.
-        numbers: SI values by name.
-
-    Returns:
-        The text, each number in the unit that its placeholder names, to four significant digits unless the
-        placeholder has a format, and held to its unit by a no-break space.
-
-    Raises:
-        ValueError: a number that is missing or not finite.
+    Args: `text`: with placeholders. `numbers`: SI values by name.
+    Returns: The text, each number in the unit that its placeholder names, to four significant digits unless
+        the placeholder has a format, and held to its unit by a no-break space.
+    Raises: ValueError: a number that is missing or not finite.
     """
 
     def number(match: re.Match[str]) -> str:

@@ -47,12 +47,34 @@ def test_import_loads_nothing_heavy() -> None:
         "from ringbalance.cli import main\nassert main(['verify', '--list']) == 0",
     ],
 )
-def test_what_simulates_no_crowd_loads_no_compiler(code: str) -> None:
+def test_what_simulates_no_ensemble_loads_no_compiler(code: str) -> None:
     assert "numba" not in loaded(code)
 
 
+def test_a_calibration_loads_no_flow_solver_and_no_mesh_files() -> None:
+    code = "import ringbalance as r\nr.calibrate(r.load_scene(r.bundled_scene('liquid_ring_paper')))"
+    names = "import sys\nassert not [m for m in sys.modules if '.navier_stokes' in m], 'flow solver loaded'"
+    assert "meshio" not in loaded(f"{code}\n{names}")
+
+
+UNNEEDED = (
+    "pyamg",
+    "scipy.interpolate",
+    "scipy.optimize",
+    "ringbalance.physics.pressure.multigrid",
+    "ringbalance.physics.sloshing.response",
+    "ringbalance.physics.sloshing.system",
+)
+
+
+def test_a_calibration_loads_no_solver_that_it_does_not_use() -> None:
+    code = "import ringbalance as r\nr.calibrate(r.load_scene(r.bundled_scene('liquid_ring_paper')))"
+    names = f"import sys\nassert not [m for m in {UNNEEDED} if m in sys.modules], 'loaded'"
+    assert "skfem" in loaded(f"{code}\n{names}")
+
+
 def test_a_compiler_would_be_seen() -> None:
-    assert "numba" in loaded("import ringbalance.controller.ensemble")
+    assert "numba" in loaded("import ringbalance.controller.ensemble.monte_carlo")
 
 
 def test_a_heavy_start_would_be_seen() -> None:

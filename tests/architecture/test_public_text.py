@@ -75,5 +75,5 @@ def test_ordinary_text_is_let_through(text: str) -> None:
 @pytest.mark.parametrize(
     ("content", "binary"), [(b"plain", False), ("Ωµ".encode(), False), (b"\x89PNG", True), (b"a\0b", True)]
 )
-def test_binaries_are_told_from_text(content: bytes, binary: bool) -> None:
+def test_binaries_are_distinguished_from_text(content: bytes, binary: bool) -> None:
     assert is_binary(content) == binary

@@ -11,18 +11,18 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from ringbalance.controller.dynamic_motion import Dynamics, Motion, Switch
-from ringbalance.controller.dynamic_passage import Passage, pass_time
-from ringbalance.controller.terms import choices, dynamics_of
-from ringbalance.controller.transfer import Drive
+from ringbalance.controller.liquid_ring.interval import Passage, pass_time
+from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, Switch
+from ringbalance.controller.liquid_ring.transfer import Drive
+from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.calibration import calibrate
-from ringbalance.reduced_model.flow_law import Flow, Regime
-from ringbalance.reduced_model.model import BalancerModel
-from ringbalance.reduced_model.paper_law import paper_model
-from ringbalance.scene import models
+from ringbalance.reduced_model.law.flow_law import Flow, Regime
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.paper_law import paper_model
+from ringbalance.scene import loop_models, models
+from ringbalance.scene.arrays import BoolArray, FloatArray
 
-FloatArray = npt.NDArray[np.float64]
-Velocity = Callable[[FloatArray, FloatArray, FloatArray, npt.NDArray[np.bool_]], tuple[Any, Any]]
+Velocity = Callable[[FloatArray, FloatArray, FloatArray, BoolArray], tuple[Any, Any]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,14 +115,14 @@ def scene(paper_scene: models.Scene) -> models.Scene:
     return replace(
         paper_scene,
         source="test.toml",
-        rotor=models.Rotor(
+        rotor=loop_models.Rotor(
             speed=10000 * 2 * math.pi / 60,
             influence_coefficient=0.0108,
             lag_angle=math.radians(17),
             initial_amplitude=10e-6,
             initial_phase=math.pi / 2,
         ),
-        sensor=models.Sensor(amplitude_noise=0.0, phase_noise=0.0),
+        sensor=loop_models.Sensor(amplitude_noise=0.0, phase_noise=0.0),
         controller=replace(
             paper_scene.controller,
             period=0.5,
@@ -133,7 +133,7 @@ def scene(paper_scene: models.Scene) -> models.Scene:
             long_step=0.1,
             short_step=0.004,
         ),
-        run=models.RunSettings(seed=0, time_limit=120.0),
+        run=loop_models.RunSettings(seed=0, time_limit=120.0),
     )
 
 
@@ -169,7 +169,7 @@ def drive_by(laws: Mapping[str, FunctionLaw]) -> Callable[..., Drive]:
 
 @pytest.fixture(scope="session")
 def calibrated(scene: models.Scene) -> BalancerModel:
-    """The same disc by its calibrated law, with the hump at 31.5 mm."""
+    """The same disc by its calibrated law, with the crest at 31.5 mm."""
     return calibrate(scene).model
 
 
@@ -180,7 +180,7 @@ def plant(scene: models.Scene) -> Callable[..., Dynamics]:
     def make(model: BalancerModel, *terms: str, length: float | None = None, **gas: Any) -> Dynamics:
         tube = replace(scene.tube, length=length or scene.tube.length)
         own = replace(scene, tube=tube, gas=replace(scene.gas, **gas))
-        found = dynamics_of(scene=own, model=model, chosen=choices(scene=own, model=model, asked=terms))
+        found = dynamics_of(scene=own, model=model, modelled=terms)
         assert found is not None
         return found
 
@@ -197,7 +197,7 @@ def pulse() -> Callable[..., Passage]:
         lag = dynamics.valve_lag
         opens = Switch(after=lag, chamber=0, opens=True)
         closes = Switch(after=lag + duration, chamber=0, opens=False)
-        given = {"motion": Motion(pending=(opens, closes)), "primed": False} | state
+        given: dict[str, Any] = {"motion": Motion(pending=(opens, closes)), "primed": False} | state
         return pass_time(dynamics, fill=fill, total=0.5, instants=instants, **given)
 
     return make

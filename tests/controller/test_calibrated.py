@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ringbalance.controller.adaptive_ode import adaptive_ode
+from ringbalance.controller.liquid_ring.quadrature import quadrature
+from ringbalance.controller.liquid_ring.transfer import Drive, Event
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.quadrature import quadrature
 from ringbalance.controller.simulation import Outcome
-from ringbalance.controller.transfer import Drive, Event
 from ringbalance.reduced_model.calibration import calibrate
-from ringbalance.reduced_model.flow_law import Regime
-from ringbalance.reduced_model.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.models import Scene
+from ringbalance.verification.reference.adaptive_ode import adaptive_ode
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +79,7 @@ def test_too_little_pressure_names_the_priming_threshold(
     low = replace(paper_scene, gas=replace(paper_scene.gas, pressure=0.3e6))
     run = simulate(low, calibrated)
     assert run.outcome is Outcome.STALLED
-    # Column from the hump to the free surface at a quarter's fill, rho omega^2 (a^2 - r_m^2)/2, in MPa.
+    # Column from the crest to the free surface at a quarter's fill, rho omega^2 (a^2 - r_m^2)/2, in MPa.
     assert "to start there: 0.33" in run.status
 
 

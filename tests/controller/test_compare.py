@@ -12,9 +12,9 @@ import pytest
 from ringbalance.cli import main
 from ringbalance.controller.compare import compare, comparison_document
 from ringbalance.controller.compare_rotor import own_scene, rotor_of, scene_on
-from ringbalance.controller.eccentric.parameters import plant_parameters
-from ringbalance.controller.eccentric.plant_whirl import influence, steady_whirl
-from ringbalance.reduced_model.paper_law import paper_model
+from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
+from ringbalance.controller.eccentric_mass.plant.whirl import influence, steady_whirl
+from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene import (
     EccentricScene,
     Scene,
@@ -39,7 +39,7 @@ def small() -> EccentricScene:
     return eccentric_scene(load_scene(bundled_scene("driven_masses_small")))
 
 
-def test_driven_masses_on_the_liquid_rings_rotor(paper_scene: Scene, driven: EccentricScene) -> None:
+def test_eccentric_masses_on_the_liquid_rings_rotor(paper_scene: Scene, driven: EccentricScene) -> None:
     """Speed, influence coefficient and lag, first vibration, noise and limit are those of the other scene."""
     told = eccentric_scene(scene_on(rotor_of(paper_scene), driven))
     speed = told.rotor.speed_profile[0].speed
@@ -69,8 +69,8 @@ def test_the_scene_made_for_that_rotor_has_it_already(paper_scene: Scene, small:
     assert told.imbalance.phase == pytest.approx(small.imbalance.phase, rel=1e-9)
 
 
-def test_a_liquid_ring_on_the_driven_masses_rotor(paper_scene: Scene, small: EccentricScene) -> None:
-    """There and back again; gas times per unbalance and wrong beliefs are kept."""
+def test_a_liquid_ring_on_the_eccentric_masses_rotor(paper_scene: Scene, small: EccentricScene) -> None:
+    """There and back again; valve-open times per unbalance and wrong assumptions are kept."""
     wrong = replace(
         paper_scene,
         controller=replace(
@@ -99,7 +99,7 @@ def test_a_liquid_ring_on_its_own_rotor_is_left_alone(paper_scene: Scene) -> Non
     assert own_scene(paper_scene) is paper_scene
 
 
-def test_driven_masses_start_in_steady_whirl_at_constant_speed(driven: EccentricScene) -> None:
+def test_eccentric_masses_start_in_steady_whirl_at_constant_speed(driven: EccentricScene) -> None:
     told = eccentric_scene(own_scene(driven))
     assert [corner.speed for corner in told.rotor.speed_profile] == pytest.approx([100 * RPM])
     decay = told.rotor.damping / (2 * plant_parameters(told).mass)
@@ -107,11 +107,11 @@ def test_driven_masses_start_in_steady_whirl_at_constant_speed(driven: Eccentric
     assert told.run.time_limit == pytest.approx(driven.run.time_limit + told.supervisor.start)
 
 
-def test_no_ring_at_the_speed_of_the_driven_masses(driven: EccentricScene, paper_scene: Scene) -> None:
+def test_no_ring_at_the_speed_of_the_eccentric_masses(driven: EccentricScene, paper_scene: Scene) -> None:
     pattern = "on the rotor of eccentric_mass_paper.toml: so slow that gravity"
     with pytest.raises(SceneError, match=pattern) as caught:
         compare(driven, paper_scene, model_of=paper_model)
-    assert caught.value.faults[0].file == "liquid_ring_paper.toml"
+    assert caught.value.faults[0].file == str(bundled_scene("liquid_ring_paper"))
 
 
 def _at(driven: EccentricScene, speed: float) -> EccentricScene:
@@ -156,7 +156,7 @@ def test_two_liquid_rings(paper_scene: Scene) -> None:
     assert [scene["source"] for scene in found["scenes"]] == ["liquid_ring_paper.toml"] * 2
 
 
-def test_two_pairs_of_driven_masses(driven: EccentricScene) -> None:
+def test_two_pairs_of_eccentric_masses(driven: EccentricScene) -> None:
     """A second pair of half the mass cannot undo the imbalance of the first one's rotor."""
     strong = replace(driven, run=replace(driven.run, time_limit=40.0))
     weak = replace(strong, masses=replace(driven.masses, mass=0.06), source="weak.toml")

@@ -1,4 +1,4 @@
-"""Compiled functions: the same numbers as the plain ones, kept, and made anew when a source changes."""
+"""Compiled functions: the same numbers as the plain ones, kept, and made again when a source changes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,14 @@ from typing import Any, cast
 
 import numpy as np
 
-from ringbalance.controller.compiled import compiled
+from ringbalance.controller.compilation.compiled import compiled, compiled_sources
+from ringbalance.controller.ensemble import (
+    compiled_disc,
+    compiled_noise,
+    compiled_pid,
+    compiled_sample,
+    compiled_transfer,
+)
 
 
 def _sum_of_sines(values: np.ndarray[Any, np.dtype[np.float64]], factor: float) -> float:
@@ -38,7 +45,14 @@ def test_division_by_zero_is_infinite_as_in_numpy() -> None:
 PROGRAM = """
 import numba
 from numba.core import config
-from ringbalance.controller.compiled import compiled
+from ringbalance.controller.compilation.compiled import compiled, compiled_sources
+from ringbalance.controller.ensemble import (
+    compiled_disc,
+    compiled_noise,
+    compiled_pid,
+    compiled_sample,
+    compiled_transfer,
+)
 before = config.CACHE_DIR
 def twice(x):
     return 2 * x
@@ -63,6 +77,18 @@ def _run(tmp_path: Path, **more: str) -> str:
     return done.stdout.strip()
 
 
+def test_every_compiled_functions_source_tells_stale_code() -> None:
+    modules = (compiled_disc, compiled_noise, compiled_pid, compiled_sample, compiled_transfer)
+    functions = [
+        one.py_func for module in modules for one in vars(module).values() if hasattr(one, "py_func")
+    ]
+    files = {Path(function.__code__.co_filename).resolve() for function in functions}
+    assert {"path_piece.py", "control_law.py", "stopping.py", "linear_path.py"} <= {
+        file.name for file in files
+    }
+    assert files <= {path.resolve() for path in compiled_sources()}
+
+
 def test_compiled_functions_are_kept_in_the_users_folder(tmp_path: Path) -> None:
     home = tmp_path / "kept"
     folder = _run(tmp_path, NUMBA_CACHE_DIR=str(home))
@@ -73,4 +99,5 @@ def test_compiled_functions_are_kept_in_the_users_folder(tmp_path: Path) -> None
 def test_a_folder_that_cannot_be_written_is_no_obstacle(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.write_text("not a folder")
-    assert str(blocked) not in _run(tmp_path, NUMBA_CACHE_DIR=str(blocked))
+    _run(tmp_path, NUMBA_CACHE_DIR=str(blocked))
+    assert not list(tmp_path.rglob("*.nbi")), "nor may another folder take its place"

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from ringbalance.controller.compiled_noise import member_noise, noise_key, noise_pair, philox
-from ringbalance.controller.compiled_records import SHARED
+from ringbalance.controller.ensemble.compiled_noise import member_noise, noise_key, noise_pair, philox
+from ringbalance.controller.ensemble.compiled_records import SHARED
 
 
 def words(*values: int) -> tuple[np.uint64, ...]:

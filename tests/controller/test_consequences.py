@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ringbalance.controller.algorithms import target_vector_of
-from ringbalance.controller.consequences import Consequences, consequences_document, find_consequences
-from ringbalance.controller.consequences_gain import LoopGain, loop_gain
-from ringbalance.controller.ensemble import ensemble_transfer
+from ringbalance.controller.algorithms.by_name import target_vector_of
+from ringbalance.controller.ensemble.monte_carlo import ensemble_transfer
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Outcome
-from ringbalance.reduced_model.model import BalancerModel
-from ringbalance.reduced_model.paper_law import PaperLaw, paper_model
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_model
+from ringbalance.reports.studies.consequences import Consequences, consequences_document, find_consequences
+from ringbalance.reports.studies.consequences_gain import LoopGain, loop_gain
 from ringbalance.scene.models import Scene
 
 TRUE_K = 3.5
@@ -164,6 +164,7 @@ def test_the_retuned_gain_restores_what_was_meant(found: Consequences, noisy: Sc
     assert retuned.simulation.settled
     assert retuned.simulation.overshoots == 0
     nominal, true = found.gains
+    assert found.retuned_proportional is not None
     assert true.slope * found.retuned_proportional == pytest.approx(nominal.per_operation)
 
 

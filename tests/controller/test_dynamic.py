@@ -9,22 +9,20 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from scipy.integrate import quad
 
-from ringbalance.controller.dynamic_column import column_of
-from ringbalance.controller.dynamic_gas import GasLine, flow_shape
-from ringbalance.controller.dynamic_motion import Dynamics, Motion
-from ringbalance.controller.dynamic_passage import Passage, pass_time
-from ringbalance.reduced_model.calibrated_law import CalibratedLaw
+from ringbalance.controller.liquid_ring.column import column_of
+from ringbalance.controller.liquid_ring.gas import GasLine, flow_shape
+from ringbalance.controller.liquid_ring.interval import Passage, pass_time
+from ringbalance.controller.liquid_ring.motion import Dynamics, Motion
 from ringbalance.reduced_model.calibration import calibrate
-from ringbalance.reduced_model.flow_law import Regime
-from ringbalance.reduced_model.model import BalancerModel
-from ringbalance.reduced_model.paper_law import PaperLaw
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.scene.models import Scene
 
-FloatArray = npt.NDArray[np.float64]
 Plant = Callable[..., Dynamics]
 Pulse = Callable[..., Passage]
 AMBIENT = 101325.0
@@ -32,8 +30,10 @@ PIPED = {"conductance": 1e-8, "critical_ratio": 0.3}
 
 
 def blocked(dynamics: Dynamics) -> Dynamics:
-    """The same with a hump that no gas lifts liquid over."""
-    return replace(dynamics, column=replace(dynamics.column, hump_pressure=1e9))
+    """The same with a crest that no gas lifts liquid over."""
+    crest = dynamics.column.crest
+    assert crest is not None
+    return replace(dynamics, column=replace(dynamics.column, crest=replace(crest, column_pressure=1e9)))
 
 
 # --- the column ---
@@ -49,7 +49,8 @@ def test_without_inertia_the_column_is_the_flow_law(scene: Scene, hump: Any) -> 
     regimes = set()
     for _ in range(400):
         x, y = random.uniform(0, 0.5, 2)
-        pressure, primed = random.choice([0.0, random.uniform(0, 1.2e6)]), bool(random.integers(2))
+        pressure = float(random.choice([0.0, random.uniform(0, 1.2e6)]))
+        primed = bool(random.integers(2))
         known = law.evaluate(fill_ratio=x, opposite_fill_ratio=y, gas_pressure=pressure, primed=primed)
         found = column.steady((x, y), (pressure, 0.0), primed=primed)
         assert found.velocity == pytest.approx(float(known.velocity), abs=1e-12)
@@ -69,23 +70,23 @@ def test_the_accelerations_vanish_at_the_laws_velocity(calibrated: BalancerModel
         assert abs(column.acceleration(speed=u, **at)) < 1e-8 * column.acceleration(speed=0.0, **at)  # type: ignore[arg-type]
 
 
-def test_the_column_tears_where_the_hump_would_cavitate(calibrated: BalancerModel, scene: Scene) -> None:
-    # The pressure over the hump of a *full* column against the vapour pressure, by its own balance.
+def test_the_column_separates_where_the_hump_would_cavitate(calibrated: BalancerModel, scene: Scene) -> None:
+    # The pressure over the crest of a *full* column against the vapour pressure, by its own balance.
     column = column_of(law=calibrated.flow, tube=scene.tube)
     law = calibrated.flow
     assert isinstance(law, CalibratedLaw)
     assert column is not None
     assert law.heads.hump_head is not None
-    torn = []
+    separated = []
     for u in np.linspace(0.5, 24.0, 24):
         surplus = 0.7e6 + float(law.wall_pressure(0.25)) - float(law.wall_pressure(0.25))
         full = (surplus / 1000 - math.exp(float(law.heads.head(math.log(float(u)))))) / 0.12
         head = math.exp(float(law.heads.hump_head(math.log(float(u)))))
         over = 0.7e6 + float(law.wall_pressure(0.25)) - float(law.path.hump_pressure or 0.0)
         over -= 1000 * (head + 0.06 * full)
-        torn.append(over < law.path.vapour_pressure)
-        assert column.separated((0.25, 0.25), (0.7e6, 0.0), speed=float(u), direction=1) == torn[-1]
-    assert len(set(torn)) == 2
+        separated.append(over < law.path.vapour_pressure)
+        assert column.separated((0.25, 0.25), (0.7e6, 0.0), speed=float(u), direction=1) == separated[-1]
+    assert len(set(separated)) == 2
 
 
 # --- inertia ---

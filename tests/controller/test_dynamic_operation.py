@@ -8,25 +8,24 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from scipy.integrate import solve_ivp
 
-from ringbalance.controller.dynamic_column import Column, column_of
-from ringbalance.controller.dynamic_motion import Dynamics, Motion
-from ringbalance.controller.dynamic_passage import Passage, pass_time
-from ringbalance.controller.dynamic_steps import Stepper, step
-from ringbalance.controller.liquid_ring import LiquidRing, initial_state
+from ringbalance.controller.liquid_ring.column import Column, column_of
+from ringbalance.controller.liquid_ring.interval import Passage, pass_time
+from ringbalance.controller.liquid_ring.motion import Dynamics, Motion
+from ringbalance.controller.liquid_ring.plant import LiquidRing, initial_state
+from ringbalance.controller.liquid_ring.quadrature import quadrature
+from ringbalance.controller.liquid_ring.steps import Stepper, step
+from ringbalance.controller.liquid_ring.transfer import Event
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.quadrature import quadrature
-from ringbalance.controller.transfer import Event
-from ringbalance.reduced_model.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.calibration import calibrate
-from ringbalance.reduced_model.flow_law import Regime
-from ringbalance.reduced_model.model import BalancerModel
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Gas, Scene
 
-FloatArray = npt.NDArray[np.float64]
 Plant = Callable[..., Dynamics]
 Pulse = Callable[..., Passage]
 AMBIENT = 101325.0
@@ -126,7 +125,7 @@ class Independent:
         return c * outside * self.phi(outside, p) if outside > p else -c * p * self.phi(p, outside)
 
     def push(self, x: float, u: float, p: float, q: float) -> float:
-        """du/dt: a full column first; if its hump would be below the vapour pressure, the torn one."""
+        """du/dt: a full column first; if its crest would be below the vapour pressure, the separated one."""
         law, rho = self.law, self.law.density
         assert law.heads.hump_head is not None
         assert law.path.hump_pressure is not None
@@ -187,7 +186,12 @@ class Independent:
 def test_an_operation_with_all_terms_against_scipy(
     scene: Scene, calibrated: BalancerModel, plant: Plant, duration: float, conductance: float, pulse: Pulse
 ) -> None:
-    asked = {"conductance": conductance, "critical_ratio": 0.35, "dead_volume": 3e-6, "valve_lag": 0.01}
+    asked: dict[str, Any] = {
+        "conductance": conductance,
+        "critical_ratio": 0.35,
+        "dead_volume": 3e-6,
+        "valve_lag": 0.01,
+    }
     terms = ("tube inertia", "gas filling", "valve lag")
     own = plant(calibrated, *terms, **asked)
     known = Independent(calibrated, replace(scene.gas, **asked), length=0.12, share=0.5)
@@ -235,7 +239,7 @@ def test_a_stretch_may_be_cut_anywhere(calibrated: BalancerModel, plant: Plant, 
         assert second.motion.record.work == pytest.approx(whole.motion.record.work, rel=1e-6)
 
 
-def test_what_stops_the_flow_is_told(calibrated: BalancerModel, plant: Plant, pulse: Pulse) -> None:
+def test_what_stops_the_flow_is_reported(calibrated: BalancerModel, plant: Plant, pulse: Pulse) -> None:
     own = plant(calibrated, "tube inertia")
     empty = pulse(own, 3.0, np.array([3.2]))
     assert (empty.motion.record.event, empty.fill, empty.primed) == (Event.EMPTY, 0.0, False)
@@ -258,7 +262,7 @@ def test_the_opposite_chamber_can_be_full(model: BalancerModel, plant: Plant, pu
 def test_work_bounds_the_integrators_steps(
     calibrated: BalancerModel, plant: Plant, monkeypatch: pytest.MonkeyPatch, pulse: Pulse
 ) -> None:
-    monkeypatch.setattr("ringbalance.controller.dynamic_passage.MAX_STEPS", 20)
+    monkeypatch.setattr("ringbalance.controller.liquid_ring.interval.MAX_STEPS", 20)
     found = pulse(plant(calibrated, "tube inertia", "gas filling", **PIPED), 0.5, np.array([0.6]))
     assert found.motion.record.event is Event.UNFINISHED
     assert 0 <= found.fill <= 0.5
@@ -275,7 +279,7 @@ def test_a_creep_through_a_narrow_tube_takes_few_steps(
         environment=replace(scene.environment, gravity=0.0),
     )
     own = plant(calibrate(thick).model, "tube inertia")
-    monkeypatch.setattr("ringbalance.controller.dynamic_passage.MAX_STEPS", 5000)
+    monkeypatch.setattr("ringbalance.controller.liquid_ring.interval.MAX_STEPS", 5000)
     instants = np.array([0.5, 5.0, 50.0])
     found = pass_time(own, fill=0.3, total=0.5, primed=True, motion=Motion(), instants=instants)
 
@@ -295,7 +299,8 @@ def test_a_creep_through_a_narrow_tube_takes_few_steps(
 def test_a_creep_near_its_balance_takes_few_steps(
     scene: Scene, plant: Plant, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Slower than the error allowed to a step: explicit steps would stop it and start it anew without end."""
+    """Slower than the error allowed to a step: explicit steps would stop it and start it again without
+    end."""
     thick = replace(
         scene,
         liquid=replace(scene.liquid, name="custom", kinematic_viscosity=1e-3),
@@ -303,7 +308,7 @@ def test_a_creep_near_its_balance_takes_few_steps(
         environment=replace(scene.environment, gravity=0.0),
     )
     own = plant(calibrate(thick).model, "tube inertia")
-    monkeypatch.setattr("ringbalance.controller.dynamic_passage.MAX_STEPS", 5000)
+    monkeypatch.setattr("ringbalance.controller.liquid_ring.interval.MAX_STEPS", 5000)
     left = []
     for offset in (1e-5, 1e-7):
         found = pass_time(
@@ -343,7 +348,7 @@ def test_the_controller_commands_and_the_plant_follows(scene: Scene, calibrated:
     )
     run = simulate(slow, calibrated)
     assert {
-        t.term for t in run.terms if t.term in {"gas filling", "valve lag"} and t.model != "left out"
+        t.term for t in run.models_used if t.term in {"gas filling", "valve lag"} and t.model != "left out"
     } == {
         "gas filling",
         "valve lag",
@@ -368,7 +373,7 @@ def test_short_trials_settle_with_moving_liquid(scene: Scene, calibrated: Balanc
     )
     run = simulate(trial, calibrated)
     assert run.integrator == "runge_kutta"
-    assert {t.term: t.model for t in run.terms}["tube inertia"].startswith("rho L du/dt")
+    assert {t.term: t.model for t in run.models_used}["tube inertia"].startswith("rho L du/dt")
     assert run.status
     fills = np.array(list(run.fill_ratio.values()))
     assert fills[:2] + fills[2:] == pytest.approx(0.5, abs=1e-15)

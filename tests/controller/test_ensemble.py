@@ -1,4 +1,4 @@
-"""Ensembles against `simulate` member by member, and what a crowd of members says."""
+"""Ensembles against `simulate` member by member, and what a ensemble of members says."""
 
 from __future__ import annotations
 
@@ -14,35 +14,35 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ringbalance.controller.algorithm import Measurement
-from ringbalance.controller.compiled_noise import member_noise
-from ringbalance.controller.ensemble import (
+from ringbalance.controller.algorithms.algorithm import Measurement
+from ringbalance.controller.ensemble.compiled_noise import member_noise
+from ringbalance.controller.ensemble.moment import moment_table
+from ringbalance.controller.ensemble.monte_carlo import (
     binomial_share,
     ensemble_document,
     simulate_ensemble,
     simulate_members,
 )
-from ringbalance.controller.ensemble_members import (
+from ringbalance.controller.ensemble.samples import (
     BLOCK,
     Members,
-    Spread,
+    MemberUncertainty,
     drawn_members,
+    member_uncertainty,
     members_alike,
-    spread_of,
 )
-from ringbalance.controller.ensemble_moment import moment_table
-from ringbalance.controller.ensemble_transfer import pair_transfer
+from ringbalance.controller.ensemble.transfer import pair_transfer
+from ringbalance.controller.liquid_ring.quadrature import quadrature
+from ringbalance.controller.liquid_ring.transfer import Drive
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.quadrature import quadrature
 from ringbalance.controller.sensor import Sensor
 from ringbalance.controller.simulation import Outcome
-from ringbalance.controller.transfer import Drive
-from ringbalance.reduced_model.flow_law import Regime
-from ringbalance.reduced_model.model import BalancerModel
-from ringbalance.reduced_model.paper_law import PaperLaw, PaperMoment, paper_model
+from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.paper_law import PaperLaw, PaperMoment, paper_model
 from ringbalance.scene.models import Scene
 
-EXACT = Spread(velocity=0.0, moment=0.0, influence_coefficient=0.0, lag_angle=0.0)
+EXACT = MemberUncertainty(velocity=0.0, moment=0.0, influence_coefficient=0.0, lag_angle=0.0)
 
 
 def noisy(scene: Scene, *, time_limit: float = 12.0, **controller: Any) -> Scene:
@@ -222,7 +222,7 @@ def test_a_law_that_changes_all_the_time_is_refused(
         simulate_members(noisy(scene), replace(model, flow=laws["restless"]), size=3)
 
 
-# --- the crowd ---
+# --- the ensemble ---
 
 
 def test_the_same_seed_gives_the_same_numbers_for_any_threads(scene: Scene, model: BalancerModel) -> None:
@@ -237,8 +237,8 @@ def test_the_same_seed_gives_the_same_numbers_for_any_threads(scene: Scene, mode
 
 def test_a_larger_ensemble_begins_with_the_smaller(scene: Scene, model: BalancerModel) -> None:
     asked = noisy(scene, time_limit=10.0)
-    spread = spread_of(asked, model)
-    drawn = drawn_members(asked, spread=spread, seed=1, block=0)
+    uncertainty_95 = member_uncertainty(asked, model)
+    drawn = drawn_members(asked, uncertainty_95=uncertainty_95, seed=1, block=0)
     few = Members(**{name: values[:7] for name, values in vars(drawn).items()})
     more = Members(**{name: values[:50] for name, values in vars(drawn).items()})
     a, b = (simulate_members(asked, model, members=m, seed=1) for m in (few, more))
@@ -264,7 +264,7 @@ def test_an_interrupt_ends_an_ensemble_at_once(scene: Scene, model: BalancerMode
     assert seen == [BLOCK]
 
 
-def test_terms_that_only_a_single_run_models_are_told(scene: Scene, model: BalancerModel) -> None:
+def test_terms_that_only_a_single_run_models_are_reported(scene: Scene, model: BalancerModel) -> None:
     lagging = replace(noisy(scene, time_limit=2.0), gas=replace(scene.gas, valve_lag=0.05))
     assert simulate_ensemble(lagging, model, 5, 0).left_out == ("valve lag",)
     assert simulate_ensemble(noisy(scene, time_limit=2.0), model, 5, 0).left_out == ()
@@ -286,14 +286,14 @@ def test_more_uncertainty_more_overshoot(scene: Scene, model: BalancerModel) -> 
     asked = noisy(scene, time_limit=9.0)
     asked = replace(asked, sensor=replace(asked.sensor, amplitude_noise=2e-9))
     wide = replace(EXACT, velocity=0.3, influence_coefficient=0.3)
-    calm, wild = (simulate_ensemble(asked, model, 2000, 0, spread=s) for s in (EXACT, wide))
+    calm, wild = (simulate_ensemble(asked, model, 2000, 0, uncertainty_95=s) for s in (EXACT, wide))
     assert wild.overshoot.low > calm.overshoot.high
     assert wild.settling_quantiles[4] > calm.settling_quantiles[4]
 
 
 def test_members_are_drawn_with_the_half_widths(scene: Scene) -> None:
-    spread = Spread(velocity=0.1, moment=0.02, influence_coefficient=0.2, lag_angle=0.05)
-    drawn = drawn_members(scene, spread=spread, seed=0, block=0)
+    uncertainty_95 = MemberUncertainty(velocity=0.1, moment=0.02, influence_coefficient=0.2, lag_angle=0.05)
+    drawn = drawn_members(scene, uncertainty_95=uncertainty_95, seed=0, block=0)
     for values, low, high in (
         (drawn.velocity_factor, 1 / 1.1, 1.1),
         (drawn.moment_factor, 1 / 1.02, 1.02),
@@ -305,7 +305,7 @@ def test_members_are_drawn_with_the_half_widths(scene: Scene) -> None:
 
 
 def test_the_spread_says_where_it_comes_from(scene: Scene, model: BalancerModel) -> None:
-    found = spread_of(replace(scene, uncertainty=()), model)
+    found = member_uncertainty(replace(scene, uncertainty=()), model)
     # k = 50 within 10 %: (k + 1) within 5/51, the velocity within half of that.
     assert found.velocity == pytest.approx(5 / 51 / 2)
     assert all("assumed" in source for source in found.sources[2:])

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ringbalance.controller.algorithm import Measurement
+from ringbalance.controller.algorithms.algorithm import Measurement
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Outcome, Simulation
-from ringbalance.reduced_model.model import BalancerModel
+from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 
@@ -67,7 +67,7 @@ def test_settings_without_a_meaning_are_refused(
         simulate(changed(scene, table, **{key: value}), model)
 
 
-def test_all_faults_are_told_at_once(scene: Scene, model: BalancerModel) -> None:
+def test_all_errors_are_reported_at_once(scene: Scene, model: BalancerModel) -> None:
     with pytest.raises(SceneError) as caught:
         simulate(changed(scene, "controller", proportional=0.0, limit=-1.0), model)
     assert len(caught.value.faults) == 2
@@ -118,7 +118,7 @@ def test_one_bad_sample_costs_one_period(scene: Scene, model: BalancerModel, kin
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_dead_sensor_opens_no_valve_and_is_told(scene: Scene, model: BalancerModel, kind: str) -> None:
+def test_a_dead_sensor_opens_no_valve_and_is_reported(scene: Scene, model: BalancerModel, kind: str) -> None:
     run = seen_through(changed(scene, "controller", kind=kind), model, lambda *_: None)
     assert run.outcome is Outcome.NO_SAMPLES
     assert run.injections == ()
@@ -141,8 +141,8 @@ def test_a_phase_that_jumps_by_whole_turns_changes_nothing(
     assert run.amplitude[-1] == pytest.approx(clean.amplitude[-1], rel=1e-6, abs=1e-12)
 
 
-def test_gas_that_is_gone_before_it_presses_is_told(scene: Scene, calibrated: BalancerModel) -> None:
-    # 25 ms fill a chamber at this conductance; 4 ms lift no liquid over the hump.
+def test_gas_that_is_gone_before_it_presses_is_reported(scene: Scene, calibrated: BalancerModel) -> None:
+    # 25 ms fill a chamber at this conductance; 4 ms lift no liquid over the crest.
     gas = {"conductance": 1e-8, "critical_ratio": 0.3}
     short = changed(changed(scene, "gas", **gas), "controller", kind="trial", first_trial=4e-3)
     run = simulate(short, calibrated)

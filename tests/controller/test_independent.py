@@ -1,4 +1,4 @@
-"""Whole runs replayed by a second model: exact chamber geometry, k by decree, an adaptive solver of its own.
+"""Whole runs replayed by a second model: exact chamber geometry, prescribed k, an adaptive solver of its own.
 
 Only the kinetic-energy factor alpha is taken from the program; all else is written down again here.
 """
@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Injection, Simulation
-from ringbalance.physics.tube_state import tube_state
+from ringbalance.physics.tube.state import tube_state
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.scene.models import Scene
 
@@ -27,7 +27,7 @@ AGREEMENT = 1e-6
 
 
 class Second:
-    """The disc of a scene with k by decree, from geometry and hydrostatics alone."""
+    """The disc of a scene with prescribed k, from geometry and hydrostatics alone."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
@@ -172,7 +172,7 @@ def replayed(run: Simulation, second: Second) -> tuple[float, int]:
 
 @pytest.fixture(scope="module")
 def disc(paper_scene: Scene) -> Scene:
-    """k by decree, an exact sensor, no gravity, few samples."""
+    """prescribed k, an exact sensor, no gravity, few samples."""
     return replace(
         paper_scene,
         tube=replace(paper_scene.tube, drag_coefficient=20.0, bends=()),
@@ -201,7 +201,7 @@ def with_speed(scene: Scene, speed: float, pressure: float) -> Scene:
 def scenes(disc: Scene) -> dict[str, Scene]:
     low_port = replace(disc, tube=replace(disc.tube, port_radius=42e-3))
     return {
-        "the hump tears the column": with_hump(disc, 31.5e-3),
+        "the siphon crest separates the column": with_hump(disc, 31.5e-3),
         "no hump, and the siphon stalls": with_speed(with_hump(disc, None), 1047.0, 0.2e6),
         "six chambers, trapped gas": with_hump(with_chambers(disc, 6), 33e-3, "trapped"),
         "two chambers at low speed level out": with_speed(
@@ -216,7 +216,7 @@ def scenes(disc: Scene) -> dict[str, Scene]:
 
 
 NAMES = (
-    "the hump tears the column",
+    "the siphon crest separates the column",
     "no hump, and the siphon stalls",
     "six chambers, trapped gas",
     "two chambers at low speed level out",

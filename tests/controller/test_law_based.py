@@ -1,4 +1,5 @@
-"""The law-based algorithm: gas times by the law, moments over the pairs, what it learns from responses."""
+"""The law-based algorithm: valve-open times by the law, moments over the pairs, what it learns from
+responses."""
 
 from __future__ import annotations
 
@@ -13,18 +14,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ringbalance.controller.algorithm import Command, Measurement
-from ringbalance.controller.algorithms import controller_of, law_based_of, target_vector_of
-from ringbalance.controller.closed_form import closed_form
-from ringbalance.controller.law_based_estimate import InfluenceEstimate, updated
-from ringbalance.controller.law_based_times import fill_for_moment, gas_time, pair_changes
+from ringbalance.controller.algorithms.algorithm import Command, Measurement
+from ringbalance.controller.algorithms.by_name import controller_of, law_based_of, target_vector_of
+from ringbalance.controller.algorithms.law_based_estimate import InfluenceEstimate, updated
+from ringbalance.controller.algorithms.law_based_times import fill_for_moment, gas_time, pair_changes
+from ringbalance.controller.liquid_ring.closed_form import closed_form
+from ringbalance.controller.liquid_ring.quadrature import quadrature
+from ringbalance.controller.liquid_ring.transfer import Drive
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.quadrature import quadrature
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.simulation import Outcome
-from ringbalance.controller.transfer import Drive
-from ringbalance.reduced_model.model import BalancerModel
-from ringbalance.reduced_model.paper_law import PaperMoment, paper_model
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.paper_law import PaperMoment, paper_model
 from ringbalance.scene.models import Scene
 
 K = cmath.rect(0.0108, -math.radians(17))
@@ -50,7 +51,7 @@ def with_chambers(scene: Scene, chambers: int) -> Scene:
     return replace(scene, disc=disc, rotor=replace(scene.rotor, initial_amplitude=4e-6))
 
 
-# --- gas times ---
+# --- valve-open times ---
 
 
 def test_a_gas_time_is_the_integral_of_dx_over_u(drive_by: Callable[..., Drive]) -> None:
@@ -142,13 +143,13 @@ def test_what_no_pair_can_give_is_asked_of_those_at_their_ends() -> None:
 # --- the influence coefficient ---
 
 
-def learn(*, k: complex, seen: complex, noise: float, spread: float = 0.0) -> InfluenceEstimate:
+def learn(*, k: complex, seen: complex, noise: float, standard_deviation: float = 0.0) -> InfluenceEstimate:
     return updated(
         InfluenceEstimate(value=k, variance=abs(0.5 * k) ** 2),
         moment_change=2e-4 + 1e-4j,
         vibration_change=seen * (2e-4 + 1e-4j),
         noise_variance=noise,
-        law_spread=spread,
+        law_standard_deviation=standard_deviation,
         assumed_magnitude=abs(k),
     )
 
@@ -172,7 +173,7 @@ def test_a_response_within_the_noise_is_not_believed() -> None:
 def test_the_estimate_stays_within_a_decade_and_goes_on_following() -> None:
     assert abs(learn(k=K, seen=0.0, noise=0.0).value) == pytest.approx(abs(K) / 10)
     assert abs(learn(k=K, seen=50 * K, noise=0.0).value) == pytest.approx(abs(K) * 10)
-    followed = learn(k=K, seen=K, noise=0.0, spread=0.05)
+    followed = learn(k=K, seen=K, noise=0.0, standard_deviation=0.05)
     assert followed.variance == pytest.approx(abs(0.05 * K) ** 2)
 
 
@@ -187,7 +188,7 @@ def test_the_average_of_many_noisy_responses_is_the_coefficient() -> None:
             moment_change=change,
             vibration_change=true * change + noise,
             noise_variance=2e-12,
-            law_spread=0.0,
+            law_standard_deviation=0.0,
             assumed_magnitude=abs(K),
         )
     assert abs(estimate.value / true - 1) < 0.06
@@ -247,7 +248,7 @@ def test_a_wrong_coefficient_and_a_wrong_k_are_learnt_together(
     assumed = scene.controller.assumed_influence_coefficient * factor
     small = replace(scene, rotor=replace(scene.rotor, initial_amplitude=5e-6))
     asked = law_based(small, assumed_influence_coefficient=assumed)
-    # The algorithm believes k = 20 where it is 50: 1.56 times too fast.
+    # The algorithm assumes k = 20 where it is 50: 1.56 times too fast.
     tube = replace(scene.tube, drag_coefficient=20.0)
     believed = paper_model(replace(asked, tube=tube))
     run = simulate(asked, model, controller=law_based_of(asked, believed))
@@ -292,6 +293,6 @@ def test_limits_of_the_valves_hold(scene: Scene, model: BalancerModel) -> None:
     _, command = algorithm.step(algorithm.start(), Measurement(time=0.0, amplitude=9e-6, phase=0.6))
     assert max(valve.duration for valve in command.valves) == 0.2
     _, small = algorithm.step(algorithm.start(), Measurement(time=0.0, amplitude=6e-8, phase=0.6))
-    assert small == Command(reason="the gas time is below the minimum")
+    assert small == Command(reason="the valve-open time is below the minimum")
     _, rest = algorithm.step(algorithm.start(), Measurement(time=0.0, amplitude=5e-8, phase=0.6))
     assert rest == Command(resting=True)

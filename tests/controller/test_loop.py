@@ -6,23 +6,24 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from ringbalance.controller.adaptive_ode import adaptive_ode
-from ringbalance.controller.algorithm import Measurement
-from ringbalance.controller.algorithms import controller_of
+from ringbalance.controller.algorithms.algorithm import Measurement
+from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.document import simulation_document
-from ringbalance.controller.liquid_ring import LiquidRing, initial_state
-from ringbalance.controller.loop import simulate
-from ringbalance.controller.quadrature import quadrature
+from ringbalance.controller.liquid_ring.plant import LiquidRing, initial_state
+from ringbalance.controller.liquid_ring.quadrature import quadrature
+from ringbalance.controller.loop import MAX_SAMPLES, simulate
 from ringbalance.controller.simulation import Outcome, Simulation
-from ringbalance.reduced_model.model import BalancerModel
-from ringbalance.reduced_model.paper_law import paper_model
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
+from ringbalance.verification.reference.adaptive_ode import adaptive_ode
 
 
 def with_controller(scene: Scene, **changes: Any) -> Scene:
@@ -183,21 +184,21 @@ def test_a_wrong_sense_of_rotation_is_found_out(scene: Scene, model: BalancerMod
     assert "sense of rotation" in run.status
 
 
-def test_far_too_high_a_gain_is_told_by_its_overshoots(scene: Scene, model: BalancerModel) -> None:
+def test_far_too_high_a_gain_is_reported_by_its_overshoots(scene: Scene, model: BalancerModel) -> None:
     run = simulate(with_controller(scene, proportional=0.5e6), model)
     assert not run.settled
     assert run.overshoots > 2
     assert "proportional" in run.status
 
 
-def test_commands_below_the_valves_minimum_are_told(scene: Scene, model: BalancerModel) -> None:
+def test_commands_below_the_valves_minimum_are_reported(scene: Scene, model: BalancerModel) -> None:
     run = simulate(with_controller(scene, minimum_gas_time=0.05, integral_time=None), model)
     assert run.outcome is Outcome.GAS_TIME_TOO_SHORT
     assert "50 ms" in run.status
     assert all(i.operation.duration >= 0.05 for i in run.injections)
 
 
-def test_a_limit_below_the_noise_is_told(scene: Scene, model: BalancerModel) -> None:
+def test_a_limit_below_the_noise_is_reported(scene: Scene, model: BalancerModel) -> None:
     loud = replace(scene, sensor=replace(scene.sensor, amplitude_noise=1e-6))
     run = simulate(loud, model)
     assert run.outcome is Outcome.NOISE
@@ -220,7 +221,13 @@ def test_a_tiny_period_does_not_run_for_ever(
     run = simulate(tiny, model)
     assert run.outcome is Outcome.TOO_MANY_SAMPLES
     assert "controller.period" in run.status
+    assert "run.time_limit" in run.status
     assert len(run.samples) == 50
+
+
+def test_the_most_samples_of_a_run_are_documented() -> None:
+    text = (Path(__file__).parents[2] / "docs" / "scene-file.md").read_text(encoding="utf-8")
+    assert f"at most {MAX_SAMPLES:,} samples".replace(",", " ") in text
 
 
 def test_noise_is_reproducible_by_seed(scene: Scene, model: BalancerModel) -> None:
@@ -283,7 +290,7 @@ def test_progress_runs_to_the_end(scene: Scene, model: BalancerModel) -> None:
 
 
 def test_an_algorithm_that_is_not_there_is_a_fault_of_the_scene(scene: Scene, model: BalancerModel) -> None:
-    with pytest.raises(SceneError, match=r"test\.toml: \[controller\] kind"):
+    with pytest.raises(SceneError, match=r"\.toml: \[controller\] kind"):
         simulate(with_controller(scene, kind="guesswork"), model)
 
 
@@ -333,7 +340,7 @@ def siphoning(model: BalancerModel, laws: Mapping[str, Any]) -> BalancerModel:
     return replace(model, name="levelling", flow=laws["levelling"])
 
 
-def test_self_siphoning_loses_the_correction_and_is_told(scene: Scene, siphoning: BalancerModel) -> None:
+def test_self_siphoning_loses_the_correction_and_is_reported(scene: Scene, siphoning: BalancerModel) -> None:
     run = simulate(scene, siphoning)
     assert run.outcome is Outcome.DRIFTING
     assert "run back" in run.status

@@ -11,18 +11,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from ringbalance.controller.adaptive_ode import adaptive_ode
-from ringbalance.controller.closed_form import closed_form
 from ringbalance.controller.document import simulation_document
+from ringbalance.controller.liquid_ring.closed_form import closed_form
+from ringbalance.controller.liquid_ring.quadrature import quadrature
+from ringbalance.controller.liquid_ring.transfer import Drive
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.quadrature import quadrature
-from ringbalance.controller.transfer import Drive
-from ringbalance.reduced_model.model import BalancerModel
-from ringbalance.reduced_model.paper_law import paper_model
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.models import Scene
+from ringbalance.verification.reference.adaptive_ode import adaptive_ode
 
 DriveBy = Callable[..., Drive]
 NAMES = ("tube inertia", "gas filling", "valve lag")
@@ -149,6 +149,7 @@ def test_any_run_under_other_laws(
     pressure=st.floats(0.0, 2e6),
     duration=st.floats(1e-6, 30.0),
 )
+@example(fill=0.25, pressure=5.8e-105, duration=1.0)
 @settings(max_examples=60)
 def test_quadrature_and_closed_form_agree(
     drive: Drive, fill: float, pressure: float, duration: float
@@ -157,7 +158,9 @@ def test_quadrature_and_closed_form_agree(
     t = np.linspace(0.0, duration, 4)
     exact, found = closed_form(asked, t), quadrature(asked, t)
     assert found.fill == pytest.approx(exact.fill, abs=1e-9)
-    assert found.event is exact.event or exact.event_time == pytest.approx(duration, rel=1e-5)
+    # The tables do not tell a stall from its last 1e-12 of fill.
+    at_rest = abs(exact.fill[-1] - exact.fill[0]) <= 1e-12
+    assert found.event is exact.event or at_rest or exact.event_time == pytest.approx(duration, rel=1e-5)
 
 
 @given(

@@ -9,9 +9,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ringbalance.controller.liquid_ring import LiquidRing, initial_state
-from ringbalance.controller.quadrature import quadrature
-from ringbalance.controller.reach import largest_pair_moment, starting_pressure, unreachable_moment
+from ringbalance.controller.liquid_ring.plant import LiquidRing, initial_state
+from ringbalance.controller.liquid_ring.quadrature import quadrature
+from ringbalance.controller.liquid_ring.reach import (
+    largest_pair_moment,
+    starting_pressure,
+    unreachable_moment,
+)
 from ringbalance.controller.rotor import (
     chamber_directions,
     chamber_letters,
@@ -20,7 +24,7 @@ from ringbalance.controller.rotor import (
     vibration,
     wrapped,
 )
-from ringbalance.reduced_model.model import BalancerModel
+from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.models import Scene
 
 # lambda rho V / 2 per fill difference, by hand: 72 mm, 1000 kg/m^3, V of Eq. 4.

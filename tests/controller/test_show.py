@@ -11,7 +11,7 @@ from rich.console import Console
 
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.show import show, sparkline
-from ringbalance.reduced_model.model import BalancerModel
+from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.models import Scene
 
 

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.controller.algorithm import Command, Measurement
+from ringbalance.controller.algorithms.algorithm import Command, Measurement
+from ringbalance.controller.algorithms.target_vector import TargetVector, TargetVectorState, components
 from ringbalance.controller.rotor import chamber_directions
-from ringbalance.controller.target_vector import TargetVector, TargetVectorState, components
 
 PID = TargetVector(
     chambers=4,
@@ -121,8 +121,8 @@ def test_a_short_share_is_not_executed() -> None:
 
 
 def test_the_integral_is_dropped_when_the_residual_has_turned_round() -> None:
-    for mode, expected in (("reset", 0.0), ("accumulate", (4e-6 + 1e-6) / 2)):
-        pid = replace(PID, on_reversal=mode)
+    accumulating = replace(PID, on_reversal="accumulate")
+    for pid, expected in ((replace(PID, on_reversal="reset"), 0.0), (accumulating, (4e-6 + 1e-6) / 2)):
         state, _ = pid.step(pid.start(), sample(0.0, 4e-6))
         state, _ = pid.step(state, sample(1.0, 1e-6, phase=0.2 + math.pi))
         assert state.integral == pytest.approx(expected)

@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ringbalance.controller.adaptive_ode import adaptive_ode
-from ringbalance.controller.closed_form import closed_form, has_closed_form
-from ringbalance.controller.explicit_segments import explicit_segments
-from ringbalance.controller.quadrature import quadrature
-from ringbalance.controller.transfer import Drive, Event, Integrator
-from ringbalance.reduced_model.flow_law import Regime
+from ringbalance.controller.liquid_ring.closed_form import closed_form, has_closed_form
+from ringbalance.controller.liquid_ring.quadrature import quadrature
+from ringbalance.controller.liquid_ring.transfer import Drive, Event, Integrator
+from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.verification.reference.adaptive_ode import adaptive_ode
+from ringbalance.verification.reference.explicit_segments import explicit_segments
 
 DriveBy = Callable[..., Drive]
 

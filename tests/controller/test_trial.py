@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from ringbalance.controller.algorithm import Command, Measurement
-from ringbalance.controller.trial import Trial, TrialState
+from ringbalance.controller.algorithms.algorithm import Command, Measurement
+from ringbalance.controller.algorithms.trial import Trial, TrialState
 
 TRIAL = Trial(
     sequence=(0, 2, 1, 3),
@@ -22,7 +22,7 @@ TRIAL = Trial(
 
 
 def run(amplitudes: list[float]) -> list[tuple[int, float] | None]:
-    """Chamber and gas time for amplitudes in micrometres; None where no valve opens."""
+    """Chamber and valve-open time for amplitudes in micrometres; None where no valve opens."""
     state, answers = TRIAL.start(), []
     for index, amplitude in enumerate(amplitudes):
         seen = Measurement(time=float(index), amplitude=amplitude * 1e-6, phase=math.nan)

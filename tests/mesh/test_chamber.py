@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -125,7 +126,7 @@ def test_a_folded_cell_is_seen(disc: Disc) -> None:
         (lambda angle, axial: -1e-3 + 0 * (angle + axial), (2, 4)),
     ],
 )
-def test_impossible_meshes_are_refused(disc: Disc, surface: object, cells: tuple[int, ...]) -> None:
+def test_impossible_meshes_are_refused(disc: Disc, surface: Any, cells: tuple[int, ...]) -> None:
     with pytest.raises(ValueError, match=r"cells|surface_radius"):
         chamber_mesh(disc=disc, surface_radius=surface, cells=cells)
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from ringbalance.mesh.bent_tube import Segment
-from ringbalance.physics import rotating_friction_ratio
-from ringbalance.physics.bent_tube import BentTubeFlow, bent_tube_flow, pressure_loss
-from ringbalance.physics.bent_tube_field import bent_tube_field
-from ringbalance.physics.bent_tube_terms import bend_shift, rotation_with_curvature
-from ringbalance.physics.rotating_section import SectionMesh
+from ringbalance.physics.navier_stokes.rotating_section import SectionMesh
+from ringbalance.physics.tube.bend_terms import bend_shift, rotation_with_curvature
+from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
+from ringbalance.verification.reference.bent_tube import BentTubeFlow, bent_tube_flow, pressure_loss
+from ringbalance.verification.reference.bent_tube_field import bent_tube_field
 
 COARSE = SectionMesh(around=2, across=2, wall_ratio=3.0)
 STRAIGHT = (Segment(length=2.0, cells=2),)

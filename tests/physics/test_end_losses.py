@@ -8,11 +8,12 @@ from importlib import resources
 
 import numpy as np
 import pytest
+from end_losses_table import EndSettings, run_path
 from fluids.fittings import entrance_sharp, exit_normal
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.physics.end_losses import (
+from ringbalance.physics.navier_stokes.end_losses import (
     End,
     EndMesh,
     end_loss_times_reynolds,
@@ -20,10 +21,9 @@ from ringbalance.physics.end_losses import (
     entry_length,
     solve_end,
 )
-from ringbalance.physics.end_losses_generate import EndSettings, run_path
-from ringbalance.physics.end_losses_table import end_table, laminar_entrance_loss, laminar_exit_loss
-from ringbalance.physics.navier_stokes import FlowSolution, FlowSystem
+from ringbalance.physics.navier_stokes.newton import FlowSolution, FlowSystem
 from ringbalance.physics.results import StatusCode
+from ringbalance.physics.tube.end_losses_table import end_table, laminar_entrance_loss, laminar_exit_loss
 
 
 def _cells(end: End) -> EndMesh:
@@ -116,6 +116,7 @@ def test_unseen_reynolds_numbers_in_a_larger_domain(end: End, reynolds: float) -
     for step in (0.0, 10.0, 40.0, 120.0, reynolds):
         flow = solve_end(system=system, reynolds=step, start=flow)
         assert flow.status.ok
+    assert flow is not None
     found = end_loss_times_reynolds(system=system, solution=flow, end=end, cells=cells) / reynolds
     table = (laminar_entrance_loss if end == "entrance" else laminar_exit_loss)(reynolds=reynolds)
     assert found == pytest.approx(float(table.value), rel=0.01 if end == "entrance" else 0, abs=2e-3)

@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ringbalance.physics import (
+from ringbalance.physics.navier_stokes.flow_fields import (
+    LARGEST_KL,
+    LARGEST_ROTATION,
+    EndFlow,
+    SectionFlow,
     entrance_flow,
     exit_flow,
-    laminar_entrance_loss,
-    laminar_exit_loss,
-    rotating_friction_ratio,
     section_flow,
 )
-from ringbalance.physics.flow_fields import LARGEST_KL, LARGEST_ROTATION, EndFlow, SectionFlow
 from ringbalance.physics.results import StatusCode
-
-FloatArray = npt.NDArray[np.float64]
+from ringbalance.physics.tube.end_losses_table import laminar_entrance_loss, laminar_exit_loss
+from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
+from ringbalance.scene.arrays import BoolArray, FloatArray
 
 
 def _areas(flow: SectionFlow | EndFlow) -> FloatArray:
@@ -100,7 +100,7 @@ def _pressure_on_axis(flow: EndFlow, x: float) -> float:
     return float(np.interp(x, flow.points[0, order], flow.pressure[order]))
 
 
-def _wall(flow: EndFlow, inside: float) -> npt.NDArray[np.bool_]:
+def _wall(flow: EndFlow, inside: float) -> BoolArray:
     """Nodes on the tube's wall and on the plane it ends in; `inside` is the sign of x in the tube."""
     x, r = flow.points
     return np.asarray((np.abs(x) < 1e-12) & (r >= 0.5) | (x * inside > 0) & (np.abs(r - 0.5) < 1e-12))

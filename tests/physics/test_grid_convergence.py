@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.physics.grid_convergence import Verdict, celik_order, gci
+from ringbalance.physics.convergence.grid import Verdict, celik_order, gci
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from ringbalance.physics.mixing_length import MixingLength, mixing_length, mixing_length_flow
 from ringbalance.physics.results import StatusCode
-from ringbalance.physics.tube_friction import friction_factor, friction_uncertainty
+from ringbalance.physics.tube.friction import friction_factor, friction_uncertainty
+from ringbalance.verification.reference.mixing_length import MixingLength, mixing_length, mixing_length_flow
 
 DATA = Path(__file__).parent / "data"
 
@@ -32,7 +32,7 @@ def by_quadrature(radius: float, grain: float) -> float:
 
     cuts = [0.0, 3.0, 12.0, 60.0, 300.0, radius]
     bulk = sum(quad(flux, a, b, epsrel=1e-12)[0] for a, b in itertools.pairwise(cuts)) / radius**2
-    return 8 / bulk**2
+    return float(8 / bulk**2)
 
 
 @pytest.mark.parametrize("roughness", [0.0, 2e-3, 3e-2])

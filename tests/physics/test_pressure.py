@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 import skfem
 from scipy.sparse import csr_matrix, diags_array, random_array
 from skfem.helpers import dot, grad
 
 from ringbalance.mesh.chamber import ChamberMesh, Geometry, chamber_mesh
-from ringbalance.physics import pressure_linear
-from ringbalance.physics.pressure import PressureProblem, RotatingLiquid, places, solve_pressure
-from ringbalance.physics.pressure_assembly import (
+from ringbalance.physics.pressure import multigrid as pressure_multigrid
+from ringbalance.physics.pressure.assembly import (
     at_cells,
     facet_load,
     facet_mass,
@@ -23,11 +22,11 @@ from ringbalance.physics.pressure_assembly import (
     volume_load,
     volume_points,
 )
-from ringbalance.physics.pressure_linear import linear_prolongation, solve_linear
+from ringbalance.physics.pressure.linear import linear_prolongation, solve_linear
+from ringbalance.physics.pressure.solve import PressureProblem, RotatingLiquid, places, solve_pressure
 from ringbalance.physics.results import StatusCode
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
-
-FloatArray = npt.NDArray[np.float64]
 
 WATER = RotatingLiquid(density=1000.0, angular_velocity=1047.2)
 
@@ -205,7 +204,7 @@ def test_linear_elements_below_quadratic_ones_save_steps_over_aggregates_alone(
 
 
 def test_a_solve_that_does_not_converge_says_so(disc: Disc, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pressure_linear, "_MAX_ITERATIONS", 2)
+    monkeypatch.setattr(pressure_multigrid, "_MAX_ITERATIONS", 2)
     solution = solve_pressure(chamber=chamber_and_load(disc), problem=WATER.problem(), direct_limit=0)
     assert solution.status.code is StatusCode.NOT_CONVERGED
     assert "residual" in solution.status.text
@@ -235,7 +234,8 @@ def test_a_singular_matrix_is_a_status_and_not_an_exception() -> None:
 def test_a_deliberate_fault_changes_the_pressure(disc: Disc, factor: str) -> None:
     chamber = chamber_mesh(disc=disc, surface_radius=30e-3, cells=(2, 6))
     sound = solve_pressure(chamber=chamber, problem=WATER.problem())
-    faulty = solve_pressure(chamber=chamber, problem=replace(WATER, **{factor: 1.01}).problem())
+    changes: dict[str, Any] = {factor: 1.01}
+    faulty = solve_pressure(chamber=chamber, problem=replace(WATER, **changes).problem())
     volume = volume_points(chamber.mesh)
     difference = at_cells(volume, faulty.pressure - sound.pressure)
     assert np.abs(difference).max() > 1e-3 * sound.pressure.max()

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
-from ringbalance.physics.pressure import PressureSolution, RotatingLiquid, places
-from ringbalance.physics.pressure_assembly import volume_points
-from ringbalance.physics.pressure_surface import find_surface, refined_surface, solve_with_gravity
+from ringbalance.physics.pressure.assembly import volume_points
+from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, places
+from ringbalance.physics.pressure.surface import find_surface, refined_surface, solve_with_gravity
 from ringbalance.physics.results import StatusCode
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
-
-FloatArray = npt.NDArray[np.float64]
 
 G = 9.80665
 
@@ -165,7 +164,8 @@ def test_a_start_from_the_coarser_mesh_leads_to_the_same_surface(disc: Disc) -> 
 
 @pytest.mark.parametrize("factor", ["source_factor", "wall_factor"])
 def test_a_deliberate_fault_bends_the_surface(disc: Disc, factor: str) -> None:
-    liquid = replace(across(1000.0, 0.5), **{factor: 1.01})
+    changes: dict[str, Any] = {factor: 1.01}
+    liquid = replace(across(1000.0, 0.5), **changes)
     solution = solve_with_gravity(disc=disc, liquid=liquid, fill_ratio=0.3, cells=(8, 24))
     spread = float(np.ptp(level(solution, liquid))) / disc.outer_radius
     assert spread > 1e-4

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_first_moment, surface_radius
-from ringbalance.physics import pressure_linear
-from ringbalance.physics.grid_convergence import Verdict
+from ringbalance.physics.convergence.grid import Verdict
+from ringbalance.physics.pressure import linear as pressure_linear
+from ringbalance.physics.pressure import multigrid as pressure_multigrid
+from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
 from ringbalance.physics.results import Estimate, StatusCode
-from ringbalance.physics.ring import RingQuantities, ring_quantities
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
-
-FloatArray = npt.NDArray[np.float64]
 
 RHO, OMEGA = 1000.0, 10_000 * np.pi / 30
 FILLS = np.linspace(0.0, 0.5, 11)
@@ -136,7 +136,12 @@ def test_moment_per_volume_is_the_derivative_of_the_moment(disc: Disc) -> None:
 
 
 def test_three_dimensions_agree_with_two(disc: Disc) -> None:
-    arguments = {"disc": disc, "density": RHO, "angular_velocity": OMEGA, "fill_ratio": [0.25]}
+    arguments: dict[str, Any] = {
+        "disc": disc,
+        "density": RHO,
+        "angular_velocity": OMEGA,
+        "fill_ratio": [0.25],
+    }
     flat = ring_quantities(**arguments)
     deep = ring_quantities(**arguments, dimension=3)
     for name in ("liquid_volume", "wall_pressure", "moment", "moment_per_volume"):
@@ -150,9 +155,8 @@ def test_three_dimensions_agree_with_two(disc: Disc) -> None:
 
 @pytest.mark.parametrize("factor", ["source_factor", "wall_factor"])
 def test_a_deliberate_fault_leaves_the_half_width(disc: Disc, factor: str) -> None:
-    ring = ring_quantities(
-        disc=disc, density=RHO, angular_velocity=OMEGA, fill_ratio=[0.25], **{factor: 1.01}
-    )
+    factors: dict[str, Any] = {factor: 1.01}
+    ring = ring_quantities(disc=disc, density=RHO, angular_velocity=OMEGA, fill_ratio=[0.25], **factors)
     exact = closed_forms(disc, 0.25, RHO, OMEGA)["wall_pressure"]
     assert abs(ring.wall_pressure.value[0] - exact) > 10 * ring.wall_pressure.uncertainty[0]
 
@@ -173,15 +177,15 @@ def test_a_deliberate_fault_leaves_the_half_width(disc: Disc, factor: str) -> No
         {"cells": [(4, 8), (2, 4), (1, 2, 1)]},
     ],
 )
-def test_impossible_arguments_are_refused(disc: Disc, change: Mapping[str, object]) -> None:
-    arguments = {"disc": disc, "density": RHO, "angular_velocity": OMEGA, "fill_ratio": [0.2]}
+def test_impossible_arguments_are_refused(disc: Disc, change: Mapping[str, Any]) -> None:
+    arguments: dict[str, Any] = {"disc": disc, "density": RHO, "angular_velocity": OMEGA, "fill_ratio": [0.2]}
     with pytest.raises(ValueError, match=r"fill_ratio|density|gravity|turn_samples|cells"):
         ring_quantities(**{**arguments, **change})
 
 
 def test_a_failed_solve_is_said_and_claims_nothing(disc: Disc, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pressure_linear, "DIRECT_LIMIT", {2: 0, 3: 0})
-    monkeypatch.setattr(pressure_linear, "_MAX_ITERATIONS", 1)
+    monkeypatch.setattr(pressure_multigrid, "_MAX_ITERATIONS", 1)
     ring = ring_quantities(disc=disc, density=RHO, angular_velocity=OMEGA, fill_ratio=[0.0, 0.2])
     assert ring.status.code is StatusCode.NOT_CONVERGED
     assert "0.2" in ring.status.text

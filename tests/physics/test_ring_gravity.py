@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-import numpy.typing as npt
 import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_first_moment, surface_radius
+from ringbalance.physics.pressure.ring import ring_quantities
 from ringbalance.physics.results import StatusCode
-from ringbalance.physics.ring import ring_quantities
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
-
-FloatArray = npt.NDArray[np.float64]
 
 RHO, G = 1000.0, 9.80665
 
@@ -79,7 +79,7 @@ def moments_below(disc: Disc, shift: FloatArray, radius: float) -> tuple[float, 
 
     def corner(side: int) -> float:
         def gap(phi: float) -> float:
-            return isobar(shift, radius, side * phi) * np.sin(half - phi) - t
+            return float(isobar(shift, radius, side * phi) * np.sin(half - phi) - t)
 
         return float(side * brentq(gap, 0.0, far, xtol=1e-15))
 
@@ -134,7 +134,7 @@ def test_means_over_a_turn_are_those_of_the_exact_isobars(disc: Disc) -> None:
 
 
 def test_enough_angles_are_taken_for_the_mean(disc: Disc) -> None:
-    arguments = {
+    arguments: dict[str, Any] = {
         "disc": disc,
         "density": RHO,
         "angular_velocity": 80.0,

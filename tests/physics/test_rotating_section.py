@@ -13,20 +13,20 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rotating_friction_table import columns, run_column, settings_hash
 
-from ringbalance.physics.navier_stokes import FlowSolution, FlowSystem, NewtonSettings
-from ringbalance.physics.navier_stokes_continuation import StepRule, follow
-from ringbalance.physics.results import Status, StatusCode
-from ringbalance.physics.rotating_section import (
+from ringbalance.physics.navier_stokes.continuation import StepRule, follow
+from ringbalance.physics.navier_stokes.newton import FlowSolution, FlowSystem, NewtonSettings
+from ringbalance.physics.navier_stokes.rotating_section import (
     SectionMesh,
     friction_ratio,
     section_system,
     solve_section,
     solve_section_without_inertia,
 )
-from ringbalance.physics.rotating_section_generate import columns, run_column, settings_hash
-from ringbalance.physics.rotating_section_grid import slow_first, table_settings
-from ringbalance.physics.rotating_section_table import (
+from ringbalance.physics.results import Status, StatusCode
+from ringbalance.physics.tube.rotation_grid import slow_first, table_settings
+from ringbalance.physics.tube.rotation_table import (
     friction_table,
     ito_nanbu_laminar,
     rotating_friction_ratio,

@@ -16,11 +16,11 @@ from skfem.models.poisson import laplace
 from ringbalance.mesh.chamber import chamber_mesh
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.results import StatusCode
-from ringbalance.physics.sloshing import resonant_fills, sloshing_modes
-from ringbalance.physics.sloshing_response import sloshing_response
-from ringbalance.physics.sloshing_system import sloshing_system
+from ringbalance.physics.sloshing.modes import resonant_fills, sloshing_modes
+from ringbalance.physics.sloshing.response import sloshing_response
+from ringbalance.physics.sloshing.system import sloshing_system
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.sloshing_exact import (
+from ringbalance.verification.reference.sloshing_exact import (
     cosine_amplification,
     cosine_frequencies,
     cosine_pressure_amplification,
@@ -139,7 +139,7 @@ class Potential:
         stiff = laplace.assemble(self.basis)
         stream = solve(*condense(stiff, x=fixed, D=np.unique(self.dofs[np.concatenate(rim)])))
 
-        @LinearForm
+        @LinearForm  # type: ignore[untyped-decorator]  # scikit-fem has no types
         def turned(v: Any, w: Any) -> Any:
             return w["psi"].grad[1] * v.grad[0] - w["psi"].grad[0] * v.grad[1]
 

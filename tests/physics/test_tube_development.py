@@ -13,29 +13,29 @@ from scipy.optimize import root
 from scipy.special import jv, roots_jacobi
 
 from ringbalance.mesh.bent_tube import Segment, swept_tube
-from ringbalance.physics import bent_tube
-from ringbalance.physics.entry_length import slowest_decay
-from ringbalance.physics.navier_stokes import (
+from ringbalance.physics.navier_stokes.newton import (
     Coefficients,
     FlowSolution,
     FlowSystem,
     NewtonSettings,
     solve_flow,
 )
-from ringbalance.physics.navier_stokes_space import at_points
-from ringbalance.physics.rotating_section import (
+from ringbalance.physics.navier_stokes.rotating_section import (
     SectionMesh,
     section_mesh,
     section_system,
     solve_section_without_inertia,
 )
-from ringbalance.physics.rotating_section_table import rotating_friction_ratio
-from ringbalance.physics.tube_development import (
+from ringbalance.physics.navier_stokes.space import at_points
+from ringbalance.physics.tube.development import (
     DEVELOPMENT_SHARE,
     developing_length,
-    development_spread,
+    development_uncertainty,
 )
-from ringbalance.physics.tube_ends import ROTATING_PROFILE_SPREAD, kinetic_factor
+from ringbalance.physics.tube.ends import ROTATING_PROFILE_UNCERTAINTY, kinetic_factor
+from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
+from ringbalance.verification.reference import bent_tube
+from ringbalance.verification.reference.entry_length import slowest_decay
 
 Array = np.ndarray
 
@@ -102,7 +102,7 @@ def _axisymmetric_rates(re: float, order: int = 40) -> Array:
         a[row], b[row] = 0, 0
         a[row, block * n : (block + 1) * n] = what[row % n]
     rates = eig(a, b, right=False)
-    return 2 * rates[np.isfinite(rates)]
+    return np.asarray(2 * rates[np.isfinite(rates)])
 
 
 def test_disturbed_poiseuille_flow_has_the_rate_of_a_spectral_solution() -> None:
@@ -179,7 +179,7 @@ def test_profile_in_rotation_carries_the_energy_that_the_formula_says(re: float,
         flow = bent_tube.developed_section(system=system, reynolds=re, rotation_reynolds=rotation)
     ratio = rotating_friction_ratio(reynolds=re, rotation_reynolds=rotation).value
     found = kinetic_factor(reynolds=max(re, 1e-3), friction_ratio=ratio)
-    assert float(found) == pytest.approx(_alpha(flow, system), abs=ROTATING_PROFILE_SPREAD)
+    assert float(found) == pytest.approx(_alpha(flow, system), abs=ROTATING_PROFILE_UNCERTAINTY)
 
 
 def test_kinetic_factor_has_its_exact_ends() -> None:
@@ -191,7 +191,7 @@ def test_kinetic_factor_has_its_exact_ends() -> None:
 
 def test_what_development_adds_never_exceeds_rotations_share() -> None:
     lengths = np.geomspace(1e-3, 1e3, 50)
-    spread = development_spread(length=0.1, bore=1e-3, developing=lengths, rotation_loss=-8.0)
+    spread = development_uncertainty(length=0.1, bore=1e-3, developing=lengths, rotation_loss=-8.0)
     assert np.all(np.diff(spread) > 0)
     assert spread[-1] == pytest.approx(8.0, rel=0.06)
     assert spread[0] == pytest.approx(8 * DEVELOPMENT_SHARE * 1e-5, rel=1e-6)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from fluids.friction import Churchill_1977
 
-from ringbalance.physics.tube_friction import friction_factor, friction_uncertainty, turbulent_share
+from ringbalance.physics.tube.friction import friction_factor, friction_uncertainty, turbulent_share
 
 DATA = Path(__file__).parent / "data"
 

@@ -12,9 +12,9 @@ from fluids.friction import friction_factor
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.physics.tube_bends import bend_loss
-from ringbalance.physics.tube_loss import TubeLoss, tube_loss
-from ringbalance.physics.tube_numbers import reynolds_number, rotation_reynolds_number
+from ringbalance.physics.tube.bends import bend_loss
+from ringbalance.physics.tube.loss import TubeLoss, tube_loss
+from ringbalance.physics.tube.numbers import reynolds_number, rotation_reynolds_number
 from ringbalance.scene.models import Bend, InputUncertainty, Liquid, Tube
 
 WATER = Liquid(
@@ -169,7 +169,7 @@ def test_rotation_costs_far_more_than_friction_in_the_papers_tube_when_slow() ->
     assert list(found.flow_state) == ["laminar", "turbulent"]
 
 
-def test_ranges_are_told_in_words() -> None:
+def test_ranges_are_reported_in_words() -> None:
     found = loss(velocity=np.array([0.5, 15.0]))
     assert list(found.in_range) == [False, True]
     assert any(text.startswith("bends") and where[0] for text, where in found.range_notes.items())
@@ -177,7 +177,7 @@ def test_ranges_are_told_in_words() -> None:
     assert "in_range" in found.k.status.text
 
 
-def test_decree_fixes_k_at_every_velocity() -> None:
+def test_a_prescribed_k_holds_at_every_velocity() -> None:
     found = loss(dataclasses.replace(TUBE, drag_coefficient=50.0))
     assert np.all(found.k.value == 50.0)
     assert set(found.terms) == {"decree"}

@@ -5,14 +5,13 @@ from __future__ import annotations
 import cProfile
 import dataclasses
 import math
-import pstats
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.physics.tube_loss import TubeLoss, tube_loss
+from ringbalance.physics.tube.loss import TubeLoss, tube_loss
 from ringbalance.scene.models import Bend, Liquid, Tube
 
 VELOCITIES = np.geomspace(1e-5, 1e3, 1500)
@@ -73,7 +72,7 @@ def test_any_tube_has_one_velocity_for_a_head_and_no_jump(tube: Tube, nu: float,
     assert np.all(found.k.value > -1)
     assert np.all(np.isfinite(found.k.uncertainty) & (found.k.uncertainty > 0))
     assert np.all(np.isfinite(found.upstream_k))
-    # The head between chambers and that up to the hump: no slower than linear in u, no faster than u^4.
+    # The head between chambers and that up to the crest: no slower than linear in u, no faster than u^4.
     for head in (found.k.value + 1, found.kinetic_factor + found.upstream_k):
         slope = slopes(head, found.velocity)
         assert np.min(slope) > 0.9
@@ -87,7 +86,7 @@ def test_any_tube_has_one_velocity_for_a_head_and_no_jump(tube: Tube, nu: float,
 
 
 @given(tube=tubes(), nu=viscosities, omega=speeds)
-def test_ranges_are_told_wherever_a_source_ends(tube: Tube, nu: float, omega: float) -> None:
+def test_ranges_are_reported_wherever_a_source_ends(tube: Tube, nu: float, omega: float) -> None:
     found = loss(tube, nu, omega)
     re, rotation = found.reynolds, found.rotation_reynolds
     u = found.velocity
@@ -113,7 +112,7 @@ def test_cost_does_not_grow_by_calls() -> None:
         profile.enable()
         loss(tube, 1e-6, 1047.2, velocity)
         profile.disable()
-        calls.append(pstats.Stats(profile).total_calls)
+        calls.append(sum(entry.callcount for entry in profile.getstats()))
     assert calls[1] == pytest.approx(calls[0], rel=0.02)
 
 

@@ -8,7 +8,7 @@ from fluids.friction import helical_turbulent_fd_Mori_Nakayama
 from numpy.polynomial import chebyshev
 from scipy.linalg import solve, toeplitz
 
-from ringbalance.physics.tube_rotation import (
+from ringbalance.physics.tube.rotation import (
     critical_reynolds,
     curved_friction_ratio,
     rotating_friction_ratio,
@@ -81,7 +81,7 @@ def spectral_ratio(disc: Disc, rotation: float, re: float, start: Array | None =
         carry = inertia * ((dy @ psi)[:, None] * dx - (dx @ psi)[:, None] * dy)
 
         def carried(f: Array) -> Array:
-            return inertia * ((dx @ f)[:, None] * dy - (dy @ f)[:, None] * dx)
+            return np.asarray(inertia * ((dx @ f)[:, None] * dy - (dy @ f)[:, None] * dx))
 
         zero, one = np.zeros((n, n)), np.zeros((n, 1))
         jac = np.block(

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from ringbalance.reduced_model.calibration import Calibration, calibrate
-from ringbalance.scene import models
+from ringbalance.scene import loop_models, models
 
 DISC = models.Disc(
     outer_radius=44.5e-3,
@@ -53,14 +53,14 @@ GAS = models.Gas(
     valve_lag=None,
     process="isothermal",
 )
-ROTOR = models.Rotor(
+ROTOR = loop_models.Rotor(
     speed=10000 * 2 * math.pi / 60,
     influence_coefficient=0.0108,
     lag_angle=math.radians(17),
     initial_amplitude=10e-6,
     initial_phase=math.pi / 2,
 )
-CONTROLLER = models.ControllerSettings(
+CONTROLLER = loop_models.ControllerSettings(
     kind="target_vector",
     limit=0.05e-6,
     period=0.5,
@@ -90,12 +90,13 @@ def table_1_scene() -> models.Scene:
         gas=GAS,
         environment=models.Environment(shaft="horizontal", gravity=9.80665),
         rotor=ROTOR,
-        sensor=models.Sensor(amplitude_noise=0.0, phase_noise=0.0),
+        sensor=loop_models.Sensor(amplitude_noise=0.0, phase_noise=0.0),
         controller=CONTROLLER,
         uncertainty=(),
-        run=models.RunSettings(seed=0, time_limit=120.0),
+        run=loop_models.RunSettings(seed=0, time_limit=120.0),
         tolerance=0.01,
         source="test.toml",
+        file="test.toml",
         sha256="0" * 64,
     )
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from ringbalance.reduced_model.cli import calibrate
-from ringbalance.reduced_model.loading import load_law
+from ringbalance.reduced_model.law.loading import load_law
 from ringbalance.scene import SceneError, bundled_scene
 
 

@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.physics.tube_loss import tube_loss
-from ringbalance.reduced_model.calibrated_law import CalibratedLaw
+from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.calibration import Calibration
-from ringbalance.reduced_model.chamber_calibration import calibrate_chamber
-from ringbalance.reduced_model.flow_law import Regime
-from ringbalance.reduced_model.law_building import calibrated_law, column_pressure
-from ringbalance.reduced_model.thresholds import priming_pressure, siphon_stall_pressure
-from ringbalance.reduced_model.tube_heads import tube_heads
+from ringbalance.reduced_model.chamber.calibration import calibrate_chamber
+from ringbalance.reduced_model.law.building import calibrated_law, column_pressure
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.tube.heads import tube_heads
+from ringbalance.reduced_model.tube.thresholds import priming_pressure, siphon_stall_pressure
 from ringbalance.scene.models import Scene
 
 AMBIENT = 101325.0
@@ -36,7 +36,7 @@ def variant(scene: Scene, *, speed: float | None = None, **tube: object) -> Cali
 
 @pytest.fixture(scope="module")
 def slow(table_1_scene: Scene) -> CalibratedLaw:
-    """At 3000 rpm a column holds over the hump without gas."""
+    """At 3000 rpm a column holds over the crest without gas."""
     return variant(table_1_scene, speed=314.0)
 
 
@@ -120,7 +120,7 @@ def test_stall_by_eq_19_is_0_381_mpa_and_by_finite_elements_a_tenth_more(law: Ca
     assert list(around.velocity > 0) == [
         False,
         False,
-    ]  # the column cannot hold over this hump at that pressure
+    ]  # the column cannot hold over this crest at that pressure
 
 
 def test_straight_tube_stalls_without_a_jump(straight: CalibratedLaw) -> None:
@@ -154,7 +154,7 @@ def test_gas_off_a_slow_rotors_column_levels_the_chambers_out(slow: CalibratedLa
     assert np.all(slow.evaluate(fill_ratio=x, gas_pressure=0.0, primed=False).regime == Regime.BLOCKED)
 
 
-def test_gas_off_a_fast_rotors_column_tears(law: CalibratedLaw) -> None:
+def test_gas_off_a_fast_rotors_column_separates(law: CalibratedLaw) -> None:
     flow = law.evaluate(fill_ratio=[0.05, 0.45], gas_pressure=0.0, primed=True)
     assert np.all(flow.regime == Regime.BLOCKED)
     assert not np.any(flow.primed)
@@ -278,9 +278,9 @@ def test_spread_of_the_heads_never_falls_below_that_of_k(
     u = np.geomspace(2e-5, 5e2, 20001)
     loss = tube_loss(tube=scene.tube, liquid=scene.liquid, angular_velocity=speed, velocity=u)
     exact = loss.k.uncertainty / (loss.k.value + 1)
-    tabulated = heads.spread(np.log(u))
+    tabulated = heads.uncertainty(np.log(u))
     neighbours = np.lib.stride_tricks.sliding_window_view(np.pad(exact, 12, mode="edge"), 25)
     assert np.all(tabulated > 0.99 * neighbours.min(axis=1))
     assert np.all(tabulated < 1.01 * neighbours.max(axis=1))
     assert np.median(np.abs(tabulated / exact - 1)) < 1e-4
-    assert np.all(heads.hump_spread(np.log(u)) > 0)
+    assert np.all(heads.hump_uncertainty(np.log(u)) > 0)

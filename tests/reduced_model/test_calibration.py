@@ -96,7 +96,8 @@ def test_random_discs_agree_within_1e_6_and_their_own_bars(table_1_scene: Scene,
             error = abs(float(curve.value[i]) - reference)
             assert error <= 1e-6 * reference
             assert error <= float(curve.uncertainty[i])
-            assert float(curve.uncertainty[i]) <= 1e-5 * reference
+            # Without surface tension, which no model holds.
+            assert float(np.hypot(curve.numerical, curve.left_out)[i]) <= 1e-5 * reference
     lam = chamber.moment_per_mass
     assert abs(float(lam.value) - exact.central_lambda()) <= min(
         float(lam.uncertainty), 1e-6 * exact.central_lambda()
@@ -106,7 +107,7 @@ def test_random_discs_agree_within_1e_6_and_their_own_bars(table_1_scene: Scene,
         level = density * omega**2 * (scene.disc.outer_radius**2 - exact.surface(float(x)) ** 2) / 2
         assert float(found.flow_law.wall_pressure(x)) == pytest.approx(level, rel=2e-6)
         assert abs(float(found.flow_law.wall_pressure(x)) - level) <= float(
-            found.flow_law.wall_pressure_spread(x)
+            found.flow_law.wall_pressure_uncertainty(x)
         )
 
 
@@ -143,12 +144,11 @@ def test_gravity_is_modelled_only_above_the_tolerance(table_1_scene: Scene) -> N
     assert not left_out.chamber.gravity_modelled
     modelled = calibrate(dataclasses.replace(slow, tolerance=1e-7))
     assert modelled.chamber.gravity_modelled
-    # The bar of the cheaper rung holds the dearer one.
+    # The uncertainty of the cheaper model holds the more expensive one.
     for name in ("wall_pressure", "moment"):
-        cheap, dear = getattr(left_out.chamber, name), getattr(modelled.chamber, name)
-        off = np.abs(cheap.value[::2] - dear.value)  # the dearer rung has every second node
-        assert np.all(off <= cheap.uncertainty[::2] + dear.uncertainty)
-        assert np.any(off > dear.numerical)
+        cheap, costly = getattr(left_out.chamber, name), getattr(modelled.chamber, name)
+        assert np.all(np.abs(cheap.value - costly.value) <= cheap.uncertainty + costly.uncertainty)
+        assert np.any(np.abs(cheap.value - costly.value) > costly.numerical)
     terms = {t.term: t.model for t in modelled.models_used}
     assert "quasi-static" in terms["gravity, mean over a turn"]
 
@@ -189,3 +189,15 @@ def test_calibration_reproduces_to_the_last_bit(
     assert first.statistics == second.statistics
     for name, table in first.flow_law.table().items():
         np.testing.assert_array_equal(table, second.flow_law.table()[name])
+
+
+def test_terms_without_a_model_enter_the_uncertainty(table_1_calibration: Calibration) -> None:
+    """Surface tension, 0.0078 % of the wall pressure at the worst fill, is in the bar of every answer."""
+    terms = {used.term: used.estimated_contribution or 0.0 for used in table_1_calibration.models_used}
+    chamber = table_1_calibration.chamber
+    share = chamber.wall_pressure.uncertainty[1:] / chamber.wall_pressure.value[1:]
+    assert terms["surface tension"] > 5e-5
+    assert np.max(share) >= terms["surface tension"]
+    assert np.min(share) > 1e-5
+    central = float(chamber.moment_per_mass.uncertainty / chamber.moment_per_mass.value)
+    assert 1e-6 < central < 1e-3

@@ -1,4 +1,4 @@
-"""The map of k over bore and viscosity, held against the calibrated law and `tube_loss` point by point."""
+"""The map of k over bore and viscosity, compared with the calibrated law and `tube_loss` point by point."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ringbalance.physics.tube_loss import tube_loss
+from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.calibration import Calibration
-from ringbalance.reduced_model.drag_map import (
+from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.tube.heads import tube_heads
+from ringbalance.reports.studies.drag_map import (
     LiquidVerdicts,
     drag_contour,
     drag_map,
     liquid_verdicts,
     velocity_errors,
 )
-from ringbalance.reduced_model.flow_law import Regime
-from ringbalance.reduced_model.tube_heads import tube_heads
 from ringbalance.scene.liquids import liquid_at
 from ringbalance.scene.models import InputUncertainty, Scene
 
@@ -102,13 +102,13 @@ def test_where_the_apparent_k_is_fifty_eq_19_has_the_velocity(calibration: Calib
     )
 
 
-def test_torn_columns_look_like_more_drag(calibration: Calibration) -> None:
+def test_separated_columns_look_like_more_drag(calibration: Calibration) -> None:
     point = drag_map(calibration=calibration).point
-    torn = point.regime == Regime.SEPARATED
-    assert np.any(torn)
-    assert np.any(~torn)
-    assert np.all(point.apparent_k[torn] > point.k[torn])
-    np.testing.assert_allclose(point.apparent_k[~torn], point.k[~torn], rtol=1e-9)
+    separated = point.regime == Regime.SEPARATED
+    assert np.any(separated)
+    assert np.any(~separated)
+    assert np.all(point.apparent_k[separated] > point.k[separated])
+    np.testing.assert_allclose(point.apparent_k[~separated], point.k[~separated], rtol=1e-9)
 
 
 @pytest.mark.parametrize(("bore", "viscosity"), [(1.5e-3, 5e-5), (0.4e-3, 4e-6)])
@@ -140,12 +140,12 @@ def test_the_default_map_holds_the_scene(calibration: Calibration) -> None:
     assert np.all(found.point.k[0] > found.point.k[20])
 
 
-def test_k_by_decree_is_lifted(calibration: Calibration) -> None:
+def test_prescribed_k_is_lifted(calibration: Calibration) -> None:
     scene = calibration.scene
-    decreed = replace(scene, tube=replace(scene.tube, drag_coefficient=50.0))
+    prescribed = replace(scene, tube=replace(scene.tube, drag_coefficient=50.0))
     grid = {"bore": [1e-3, 2e-3], "kinematic_viscosity": [1e-6, 1e-4]}
-    plain = drag_map(calibration=calibration, **grid)  # type: ignore[arg-type]
-    lifted = drag_map(calibration=with_scene(calibration, decreed), **grid)  # type: ignore[arg-type]
+    plain = drag_map(calibration=calibration, **grid)
+    lifted = drag_map(calibration=with_scene(calibration, prescribed), **grid)
     np.testing.assert_array_equal(plain.point.k, lifted.point.k)
 
 

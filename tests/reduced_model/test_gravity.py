@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
-from ringbalance.physics.ring import ring_quantities
-from ringbalance.reduced_model.gravity import check_ring, closed_ring, gravity_effect, gravity_ratio
-from ringbalance.reduced_model.gravity_open import open_ring_effect
+from ringbalance.physics.pressure.ring import ring_quantities
+from ringbalance.reduced_model.chamber.gravity import check_ring, closed_ring, gravity_effect, gravity_ratio
+from ringbalance.reduced_model.chamber.gravity_open import open_ring_effect
 from ringbalance.scene import SceneError
 from ringbalance.scene.models import Scene, Shaft
 
@@ -18,10 +19,10 @@ from ringbalance.scene.models import Scene, Shaft
 @pytest.mark.parametrize("shaft", ["horizontal", "vertical"])
 def test_second_order_effect_agrees_with_finite_elements(table_1_scene: Scene, shaft: Shaft) -> None:
     disc, x = table_1_scene.disc, np.array([0.25, 0.5])
-    common = {"disc": disc, "density": 1000.0, "angular_velocity": 100.0, "fill_ratio": x}
-    plain = ring_quantities(**common)  # type: ignore[arg-type]
-    heavy = ring_quantities(**common, gravity=9.80665, shaft=shaft)  # type: ignore[arg-type]
-    effect = gravity_effect(**common, gravity=9.80665, vertical=shaft == "vertical")  # type: ignore[arg-type]
+    common: dict[str, Any] = {"disc": disc, "density": 1000.0, "angular_velocity": 100.0, "fill_ratio": x}
+    plain = ring_quantities(**common)
+    heavy = ring_quantities(**common, gravity=9.80665, shaft=shaft)
+    effect = gravity_effect(**common, gravity=9.80665, vertical=shaft == "vertical")
     # Plates are taken as radial in the estimate: it is good to a quarter, which its safety factor covers.
     for found, estimate in (
         (heavy.wall_pressure.value - plain.wall_pressure.value, effect.wall_pressure),
@@ -32,8 +33,12 @@ def test_second_order_effect_agrees_with_finite_elements(table_1_scene: Scene, s
 
 def test_effect_falls_with_the_fourth_power_of_speed_against_the_whole(table_1_scene: Scene) -> None:
     def share(omega: float) -> float:
-        common = {"disc": table_1_scene.disc, "density": 1000.0, "fill_ratio": np.array([0.25])}
-        effect = gravity_effect(**common, angular_velocity=omega, gravity=9.81, vertical=False)  # type: ignore[arg-type]
+        common: dict[str, Any] = {
+            "disc": table_1_scene.disc,
+            "density": 1000.0,
+            "fill_ratio": np.array([0.25]),
+        }
+        effect = gravity_effect(**common, angular_velocity=omega, gravity=9.81, vertical=False)
         return float(effect.wall_pressure[0]) / omega**2
 
     assert share(100.0) / share(1000.0) == pytest.approx(1e4, rel=1e-9)
@@ -69,10 +74,10 @@ def test_a_thin_ring_opens_first(table_1_scene: Scene) -> None:
 @pytest.mark.parametrize("vertical", [False, True])
 def test_two_derivations_of_the_effect_agree_on_closed_rings(table_1_scene: Scene, vertical: bool) -> None:
     bare = dataclasses.replace(table_1_scene.disc, plate_thickness=0.0)
-    common = {"disc": bare, "density": 1000.0, "gravity": 9.81, "vertical": vertical}
+    common: dict[str, Any] = {"disc": bare, "density": 1000.0, "gravity": 9.81, "vertical": vertical}
     fills = np.array([0.1, 0.25, 0.5])
     expansion, quadrature = (
-        effect(**common, angular_velocity=200.0, fill_ratio=fills)  # type: ignore[operator]
+        effect(**common, angular_velocity=200.0, fill_ratio=fills)
         for effect in (gravity_effect, open_ring_effect)
     )
     np.testing.assert_allclose(quadrature.moment, expansion.moment, rtol=2e-3)
@@ -81,11 +86,16 @@ def test_two_derivations_of_the_effect_agree_on_closed_rings(table_1_scene: Scen
 
 def test_an_open_ring_loses_less_than_the_expansion_says(table_1_scene: Scene) -> None:
     bare = dataclasses.replace(table_1_scene.disc, plate_thickness=0.0)
-    common = {"disc": bare, "density": 1000.0, "gravity": 9.81, "vertical": False, "angular_velocity": 50.0}
+    common: dict[str, Any] = {
+        "disc": bare,
+        "density": 1000.0,
+        "gravity": 9.81,
+        "vertical": False,
+        "angular_velocity": 50.0,
+    }
     fills = np.array([0.0, 0.005, 0.02])
     expansion, quadrature = (
-        effect(**common, fill_ratio=fills)  # type: ignore[operator]
-        for effect in (gravity_effect, open_ring_effect)
+        effect(**common, fill_ratio=fills) for effect in (gravity_effect, open_ring_effect)
     )
     assert quadrature.wall_pressure[0] == pytest.approx(0.0, abs=1e-9)
     assert np.all(quadrature.wall_pressure[1:] < expansion.wall_pressure[1:])

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.reduced_model.hermite import HermiteTable
-from ringbalance.reduced_model.hermite_fit import level_table, refined_table, table_from_samples
+from ringbalance.reduced_model.tables.fit import level_table, refined_table, table_from_samples
+from ringbalance.reduced_model.tables.hermite import HermiteTable
 
 
 def test_quintics_are_exact() -> None:
     def y(x: np.ndarray) -> np.ndarray:
-        return 1 - 2 * x + 3 * x**2 - x**3 + 0.5 * x**4 - 0.25 * x**5
+        return np.asarray(1 - 2 * x + 3 * x**2 - x**3 + 0.5 * x**4 - 0.25 * x**5)
 
     table = table_from_samples(start=-1.0, stop=2.0, value=y(np.linspace(-1, 2, 9)))
     x = np.linspace(-1, 2, 101)

@@ -7,9 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from ringbalance.reduced_model import paper
-from ringbalance.reduced_model.flow_law import Regime
-from ringbalance.reduced_model.paper_law import paper_law, paper_model
+from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.law.paper_law import paper_law, paper_model
+from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.scene.models import Scene
 
 
@@ -53,7 +53,7 @@ def test_table_reproduces_the_law(table_1_scene: Scene) -> None:
     assert float(flow.velocity) == pytest.approx(float(squared[0]) ** 0.5, rel=1e-15)
 
 
-def test_scene_fixes_k_by_decree(table_1_scene: Scene) -> None:
+def test_scene_fixes_prescribed_k(table_1_scene: Scene) -> None:
     tube = dataclasses.replace(table_1_scene.tube, drag_coefficient=20.0)
     assert paper_law(dataclasses.replace(table_1_scene, tube=tube)).drag_coefficient == 20.0
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_first_moment, surface_radius
-from ringbalance.reduced_model.tilted_ring import TiltedRing, tilted_ring
+from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing, tilted_ring
 from ringbalance.scene import models
 
 
@@ -88,7 +88,7 @@ def test_the_slope_of_the_moment_is_that_of_the_moment(table_1_scene: models.Sce
         assert found.moment_per_volume[1] == pytest.approx(slope, rel=1e-5)
 
 
-def test_an_open_ring_is_told(table_1_scene: models.Scene) -> None:
+def test_an_open_ring_is_reported(table_1_scene: models.Scene) -> None:
     assert list(ring(table_1_scene.disc, tilt=8e-3, fills=[0.05, 0.5]).closed) == [False, True]
 
 

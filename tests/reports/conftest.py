@@ -91,11 +91,11 @@ def _law() -> dict[str, Any]:
         found = np.minimum(printed * 1.9, separated)
         paper.append(_floats(printed))
         velocity.append(_floats(found))
-        torn = separated < 1.9 * printed
+        cavitated = separated < 1.9 * printed
         regime.append(
             [
                 "blocked" if v == 0 else "separated" if t else "siphon"
-                for v, t in zip(found, torn, strict=True)
+                for v, t in zip(found, cavitated, strict=True)
             ]
         )
     return {
@@ -287,7 +287,7 @@ def _profile() -> dict[str, Any]:
 
 @pytest.fixture
 def evidence() -> dict[str, Any]:
-    """A whole evidence document, anew for each test."""
+    """A whole evidence document, fresh for each test."""
     return document()
 
 

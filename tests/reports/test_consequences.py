@@ -6,7 +6,7 @@ import copy
 from typing import Any
 
 from ringbalance.reports import summary
-from ringbalance.reports.consequence_view import consequence_view
+from ringbalance.reports.pages.consequences import consequence_view
 from ringbalance.reports.render import render
 
 Record = dict[str, Any]
@@ -101,7 +101,7 @@ def test_a_law_that_does_not_flow_leaves_its_tables_out() -> None:
     assert consequence_view(None) is None
 
 
-def test_claims_judged_on_another_disc_are_told_apart(evidence: Record) -> None:
+def test_claims_judged_on_another_disc_are_distinguished(evidence: Record) -> None:
     changed = copy.deepcopy(evidence)
     for case in changed["verification"]:
         case["scene_sha256"] = changed["scene"]["sha256"]

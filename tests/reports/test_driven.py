@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from ringbalance.reports import driven, summary
+from ringbalance.reports import summary
+from ringbalance.reports.pages import eccentric_mass as driven
 
 Record = dict[str, Any]
 
@@ -39,7 +40,7 @@ def test_each_paper_has_its_own_claims() -> None:
 def test_verdicts_are_counted() -> None:
     view = driven.view(evidence())
     assert view is not None
-    assert view["lead"] == "Of 2 claims of the driven-mass paper 1 is confirmed, 1 is refuted."
+    assert view["lead"] == "Of 2 claims of the eccentric-mass paper 1 is confirmed, 1 is refuted."
 
 
 def test_a_balancer_that_does_not_settle_has_no_time() -> None:
@@ -53,9 +54,9 @@ def test_a_balancer_that_does_not_settle_has_no_time() -> None:
     }
     view = driven.view(evidence(compared))
     assert view is not None
-    assert view["compared"]["heads"] == ["liquid ring", "two driven masses"]
+    assert view["compared"]["heads"] == ["liquid ring", "two eccentric masses"]
     assert view["compared"]["rows"][0]["cells"][0] == "–"
-    assert view["status"][1] == "Two driven masses: settled."
+    assert view["status"][1] == "Two eccentric masses: settled."
 
 
 def test_what_cannot_be_compared_is_said() -> None:

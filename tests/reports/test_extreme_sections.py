@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import pytest
 
-from ringbalance.reports import extremes, extremes_cli, sloshing
+from ringbalance.reports.pages import extremes, extremes_cli, sloshing
 from ringbalance.reports.section import Work
 from ringbalance.scene import Scene
 
@@ -52,7 +52,7 @@ def test_a_first_mode_that_nears_the_speed_is_named() -> None:
     assert "No mode" in findings(waves(resonant=[], top=0.6))
 
 
-def test_the_swing_of_the_pressure_is_told_beside_that_of_the_moment() -> None:
+def test_the_swing_of_the_pressure_is_reported_beside_that_of_the_moment() -> None:
     told = findings(waves(resonant=[], top=0.6))
     assert "0.8 times" in told
     assert "the wall pressure 3.6 times" in told

@@ -9,7 +9,13 @@ import numpy as np
 import pytest
 
 from ringbalance.mesh.export import read_vtu
-from ringbalance.reports.fields import ChamberField, chamber_field, mesh_record, pressure_profile, write_field
+from ringbalance.reports.pictures.fields import (
+    ChamberField,
+    chamber_field,
+    mesh_record,
+    pressure_profile,
+    write_field,
+)
 from ringbalance.scene import Scene
 
 
@@ -51,7 +57,7 @@ def test_the_file_holds_the_field(tmp_path: Path, paper_scene: Scene, field: Cha
     assert {"free_surface", "outer_wall", "end_front"} <= set(stored.mesh.boundaries)
 
 
-def test_the_mesh_is_told(field: ChamberField) -> None:
+def test_the_mesh_is_reported(field: ChamberField) -> None:
     record = mesh_record(field)
     assert record["unknowns"] == math.prod(2 * count + 1 for count in record["cells"])
     assert 0.5 < record["minimum_scaled_jacobian"] <= 1

@@ -8,8 +8,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from ringbalance.reports.case_figures import series_plots
-from ringbalance.reports.figure_style import DARK, LIGHT, Drawing, decade, plain_number, standalone
+from ringbalance.reports.figures.cases import series_plots
+from ringbalance.reports.figures.style import DARK, LIGHT, Drawing, decade, plain_number, standalone
 from ringbalance.reports.page import page_content
 
 Record = dict[str, Any]

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from ringbalance.reports import opengl
-from ringbalance.reports.opengl import DEBIAN_PACKAGES, find_opengl
+from ringbalance.reports.pictures import opengl
+from ringbalance.reports.pictures.opengl import DEBIAN_PACKAGES, find_opengl
 
 
 def test_a_missing_library_is_named_with_what_to_install() -> None:
@@ -35,7 +35,7 @@ def fake_python(folder: Path, script: str) -> str:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="needs a shell")
-def test_a_driver_that_crashes_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_driver_that_crashes_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "executable", fake_python(tmp_path, "kill -SEGV $$"))
     found = find_opengl()
     assert not found.available
@@ -43,7 +43,7 @@ def test_a_driver_that_crashes_is_told(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 @pytest.mark.skipif(os.name != "posix", reason="needs a shell")
-def test_a_driver_that_hangs_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_driver_that_hangs_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "executable", fake_python(tmp_path, "exec sleep 60"))
     monkeypatch.setattr(opengl, "_PATIENCE", 0.2)
     found = find_opengl()

@@ -8,8 +8,8 @@ from importlib.resources import files
 from itertools import pairwise
 from typing import Any
 
-from ringbalance.reports.figure_style import DARK, LIGHT
-from ringbalance.reports.picture_theme import THEMES
+from ringbalance.reports.figures.style import DARK, LIGHT
+from ringbalance.reports.pictures.theme import THEMES
 from ringbalance.reports.render import render
 
 Record = dict[str, Any]

@@ -8,14 +8,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib import colormaps
 from PIL import Image
 
 from ringbalance.reports.cli import plot
-from ringbalance.reports.opengl import OpenGL, find_opengl
-from ringbalance.reports.picture_text import BAR_SHADES, Bar, letter, shade_bar, with_palette
-from ringbalance.reports.picture_theme import PICTURE, THEMES
-from ringbalance.reports.pictures import finish_drawing, start_drawing, stop_drawing, write_fields
-from ringbalance.reports.tube_picture import tube_field
+from ringbalance.reports.pictures.opengl import OpenGL, find_opengl
+from ringbalance.reports.pictures.process import finish_drawing, start_drawing, stop_drawing, write_fields
+from ringbalance.reports.pictures.text import BAR_SHADES, Bar, letter, shade_bar, with_palette
+from ringbalance.reports.pictures.theme import PICTURE, THEMES
+from ringbalance.reports.pictures.tube import tube_field
 from ringbalance.scene import Scene, bundled_scene
 
 NO_OPENGL = OpenGL(available=False, window="", text="The 3-D pictures were left out: no OpenGL here.")
@@ -69,7 +70,7 @@ def test_the_colour_bar_runs_from_end_to_end(drawn: Path) -> None:
 
 
 @needs_opengl
-def test_a_drawing_that_fails_is_told(tmp_path: Path, paper_scene: Scene) -> None:
+def test_a_drawing_that_fails_is_reported(tmp_path: Path, paper_scene: Scene) -> None:
     missing = {"pressure": tmp_path / "none.vtu", "disc": tmp_path / "none.vtu"}
     record = finish_drawing(start_drawing(scene=paper_scene, fields=missing, folder=tmp_path))
     assert record["drawn"] is False
@@ -98,7 +99,7 @@ def test_captions_follow_the_scene(tmp_path: Path, paper_scene: Scene) -> None:
 def test_plot_without_opengl_writes_the_fields(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("ringbalance.reports.pictures.find_opengl", lambda: NO_OPENGL)
+    monkeypatch.setattr("ringbalance.reports.pictures.process.find_opengl", lambda: NO_OPENGL)
     assert plot(bundled_scene("liquid_ring_paper"), out=tmp_path / "out") == 1
     assert "no OpenGL here" in capsys.readouterr().err.replace("\n", " ")
     assert len(list((tmp_path / "out" / "fields").glob("*.vtu"))) == 2
@@ -111,9 +112,7 @@ def test_fields_are_written_at_two_fills(tmp_path: Path, paper_scene: Scene) -> 
 
 
 def test_lettering_and_palette() -> None:
-    bar = Bar(
-        title="depth", colours=lambda x: np.c_[x, x, x, x], low=0.0, high=1.0, ticks=(0.5,), labels=("0.5",)
-    )
+    bar = Bar(title="depth", colours=colormaps["gray"], low=0.0, high=1.0, ticks=(0.5,), labels=("0.5",))
     blank = Image.new("RGB", (200, 300), "#ffffff")
     lettered = letter(blank, labels=[], bar=bar, ink="#000000", ground="#ffffff", scale=1)
     shaded = shade_bar(lettered, bar)
@@ -141,7 +140,7 @@ def test_the_tube_is_coloured_by_its_own_pressures(paper_scene: Scene) -> None:
     assert radius[field["hump"]] == pytest.approx(paper_scene.tube.hump_radius)
     np.testing.assert_allclose(points[0, :2], -points[-1, :2], atol=1e-12)
     assert np.all(np.linalg.norm(np.diff(points, axis=0), axis=1) > 0)
-    # Torn at the hump: the lowest pressure begins there.
+    # Separated at the crest: the lowest pressure begins there.
     assert pressure[field["hump"]] == pytest.approx(pressure.min(), abs=1.0)
     assert not all(field["full"])
 

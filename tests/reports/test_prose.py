@@ -23,7 +23,7 @@ from ringbalance.reports.prose import typeset
         ("0.05 um at 20 degC", "0.05 µm at 20 °C"),
         ("rhomboid, omegas, pipe", "rhomboid, omegas, pipe"),
         ("sqrt(T_0/T) with sigma and R_Omega", "√(T₀/T) with σ and R_Ω"),
-        ("the disc's hump", "the disc’s hump"),
+        ("the disc's siphon crest", "the disc’s siphon crest"),
     ],
 )
 def test_signs(plain: str, set_text: str) -> None:

@@ -11,15 +11,15 @@ from typing import Any
 
 import pytest
 
-from ringbalance.controller import find_consequences
 from ringbalance.reports import cli
 from ringbalance.reports import evidence as evidence_module
 from ringbalance.reports import report as report_module
-from ringbalance.reports.opengl import OpenGL
 from ringbalance.reports.page import page_content
+from ringbalance.reports.pictures.opengl import OpenGL
 from ringbalance.reports.render import render
 from ringbalance.reports.report import Report, write_report
 from ringbalance.reports.saved import heavy_cases, kept_document, saved_cases
+from ringbalance.reports.studies.consequences import find_consequences
 from ringbalance.scene import Scene, SceneError, bundled_scene
 from ringbalance.verification.runner import cases_under_way
 
@@ -72,12 +72,23 @@ def test_everything_is_there(first: Report) -> None:
     assert (folder / "report.html").stat().st_mode & 0o777 == 0o644
 
 
+def test_the_report_gives_the_estimates_of_every_command(first: Report) -> None:
+    evidence = first.evidence
+    used = evidence["calibration"]["models_used"]
+    assert used == evidence["closed_loop"]["calibrated"]["models_used"]
+    shown = {row["term"]: row for row in used}
+    for row in evidence["trade"]["terms"]:
+        assert shown[row["term"]]["estimated_contribution"] == row["estimated_contribution"]
+        assert shown[row["term"]]["why"].startswith(row["why"])
+    assert shown["tube inertia"]["model"] != "left out"
+
+
 def test_the_page_comes_from_the_evidence_file_alone(first: Report) -> None:
     evidence = json.loads((first.page.parent / "evidence.json").read_text())
     assert render(evidence) == first.page.read_text()
 
 
-def test_the_consequences_of_a_wrong_k_are_told(first: Report) -> None:
+def test_the_consequences_of_a_wrong_k_are_reported(first: Report) -> None:
     page, found = first.page.read_text(), first.evidence["consequences"]
     assert 'href="#consequences"' in page
     assert {drawing.name for drawing in page_content(first.evidence).drawings} >= {"gain-margin"}
@@ -116,7 +127,7 @@ def test_a_real_document_has_the_shape_of_the_sample(first: Report, whole: Recor
     assert [fault for fault in lacking(whole, first.evidence, "") if "verification" not in fault] == []
 
 
-def test_the_scene_and_its_text_are_told(first: Report, paper_scene: Scene) -> None:
+def test_the_scene_and_its_text_are_reported(first: Report, paper_scene: Scene) -> None:
     assert first.evidence["scene"]["sha256"] == paper_scene.sha256
     assert first.evidence["scene"]["text"] == "# a scene\n"
     assert first.evidence["seeds"] == {"run": paper_scene.run.seed}
@@ -184,6 +195,56 @@ def test_an_evidence_file_that_is_none_is_refused(tmp_path: Path) -> None:
     (tmp_path / "evidence.json").write_text("{")
     with pytest.raises(OSError, match=r"evidence\.json is not an evidence file"):
         saved_cases(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        (b"", "evidence.json is not an evidence file"),
+        (b"\xff\xfe{}", "evidence.json is not an evidence file"),
+        (b"[" * 100_000, "nested too deeply"),
+        (b"[]", "no object"),
+        (b'{"times": null}', '"times"'),
+        (b'{"times": []}', '"times"'),
+        (b'{"times": {"date": 3}}', '"times"'),
+        (b'{"times": {"total_s": NaN}}', "not JSON compliant"),
+        (b'{"verification": null}', '"verification"'),
+        (b'{"verification": [1]}', '"verification"'),
+        (b'{"verification": {"a": 1}}', '"verification"'),
+        (b'{"verification": [{"cost": "heavy", "verdict": "passed"}]}', '"id" of verification[0] is missing'),
+    ],
+)
+def test_a_damaged_evidence_file_is_reported_before_the_work(
+    content: bytes, told: str, write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(report_module, "write_fields", lambda **_: pytest.fail("begun"))
+    (tmp_path / "evidence.json").write_bytes(content)
+    with pytest.raises(OSError, match="move it away or choose another folder") as caught:
+        write(tmp_path)
+    assert told in str(caught.value)
+    assert str(tmp_path / "evidence.json") in str(caught.value)
+    assert (tmp_path / "evidence.json").read_bytes() == content
+
+
+@pytest.mark.parametrize("name", ["figures", "fields", "report.html"])
+def test_what_is_in_the_way_of_a_report_is_reported_before_the_work(
+    name: str, write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(report_module, "write_fields", lambda **_: pytest.fail("begun"))
+    (tmp_path / name).touch() if name != "report.html" else (tmp_path / name).mkdir()
+    with pytest.raises(OSError, match=f"{name} is a f"):
+        write(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+def test_a_failure_makes_no_folder(write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: Any, **__: Any) -> Record:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(report_module, "collect_evidence", fail)
+    with pytest.raises(KeyboardInterrupt):
+        write(tmp_path / "new" / "out")
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(

@@ -11,11 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ringbalance.controller import simulate
+from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.calibration import calibrate
-from ringbalance.reduced_model.paper_law import paper_model
-from ringbalance.reports import fifty, hump, inside, paper_again
-from ringbalance.reports.figure_style import Drawing
+from ringbalance.reduced_model.law.paper_law import paper_model
+from ringbalance.reports.figures.style import Drawing
+from ringbalance.reports.pages import drag_coefficient as fifty
+from ringbalance.reports.pages import paper_figures as paper_again
+from ringbalance.reports.pages import siphon_crest as hump
+from ringbalance.reports.pages import tube_flow as inside
 from ringbalance.reports.render import render
 from ringbalance.reports.section import Section, Work
 from ringbalance.reports.sections import SECTIONS, drawings_in, viewed
@@ -99,13 +102,13 @@ def test_where_nothing_flows_the_page_says_so(evidence: Record, fifty_record: Re
     assert view is not None
     assert view["map"] is None
     assert {row["verdict"] for row in view["rows"]} == {"nothing flows"}
-    assert "no k can be told" in view["lead"]
+    assert "no k can be given" in view["lead"]
     assert "there is no map to draw" in render({**evidence, "fifty": dry})
 
 
-def test_a_decreed_k_is_named(evidence: Record, fifty_record: Record) -> None:
-    decreed = {**fifty_record, "decreed_k": 50.0}
-    assert "The scene fixes k at 50" in render(with_section(evidence, "fifty", decreed))
+def test_a_prescribed_k_is_named(evidence: Record, fifty_record: Record) -> None:
+    prescribed = {**fifty_record, "decreed_k": 50.0}
+    assert "The scene fixes k at 50" in render(with_section(evidence, "fifty", prescribed))
     assert "The scene fixes k" not in render(with_section(evidence, "fifty", fifty_record))
 
 
@@ -130,7 +133,7 @@ def test_every_regime_that_is_found_is_drawn(evidence: Record, hump_record: Reco
     view = hump.view(with_section(evidence, "hump", hump_record))
     assert view is not None
     columns = {row["regime"]: row["column"] for row in view["rows"]}
-    assert (columns["siphon"], columns["separated"]) == ("holds", "tears")
+    assert (columns["siphon"], columns["separated"]) == ("holds", "separates")
     assert view["absent"] == "reverse"
     assert 'id="hump"' in render(with_section(evidence, "hump", hump_record))
 
@@ -196,7 +199,7 @@ def test_the_three_dimensional_check_tells_when_it_was_run(evidence: Record) -> 
     assert check is not None
     assert (check["when"], check["hash"]) == ("", "")
     assert "heavy" in check["why_not_run"]
-    run = {**case, "verdict": "passed", "date": "2031-05-06", "scene_sha256": "ef" * 32}
+    run: dict[str, Any] = {**case, "verdict": "passed", "date": "2031-05-06", "scene_sha256": "ef" * 32}
     run["quantities"] = [
         {"name": "k", "unit": "1", "value": 12.3, "reference": 12.1, "uncertainty": 0.4, "verdict": "passed"}
     ]

@@ -1,4 +1,4 @@
-"""The summary counts, chooses and compares; it never judges anew."""
+"""The summary counts, chooses and compares; it never judges again."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_claims_stand_in_the_papers_order(evidence: Record) -> None:
     assert [case["number"] for case in headlines(evidence)] == [6, 9, 10, 11]
 
 
-def test_without_marked_claims_those_that_fell_are_told(evidence: Record) -> None:
+def test_without_marked_claims_those_that_fell_are_reported(evidence: Record) -> None:
     for case in evidence["verification"]:
         case["headline"] = False
     assert [case["number"] for case in headlines(evidence)] == [6, 9, 10]

@@ -6,12 +6,12 @@ from typing import Any
 
 import pytest
 
-from ringbalance.reports.trade import view
+from ringbalance.reports.pages.model_selection import view
 
 Record = dict[str, Any]
 
 
-def rung(name: str, error: float, cost: float, *, front: bool = True) -> Record:
+def fidelity(name: str, error: float, cost: float, *, front: bool = True) -> Record:
     return {"name": name, "error": error, "cost_s": cost, "on_front": front, "models": {}, "leaves_out": []}
 
 
@@ -32,10 +32,10 @@ def evidence() -> Record:
         "title": "wall pressure",
         "status": {"code": "out_of_range", "text": "gravity leaves a closed ring above 0.3 only"},
         "rungs": [
-            rung("formula", 0.09, 4e-5),
-            rung("closed form", 1.6e-3, 3e-4),
-            rung("coarse mesh", 1.7e-3, 0.04, front=False),
-            rung("fine mesh", 0.0, 0.8),
+            fidelity("formula", 0.09, 4e-5),
+            fidelity("closed form", 1.6e-3, 3e-4),
+            fidelity("coarse mesh", 1.7e-3, 0.04, front=False),
+            fidelity("fine mesh", 0.0, 0.8),
         ],
         "knee": "closed form",
         "top": "fine mesh",
@@ -52,7 +52,7 @@ def evidence() -> Record:
             "numbers": [
                 {"name": "Re", "value": 27800.0, "formula": "u d/nu", "tells": "laminar or turbulent"},
                 {
-                    "name": "valve lag over gas time",
+                    "name": "valve lag over valve-open time",
                     "value": None,
                     "formula": "lag over T",
                     "tells": "valve lag",
@@ -64,7 +64,7 @@ def evidence() -> Record:
     }
 
 
-def test_the_front_and_the_choices_are_told(evidence: Record) -> None:
+def test_the_front_and_the_choices_are_reported(evidence: Record) -> None:
     found = view(evidence)
     assert found is not None
     (quantity,) = found["quantities"]
@@ -75,18 +75,18 @@ def test_the_front_and_the_choices_are_told(evidence: Record) -> None:
         "cost": "300 µs",
         "time": "560 µs",
     }
-    assert [row["rung"] for row in quantity["choices"]] == ["formula", "closed form"]
+    assert [row["model"] for row in quantity["choices"]] == ["formula", "closed form"]
     assert quantity["own"]["reasons"][1].startswith("checked")
     assert "closed ring" in quantity["status"]
     assert found["numbers"][1]["value"] == "–"
 
 
-def test_the_figure_draws_every_rung(evidence: Record) -> None:
+def test_the_figure_draws_every_model(evidence: Record) -> None:
     found = view(evidence)
     assert found is not None
     figure = found["quantities"][0]["figure"]
     assert figure.name == "trade-wall-pressure"
-    assert "4 rungs" in figure.alt
+    assert "4 models" in figure.alt
 
 
 def test_without_a_trade_there_is_no_section() -> None:
@@ -103,7 +103,9 @@ def test_without_a_trade_there_is_no_section() -> None:
         ),
     ],
 )
-def test_a_tolerance_that_no_models_are_chosen_for_is_told(evidence: Record, asked: float, told: str) -> None:
+def test_a_tolerance_that_no_models_are_chosen_for_is_reported(
+    evidence: Record, asked: float, told: str
+) -> None:
     evidence["trade"]["tolerance"] = asked
     found = view(evidence)
     assert found is not None

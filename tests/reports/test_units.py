@@ -47,5 +47,5 @@ def test_the_unit_does_not_hang_on_the_last_bits(value: float, unit: str) -> Non
         for v in (value, math.nextafter(value, 0), math.nextafter(value, math.inf))
     ]
     assert len(set(near)) == 1 or any(
-        abs(value / rung - 1) < 2e-9 for rung in (1e-8, 1e-4, 1e3, 1e5, 0.1, 10.0)
+        abs(value / fidelity - 1) < 2e-9 for fidelity in (1e-8, 1e-4, 1e3, 1e5, 0.1, 10.0)
     )

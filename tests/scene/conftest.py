@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from ringbalance.scene import Scene, bundled_scene, load_scene
+from ringbalance.scene import AnyScene, bundled_scene, load_scene
 
 Document = dict[str, Any]
 
@@ -59,10 +59,10 @@ def newcomer_document() -> Document:
 
 
 @pytest.fixture
-def load(tmp_path: Path, as_toml: Callable[[Mapping[str, Any]], str]) -> Callable[[Mapping[str, Any]], Scene]:
+def load(tmp_path: Path, as_toml: Callable[[Mapping[str, Any]], str]) -> Callable[[Mapping[str, Any]], Any]:
     """Write a document to my_disc.toml and load it."""
 
-    def load_document(document: Mapping[str, Any]) -> Scene:
+    def load_document(document: Mapping[str, Any]) -> AnyScene:
         path = tmp_path / "my_disc.toml"
         path.write_text(as_toml(document), encoding="utf-8")
         return load_scene(path)

@@ -102,19 +102,15 @@ SINGLE: dict[str, Broken] = {
     "port inside the chamber's floor": _one(
         "tube.port_radius", "20 mm", "port lies outside", "inner_radius (20.5 mm)"
     ),
-    "hump outside the port": Broken(
+    "siphon crest outside the port": Broken(
         {"tube.port_radius": "40 mm", "tube.hump_radius": "41 mm"},
-        (
-            Expected(
-                "tube", "hump_radius", '"41 mm"', "hump lies outside the port", "below port_radius (40 mm)"
-            ),
-        ),
+        (Expected("tube", "hump_radius", '"41 mm"', "lies outside the port", "below port_radius (40 mm)"),),
     ),
-    "hump outside the disc": _one(
+    "siphon crest outside the disc": _one(
         "tube.hump_radius", "50 mm", "outer wall too", "at most outer_radius (44.5 mm)"
     ),
-    "hump on the axis": _one("tube.hump_radius", "0 mm", "above 0", "a length above 0"),
-    "hump at the end": _one("tube.hump_position", 1, "below 1", "above 0 and below 1"),
+    "siphon crest on the axis": _one("tube.hump_radius", "0 mm", "above 0", "a length above 0"),
+    "siphon crest at the end": _one("tube.hump_position", 1, "below 1", "above 0 and below 1"),
     "bore too wide for the bends": _one(
         "tube.bore", "6.5 mm", "tightest of the bends", "at most twice that radius, 6 mm"
     ),
@@ -126,8 +122,8 @@ SINGLE: dict[str, Broken] = {
         {"tube.bends": [{"angle": "90 deg", "radius": "80 mm"}]},
         (Expected("tube", "length", '"120 mm"', "shorter than the arcs", "at least 125.664 mm"),),
     ),
-    "tube too short for the hump": _one(
-        "tube.length", "60 mm", "cannot reach the opposite port over the hump", "62.93"
+    "tube too short for the siphon crest": _one(
+        "tube.length", "60 mm", "cannot reach the opposite port over the siphon crest", "62.93"
     ),
     "tube too short to cross": Broken(
         {"tube.length": "60 mm", "tube.hump_radius": REMOVED},
@@ -172,15 +168,13 @@ SINGLE: dict[str, Broken] = {
     "vibration that is no table": _one("rotor.initial_vibration", "10 um", "not a table", "amplitude, phase"),
     "negative noise": _one("sensor.amplitude_noise", "-1 um", "at least 0", "a length of at least 0"),
     "unknown algorithm": _one("controller.kind", "pid", "not one of the known words", '"law_based"'),
-    "limit in the noise": _one(
-        "controller.limit", "0.01 um", "drowns in the sensor's noise", "above 0.01 um"
-    ),
+    "limit in the noise": _one("controller.limit", "0.01 um", "is below the sensor noise", "above 0.01 um"),
     "gain of zero": _one("controller.proportional", "0 s/um", "above 0", "s/um"),
     "gain upside down": _one(
         "controller.proportional", "0.08 um/s", "a unit of velocity, not of gain", "s/um"
     ),
     "integral time below zero": _one("controller.integral_time", "-1 s", "above 0", "a time above 0"),
-    "gas times crossed": _one(
+    "valve-open times crossed": _one(
         "controller.minimum_gas_time", "6 s", "shorter than maximum_gas_time (5 s)", "below 5 s"
     ),
     "valve slower than the period": Broken(
@@ -279,8 +273,8 @@ SEVERAL: dict[str, Broken] = {
         {"disc.axial_width": "62 kg", "tube.hump_radius": "50 mm", "controller.limit": "0.005 um"},
         (
             Expected("disc", "axial_width", '"62 kg"', "a unit of mass, not of length", "mm"),
-            Expected("tube", "hump_radius", '"50 mm"', "hump lies outside", "44.5 mm"),
-            Expected("controller", "limit", '"0.005 um"', "drowns", "above 0.01 um"),
+            Expected("tube", "hump_radius", '"50 mm"', "siphon crest lies outside", "44.5 mm"),
+            Expected("controller", "limit", '"0.005 um"', "is below the sensor noise", "above 0.01 um"),
         ),
     ),
     "everywhere": Broken(

@@ -10,16 +10,12 @@ from typing import Any
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from ringbalance.scene import Scene, SceneError, bundled_scene, scene_from
+from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, scene_from
 from ringbalance.scene.dimensions import DIMENSIONS
-from ringbalance.scene.reading import TABLES
-from ringbalance.scene.schema import SceneTables
+from ringbalance.scene.keys.schema import LIQUID_RING
 
-PATHS = [
-    (table, key)
-    for table in TABLES
-    for key in (*SceneTables.model_fields[table].annotation.model_fields, "colour")  # type: ignore[union-attr]
-]
+TABLES = tuple(LIQUID_RING.tables)
+PATHS = [(table, key) for table in TABLES for key in (*LIQUID_RING.tables[table].keys, "colour")]
 UNITS = sorted({unit for kind in DIMENSIONS.values() for unit in kind.units})
 NUMBERS = st.one_of(
     st.floats(allow_nan=True, allow_infinity=True).map(str),
@@ -51,7 +47,7 @@ FUZZ = settings(
 
 def _loaded(content: bytes) -> Scene | None:
     try:
-        return scene_from(content=content, file="my_disc.toml")
+        return liquid_ring_scene(scene_from(content=content, file="my_disc.toml"))
     except SceneError as error:
         lines = str(error).splitlines()
         if not error.faults or len(lines) != len(error.faults) or not all(map(str.isprintable, lines)):
@@ -192,7 +188,7 @@ def test_junk_in_place_of_tables(
 
 @given(at=st.integers(0, 10**6), deleted=st.integers(0, 40), inserted=st.binary(max_size=10))
 @FUZZ
-def test_torn_files(at: int, deleted: int, inserted: bytes) -> None:
+def test_damaged_files(at: int, deleted: int, inserted: bytes) -> None:
     whole = bundled_scene("liquid_ring_paper").read_bytes()
     place = at % len(whole)
     scene = _loaded(whole[:place] + inserted + whole[place + deleted :])

@@ -72,7 +72,9 @@ def test_interpolation_of_viscosity() -> None:
 @settings(max_examples=50, deadline=None, derandomize=True)
 def test_gallium_literature(temperature: float) -> None:
     """Assael et al., J. Phys. Chem. Ref. Data 41 (2012) 033101: log10(mu / mPa s) = -0.4465 + 204.03 K / T,
-    rho / (kg/m^3) = 6077 - 0.611 (T - 302.914 K); the interpolated table lies 0.1 % and 0.01 % from them."""
+
+    rho / (kg/m^3) = 6077 - 0.611 (T - 302.914 K); the interpolated table lies 0.1 % and 0.01 % from them.
+    """
     liquid = liquid_at(name="gallium", temperature=temperature)
     viscosity = 1e-3 * 10 ** (-0.4465 + 204.03 / temperature)
     assert liquid.density == pytest.approx(6077 - 0.611 * (temperature - 302.914), rel=1e-4)

@@ -5,23 +5,43 @@ from __future__ import annotations
 import copy
 import hashlib
 import math
+import os
 import pickle
+import threading
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import FrozenInstanceError, fields
 from pathlib import Path
+from time import process_time
 from typing import Any
 
 import pytest
 
-from ringbalance.scene import Fault, Scene, SceneError, bundled_scene, load_scene, scene_fault, scene_table
-from ringbalance.scene.defaults import even_number_of_chambers, trial_sequence
-from ringbalance.scene.uncertain import UNCERTAIN, nominal_value, with_value
+from ringbalance.scene import (
+    Fault,
+    Scene,
+    SceneError,
+    bundled_scene,
+    eccentric_scene,
+    load_scene,
+    read_scene,
+    scene_fault,
+    scene_from,
+    scene_table,
+)
+from ringbalance.scene.keys.derivations import even_number_of_chambers, trial_sequence
+from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, nominal_value, with_value
 
 Load = Callable[[Mapping[str, Any]], Scene]
 BUNDLED = ("liquid_ring_paper", "silicone_oil_100cst", "perfluorinated_oil", "six_chamber")
 DRIVEN = ("eccentric_mass_paper", "washing_machine", "driven_masses_small")
 """Tested in test_eccentric_scene.py."""
+
+
+def paper() -> Scene:
+    """The liquid-ring paper's scene, loaded again at each call."""
+    return liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper")))
 
 
 def _message(path: Path) -> str:
@@ -76,7 +96,7 @@ def test_byte_order_mark_and_windows_lines(tmp_path: Path) -> None:
     content = bundled_scene("liquid_ring_paper").read_text(encoding="utf-8")
     path = tmp_path / "windows.toml"
     path.write_bytes(b"\xef\xbb\xbf" + content.replace("\n", "\r\n").encode())
-    assert load_scene(path).disc == load_scene(bundled_scene("liquid_ring_paper")).disc
+    assert liquid_ring_scene(load_scene(path)).disc == paper().disc
 
 
 def test_error_survives_pickling() -> None:
@@ -90,7 +110,7 @@ def test_error_survives_pickling() -> None:
 def test_bundled_scenes(name: str) -> None:
     """Each loads, is named by its file's bytes, and its gas primes the tube down to an empty chamber."""
     path = bundled_scene(name)
-    scene = load_scene(path)
+    scene = liquid_ring_scene(load_scene(path))
     assert scene.source == f"{name}.toml"
     assert scene.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
     assert scene == load_scene(str(path))
@@ -116,7 +136,7 @@ def test_bundled_scene_by_file_name_and_unknown() -> None:
 
 def test_paper_scene_has_the_papers_values() -> None:
     """Table 1, Eqs. 4 to 6 and section 6 of the liquid-ring paper."""
-    scene = load_scene(bundled_scene("liquid_ring_paper"))
+    scene = paper()
     disc = scene.disc
     assert (disc.outer_radius, disc.inner_radius, disc.axial_width) == (0.0445, 0.0205, 0.062)
     assert disc.central_angle == pytest.approx(math.pi / 2, rel=1e-15)
@@ -212,7 +232,7 @@ def test_uncertainty_of_a_liquid(newcomer_document: dict[str, Any], load: Load) 
     assert spreads == {"density": (10.0, False), "kinematic_viscosity": (0.07, True), "bore": (2e-5, False)}
 
 
-def test_decreed_drag_needs_no_length(newcomer_document: dict[str, Any], load: Load) -> None:
+def test_prescribed_drag_needs_no_length(newcomer_document: dict[str, Any], load: Load) -> None:
     newcomer_document["tube"] = {"bore": "2 mm", "drag_coefficient": 50}
     assert load(newcomer_document).tube.length == pytest.approx(0.12, rel=1e-15)
     newcomer_document["tube"]["hump_radius"] = "45 mm"
@@ -249,7 +269,7 @@ def test_trial_sequence_alternates_opposites(chambers: int) -> None:
 
 
 def test_scene_is_frozen() -> None:
-    scene = load_scene(bundled_scene("liquid_ring_paper"))
+    scene = paper()
     with pytest.raises(FrozenInstanceError):
         scene.disc.outer_radius = 1.0  # type: ignore[misc]
     assert copy.deepcopy(scene) == scene
@@ -260,17 +280,17 @@ def test_table_of_a_scene(newcomer_document: dict[str, Any], load: Load) -> None
     rows = {(row.group, row.quantity): row for row in scene_table(load(newcomer_document))}
     assert rows["Disc", "outer radius R2"].value == "60 mm"
     assert rows["Rotor", "speed"].value == "6000 rpm"
-    assert rows["Rotor", "speed"].note == "give or take 1 % (95 %)"
-    assert rows["Rotor", "lag angle"].note == "default; give or take 3 deg (95 %)"
-    assert rows["Connecting tube", "bore d"].note == "give or take 0.02 mm (95 %)"
-    assert rows["Connecting tube", "hump radius"].value == "none: always a full siphon"
+    assert rows["Rotor", "speed"].note == "plus or minus 1 % (95 %)"
+    assert rows["Rotor", "lag angle"].note == "default; plus or minus 3 deg (95 %)"
+    assert rows["Connecting tube", "bore d"].note == "plus or minus 0.02 mm (95 %)"
+    assert rows["Connecting tube", "siphon crest radius"].value == "none: always a full siphon"
     assert rows["Liquid", "temperature"].value == "25 degC"
     assert rows["Run", "tolerance"].value == "1 %"
 
 
 def test_table_has_every_value() -> None:
     """No number of a scene is left out of its description."""
-    scene = load_scene(bundled_scene("liquid_ring_paper"))
+    scene = paper()
     lines = len(scene_table(scene))
     tables = ("disc", "liquid", "tube", "gas", "environment", "rotor", "sensor", "controller", "run")
     shown_elsewhere = {"density_uncertainty", "viscosity_uncertainty", "source", "entrance_radius"}
@@ -281,20 +301,41 @@ def test_table_has_every_value() -> None:
 
 
 def test_fault_of_a_loaded_scene() -> None:
-    scene = load_scene(bundled_scene("liquid_ring_paper"))
+    scene = paper()
     fault = scene_fault(scene=scene, table="rotor", key="speed", problem="too slow", allowed="above 300 rpm")
-    assert (
-        str(fault) == 'liquid_ring_paper.toml: [rotor] speed = "10000 rpm": too slow; allowed: above 300 rpm'
-    )
+    place = bundled_scene("liquid_ring_paper")
+    assert str(fault) == f'{place}: [rotor] speed = "10000 rpm": too slow; allowed: above 300 rpm'
+
+
+def test_a_scene_is_named_as_the_user_named_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "discs").mkdir()
+    (tmp_path / "discs" / "one.toml").write_bytes(bundled_scene("liquid_ring_paper").read_bytes())
+    monkeypatch.chdir(tmp_path)
+    scene = load_scene("discs/one.toml")
+    with pytest.raises(SceneError, match=r"^discs/one\.toml: balancer"):
+        eccentric_scene(scene)
+    assert scene.source == "one.toml"
+    assert scene == load_scene(tmp_path / "discs" / "one.toml")
+
+
+def test_a_scene_and_its_text_are_read_from_a_pipe(tmp_path: Path) -> None:
+    pipe, text = tmp_path / "pipe", bundled_scene("liquid_ring_paper").read_text(encoding="utf-8")
+    os.mkfifo(pipe)
+    writer = threading.Thread(target=lambda: pipe.write_text(text, encoding="utf-8"))
+    writer.start()
+    scene, read = read_scene(pipe)
+    writer.join()
+    assert read == text
+    assert scene.sha256 == load_scene(bundled_scene("liquid_ring_paper")).sha256
 
 
 def test_one_quantity_changed() -> None:
-    scene = load_scene(bundled_scene("liquid_ring_paper"))
-    for quantity in UNCERTAIN:
+    scene = paper()
+    for quantity in UNCERTAIN_QUANTITIES:
         changed = with_value(scene=scene, quantity=quantity, value=0.125)
         assert nominal_value(scene=changed, quantity=quantity) == 0.125
         assert changed != scene
-        back = getattr(getattr(scene, UNCERTAIN[quantity].table), quantity)
+        back = getattr(getattr(scene, UNCERTAIN_QUANTITIES[quantity]), quantity)
         assert with_value(scene=changed, quantity=quantity, value=back) == scene
     with pytest.raises(ValueError, match="'colour' is none of"):
         nominal_value(scene=scene, quantity="colour")
@@ -310,3 +351,33 @@ def test_comments_give_every_origin() -> None:
         line for line in values if not any(word in line for word in ("given", "inferred", "assumed"))
     ] == []
     assert tomllib.loads(text)["disc"]["plate_thickness"] == "2.777 mm"
+
+
+@pytest.mark.parametrize("where", ["at the top", "in a table", "as tables"])
+def test_thousands_of_errors_are_counted_not_listed(where: str) -> None:
+    text, many = bundled_scene("liquid_ring_paper").read_text(encoding="utf-8"), range(10_000)
+    keys = "".join(f"outer_radiu{n} = 1\n" for n in many)
+    content = {
+        "at the top": keys + text,
+        "in a table": text.replace("[disc]\n", f"[disc]\n{keys}"),
+        "as tables": text + "".join(f"\n[disk{n}]" for n in many),
+    }[where]
+    start = process_time()
+    with pytest.raises(SceneError) as error:
+        scene_from(content=content.encode(), file="many.toml")
+    assert process_time() - start < 5.0
+    lines = str(error.value).splitlines()
+    assert len(error.value.faults) == 10_000
+    assert len(lines) == 51
+    assert all("did you mean" in line or "allowed: " in line for line in lines[:50])
+    assert lines[-1] == "many.toml: and 9950 more; correct these first"
+    assert len(pickle.loads(pickle.dumps(error.value)).faults) == 10_000
+
+
+def test_fifty_errors_are_all_listed() -> None:
+    text = bundled_scene("liquid_ring_paper").read_text(encoding="utf-8")
+    with pytest.raises(SceneError) as error:
+        scene_from(content=("".join(f"key{n} = 1\n" for n in range(50)) + text).encode(), file="some.toml")
+    lines = str(error.value).splitlines()
+    assert len(lines) == 50
+    assert not any("more" in line.rsplit(":", 1)[-1] for line in lines)

@@ -29,7 +29,7 @@ def test_straight_across() -> None:
 
 
 def test_hump_on_the_way_in_and_out() -> None:
-    """Ports side by side: straight in to the hump and back."""
+    """Ports side by side: straight in to the crest and back."""
     assert shortest_path(port_radius=0.05, hump_radius=0.02, separation=0.0) == pytest.approx(0.06)
 
 
@@ -48,7 +48,7 @@ def test_taut_string_is_a_path(hump: float, separation: float) -> None:
 @given(**SHAPES, knots=st.lists(st.tuples(st.floats(0, 1), st.floats(0, 1)), min_size=1, max_size=6))
 @PROPERTY
 def test_no_path_is_shorter(hump: float, separation: float, knots: list[tuple[float, float]]) -> None:
-    """A path through any radii between hump and port that touches the hump is no shorter than the bound."""
+    """A path through any radii between crest and port that touches the crest is no shorter than the bound."""
     radii = [hump + (1 - hump) * share for share, _ in knots]
     angles = sorted(separation * share for _, share in knots)
     radii[len(radii) // 2] = hump

@@ -6,42 +6,40 @@ import re
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import fields
-from pathlib import Path
-from typing import Any, get_args, get_type_hints
+from typing import Any
 
 import pytest
+import scene_reference
 
-from ringbalance.scene import Scene, models
-from ringbalance.scene.checks import CHECKS
-from ringbalance.scene.reading import TABLES
-from ringbalance.scene.reference import key_reference, liquid_reference, unit_reference
-from ringbalance.scene.schema import SceneTables
-from ringbalance.scene.uncertain import UNCERTAIN
+from ringbalance.scene import Scene, loop_models, models
+from ringbalance.scene.keys.schema import ECCENTRIC_MASS, LIQUID_RING, Schema
+from ringbalance.scene.rules.checks import CHECKS, ECCENTRIC_CHECKS, Check
+from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 
-DOCUMENT = Path(__file__).parents[2] / "docs" / "scene-file.md"
-REWRITE = "paste the output of ringbalance.scene.reference into docs/scene-file.md"
+TABLES = tuple(LIQUID_RING.tables)
 
 
 def _keys(table: str) -> set[str]:
-    model: Any = SceneTables.model_fields[table].annotation
-    return set(model.model_fields)
+    return set(LIQUID_RING.tables[table].keys)
 
 
-@pytest.mark.parametrize("part", [key_reference, liquid_reference, unit_reference])
-def test_document_holds_the_reference(part: Callable[[], str]) -> None:
-    assert part() in DOCUMENT.read_text(encoding="utf-8"), REWRITE
+def test_document_holds_the_reference() -> None:
+    page = scene_reference.PAGE.read_text(encoding="utf-8")
+    assert len(scene_reference.BLOCK.findall(page)) == 4
+    assert scene_reference.fresh(page) == page, "run tools/scene_reference.py --write"
 
 
-def test_every_key_has_a_meaning() -> None:
-    rows = [line for line in key_reference().splitlines() if line.startswith("| `")]
-    top = len(SceneTables.model_fields) - len(TABLES)
-    inside_lists = len(("angle", "radius", "amplitude", "phase"))
-    assert len(rows) == top + sum(len(_keys(table)) for table in TABLES) + inside_lists
+@pytest.mark.parametrize(("schema", "inside_lists"), [(LIQUID_RING, 4), (ECCENTRIC_MASS, 2)])
+def test_every_key_has_a_meaning(schema: Schema, inside_lists: int) -> None:
+    reference = scene_reference.key_reference(schema, "title")
+    rows = [line for line in reference.splitlines() if line.startswith("| `")]
+    keys = len(schema.top) + sum(len(table.keys) for table in schema.tables.values())
+    assert len(rows) == keys + inside_lists
     assert all(cell.strip() for row in rows for cell in row.strip("|").split("|"))
 
 
 def test_example_in_the_document_loads(load: Callable[[Mapping[str, Any]], Scene]) -> None:
-    blocks = re.findall(r"```toml\n(.*?)```", DOCUMENT.read_text(encoding="utf-8"), re.DOTALL)
+    blocks = re.findall(r"```toml\n(.*?)```", scene_reference.PAGE.read_text(encoding="utf-8"), re.DOTALL)
     assert len(blocks) == 1
     assert load(tomllib.loads(blocks[0])).disc.chambers == 4
 
@@ -54,10 +52,10 @@ def test_example_in_the_document_loads(load: Callable[[Mapping[str, Any]], Scene
         ("tube", models.Tube, set()),
         ("gas", models.Gas, set()),
         ("environment", models.Environment, set()),
-        ("rotor", models.Rotor, {"initial_vibration", "initial_amplitude", "initial_phase"}),
-        ("sensor", models.Sensor, set()),
-        ("controller", models.ControllerSettings, set()),
-        ("run", models.RunSettings, set()),
+        ("rotor", loop_models.Rotor, {"initial_vibration", "initial_amplitude", "initial_phase"}),
+        ("sensor", loop_models.Sensor, set()),
+        ("controller", loop_models.ControllerSettings, set()),
+        ("run", loop_models.RunSettings, set()),
     ],
 )
 def test_keys_are_fields(table: str, record: Any, differences: set[str]) -> None:
@@ -65,31 +63,37 @@ def test_keys_are_fields(table: str, record: Any, differences: set[str]) -> None
     assert _keys(table) ^ {field.name for field in fields(record)} == differences
 
 
-@pytest.mark.parametrize(
-    ("table", "key", "record"),
-    [
-        ("tube", "hump_gas", models.Tube),
-        ("tube", "entrance", models.Tube),
-        ("environment", "shaft", models.Environment),
-        ("controller", "kind", models.ControllerSettings),
-    ],
-)
-def test_words_are_those_of_the_records(table: str, key: str, record: Any) -> None:
-    model: Any = SceneTables.model_fields[table].annotation
-    (reader,) = model.model_fields[key].metadata
-    words = get_args(get_type_hints(record)[key])
-    assert [reader.read(word) for word in words] == list(words)
-    assert reader.allowed == " or ".join(f'"{word}"' for word in words)
-
-
 def test_uncertain_quantities() -> None:
-    assert _keys("uncertainty") == set(UNCERTAIN)
-    assert all(key in _keys(entry.table) for key, entry in UNCERTAIN.items())
+    """A key of [uncertainty] names no table, so only one table can have a quantity of its name."""
+    declared = [
+        name for table in LIQUID_RING.tables.values() for name, key in table.keys.items() if key.uncertain
+    ]
+    assert len(declared) == len(set(declared))
+    assert _keys("uncertainty") == set(declared) == set(UNCERTAIN_QUANTITIES)
+    assert all(key in _keys(table) for key, table in UNCERTAIN_QUANTITIES.items())
 
 
-def test_checks_need_keys_that_exist() -> None:
-    for check in CHECKS:
+@pytest.mark.parametrize(("schema", "checks"), [(LIQUID_RING, CHECKS), (ECCENTRIC_MASS, ECCENTRIC_CHECKS)])
+def test_checks_need_keys_that_exist(schema: Schema, checks: tuple[Check, ...]) -> None:
+    for check in checks:
         for path in check.needs:
             table, key = path.split(".")
-            assert table in TABLES
-            assert key in _keys(table)
+            assert key in schema.tables[table].keys
+
+
+@pytest.mark.parametrize("schema", [LIQUID_RING, ECCENTRIC_MASS])
+def test_derived_defaults_follow_from_what_is_known_before_them(schema: Schema) -> None:
+    """Defaults are filled in table by table, so a rule needs only keys that come before, or are no rule's."""
+    pending = {
+        f"{name}.{key}"
+        for name, table in schema.tables.items()
+        for key, declared in table.keys.items()
+        if declared.presence.rule is not None
+    }
+    for name, table in schema.tables.items():
+        for key, declared in table.keys.items():
+            assert not pending & set(declared.presence.needs)
+            for path in declared.presence.needs:
+                needed_table, needed_key = path.split(".")
+                assert needed_key in schema.tables[needed_table].keys
+            pending.discard(f"{name}.{key}")

@@ -6,9 +6,10 @@ import math
 
 import pytest
 
-from ringbalance.scene import shape_rules, working_rules
-from ringbalance.scene.finding import Finding
 from ringbalance.scene.models import Bend
+from ringbalance.scene.rules import shape as shape_rules
+from ringbalance.scene.rules import working as working_rules
+from ringbalance.scene.rules.finding import Finding
 
 BENDS = (Bend(angle=1.5, radius=0.004), Bend(angle=1.0, radius=0.002))
 
@@ -18,6 +19,10 @@ BENDS = (Bend(angle=1.5, radius=0.004), Bend(angle=1.0, radius=0.002))
     [
         shape_rules.radii_in_order(0.03, 0.03),
         shape_rules.plates_leave_room(0.03, 0.03, math.pi),
+        shape_rules.chamber_has_depth(0.03, 0.03 * (1 + 0.9e-8)),
+        shape_rules.fill_has_depth(2e-9, 0.0205, 0.0445),
+        shape_rules.chamber_wide_enough(1.99e-3, 0.0, 0.01, 0.05),
+        shape_rules.chamber_wide_enough(0.1985, 0.0099, 0.1, 0.2),
         shape_rules.port_in_chamber(0.02, 0.02, 0.04),
         shape_rules.hump_in_disc(0.04, 0.04),
         shape_rules.hump_inside_port(0.04, 0.04),
@@ -45,6 +50,9 @@ def test_at_or_beyond_the_limit_is_found(finding: Finding | None) -> None:
     [
         shape_rules.radii_in_order(0.0299, 0.03),
         shape_rules.plates_leave_room(0.0299, 0.03, math.pi),
+        shape_rules.chamber_has_depth(0.03, 0.03 * (1 + 1.1e-8)),
+        shape_rules.fill_has_depth(3e-8, 0.0205, 0.0445),
+        shape_rules.chamber_wide_enough(2.01e-3, 0.0, 0.01, 0.05),
         shape_rules.chambers_fit(math.pi / 2, 4),
         shape_rules.chambers_fit(1.5708, 4),
         shape_rules.fills_share_the_liquid(0.15, 0.3),

@@ -23,6 +23,7 @@ def test_a_whole_case_is_read(claim: CaseDefinition, verification: CaseDefinitio
     [
         ("number = 1\n", "", "a claim has a number"),
         ('kind = "claim"', 'kind = "opinion"', "kind"),
+        ("number = 1\n", "number = 1\norder = 10\n", "order"),
         ("limit = 0.05", "limit = 0.0", "limit must be positive"),
         ('why = "because"', "", "why"),
         ('claim = "The answer is ten."', "", "claim"),
@@ -63,6 +64,8 @@ def test_all_faults_are_named_at_once(claim_text: str) -> None:
 
 
 def test_a_verification_must_fail_with_a_defect(claim_text: str) -> None:
-    text = claim_text.replace("number = 1\n", "").replace('kind = "claim"', 'kind = "code_verification"', 1)
+    text = claim_text.replace("number = 1\n", "order = 10\n").replace(
+        'kind = "claim"', 'kind = "code_verification"', 1
+    )
     with pytest.raises(CaseError, match=r"metric|come out"):
         parse_case(text, source="made_up/case.toml")

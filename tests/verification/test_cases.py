@@ -8,9 +8,12 @@ from pathlib import Path
 import pytest
 
 from ringbalance.scene.models import Scene
-from ringbalance.verification import CaseResult, Verdict, load_cases, run_cases
+from ringbalance.verification.catalogue import case_code, load_cases
 from ringbalance.verification.document import case_document
+from ringbalance.verification.result import CaseResult
+from ringbalance.verification.runner import run_cases
 from ringbalance.verification.text import placeholders
+from ringbalance.verification.verdicts import Verdict
 
 FOLDER = Path(__file__).resolve().parents[2] / "verification" / "cases"
 CASES = {definition.id: definition for definition in load_cases()}
@@ -31,6 +34,19 @@ def test_every_folder_is_in_the_catalogue() -> None:
 def test_all_claims_of_a_paper_are_listed_in_order(paper: str, last: int) -> None:
     claims = [d.number for d in CASES.values() if d.kind == "claim" and d.paper == paper]
     assert claims == list(range(1, last + 1))
+
+
+def test_other_cases_come_first_each_with_its_own_order() -> None:
+    definitions = list(CASES.values())
+    orders = [d.order for d in definitions if d.kind != "claim"]
+    assert [d.kind == "claim" for d in definitions] == sorted(d.kind == "claim" for d in definitions)
+    assert orders == sorted(set(orders), key=lambda order: order or 0)
+
+
+def test_a_case_s_code_is_a_module_that_other_processes_import_by_name() -> None:
+    for case in CASES:
+        name = f"ringbalance.verification.cases.{case}.case"
+        assert case_code(case).compute.__module__ == name
 
 
 def test_texts_ask_for_no_number_that_is_typed_in() -> None:
@@ -85,7 +101,7 @@ def test_claims_come_out_with_these_verdicts(results: Mapping[str, CaseResult]) 
     )
 
 
-def test_claims_on_driven_masses_come_out_with_these_verdicts(results: Mapping[str, CaseResult]) -> None:
+def test_claims_on_eccentric_masses_come_out_with_these_verdicts(results: Mapping[str, CaseResult]) -> None:
     found = {
         case: result.verdict.value
         for case, result in results.items()

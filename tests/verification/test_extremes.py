@@ -11,22 +11,23 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.quadrature import quadrature
 from ringbalance.controller.simulation import Outcome
 from ringbalance.reduced_model.calibration import Calibration, calibrate
-from ringbalance.reduced_model.paper_law import paper_law
+from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.scene import bundled_scene
 from ringbalance.scene.loader import scene_from
 from ringbalance.scene.models import Scene
-from ringbalance.verification import extremes_design, extremes_point
-from ringbalance.verification.exact_chamber import exact_moment
-from ringbalance.verification.extremes import Size, broken, extremes_document, find_extremes
-from ringbalance.verification.extremes_axes import AXES, axis_of, fitted, toml_bytes, varied
-from ringbalance.verification.extremes_design import CHUNK, Base, Point, design, judge, judged
-from ringbalance.verification.extremes_maps import Sweep
-from ringbalance.verification.extremes_numerics import at_aspect, at_step
-from ringbalance.verification.extremes_point import Defect, Ending, Judgement, judge_point
+from ringbalance.verification.extremes import design as extremes_design
+from ringbalance.verification.extremes import point as extremes_point
+from ringbalance.verification.extremes.axes import AXES, axis_of, fitted, toml_bytes, varied
+from ringbalance.verification.extremes.design import CHUNK, Base, Point, design, judge, judged
+from ringbalance.verification.extremes.maps import Sweep
+from ringbalance.verification.extremes.numerics import at_aspect, at_step
+from ringbalance.verification.extremes.point import Defect, Ending, Judgement, judge_point
+from ringbalance.verification.extremes.study import Size, broken, extremes_document, find_extremes
+from ringbalance.verification.reference.exact_chamber import exact_moment
 
 
 @pytest.fixture(scope="module")
@@ -252,6 +253,31 @@ def test_an_interrupted_set_goes_on_where_it_stopped(
     assert judged(base, points) == whole
 
 
+@pytest.mark.parametrize(
+    "content",
+    ["", "garbage", "[1]", "[" * 100_000, "null", '{"key": 1}', '{"key": 1, "judgements": [], "digest": 1}'],
+)
+def test_a_damaged_file_of_points_is_made_again(
+    content: str, base: Base, tmp_path: Path, counting: list[Point], caplog: pytest.LogCaptureFixture
+) -> None:
+    points, kept = design(count=CHUNK, seed=1), tmp_path / "kept.json"
+    kept.write_text(content)
+    whole = judged(base, points, kept=kept)
+    assert len(counting) == CHUNK
+    (told,) = caplog.messages
+    assert f"{kept} is damaged" in told
+    assert judged(base, points, kept=kept) == whole
+    assert len(counting) == CHUNK
+
+
+def test_a_changed_judgement_is_not_taken(base: Base, tmp_path: Path, counting: list[Point]) -> None:
+    points, kept = design(count=CHUNK, seed=1), tmp_path / "kept.json"
+    judged(base, points, kept=kept)
+    kept.write_text(kept.read_text().replace('"residual": 0.0', '"residual": "x"', 1))
+    judged(base, points, kept=kept)
+    assert len(counting) == 2 * CHUNK
+
+
 def test_judgements_of_another_scene_are_not_taken(base: Base, tmp_path: Path, counting: list[Point]) -> None:
     points, kept = design(count=CHUNK, seed=1), tmp_path / "kept.json"
     judged(base, points, kept=kept)
@@ -281,7 +307,7 @@ def test_a_belief_about_the_rotor_follows_the_rotor(document: dict[str, Any], pa
     assert share == pytest.approx(0.02 / paper_scene.rotor.influence_coefficient)
 
 
-def test_everything_is_told(base: Base, counting: list[Point]) -> None:
+def test_everything_is_reported(base: Base, counting: list[Point]) -> None:
     size = Size(points=10, sweep=5, fineness=1.0, grid=3)
     found = find_extremes(base, size=size)
     told = extremes_document(found)

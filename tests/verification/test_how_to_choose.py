@@ -29,9 +29,9 @@ def rows(tool: ModuleType, name: str) -> list[str]:
 
 
 def cells(row: str) -> list[tuple[str, float]]:
-    """Rung and error of each cell between a row's title and its last column; the top has no error."""
+    """Model and error of each cell between a row's title and its last column; the top has no error."""
     told = [re.fullmatch(r"(.*) \((.*)\)", cell.strip()) for cell in row.split("|")[2:-2]]
-    return [(m[1], 0.0 if m[2] == "as the top" else float(m[2])) for m in told if m is not None]
+    return [(m[1], 0.0 if m[2] == "as the finest" else float(m[2])) for m in told if m is not None]
 
 
 def test_quick_rows_are_what_is_measured(tool: ModuleType) -> None:

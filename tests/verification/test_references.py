@@ -1,4 +1,4 @@
-"""The references themselves are held against routes that share nothing with them."""
+"""The references themselves are compared with routes that share nothing with them."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from scipy.integrate import dblquad
 
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_area, surface_radius
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification import manufactured_flow as flow
-from ringbalance.verification.exact_chamber import (
+from ringbalance.verification.paper_numbers import plate_uncertainty
+from ringbalance.verification.reference import manufactured_flow as flow
+from ringbalance.verification.reference.exact_chamber import (
     central_lambda,
     exact_moment,
     exact_wall_pressure,
     pair_lambda,
 )
-from ringbalance.verification.gravity_exact import exact_ring
-from ringbalance.verification.manufactured import Manufactured
-from ringbalance.verification.paper_numbers import plate_uncertainty
+from ringbalance.verification.reference.gravity_exact import exact_ring
+from ringbalance.verification.reference.manufactured import Manufactured
 from ringbalance.verification.sensitivity import input_uncertainty
 
 
@@ -89,7 +89,7 @@ def test_the_manufactured_flow_satisfies_its_equation() -> None:
 
     def derivative(field: Callable[[np.ndarray], np.ndarray], axis: int) -> np.ndarray:
         shift = step * np.eye(2)[axis]
-        return (field(place + shift) - field(place - shift)) / (2 * step)
+        return np.asarray((field(place + shift) - field(place - shift)) / (2 * step))
 
     def second(axis: int) -> np.ndarray:
         shift = step * np.eye(2)[axis]

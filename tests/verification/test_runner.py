@@ -12,10 +12,11 @@ import pytest
 
 from ringbalance.physics.results import Status, StatusCode
 from ringbalance.scene.models import Scene
-from ringbalance.verification import run_cases, runner
+from ringbalance.scene.platform.processes import Workers
+from ringbalance.verification import runner
 from ringbalance.verification.case import CaseDefinition, parse_case
 from ringbalance.verification.evidence import Evidence, Found, Level, NotRunError, Reference
-from ringbalance.verification.runner import mutate_definition, overridden, run_case, run_definition
+from ringbalance.verification.runner import mutate_definition, overridden, run_case, run_cases, run_definition
 from ringbalance.verification.verdicts import Verdict
 
 QUICK = ("gci_celik2008", "claim_02_ring_radius", "claim_12_correction_mass")
@@ -192,12 +193,13 @@ def test_who_waits_takes_what_nobody_has_begun_and_keeps_the_order() -> None:
             busy.set_result(("slow elsewhere", "slower elsewhere"))
         return f"{case} here"
 
-    found = list(runner._in_order(run, started, ("one", "slow", "two", "slower")))
+    with Workers(1) as pool:
+        found = list(runner._in_order(run, pool, started, ("one", "slow", "two", "slower")))
     assert found == ["one here", "slow elsewhere", "two here", "slower elsewhere"]
     assert taken == ["two", "one"]
 
 
-def test_the_driven_masses_are_compiled_in_one_process() -> None:
+def test_the_eccentric_masses_are_compiled_in_one_process() -> None:
     groups = runner._started_in(("claim_01_volume", "driven_bound", "driven_fig4_imbalance"))
     assert groups == [("driven_bound", "driven_fig4_imbalance"), ("claim_01_volume",)]
 

@@ -1,4 +1,5 @@
-"""The trade: fronts and knees by hand, moved mass against an independent solver, and the whole document."""
+"""The trade: fronts and trade-off points by hand, moved mass against an independent solver, and the whole
+document."""
 
 from __future__ import annotations
 
@@ -12,21 +13,32 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from ringbalance.cli import main
-from ringbalance.physics.tube_loss import tube_loss
-from ringbalance.reduced_model.ladder_choice import Values, choose
-from ringbalance.reduced_model.law_rungs import CLOSED, REGIMES, LawModels, base_law
-from ringbalance.reduced_model.loss_rungs import TABLES
-from ringbalance.reduced_model.rungs import Ladder
-from ringbalance.reduced_model.rungs_flow import LawBook, k_ladder
+from ringbalance.physics.tube.loss import tube_loss
+from ringbalance.reduced_model.selection.choice import Values, choose
+from ringbalance.reduced_model.selection.cost import CostModel, committed_costs
+from ringbalance.reduced_model.selection.law_models import CLOSED, REGIMES, LawModels, base_law
+from ringbalance.reduced_model.selection.loss_models import TABLES
+from ringbalance.reduced_model.selection.models import ModelHierarchy
+from ringbalance.reduced_model.selection.tube_models import LawBook, k_hierarchy
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.verification import trade as trade_module
-from ringbalance.verification.trade import held_tolerance, thinned, trade_document, trade_study
-from ringbalance.verification.trade_choices import judge
-from ringbalance.verification.trade_measure import Clock, knee, measure, pareto_front
-from ringbalance.verification.trade_operation import moved_mass, operation_laws, settling_ladder, time_models
-from ringbalance.verification.trade_scenes import random_scene
+from ringbalance.verification.selection_studies import study as trade_module
+from ringbalance.verification.selection_studies.choices import judge
+from ringbalance.verification.selection_studies.measure import Clock, knee, measure, pareto_front
+from ringbalance.verification.selection_studies.operation import (
+    moved_mass,
+    operation_laws,
+    settling_hierarchy,
+    time_models,
+)
+from ringbalance.verification.selection_studies.scenes import random_scene
+from ringbalance.verification.selection_studies.study import (
+    held_tolerance,
+    thinned,
+    trade_document,
+    trade_study,
+)
 
 
 @pytest.fixture(scope="module")
@@ -46,24 +58,24 @@ def test_a_knee_by_hand() -> None:
     assert knee([1.0], [1.0], [3]) == 3
 
 
-def test_a_measured_ladder_of_k(scene: Scene) -> None:
-    ladder = k_ladder(scene)
-    found = measure(ladder, values=Values(ladder), costs=choose_costs(), clock=Clock())
-    errors = {m.rung.name: m.error for m in found.rungs}
+def test_a_measured_hierarchy_of_k(scene: Scene) -> None:
+    hierarchy = k_hierarchy(scene)
+    found = measure(hierarchy, values=Values(hierarchy), costs=choose_costs(), clock=Clock())
+    errors = {m.fidelity.name: m.error for m in found.fidelities}
     top = tube_loss(
         tube=scene.tube,
         liquid=scene.liquid,
         angular_velocity=scene.rotor.speed,
-        velocity=np.array([float(point.split()[0]) for point in ladder.points]),
+        velocity=np.array([float(point.split()[0]) for point in hierarchy.points]),
     ).k.value
     assert errors["k = 50"] == pytest.approx(float(np.max(np.abs(51 / (top + 1) - 1))), rel=1e-2)
     assert errors["finite-element tables"] == 0.0
-    assert all(m.seconds is not None and m.seconds > 0 and m.memory is not None for m in found.rungs)
-    assert next(m.rung.name for m in found.front) == "k = 50"
+    assert all(m.seconds is not None and m.seconds > 0 and m.memory is not None for m in found.fidelities)
+    assert next(m.fidelity.name for m in found.front) == "k = 50"
 
 
-def choose_costs() -> trade_module.CostModel:
-    return trade_module.committed_costs()
+def choose_costs() -> CostModel:
+    return committed_costs()
 
 
 def test_the_moved_mass_against_an_independent_solver(scene: Scene) -> None:
@@ -101,9 +113,11 @@ def test_the_ways_through_an_operation_are_those_the_scene_gives_numbers_for(sce
     assert operation_laws(scene)[-1].regimes == REGIMES
 
 
-def test_a_thinned_ladder_keeps_its_ends(scene: Scene) -> None:
-    whole = k_ladder(scene)
-    assert [rung.name for rung in thinned(whole).rungs] == [rung.name for rung in whole.rungs]
+def test_a_thinned_hierarchy_keeps_its_ends(scene: Scene) -> None:
+    whole = k_hierarchy(scene)
+    assert [fidelity.name for fidelity in thinned(whole).fidelities] == [
+        fidelity.name for fidelity in whole.fidelities
+    ]
 
 
 def test_tolerances_of_a_scene_are_held_within_what_choices_are_made_for() -> None:
@@ -127,13 +141,13 @@ def test_a_random_scene_is_the_same_again(scene: Scene) -> None:
 
 @pytest.fixture
 def only_k(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One ladder instead of all."""
+    """One model hierarchy instead of all."""
 
-    def ladders(scene: Scene, *, level: str) -> tuple[Ladder, ...]:
+    def hierarchies(scene: Scene, *, level: str) -> tuple[ModelHierarchy, ...]:
         assert level in ("light", "heavy")
-        return (k_ladder(scene),)
+        return (k_hierarchy(scene),)
 
-    monkeypatch.setattr(trade_module, "ladders_of", ladders)
+    monkeypatch.setattr(trade_module, "hierarchies_of", hierarchies)
 
 
 @pytest.mark.usefixtures("only_k")
@@ -144,7 +158,7 @@ def test_the_document_is_whole_and_the_same_again_but_for_its_times(scene: Scene
     (found,) = first["quantities"]
     assert [c["tolerance"] for c in found["choices"]] == [0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 0.01]
     assert any("is below what" in text for text in found["choices"][-1]["reasons"])
-    assert found["knee"] in {rung["name"] for rung in found["rungs"] if rung["on_front"]}
+    assert found["knee"] in {fidelity["name"] for fidelity in found["rungs"] if fidelity["on_front"]}
     assert first["times"]["counted_over_measured"]["median"] > 0
 
 
@@ -156,7 +170,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert json.loads((tmp_path / "trade.json").read_text()) == printed
     assert json.loads(costs.read_text())["seconds"]["formula"] > 0
     assert main(["trade", path]) == 0
-    assert "knee: fluids" in capsys.readouterr().out
+    assert "trade-off point: fluids" in capsys.readouterr().out
 
 
 def test_a_scene_that_cannot_be_used_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -175,7 +189,7 @@ def test_a_scene_that_cannot_be_used_is_refused(tmp_path: Path, capsys: pytest.C
 @pytest.mark.heavy
 def test_every_quantity_of_the_paper_disc_keeps_every_tolerance(scene: Scene) -> None:
     study = trade_study(scene, timed=False)
-    assert {trade.ladder.quantity for trade in study.trades} == {
+    assert {trade.hierarchy.quantity for trade in study.trades} == {
         "wall_pressure",
         "moment",
         "k",
@@ -184,19 +198,19 @@ def test_every_quantity_of_the_paper_disc_keeps_every_tolerance(scene: Scene) ->
         "settling_time",
     }
     for trade in study.trades:
-        errors = {m.rung.name: m.error for m in trade.rungs}
-        for choice in study.choices[trade.ladder.quantity]:
-            assert errors[choice.rung.name] <= 1.002 * choice.tolerance
-            enough = [m.cost for m in trade.rungs if m.error <= choice.tolerance]
+        errors = {m.fidelity.name: m.error for m in trade.fidelities}
+        for choice in study.choices[trade.hierarchy.quantity]:
+            assert errors[choice.fidelity.name] <= 1.002 * choice.tolerance
+            enough = [m.cost for m in trade.fidelities if m.error <= choice.tolerance]
             assert choice.cost <= 2 * min(enough)
 
 
 def test_the_choice_does_not_change_from_run_to_run(scene: Scene) -> None:
-    ladder = k_ladder(scene)
-    assert choose(ladder, 0.1).rung.name == choose(k_ladder(scene), 0.1).rung.name
+    hierarchy = k_hierarchy(scene)
+    assert choose(hierarchy, 0.1).fidelity.name == choose(k_hierarchy(scene), 0.1).fidelity.name
 
 
-def test_no_rung_of_the_settling_time_is_ruled_out_by_an_estimate(scene: Scene) -> None:
+def test_no_model_of_the_settling_time_is_ruled_out_by_an_estimate(scene: Scene) -> None:
     """Where no run settles the cheapest says so as well as any, and estimates cannot know."""
-    ladder = settling_ladder(scene, book=LawBook(scene, base_law(scene)))
-    assert all(contribution.rough for contribution in ladder.contributions.values())
+    hierarchy = settling_hierarchy(scene, book=LawBook(scene, base_law(scene)))
+    assert all(contribution.rough for contribution in hierarchy.contributions.values())

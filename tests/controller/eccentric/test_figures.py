@@ -10,26 +10,26 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from ringbalance.controller.eccentric.figures_bound import motion_bound
-from ringbalance.controller.eccentric.figures_effort import figure_six
-from ringbalance.controller.eccentric.figures_extremes import (
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
+from ringbalance.controller.eccentric_mass.plant.whirl import steady_whirl
+from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
+from ringbalance.verification.eccentric_mass.bound import motion_bound
+from ringbalance.verification.eccentric_mass.effort import figure_six
+from ringbalance.verification.eccentric_mass.extremes import (
     euler_map,
     noise_extremes,
     saturation_curve,
     wrong_belief,
 )
-from ringbalance.controller.eccentric.figures_imbalance import figure_four
-from ringbalance.controller.eccentric.figures_runs import (
+from ringbalance.verification.eccentric_mass.imbalance import figure_four
+from ringbalance.verification.eccentric_mass.runs import (
     figure_eight,
     figure_five,
     figure_nine,
     figure_seven,
     steady_peak_speed,
 )
-from ringbalance.controller.eccentric.figures_scenes import RPM, changed
-from ringbalance.controller.eccentric.parameters import PlantParameters, plant_parameters
-from ringbalance.controller.eccentric.plant_whirl import steady_whirl
-from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
+from ringbalance.verification.eccentric_mass.scenes import RPM, changed
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-from ringbalance.controller.eccentric.fine_tuning import (
+from ringbalance.controller.eccentric_mass.strategy.fine_tuning import (
     MOVES,
     Tuning,
     separation,

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from scipy.linalg import block_diag, expm
 
-from ringbalance.controller.eccentric.imbalance_filter import (
+from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import (
     ImbalanceEstimate,
     correct,
     imbalance_deviation,
@@ -20,7 +19,7 @@ from ringbalance.controller.eccentric.imbalance_filter import (
     start_estimate,
     turned_back,
 )
-from ringbalance.controller.eccentric.imbalance_filter_model import (
+from ringbalance.controller.eccentric_mass.estimation.imbalance_model import (
     FilterMatrices,
     ProcessNoise,
     WhirlModel,
@@ -32,8 +31,7 @@ from ringbalance.controller.eccentric.imbalance_filter_model import (
     whirl_generator,
     whirl_transition,
 )
-
-FloatArray = npt.NDArray[np.float64]
+from ringbalance.scene.arrays import ComplexArray, FloatArray
 
 MODEL = WhirlModel(5.36, 10.0, 1000.0)
 SPEED = 100 * math.pi / 30
@@ -193,7 +191,7 @@ def test_both_frames_know_the_imbalance() -> None:
         assert error < 2e-3 * np.hypot(*TRUE)
 
 
-def _parts(values: npt.NDArray[np.complex128]) -> tuple[FloatArray, FloatArray]:
+def _parts(values: ComplexArray) -> tuple[FloatArray, FloatArray]:
     return values.real, values.imag
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from ringbalance.controller.eccentric.friction_filter import TrackModel
-from ringbalance.controller.eccentric.lqr import (
+from ringbalance.controller.eccentric_mass.estimation.friction_filter import TrackModel
+from ringbalance.controller.eccentric_mass.strategy.lqr import (
     lqr_gain,
     lqr_gain_discrete,
     paper_weights,

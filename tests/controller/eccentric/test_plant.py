@@ -8,22 +8,21 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from scipy.integrate import solve_ivp
 
-from ringbalance.controller.eccentric import integrate
-from ringbalance.controller.eccentric.friction import LOCKED, SLIDING, STUCK
-from ringbalance.controller.eccentric.motor import electrical_energy
-from ringbalance.controller.eccentric.parameters import PlantParameters, plant_parameters
-from ringbalance.controller.eccentric.plant import rest_state, stuck_flags
-from ringbalance.controller.eccentric.plant_run import run_plant, run_steps
-from ringbalance.controller.eccentric.plant_speed import profile_arrays, speed_at, turned
-from ringbalance.controller.eccentric.plant_whirl import influence, steady_whirl
+from ringbalance.controller.eccentric_mass.plant import integrate
+from ringbalance.controller.eccentric_mass.plant.friction import LOCKED, SLIDING, STUCK
+from ringbalance.controller.eccentric_mass.plant.motor import electrical_energy
+from ringbalance.controller.eccentric_mass.plant.open_loop import run_plant, run_steps
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
+from ringbalance.controller.eccentric_mass.plant.plant import drive_of, rest_state, stuck_flags
+from ringbalance.controller.eccentric_mass.plant.speed import profile_arrays, speed_at, turned
+from ringbalance.controller.eccentric_mass.plant.whirl import influence, steady_whirl
 from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
+from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.eccentric_models import SpeedPoint
 
-FloatArray = npt.NDArray[np.float64]
 RPM = math.pi / 30
 ANGLES = (0.3, 2.6)
 
@@ -190,7 +189,7 @@ def test_locked_run_up(scene: EccentricScene, parameters: PlantParameters) -> No
     run = run_plant(ramp, locked=True)
     m, c, k, u = parameters.mass, parameters.damping, parameters.stiffness, parameters.unbalance
 
-    def rates(time: float, z: npt.NDArray[np.complex128]) -> npt.NDArray[np.complex128]:
+    def rates(time: float, z: ComplexArray) -> ComplexArray:
         speed, turn = (100 + time) * RPM, 100 * RPM * time + RPM * time**2 / 2
         force = u * (speed**2 - 1j * RPM) * cmath.exp(1j * (turn + parameters.phase))
         return np.array([z[1], (force - c * z[1] - k * z[0]) / m])
@@ -216,7 +215,7 @@ def test_the_order_is_five(parameters: PlantParameters) -> None:
         state = rest_state(ANGLES)
         state[6:] = [1.0, -0.5]
         work, trial = np.empty((7, 8)), np.empty(8)
-        from_plant = integrate.drive_of(smooth, np.array([1.0, -2.0]), 3.0)
+        from_plant = drive_of(smooth, np.array([1.0, -2.0]), 3.0)
         for place in range(count):
             stuck = stuck_flags(SLIDING)
             integrate._advance(smooth, state, stuck, 12.0 + 3.0 * place * step, from_plant, step, work, trial)

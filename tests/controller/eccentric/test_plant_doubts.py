@@ -7,14 +7,14 @@ import math
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from scipy.integrate import solve_ivp
 
-from ringbalance.controller.eccentric.parameters import PlantParameters, plant_parameters
-from ringbalance.controller.eccentric.plant_run import PlantRun, run_plant
-from ringbalance.controller.eccentric.plant_whirl import holding_margin, steady_whirl
+from ringbalance.controller.eccentric_mass.plant.open_loop import PlantRun, run_plant
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
+from ringbalance.controller.eccentric_mass.plant.whirl import holding_margin, steady_whirl
 from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
+from ringbalance.scene.arrays import ComplexArray
 from ringbalance.scene.eccentric_models import SpeedPoint
 
 RPM = math.pi / 30
@@ -54,7 +54,7 @@ def test_without_the_rate_terms_a_slow_run_up_hardly_changes(p: PlantParameters)
     def peak(slope: float, kept: float) -> float:
         rate = slope * RPM
 
-        def rates(time: float, z: npt.NDArray[np.complex128]) -> npt.NDArray[np.complex128]:
+        def rates(time: float, z: ComplexArray) -> ComplexArray:
             speed = 60 * RPM + rate * time
             force = p.unbalance * (speed**2 - 1j * kept * rate)
             damped = p.damping * (z[1] + 1j * speed * z[0]) + p.stiffness * z[0]
@@ -92,7 +92,7 @@ def test_mu_f_is_a_length(p: PlantParameters) -> None:
     assert p.friction_arm_1 / (0.01 * 0.23) == pytest.approx(4.348, abs=1e-3)
 
 
-def test_135_rpm_leaves_the_driven_masses_out(p: PlantParameters) -> None:
+def test_135_rpm_leaves_the_eccentric_masses_out(p: PlantParameters) -> None:
     """sqrt(K_B / m_r) is the paper's 135 rpm; with both masses on board it is 130.4 rpm."""
     assert math.sqrt(p.stiffness / 5.0) / RPM == pytest.approx(135.0, abs=0.1)
     assert math.sqrt(p.stiffness / p.mass) / RPM == pytest.approx(130.43, abs=0.01)

@@ -1,6 +1,6 @@
-"""A tube with two bends over a hump, turning, solved in three dimensions; a heavy run."""
+"""A tube with two bends over a crest, turning, solved in three dimensions; a heavy run."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import dataclasses
@@ -11,10 +11,12 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.bent_tube import Segment
-from ringbalance.physics import gci, rotating_friction_ratio, rotation_reynolds_number, tube_loss
-from ringbalance.physics.bent_tube import BentTubeFlow, bent_tube_flow, pressure_loss
-from ringbalance.physics.bent_tube_terms import bend_shift
-from ringbalance.physics.rotating_section import SectionMesh
+from ringbalance.physics.convergence.grid import gci
+from ringbalance.physics.navier_stokes.rotating_section import SectionMesh
+from ringbalance.physics.tube.bend_terms import bend_shift
+from ringbalance.physics.tube.loss import tube_loss
+from ringbalance.physics.tube.numbers import rotation_reynolds_number
+from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import (
     Axis,
@@ -27,6 +29,7 @@ from ringbalance.verification.evidence import (
     Series,
     Table,
 )
+from ringbalance.verification.reference.bent_tube import BentTubeFlow, bent_tube_flow, pressure_loss
 
 REYNOLDS: Final = 200.0
 VISCOSITY: Final = 20e-6
@@ -42,26 +45,16 @@ _DEVELOPED: Final = (5.0, 1.0)
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
-    """One, for ratios.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        References.
-    """
+    """One, for ratios."""
     return {"straight": Reference(value=1.0), "explained": Reference(value=1.0)}
 
 
 def path(scene: Scene, refinement: float) -> tuple[Segment, ...]:
-    """Straight leg, bend to the right, over the hump, bend to the right, straight leg; lengths over the bore.
+    """Straight leg, bend to the right, over the crest, bend to the right, straight leg; lengths over the
+    bore.
 
-    Args:
-        scene: for its first bend and its bore.
-        refinement: cells along the path over those of the coarsest mesh.
-
-    Returns:
-        The segments.
+    Args: `scene`: for its first bend and its bore. `refinement`: cells along the path over those of the
+        coarsest mesh.
     """
     bend = scene.tube.bends[0]
 
@@ -95,16 +88,9 @@ def _rotation(scene: Scene) -> float:
 def solve(scene: Scene, *, mesh: tuple[int, int, float], coriolis_factor: float = 1.0) -> BentTubeFlow:
     """The flow on one mesh, with progress on standard error.
 
-    Args:
-        scene: for bore, bend and speed.
-        mesh: cells around and across, and refinement along the path.
-        coriolis_factor: 1, or a defect.
-
-    Returns:
-        The flow.
-
-    Raises:
-        ArithmeticError: Newton's method failed.
+    Args: `scene`: for bore, bend and speed. `mesh`: cells around and across, and refinement along the path.
+        `coriolis_factor`: 1, or a mutation.
+    Raises: ArithmeticError: Newton's method failed.
     """
     around, across, along = mesh
     flow = bent_tube_flow(
@@ -161,16 +147,7 @@ def _straight(flow: BentTubeFlow, scene: Scene) -> float:
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Loss of the bent tube on three meshes against the sum of terms; with a defect on one coarse mesh.
-
-    Args:
-        scene: for bore, bends and speed.
-        level: not used: the case is heavy.
-        defect: "coriolis_halved".
-
-    Returns:
-        Evidence.
-    """
+    """Loss of the bent tube on three meshes against the sum of terms; with a mutation on one coarse mesh."""
     meshes = _MESHES if defect is None else _MESHES[1:2]
     flows: list[BentTubeFlow] = []
     losses: list[float] = []
@@ -237,7 +214,7 @@ def _sizes(scene: Scene, meshes: Sequence[tuple[int, int, float]]) -> list[float
 
 
 def _half_width(losses: Sequence[float], sizes: Sequence[float]) -> tuple[float, tuple[float, ...]]:
-    """95 % half-width of the finest loss, and the observed order."""
+    """Expanded uncertainty (95 %) of the finest loss, and the observed order."""
     if len(losses) < 3:
         return 0.0, ()
     found = gci(

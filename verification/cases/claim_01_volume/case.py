@@ -1,6 +1,6 @@
 """The chamber's volume from printed numbers that do not contain it: R1'min and Fig. 4's departure."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import math
@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from scipy.optimize import brentq
 
 from ringbalance.mesh.geometry import chamber_volume, liquid_area, surface_radius
-from ringbalance.reduced_model.paper import chamber_volume_paper
+from ringbalance.reduced_model.paper.formulas import chamber_volume_paper
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.comparison import COVERAGE_FACTOR, from_rounding
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table
@@ -25,35 +25,19 @@ from ringbalance.verification.sensitivity import input_uncertainty
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
-    """The printed volume, for both routes to it.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        References.
-    """
+    """The printed volume, for both routes to it."""
     return dict.fromkeys(("volume", "volume_from_departure"), CHAMBER_VOLUME.reference)
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Volume by two routes that do not use the printed volume, and the error of Eq. 3's flat strips.
-
-    Args:
-        scene: the paper's disc.
-        level: not used.
-        defect: "no_plates".
-
-    Returns:
-        Evidence.
-    """
+    """Volume by two routes that do not use the printed volume, and the error of Eq. 3's flat strips."""
     disc = scene.disc
     volume = _volume_without_plates if defect == "no_plates" else _volume_from_radius
     departure = Found(
         value=_volume_from_departure(scene, DEPARTURE_LOW.value),
-        input=math.hypot(_departure_spread(scene), _rounded_radius_spread(disc)),
+        input=math.hypot(_departure_uncertainty(scene), _rounded_radius_uncertainty(disc)),
     )
-    radius_half_width = COVERAGE_FACTOR * _plate_spread(disc)
+    radius_half_width = COVERAGE_FACTOR * _plate_uncertainty(disc)
     found = {
         "volume": Found(
             value=volume(disc, RING_RADIUS.value),
@@ -85,7 +69,7 @@ def _plate_from_radius(disc: Disc, radius: float) -> float:
     return float(brentq(excess, 0.0, 0.3 * disc.inner_radius, xtol=1e-12))
 
 
-def _plate_spread(disc: Disc) -> float:
+def _plate_uncertainty(disc: Disc) -> float:
     rounding = from_rounding(RING_RADIUS.last_digit)
     return input_uncertainty([(lambda r: _plate_from_radius(disc, r), RING_RADIUS.value, rounding)])
 
@@ -107,12 +91,12 @@ def _volume_from_departure(scene: Scene, departure: float) -> float:
     return stall / per_volume / 0.5
 
 
-def _departure_spread(scene: Scene) -> float:
+def _departure_uncertainty(scene: Scene) -> float:
     rounding = from_rounding(DEPARTURE_LOW.last_digit)
     return input_uncertainty([(lambda d: _volume_from_departure(scene, d), DEPARTURE_LOW.value, rounding)])
 
 
-def _rounded_radius_spread(disc: Disc) -> float:
+def _rounded_radius_uncertainty(disc: Disc) -> float:
     """The paper reads V'_AC off a radius that it has rounded."""
 
     def twice_the_liquid(radius: float) -> float:

@@ -1,6 +1,6 @@
 """Volumes and the ring's inner radius from the exact area."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
-from ringbalance.reduced_model.paper import surface_radius_paper
+from ringbalance.reduced_model.paper.formulas import surface_radius_paper
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
 from ringbalance.verification.paper_numbers import (
@@ -25,14 +25,7 @@ _QUARTER = 0.25
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
-    """The printed radius and volumes.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        References.
-    """
+    """The printed radius and volumes."""
     return {
         "ring_radius": RING_RADIUS.reference,
         "max_liquid": MAX_LIQUID_VOLUME.reference,
@@ -41,16 +34,7 @@ def reference(scene: Scene) -> Mapping[str, Reference]:
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Radius and volumes from the exact area.
-
-    Args:
-        scene: the paper's disc.
-        level: not used.
-        defect: none is known here; the scene carries it.
-
-    Returns:
-        Evidence.
-    """
+    """Radius and volumes from the exact area."""
 
     def found(quantity: Callable[[Disc], float]) -> Found:
         return Found(

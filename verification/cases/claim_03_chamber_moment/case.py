@@ -1,6 +1,6 @@
 """Moment of one half-full chamber by finite elements, and the arithmetic of Eq. 7."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -8,41 +8,29 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.reduced_model.paper import max_liquid_volume_paper, moment_paper, surface_radius_paper
+from ringbalance.reduced_model.paper.formulas import (
+    max_liquid_volume_paper,
+    moment_paper,
+    surface_radius_paper,
+)
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
 from ringbalance.verification.paper_numbers import CHAMBER_MOMENT, DENSITY, RING_RADIUS, at_paper_density
-from ringbalance.verification.rings import found_of, mesh_table, moment_spread, ring_of
+from ringbalance.verification.rings import found_of, mesh_table, moment_standard_uncertainty, ring_of
 
 _FILLS: Final = (0.1, 0.2, 0.3, 0.4, 0.5)
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
-    """The printed moment, for the liquid and for the arithmetic.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        References.
-    """
+    """The printed moment, for the liquid and for the arithmetic."""
     return {"moment": CHAMBER_MOMENT.reference, "arithmetic": CHAMBER_MOMENT.reference}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Moment by finite elements, and by Eq. 7 with and without the paper's rounding.
-
-    Args:
-        scene: the paper's disc.
-        level: not used.
-        defect: "plates_left_out".
-
-    Returns:
-        Evidence.
-    """
+    """Moment by finite elements, and by Eq. 7 with and without the paper's rounding."""
     given = at_paper_density(scene)
     ring = ring_of(given, _FILLS)
-    by_elements = found_of(ring, "moment", -1, input_=moment_spread(given, _FILLS[-1]))
+    by_elements = found_of(ring, "moment", -1, input_=moment_standard_uncertainty(given, _FILLS[-1]))
     unrounded, rounded = (_eq_7(given.disc, radius) for radius in (_radius(given.disc), RING_RADIUS.value))
     arithmetic = Found(value=unrounded, corrected=rounded)
     moment = arithmetic if defect == "plates_left_out" else by_elements

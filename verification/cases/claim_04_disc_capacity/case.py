@@ -1,6 +1,6 @@
 """Moment of two adjacent full chambers, from one chamber's by finite elements."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import math
@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ringbalance.reduced_model.paper import capacity, moment_paper
+from ringbalance.reduced_model.paper.formulas import capacity, moment_paper
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
 from ringbalance.verification.paper_numbers import (
@@ -18,36 +18,20 @@ from ringbalance.verification.paper_numbers import (
     RING_RADIUS,
     at_paper_density,
 )
-from ringbalance.verification.rings import found_of, moment_spread, ring_of, scaled
+from ringbalance.verification.rings import found_of, moment_standard_uncertainty, ring_of, scaled
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
-    """The printed ability of the disc.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        References.
-    """
+    """The printed ability of the disc."""
     return {"capacity": DISC_MOMENT.reference, "arithmetic": DISC_MOMENT.reference}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Two full chambers at right angles.
-
-    Args:
-        scene: the paper's disc.
-        level: not used.
-        defect: "plates_left_out".
-
-    Returns:
-        Evidence.
-    """
+    """Two full chambers at right angles."""
     given = at_paper_density(scene)
     full = given.disc.max_fill_ratio
     ring = ring_of(given, (full,))
-    chamber = found_of(ring, "moment", 0, input_=moment_spread(given, full))
+    chamber = found_of(ring, "moment", 0, input_=moment_standard_uncertainty(given, full))
     if defect == "plates_left_out":
         chamber = Found(
             value=float(moment_paper(disc=given.disc, density=DENSITY, surface_radius=RING_RADIUS.value))

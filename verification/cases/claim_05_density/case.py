@@ -1,14 +1,14 @@
 """The moment at one and at two grams per millilitre by finite elements."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from typing import Final
 
-from ringbalance.physics.ring import RingQuantities
-from ringbalance.reduced_model.paper import moment_paper
+from ringbalance.physics.pressure.ring import RingQuantities
+from ringbalance.reduced_model.paper.formulas import moment_paper
 from ringbalance.scene import liquid_at
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference
@@ -18,38 +18,25 @@ from ringbalance.verification.paper_numbers import (
     RING_RADIUS,
     at_paper_density,
 )
-from ringbalance.verification.rings import found_of, moment_spread, ring, scaled
+from ringbalance.verification.rings import found_of, moment_standard_uncertainty, ring, scaled
 
 _DENSE: Final = 2 * DENSITY
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
-    """A factor of two, and the printed ability.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        References.
-    """
+    """A factor of two, and the printed ability."""
     return {"ratio": Reference(value=2.0), "dense_capacity": DENSE_DISC_MOMENT.reference}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Moments at both densities.
-
-    Args:
-        scene: the paper's disc.
-        level: not used.
-        defect: "plates_left_out".
-
-    Returns:
-        Evidence.
-    """
+    """Moments at both densities."""
     light, dense = (_ring(scene, density) for density in (DENSITY, _DENSE))
     full = scene.disc.max_fill_ratio
     chamber = found_of(
-        dense, "moment", 0, input_=_DENSE / DENSITY * moment_spread(at_paper_density(scene), full)
+        dense,
+        "moment",
+        0,
+        input_=_DENSE / DENSITY * moment_standard_uncertainty(at_paper_density(scene), full),
     )
     if defect == "plates_left_out":
         chamber = Found(

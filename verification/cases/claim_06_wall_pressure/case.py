@@ -1,6 +1,6 @@
 """Eq. 12 against finite elements over fill, plate thickness, speed and gravity."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import dataclasses
@@ -8,11 +8,11 @@ from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from ringbalance.mesh.geometry import chamber_volume
-from ringbalance.physics.ring import RingQuantities, ring_quantities
-from ringbalance.reduced_model.paper import wall_pressure_paper
+from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
+from ringbalance.reduced_model.paper.formulas import wall_pressure_paper
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import (
     Axis,
@@ -23,12 +23,10 @@ from ringbalance.verification.evidence import (
     Series,
     Table,
 )
-from ringbalance.verification.exact_chamber import exact_wall_pressure
 from ringbalance.verification.paper_numbers import plate_uncertainty, with_plate
+from ringbalance.verification.reference.exact_chamber import exact_wall_pressure
 from ringbalance.verification.rings import found_of, mesh_table, ring_of
 from ringbalance.verification.sensitivity import input_uncertainty
-
-FloatArray = npt.NDArray[np.float64]
 
 _SHARES: Final = (0.1, 0.3, 0.5, 0.7, 0.9, 1.0)
 """Of the largest fill."""
@@ -38,30 +36,14 @@ _SPEEDS: Final = (0.1, 0.2, 0.5, 1.0)
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
-    """Eq. 12.
-
-    Args:
-        scene: the scene.
-
-    Returns:
-        References.
-    """
+    """Eq. 12."""
     fills = np.array(_fills(scene))
     by_eq_12 = _eq_12(scene, scene.disc, fills)
     return {name: Reference(value=float(by_eq_12[index])) for name, index in _JUDGED.items()}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Wall pressure by finite elements over the fill range.
-
-    Args:
-        scene: the scene.
-        level: not used.
-        defect: none is known here; the scene carries it.
-
-    Returns:
-        Evidence.
-    """
+    """Wall pressure by finite elements over the fill range."""
     fills = _fills(scene)
     ring = ring_of(scene, fills)
     x = np.array(fills)
@@ -71,7 +53,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     gravity = _gravity_table(scene)
     return Evidence(
         found={
-            name: found_of(ring, "wall_pressure", index, input_=_spread(scene, fills[index]))
+            name: found_of(ring, "wall_pressure", index, input_=_standard_uncertainty(scene, fills[index]))
             for name, index in _JUDGED.items()
         },
         numbers={
@@ -109,7 +91,7 @@ def _exact(scene: Scene, disc: Disc, fill: FloatArray) -> FloatArray:
     )
 
 
-def _spread(scene: Scene, fill: float) -> float:
+def _standard_uncertainty(scene: Scene, fill: float) -> float:
     """Input uncertainty of the difference: the plates are in the finite elements and in Eq. 12's volume."""
 
     def difference(thickness: float) -> float:

@@ -1,6 +1,6 @@
 """The three things that Eqs. 13 to 18 take for granted: one k, '+1', and a tube that runs full."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import dataclasses
@@ -8,19 +8,16 @@ import math
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.reduced_model.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.flow_law import Regime
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene.models import Scene
 from ringbalance.verification.calibrations import calibration_of
 from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series, no_reference
 from ringbalance.verification.paper_numbers import plate_uncertainty
-from ringbalance.verification.tube_running import driving_head, running_tube, tube_curve
-
-FloatArray = npt.NDArray[np.float64]
+from ringbalance.verification.reference.tube_running import driving_head, running_tube, tube_curve
 
 _PRESSURES: Final = np.geomspace(0.77, 2.53, 9)
 """In units of the scene's."""
@@ -33,16 +30,7 @@ reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Errors of one k and of '+1', and the share of conditions with a full tube.
-
-    Args:
-        scene: the scene.
-        level: not used.
-        defect: none is known here; the scene carries it.
-
-    Returns:
-        Evidence.
-    """
+    """Errors of one k and of '+1', and the share of conditions with a full tube."""
     share = _siphon_share(scene)
     low, high = _hump_bounds(scene)
     at_low, at_high = (_siphon_share(_with_hump(scene, radius)) for radius in (low, high))
@@ -51,7 +39,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         found={
             "one_k": _one_k(scene),
             "exit_velocity": Found(value=by_exit),
-            "siphon_share": Found(value=share, input=_hump_spread(scene, at_low, at_high)),
+            "siphon_share": Found(value=share, input=_hump_uncertainty(scene, at_low, at_high)),
         },
         numbers={
             "exit_excess": excess,
@@ -111,8 +99,8 @@ def _hump_bounds(scene: Scene) -> tuple[float, float]:
     return scene.disc.inner_radius, min(0.999 * ring, scene.tube.port_radius)
 
 
-def _hump_spread(scene: Scene, at_low: float, at_high: float) -> float:
-    """Stated, or for the paper's own disc, whose hump is inferred, anything within its bounds."""
+def _hump_uncertainty(scene: Scene, at_low: float, at_high: float) -> float:
+    """Stated, or for the paper's own disc, whose crest is inferred, anything within its bounds."""
     if scene.tube.hump_radius is None:
         return 0.0
     for stated in scene.uncertainty:

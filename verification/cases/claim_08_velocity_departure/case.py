@@ -1,15 +1,15 @@
 """The velocity's fall under the true wall pressure, by Eq. 19's own arithmetic, and by the calibrated law."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-from ringbalance.reduced_model.paper import departure, flat_strip_area, stall_pressure
+from ringbalance.reduced_model.paper.formulas import departure, flat_strip_area, stall_pressure
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.calibrations import calibration_of
 from ringbalance.verification.evidence import (
@@ -21,7 +21,6 @@ from ringbalance.verification.evidence import (
     Reference,
     Series,
 )
-from ringbalance.verification.exact_chamber import exact_wall_pressure
 from ringbalance.verification.paper_numbers import (
     DENSITY,
     DEPARTURE_HIGH,
@@ -33,23 +32,15 @@ from ringbalance.verification.paper_numbers import (
     plate_uncertainty,
     with_plate,
 )
+from ringbalance.verification.reference.exact_chamber import exact_wall_pressure
 from ringbalance.verification.sensitivity import input_uncertainty
-
-FloatArray = npt.NDArray[np.float64]
 
 _PRESSURES: Final = {"low": LOW_PRESSURE, "high": HIGH_PRESSURE}
 _POINTS: Final = 41
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
-    """The printed departures, for the physics and for the arithmetic.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        References.
-    """
+    """The printed departures, for the physics and for the arithmetic."""
     printed = {"low": DEPARTURE_LOW, "high": DEPARTURE_HIGH}
     return {
         f"{what}_{name}": number.reference
@@ -59,16 +50,7 @@ def reference(scene: Scene) -> Mapping[str, Reference]:
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Departures by three routes.
-
-    Args:
-        scene: the paper's disc.
-        level: not used.
-        defect: "eq_12_used".
-
-    Returns:
-        Evidence.
-    """
+    """Departures by three routes."""
     given = at_paper_density(scene)
     arithmetic = {f"arithmetic_{name}": _arithmetic(given, p) for name, p in _PRESSURES.items()}
     physics = {f"departure_{name}": _physics(given, p) for name, p in _PRESSURES.items()}
@@ -114,8 +96,8 @@ def _physics(scene: Scene, pressure: float) -> Found:
         return 1 - float(np.sqrt((pressure - level) / (pressure + level)))
 
     thickness = scene.disc.plate_thickness
-    spread = input_uncertainty([(fall, thickness, plate_uncertainty(scene))])
-    return Found(value=fall(thickness), input=spread)
+    standard_uncertainty = input_uncertainty([(fall, thickness, plate_uncertainty(scene))])
+    return Found(value=fall(thickness), input=standard_uncertainty)
 
 
 def _arithmetic(scene: Scene, pressure: float) -> Found:

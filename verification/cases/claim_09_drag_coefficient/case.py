@@ -1,6 +1,6 @@
 """k(u) over fills, bores, liquids and pressures, each tube at the velocity that it takes by itself."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import dataclasses
@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 from scipy.optimize import brentq
 
-from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT
+from ringbalance.reduced_model.paper.formulas import PAPER_DRAG_COEFFICIENT
 from ringbalance.scene import known_liquids, liquid_at
 from ringbalance.scene.models import Liquid, Scene
 from ringbalance.verification.comparison import from_half_width
@@ -25,7 +25,7 @@ from ringbalance.verification.evidence import (
     Series,
     Table,
 )
-from ringbalance.verification.tube_running import Running, driving_head, running_tube, tube_curve
+from ringbalance.verification.reference.tube_running import Running, driving_head, running_tube, tube_curve
 
 _ABOUT: Final = 0.1
 _BORES: Final = (0.5, 0.75, 1.0, 1.5, 2.0)
@@ -38,29 +38,13 @@ _NARROWEST: Final = 0.1
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
-    """About 50.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        References.
-    """
-    spread = from_half_width(_ABOUT * PAPER_DRAG_COEFFICIENT)
-    return {"k_scene": Reference(value=PAPER_DRAG_COEFFICIENT, uncertainty=spread)}
+    """About 50."""
+    standard_uncertainty = from_half_width(_ABOUT * PAPER_DRAG_COEFFICIENT)
+    return {"k_scene": Reference(value=PAPER_DRAG_COEFFICIENT, uncertainty=standard_uncertainty)}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """k at the velocity that every combination takes by itself.
-
-    Args:
-        scene: the scene.
-        level: not used.
-        defect: none is known here; the scene carries it.
-
-    Returns:
-        Evidence.
-    """
+    """k at the velocity that every combination takes by itself."""
     own = running_tube(scene, head=driving_head(scene, share=0.5))
     fills = [running_tube(scene, head=driving_head(scene, share=s)) for s in np.linspace(0, 1, 11)]
     bores = [_with_bore(scene, factor) for factor in _BORES]
@@ -70,9 +54,9 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     return Evidence(
         found={
             "k_scene": Found(value=own.k, input=from_half_width(own.half_width)),
-            "fill_spread": _spread(fills),
-            "bore_spread": _spread(bores),
-            "liquid_spread": _spread(list(liquids.values())),
+            "fill_spread": _range(fills),
+            "bore_spread": _range(bores),
+            "liquid_spread": _range(list(liquids.values())),
         },
         numbers={
             "gas": scene.gas.pressure,
@@ -126,7 +110,7 @@ def _everywhere(scene: Scene) -> list[float]:
     return found
 
 
-def _spread(runs: Sequence[Running]) -> Found:
+def _range(runs: Sequence[Running]) -> Found:
     low, high = min(runs, key=lambda one: one.k), max(runs, key=lambda one: one.k)
     both = math.hypot(low.half_width, high.half_width) if high.k > low.k else 0.0
     return Found(value=high.k - low.k, input=from_half_width(both))

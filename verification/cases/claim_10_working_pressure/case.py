@@ -1,6 +1,6 @@
-"""Stall by Eq. 19, stall by the true wall pressure, and priming over the hump, beside the printed range."""
+"""Stall by Eq. 19, stall by the true wall pressure, and priming over the crest, beside the printed range."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import math
@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT, stall_pressure, velocity_paper
+from ringbalance.reduced_model.paper.formulas import PAPER_DRAG_COEFFICIENT, stall_pressure, velocity_paper
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import (
     Axis,
@@ -21,7 +21,6 @@ from ringbalance.verification.evidence import (
     Reference,
     Series,
 )
-from ringbalance.verification.exact_chamber import exact_wall_pressure
 from ringbalance.verification.paper_numbers import (
     DENSITY,
     HIGHEST_PRESSURE,
@@ -29,37 +28,19 @@ from ringbalance.verification.paper_numbers import (
     plate_uncertainty,
     with_plate,
 )
+from ringbalance.verification.reference.exact_chamber import exact_wall_pressure
 from ringbalance.verification.sensitivity import input_uncertainty
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
-    """The lower end of the printed range, for both readings.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        References.
-    """
+    """The lower end of the printed range, for both readings."""
     return {"by_eq_19": LOWEST_PRESSURE.reference, "by_priming": LOWEST_PRESSURE.reference}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Stall and priming pressures.
-
-    Args:
-        scene: the paper's disc, with an inferred hump.
-        level: not used.
-        defect: none is known here; the scene carries it.
-
-    Returns:
-        Evidence.
-
-    Raises:
-        NotRunError: a scene without a hump.
-    """
+    """Stall and priming pressures. Raises: NotRunError: a scene without a crest."""
     if scene.tube.hump_radius is None:
-        raise NotRunError("the scene's tube has no hump to prime over")
+        raise NotRunError("the scene's tube has no siphon crest to prime over")
     ring_radius = float(surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio))
     low, high = (_priming(scene, radius) for radius in (ring_radius, scene.disc.inner_radius))
     return Evidence(
@@ -105,7 +86,7 @@ def _wall(scene: Scene, fill: float) -> float:
 
 
 def _priming(scene: Scene, hump_radius: float) -> float:
-    """Gas pressure that lifts an almost empty chamber's liquid over the hump, the other side vented."""
+    """Gas pressure that lifts an almost empty chamber's liquid over the crest, the other side vented."""
     lift = (scene.disc.outer_radius - hump_radius) * (scene.disc.outer_radius + hump_radius) / 2
     return DENSITY * scene.rotor.speed**2 * lift
 
@@ -130,7 +111,7 @@ def _figure(scene: Scene) -> Series:
     stall = np.full(radius.shape, _stall(scene, scene.disc))
     return Series(
         name="pressure that starts the flow from an almost empty chamber",
-        x=Axis(name="inner radius of the hump", unit="m", values=radius),
+        x=Axis(name="inner radius of the siphon crest", unit="m", values=radius),
         y=(
             Curve(name="priming, other chamber vented", unit="Pa", values=priming),
             Curve(name="0.54 MPa", unit="Pa", values=lowest, style="paper"),

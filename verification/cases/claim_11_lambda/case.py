@@ -1,6 +1,6 @@
 """lambda at the centre and over the range by finite elements."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import math
@@ -10,13 +10,13 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume
-from ringbalance.physics.ring import RingQuantities
-from ringbalance.reduced_model.paper import PAPER_LAMBDA
+from ringbalance.physics.pressure.ring import RingQuantities
+from ringbalance.reduced_model.paper.formulas import PAPER_LAMBDA
 from ringbalance.scene.models import Scene
 from ringbalance.verification.comparison import from_half_width, from_rounding
 from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
-from ringbalance.verification.exact_chamber import central_lambda
 from ringbalance.verification.paper_numbers import LAMBDA_TOLERANCE, plate_uncertainty, with_plate
+from ringbalance.verification.reference.exact_chamber import central_lambda
 from ringbalance.verification.rings import found_of, mesh_table, ring_of, scaled
 from ringbalance.verification.sensitivity import input_uncertainty
 
@@ -27,34 +27,20 @@ _LAST_DIGIT: Final = 1e-3
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
-    """72 mm with its stated error range and its rounding.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        References.
-    """
+    """72 mm with its stated error range and its rounding."""
     stated = from_half_width(LAMBDA_TOLERANCE * PAPER_LAMBDA)
-    spread = math.hypot(stated, from_rounding(_LAST_DIGIT))
-    return {"central": Reference(value=PAPER_LAMBDA, uncertainty=spread)}
+    standard_uncertainty = math.hypot(stated, from_rounding(_LAST_DIGIT))
+    return {"central": Reference(value=PAPER_LAMBDA, uncertainty=standard_uncertainty)}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """lambda from the moments of both chambers, and from the slope of the moment at the centre.
-
-    Args:
-        scene: the paper's disc.
-        level: not used.
-        defect: none is known here; the scene carries it.
-
-    Returns:
-        Evidence.
-    """
+    """lambda from the moments of both chambers, and from the slope of the moment at the centre."""
     fills = tuple(share * scene.disc.max_fill_ratio for share in _SHARES)
     ring = ring_of(scene, fills)
     per_density = 2 / scene.liquid.density
-    central = scaled(found_of(ring, "moment_per_volume", _CENTRE, input_=_spread(scene)), per_density)
+    central = scaled(
+        found_of(ring, "moment_per_volume", _CENTRE, input_=_standard_uncertainty(scene)), per_density
+    )
     curve = _over_range(scene, ring, central.value)
     return Evidence(
         found={
@@ -68,7 +54,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     )
 
 
-def _spread(scene: Scene) -> float:
+def _standard_uncertainty(scene: Scene) -> float:
     """Of dU/dV', from the plate thickness."""
     scale = scene.liquid.density / 2
     return scale * input_uncertainty(

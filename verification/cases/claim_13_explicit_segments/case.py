@@ -1,6 +1,6 @@
 """Explicit segments against the closed form over one long operation."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -8,10 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ringbalance.controller.closed_form import closed_form
-from ringbalance.controller.explicit_segments import explicit_segments
-from ringbalance.controller.transfer import Drive
-from ringbalance.reduced_model.paper_law import PaperLaw, paper_law
+from ringbalance.controller.liquid_ring.closed_form import closed_form
+from ringbalance.controller.liquid_ring.transfer import Drive
+from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_law
 from ringbalance.scene.models import Scene
 from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import (
@@ -26,6 +25,7 @@ from ringbalance.verification.evidence import (
     Series,
 )
 from ringbalance.verification.orders import extrapolate, order_study
+from ringbalance.verification.reference.explicit_segments import explicit_segments
 
 _COUNTS = (4, 8, 16, 32, 64, 128, 256, 512)
 _SHARE = 0.9
@@ -66,28 +66,12 @@ class _Operation:
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
-    """The closed form.
-
-    Args:
-        scene: the scene.
-
-    Returns:
-        References.
-    """
+    """The closed form."""
     return {"moved_fill": Reference(value=_long_operation(scene).exact())}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Moved fill over a sequence of segment counts.
-
-    Args:
-        scene: the scene; Eq. 19 is its law here.
-        level: not used.
-        defect: "frozen_velocity".
-
-    Returns:
-        Evidence.
-    """
+    """Moved fill over a sequence of segment counts."""
     operation = _long_operation(scene)
     frozen = defect == "frozen_velocity"
     exact = operation.exact()
@@ -96,10 +80,10 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     study = order_study(size=[1 / count for count in _COUNTS], error=error)
     limit = extrapolate(coarse=moved[-2], fine=moved[-1], ratio=2, order=1)
     # One half of the last correction bounds what the extrapolation has left.
-    spread = from_half_width(abs(limit - moved[-1]) / 2)
+    standard_uncertainty = from_half_width(abs(limit - moved[-1]) / 2)
     return Evidence(
         found={
-            "moved_fill": Found(value=limit, numerical=spread),
+            "moved_fill": Found(value=limit, numerical=standard_uncertainty),
             "order": Found(value=study.settled_order),
             "finest_error": Found(value=study.finest_error),
         },

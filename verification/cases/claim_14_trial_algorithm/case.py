@@ -1,6 +1,6 @@
 """The trial algorithm at four phases over plausible steps and periods."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import itertools
@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller import Simulation
+from ringbalance.controller.simulation import Simulation
 from ringbalance.scene.models import Scene
 from ringbalance.verification.comparison import from_rounding
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Series, Table
@@ -26,30 +26,14 @@ _STEPS: Final = {
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
-    """About 40 s.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        References.
-    """
+    """About 40 s."""
     return {"settling_time": Reference(value=_ABOUT, uncertainty=from_rounding(_TEN_SECONDS))}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """Runs at all phases for every set of steps.
 
-    Args:
-        scene: the paper's disc.
-        level: "heavy" runs more sets.
-        defect: "target_vector_instead".
-
-    Returns:
-        Evidence.
-
-    Raises:
-        ValueError: no set of steps settles at all phases.
+    Raises: ValueError: no set of steps settles at all phases.
     """
     target = defect == "target_vector_instead"
     sets = [_runs(scene, steps, target=target) for steps in itertools.product(*_STEPS[level])]
@@ -60,10 +44,10 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     counts = [run.misadjustments for runs in sets for run in runs if run.settled]
     own = max(settling(run) for run in _own(scene))
     # Any of the sets may have been the paper's: the spread over them is the input's.
-    spread = float(np.ptp(settled)) / (2 * math.sqrt(3))
+    standard_uncertainty = float(np.ptp(settled)) / (2 * math.sqrt(3))
     return Evidence(
         found={
-            "settling_time": Found(value=float(np.mean(settled)), input=spread),
+            "settling_time": Found(value=float(np.mean(settled)), input=standard_uncertainty),
             "phases_settled": Found(value=float(max(sum(r.settled for r in runs) for runs in sets))),
             "misadjustments": Found(value=float(min(counts))),
         },

@@ -1,6 +1,6 @@
 """Overshoot of the target-vector algorithm over Kp, and the rule behind it."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import math
@@ -9,9 +9,9 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller import Simulation
-from ringbalance.reduced_model.model import BalancerModel
-from ringbalance.reduced_model.paper_law import paper_model
+from ringbalance.controller.simulation import Simulation
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.models import Scene
 from ringbalance.verification.calibrations import calibration_of
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table
@@ -27,14 +27,7 @@ _UNKNOWN: Final = 0.25
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
-    """Between 0.12 and 0.16, and half a turn.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        References.
-    """
+    """Between 0.12 and 0.16, and half a turn."""
     middle = (_LAST_WITHOUT + _FIRST_WITH) / 2
     between = (_FIRST_WITH - _LAST_WITHOUT) / (2 * math.sqrt(3))
     return {
@@ -44,16 +37,7 @@ def reference(scene: Scene) -> Mapping[str, Reference]:
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Runs over Kp, and the fall of the vibration per second of gas.
-
-    Args:
-        scene: the paper's disc.
-        level: not used.
-        defect: none is known here; the scene carries it.
-
-    Returns:
-        Evidence.
-    """
+    """Runs over Kp, and the fall of the vibration per second of gas."""
     runs = {gain: _run(scene, gain) for gain in _GAINS}
     rate = _rate(scene, paper_model(scene))
     calibrated = _rate(scene, calibration_of(scene).model)

@@ -1,6 +1,6 @@
 """The target-vector algorithm over amplitudes and periods."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import dataclasses
@@ -10,8 +10,8 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller import Simulation
-from ringbalance.reduced_model.paper_law import paper_law
+from ringbalance.controller.simulation import Simulation
+from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.scene.models import Scene
 from ringbalance.verification.calibrations import calibration_of
 from ringbalance.verification.evidence import Evidence, Found, Level, Table, no_reference
@@ -26,16 +26,7 @@ reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Runs over amplitudes and periods under the paper's law, and over amplitudes under the calibrated one.
-
-    Args:
-        scene: the paper's disc.
-        level: not used.
-        defect: "lag_angle_wrong".
-
-    Returns:
-        Evidence.
-    """
+    """Runs over amplitudes and periods under the paper's law; amplitudes under the calibrated one."""
     given = _mistaken(scene) if defect == "lag_angle_wrong" else scene
     runs = {period: _runs(given, period) for period in _PERIODS}
     slowest = np.array([min(max(map(settling, group)), scene.run.time_limit) for group in runs.values()])

@@ -1,6 +1,6 @@
 """Both algorithms side by side at four phases and several periods."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import dataclasses
@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller import Simulation
+from ringbalance.controller.simulation import Simulation
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Found, Level, Table, no_reference
 from ringbalance.verification.loops import (
@@ -31,16 +31,7 @@ reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Runs of both algorithms.
-
-    Args:
-        scene: the paper's disc.
-        level: not used.
-        defect: "lag_angle_wrong".
-
-    Returns:
-        Evidence.
-    """
+    """Runs of both algorithms."""
     pairs = [(period, phase) for period in _PERIODS for phase in PHASES]
     aimed = _mistaken(scene) if defect == "lag_angle_wrong" else scene
     target = [_run(aimed, "target_vector", *pair) for pair in pairs]

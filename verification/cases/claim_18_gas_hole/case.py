@@ -1,16 +1,16 @@
 """The largest fill that leaves a point of the chamber dry at every angle, at rest and at every speed."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import minimize_scalar
 
 from ringbalance.mesh.geometry import half_angle, surface_radius
+from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import (
@@ -23,9 +23,6 @@ from ringbalance.verification.evidence import (
     Series,
     no_reference,
 )
-
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 _GRIDS = ((30, 45), (60, 90))
 """Radial and angular cells, coarse and fine."""
@@ -54,16 +51,7 @@ reference = no_reference
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """Safe fills at rest, at full speed and between.
 
-    Args:
-        scene: the scene, its shaft horizontal.
-        level: not used.
-        defect: "upright_only".
-
-    Returns:
-        Evidence.
-
-    Raises:
-        NotRunError: the shaft is vertical, or there is no gravity.
+    Raises: NotRunError: the shaft is vertical, or there is no gravity.
     """
     if scene.environment.shaft != "horizontal" or scene.environment.gravity == 0:
         raise NotRunError("the claim is about a horizontal shaft under gravity")
@@ -116,7 +104,7 @@ def _cells(disc: Disc, radial: int, angular: int) -> _Cells:
     alpha = half_angle(disc=disc, radius=radius)
     angle = np.outer(alpha, 2 * (np.arange(angular) + 0.5) / angular - 1)
     area = np.broadcast_to((radius * 2 * alpha * depth / (radial * angular))[:, None], angle.shape).ravel()
-    place = (radius[:, None] * np.exp(1j * angle)).ravel()
+    place = np.asarray(radius[:, None] * np.exp(1j * angle), dtype=np.complex128).ravel()
     return _Cells(place=place, share=area / area.sum(), width=np.sqrt(area))
 
 

@@ -1,6 +1,6 @@
 """What the same gas pressure achieves with a liquid of twice the density."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import math
@@ -12,44 +12,28 @@ from scipy.optimize import brentq
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
-from ringbalance.verification.exact_chamber import exact_moment, exact_wall_pressure
+from ringbalance.verification.reference.exact_chamber import exact_moment, exact_wall_pressure
 from ringbalance.verification.rings import found_of, ring
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
-    """A free gain: no more pressure, twice the ability.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        References.
-    """
+    """A free gain: no more pressure, twice the ability."""
     return {"pressure_ratio": Reference(value=1.0), "gain": Reference(value=2.0)}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Pressures and reachable abilities at the scene's density and at twice that.
-
-    Args:
-        scene: the scene.
-        level: not used.
-        defect: "weightless".
-
-    Returns:
-        Evidence.
-    """
+    """Pressures and reachable abilities at the scene's density and at twice that."""
     light = scene.liquid.density
     dense = 2 * light
     felt = light if defect == "weightless" else dense
     stalls = [_stall_by_elements(scene, density) for density in (light, felt)]
     ratio = stalls[1].value / stalls[0].value
-    spread = ratio * math.hypot(*(stall.numerical / stall.value for stall in stalls))
+    standard_uncertainty = ratio * math.hypot(*(stall.numerical / stall.value for stall in stalls))
     reach_light, reach_dense = (_reach(scene, density, scene.gas.pressure) for density in (light, felt))
     gain = _ability(scene, dense, reach_dense) / _ability(scene, light, reach_light)
     return Evidence(
         found={
-            "pressure_ratio": Found(value=ratio, numerical=spread),
+            "pressure_ratio": Found(value=ratio, numerical=standard_uncertainty),
             "gain": Found(value=gain),
         },
         numbers={
@@ -103,7 +87,7 @@ def _ability(scene: Scene, density: float, fill: float) -> float:
 
 
 def _priming(scene: Scene, density: float) -> float:
-    """Gas pressure that lifts the liquid over the hump from equal fills, the other chamber vented."""
+    """Gas pressure that lifts the liquid over the crest from equal fills, the other chamber vented."""
     if scene.tube.hump_radius is None:
         return 0.0
     level = float(surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio / 2))

@@ -1,6 +1,6 @@
 """The integral of Eq. 11 against finite elements, and against the force balance of the whole liquid."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import dataclasses
@@ -9,38 +9,22 @@ from collections.abc import Mapping
 import numpy as np
 
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.physics.ring import RingQuantities
+from ringbalance.physics.pressure.ring import RingQuantities
 from ringbalance.scene.models import Scene
 from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
-from ringbalance.verification.exact_chamber import exact_moment, exact_wall_pressure
+from ringbalance.verification.reference.exact_chamber import exact_moment, exact_wall_pressure
 from ringbalance.verification.rings import found_of, mesh_table, ring_of
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
-    """The integral of Eq. 11, and a balance of one.
-
-    Args:
-        scene: the scene.
-
-    Returns:
-        References.
-    """
+    """The integral of Eq. 11, and a balance of one."""
     pressure = _integrated(scene, np.array([scene.disc.max_fill_ratio]))
     return {"wall_pressure": Reference(value=float(pressure[0])), "force_balance": Reference(value=1.0)}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Wall pressure and net force by finite elements.
-
-    Args:
-        scene: the scene.
-        level: not used.
-        defect: "whole_ring".
-
-    Returns:
-        Evidence.
-    """
+    """Wall pressure and net force by finite elements."""
     fills = tuple((np.array([0.2, 0.4, 0.6, 0.8, 1.0]) * scene.disc.max_fill_ratio).tolist())
     ring = ring_of(scene, fills)
     pressure = found_of(ring, "wall_pressure", -1)
@@ -76,8 +60,8 @@ def _balance(scene: Scene, ring: RingQuantities) -> Found:
     moment = exact_moment(disc=scene.disc, density=scene.liquid.density, fill_ratio=scene.disc.max_fill_ratio)
     centrifugal = scene.rotor.speed**2 * float(moment)
     force = float(ring.resultant_force.value[-1, 0])
-    spread = from_half_width(float(ring.resultant_force.uncertainty[-1, 0]))
-    return Found(value=force / centrifugal, numerical=spread / centrifugal)
+    standard_uncertainty = from_half_width(float(ring.resultant_force.uncertainty[-1, 0]))
+    return Found(value=force / centrifugal, numerical=standard_uncertainty / centrifugal)
 
 
 def _figure(scene: Scene, ring: RingQuantities) -> Series:

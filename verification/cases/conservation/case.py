@@ -1,26 +1,24 @@
 """Balances on meshes with a free surface found under gravity."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.mesh.geometry import chamber_volume
-from ringbalance.physics.pressure import FREE_SURFACE, PressureSolution, RotatingLiquid
-from ringbalance.physics.pressure_assembly import at_facets, facet_points, volume_points
-from ringbalance.physics.pressure_integrals import liquid_integrals, section_integrals
-from ringbalance.physics.pressure_surface import solve_with_gravity
+from ringbalance.physics.pressure.assembly import at_facets, facet_points, volume_points
+from ringbalance.physics.pressure.integrals import liquid_integrals, section_integrals
+from ringbalance.physics.pressure.solve import FREE_SURFACE, PressureSolution, RotatingLiquid
+from ringbalance.physics.pressure.surface import solve_with_gravity
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Found, Level, no_reference
-from ringbalance.verification.gravity_study import tilted_liquid
+from ringbalance.verification.reference.gravity_study import tilted_liquid
 from ringbalance.verification.rings import ring_of
-
-FloatArray = npt.NDArray[np.float64]
 
 _FILL_SHARE: Final = 0.8
 
@@ -39,16 +37,7 @@ reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Residuals of all balances.
-
-    Args:
-        scene: the scene; its disc and density are used.
-        level: not used.
-        defect: "wall_condition_off_by_a_percent" or "plate_force_dropped".
-
-    Returns:
-        Evidence.
-    """
+    """Residuals of all balances."""
     fill = _FILL_SHARE * scene.disc.max_fill_ratio
     radial, angular = default_cells(disc=scene.disc)
     balances = [_section_balance(scene, fill, (radial // k, angular // k), defect) for k in (4, 2, 1)]

@@ -1,15 +1,13 @@
 """Coverage over random discs; a heavy run."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import lru_cache
 from typing import Final
 
-import numpy as np
-import numpy.typing as npt
-
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.coverage import QUANTITIES, Coverage, coverage, error_ratios, random_samples
 from ringbalance.verification.evidence import Evidence, Found, Level, Table, no_reference
@@ -24,16 +22,7 @@ reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Shares and medians over all samples.
-
-    Args:
-        scene: not used: the discs are random.
-        level: not used.
-        defect: "half_widths_quartered" or "half_widths_padded".
-
-    Returns:
-        Evidence.
-    """
+    """Shares and medians over all samples."""
     results = coverage(ratios=_ratios(), width_factor=_FACTORS[defect])
     found: dict[str, Found] = {}
     for name, quantity in zip(_NAMES, QUANTITIES, strict=True):
@@ -47,7 +36,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 
 
 @lru_cache(maxsize=1)
-def _ratios() -> npt.NDArray[np.float64]:
+def _ratios() -> FloatArray:
     return error_ratios(samples=random_samples(count=_COUNT, seed=_SEED))
 
 

@@ -1,6 +1,6 @@
 """Decay rates along the turning tube: creeping flow at rest, fast rotation, and the bound that k(u) uses."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -9,13 +9,13 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.physics.entry_length import slowest_decay
-from ringbalance.physics.navier_stokes import FlowSystem
-from ringbalance.physics.rotating_section import SectionMesh, section_system
-from ringbalance.physics.rotating_section_table import rotating_friction_ratio
-from ringbalance.physics.tube_development import developing_length
+from ringbalance.physics.navier_stokes.newton import FlowSystem
+from ringbalance.physics.navier_stokes.rotating_section import SectionMesh, section_system
+from ringbalance.physics.tube.development import developing_length
+from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table
+from ringbalance.verification.reference.entry_length import slowest_decay
 
 _CREEPING: Final = 2 * (4.46629832 + 1.46746761j)
 """Per diameter: root of z (J0^2 + J1^2) = 2 J0 J1 per radius."""
@@ -42,28 +42,12 @@ _SPEED: Final = MappingProxyType({None: 1.0, "radius_for_bore": 1.0, "coriolis_t
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
-    """The exact rates.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        References.
-    """
+    """The exact rates."""
     return {"fast": Reference(value=_GEOSTROPHIC)}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Decay rates by finite elements against exact ones, and lengths against their bound.
-
-    Args:
-        scene: not used: the section has unit bore.
-        level: "heavy" refines the meshes and takes more points.
-        defect: "radius_for_bore" or "coriolis_too_weak".
-
-    Returns:
-        Evidence.
-    """
+    """Decay rates by finite elements against exact ones, and lengths against their bound."""
     coarse, fine = (section_system(cells=cells) for cells in _MESHES[level])
     rates = slowest_decay(system=coarse, reynolds=0.0, rotation_reynolds=0.0, count=12).rates
     exact = _CREEPING / (2 if defect == "radius_for_bore" else 1)

@@ -1,13 +1,13 @@
 """The printed force beside the largest one, and the corrected bound beside a run."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
-from ringbalance.controller.eccentric.figures_bound import motion_bound
-from ringbalance.controller.eccentric.figures_runs import figure_seven
-from ringbalance.controller.eccentric.parameters import plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
 from ringbalance.scene.models import Scene
-from ringbalance.verification.driven_masses import driven_scene
+from ringbalance.verification.eccentric_mass.bound import motion_bound
+from ringbalance.verification.eccentric_mass.curves import driven_scene
+from ringbalance.verification.eccentric_mass.runs import figure_seven
 from ringbalance.verification.evidence import Evidence, Found, Level, no_reference
 
 _RATE = 1.0
@@ -18,16 +18,7 @@ reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Forces and amplitudes against their bounds.
-
-    Args:
-        scene: not used: the driven-mass paper's rotor is taken.
-        level: not used.
-        defect: "rotor_at_rest".
-
-    Returns:
-        Evidence.
-    """
+    """Forces and amplitudes against their bounds."""
     rotor = driven_scene()
     speed = rotor.rotor.speed_profile[0].speed
     parameters = plant_parameters(rotor)

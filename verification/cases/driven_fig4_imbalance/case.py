@@ -1,13 +1,13 @@
 """Four imbalances estimated, and the covariances that the printed time needs."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import numpy as np
 
-from ringbalance.controller.eccentric.figures_imbalance import FigureFour, figure_four
 from ringbalance.scene.models import Scene
-from ringbalance.verification.driven_masses import driven_scene, thinned
+from ringbalance.verification.eccentric_mass.curves import driven_scene, thinned
+from ringbalance.verification.eccentric_mass.imbalance import FigureFour, figure_four
 from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series, no_reference
 
 PRINTED = 3.5
@@ -18,16 +18,7 @@ reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Convergence times under honest and under ever less honest covariances.
-
-    Args:
-        scene: not used: the driven-mass paper's rotor is taken.
-        level: not used.
-        defect: "noise_overrated".
-
-    Returns:
-        Evidence.
-    """
+    """Convergence times under honest and under ever less honest covariances."""
     found = figure_four(driven_scene())
     honest = max(found.honest_time) if defect is None else float(found.scaled_time[-1])
     norm = found.covariance_norm
@@ -61,8 +52,8 @@ def _estimates(found: FigureFour) -> Series:
 def _times(found: FigureFour) -> Series:
     reached = np.isfinite(found.scaled_time)
     return Series(
-        name="time to be within 2 % over the noise that the filter believes in",
-        x=Axis(name="believed over true noise", unit="1", values=found.scales[reached]),
+        name="time to be within 2 % over the noise that the filter assumes",
+        x=Axis(name="assumed over true noise", unit="1", values=found.scales[reached]),
         y=(
             Curve(name="found", unit="s", values=found.scaled_time[reached]),
             Curve(name="printed", unit="s", values=np.full(int(reached.sum()), PRINTED), style="paper"),

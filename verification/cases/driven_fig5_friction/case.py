@@ -1,13 +1,13 @@
 """Two friction arms found while both masses go round."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import numpy as np
 
-from ringbalance.controller.eccentric.figures_runs import FigureFive, figure_five
 from ringbalance.scene.models import Scene
-from ringbalance.verification.driven_masses import driven_scene, thinned
+from ringbalance.verification.eccentric_mass.curves import driven_scene, thinned
+from ringbalance.verification.eccentric_mass.runs import FigureFive, figure_five
 from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series, no_reference
 
 _BEFORE, _AFTER = 0.1, 0.6
@@ -18,16 +18,7 @@ reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Errors of the friction arms and the time they take.
-
-    Args:
-        scene: not used: the driven-mass paper's rotor is taken.
-        level: not used.
-        defect: "another_friction".
-
-    Returns:
-        Evidence.
-    """
+    """Errors of the friction arms and the time they take."""
     found = figure_five(driven_scene())
     wrong = 1.1 if defect == "another_friction" else 1.0
     last = [run.estimates.friction_arm[-1] for run in found.runs]

@@ -1,11 +1,11 @@
 """Effort over the speed under four ways of compensating friction."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
-from ringbalance.controller.eccentric.figures_effort import FigureSix, figure_six
 from ringbalance.scene.models import Scene
-from ringbalance.verification.driven_masses import driven_scene
+from ringbalance.verification.eccentric_mass.curves import driven_scene
+from ringbalance.verification.eccentric_mass.effort import FigureSix, figure_six
 from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series, no_reference
 
 _STEP = {"light": 4e-4, "heavy": 1e-4}
@@ -16,16 +16,7 @@ reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Growth of the effort with the speed.
-
-    Args:
-        scene: not used: the driven-mass paper's rotor is taken.
-        level: "heavy" integrates more finely.
-        defect: "friction_left_to_the_regulator".
-
-    Returns:
-        Evidence.
-    """
+    """Growth of the effort with the speed."""
     found = figure_six(driven_scene(), step=_STEP[level])
     judged = found.exact if defect is None else found.without
     without = found.growth(found.without)
@@ -49,7 +40,7 @@ def _figure(found: FigureSix) -> Series:
         x=Axis(name="speed over natural frequency", unit="1", values=found.speed_ratios),
         y=(
             Curve(name="compensated exactly", unit="N m s", values=found.exact[at]),
-            Curve(name="arm believed a fifth too small", unit="N m s", values=found.short[at]),
+            Curve(name="arm assumed a fifth too small", unit="N m s", values=found.short[at]),
             Curve(name="not compensated", unit="N m s", values=found.without[at]),
             Curve(name="as printed", unit="N m s", values=found.printed[at], style="paper"),
         ),

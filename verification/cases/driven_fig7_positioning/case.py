@@ -1,13 +1,13 @@
 """Two imbalances balanced at constant speed."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import numpy as np
 
-from ringbalance.controller.eccentric.figures_runs import BalancingFigure, figure_eight, figure_seven
 from ringbalance.scene.models import Scene
-from ringbalance.verification.driven_masses import driven_scene, envelope, thinned
+from ringbalance.verification.eccentric_mass.curves import driven_scene, envelope, thinned
+from ringbalance.verification.eccentric_mass.runs import BalancingFigure, figure_eight, figure_seven
 from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series, no_reference
 
 _SHOWN = 12.0
@@ -18,16 +18,7 @@ reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Amplitudes before, on the way and after.
-
-    Args:
-        scene: not used: the driven-mass paper's rotor is taken.
-        level: not used.
-        defect: "ten_degrees_beside".
-
-    Returns:
-        Evidence.
-    """
+    """Amplitudes before, on the way and after."""
     rotor = driven_scene()
     found = figure_seven(rotor) if defect is None else figure_eight(rotor, time_limit=30.0)
     ratios = np.divide(found.positioned, found.before)

@@ -1,13 +1,13 @@
 """Masses ten degrees beside their targets, then tuned by trial."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import numpy as np
 
-from ringbalance.controller.eccentric.figures_runs import BalancingFigure, figure_eight
 from ringbalance.scene.models import Scene
-from ringbalance.verification.driven_masses import driven_scene, envelope, thinned
+from ringbalance.verification.eccentric_mass.curves import driven_scene, envelope, thinned
+from ringbalance.verification.eccentric_mass.runs import BalancingFigure, figure_eight
 from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series, no_reference
 
 _TIME = {None: 200.0, "tuning_given_up": 25.0}
@@ -18,16 +18,7 @@ reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Amplitudes after positioning and after fine tuning.
-
-    Args:
-        scene: not used: the driven-mass paper's rotor is taken.
-        level: not used.
-        defect: "tuning_given_up".
-
-    Returns:
-        Evidence.
-    """
+    """Amplitudes after positioning and after fine tuning."""
     found = figure_eight(driven_scene(), time_limit=_TIME[defect])
     left = np.divide(found.positioned, found.before)
     ended = np.divide(found.after, found.before)

@@ -1,15 +1,15 @@
 """The run-up, balanced at low speed and locked."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from collections.abc import Mapping
 
 import numpy as np
 
-from ringbalance.controller.eccentric.figures_runs import FigureNine, figure_nine
 from ringbalance.scene.models import Scene
-from ringbalance.verification.driven_masses import driven_scene, envelope, thinned
+from ringbalance.verification.eccentric_mass.curves import driven_scene, envelope, thinned
+from ringbalance.verification.eccentric_mass.runs import FigureNine, figure_nine
 from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
 
 _RPM = 30 / np.pi
@@ -18,28 +18,12 @@ _ROUNDED = 0.5 / np.sqrt(3)
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
-    """The printed critical speed.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        Reference, rpm.
-    """
+    """The printed critical speed."""
     return {"critical": Reference(value=_PRINTED, uncertainty=_ROUNDED)}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Peaks and critical speeds.
-
-    Args:
-        scene: not used: the driven-mass paper's rotor is taken.
-        level: not used.
-        defect: "masses_locked".
-
-    Returns:
-        Evidence.
-    """
+    """Peaks and critical speeds."""
     found = figure_nine(driven_scene())
     balanced = found.balanced_peak[0] if defect is None else found.locked_peak[0]
     critical, without = _RPM * found.critical_speed, _RPM * found.rotor_critical_speed

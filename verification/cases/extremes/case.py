@@ -1,16 +1,18 @@
 """The designed set, the axes and the maps of the extremes; a heavy run."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import tomllib
 from typing import Final
 
 from ringbalance.scene import bundled_scene
-from ringbalance.scene.files import cache_folder
 from ringbalance.scene.models import Scene
+from ringbalance.scene.platform.files import cache_folder
 from ringbalance.verification.evidence import Evidence, Found, Level, Table, no_reference
-from ringbalance.verification.extremes import (
+from ringbalance.verification.extremes.design import Base
+from ringbalance.verification.extremes.point import SOUND, Defect, Ending
+from ringbalance.verification.extremes.study import (
     SIZES,
     Size,
     broken,
@@ -18,8 +20,6 @@ from ringbalance.verification.extremes import (
     extremes_tables,
     find_extremes,
 )
-from ringbalance.verification.extremes_design import Base
-from ringbalance.verification.extremes_point import SOUND, Defect, Ending
 
 _DEFECTS: Final = {
     None: SOUND,
@@ -30,7 +30,7 @@ _FEW: Final = Size(points=40, sweep=2, fineness=1.0, grid=2)
 """Enough for a mutation to show."""
 _WORKERS: Final = 2
 _KEPT: Final = "extremes-points.json"
-"""From which an interrupted run goes on."""
+"""From which an interrupted run resumes."""
 _PAPER: Final = "liquid_ring_paper"
 _NUMBERS: Final = {
     "solved": Ending.SOLVED,
@@ -44,16 +44,7 @@ reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Judge every point.
-
-    Args:
-        scene: not used: the paper's file is varied.
-        level: "light" takes a few points.
-        defect: "half_widths_hundredth" or "liquid_lost".
-
-    Returns:
-        Evidence.
-    """
+    """Judge every point."""
     document = tomllib.loads(bundled_scene(_PAPER).read_text(encoding="utf-8"))
     base = Base(document=document, file=f"{_PAPER}.toml", defect=_DEFECTS[defect])
     size = SIZES[level] if defect is None else _FEW

@@ -1,6 +1,6 @@
 """Friction factors against smooth-tube and rough-tube measurements."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -9,14 +9,13 @@ from functools import partial
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-from ringbalance.physics.tube_friction import friction_factor, friction_uncertainty
+from ringbalance.physics.tube.friction import friction_factor, friction_uncertainty
+from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series, no_reference
 from ringbalance.verification.published import read_rows
 
-FloatArray = npt.NDArray[np.float64]
 Friction = Callable[[FloatArray, FloatArray], FloatArray]
 
 _SMOOTH_DATA: Final = 0.011
@@ -36,23 +35,14 @@ class _Points:
     friction: FloatArray
     """Darcy."""
     uncertainty: float
-    """95 % half-width, relative."""
+    """Expanded uncertainty (95 %), relative."""
 
 
 reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Deviations from the measurements, and the smoothness of the curve.
-
-    Args:
-        scene: not used.
-        level: not used.
-        defect: "fanning_factor", "roughness_ignored" or "sudden_switch".
-
-    Returns:
-        Evidence.
-    """
+    """Deviations from the measurements, and the smoothness of the curve."""
     friction = partial(_friction, defect=defect)
     smooth, rough = _smooth_points(), _rough_points()
     laminar = np.geomspace(1, 1000, 200)
@@ -92,7 +82,7 @@ def _friction(reynolds: FloatArray, roughness: FloatArray, *, defect: str | None
     return f / 4 if defect == "fanning_factor" else f
 
 
-def _within(points: _Points, friction: Friction) -> npt.NDArray[np.bool_]:
+def _within(points: _Points, friction: Friction) -> BoolArray:
     half_width = [
         float(friction_uncertainty(reynolds=re, relative_roughness=float(eps)))
         for re, eps in zip(points.reynolds, points.roughness, strict=True)

@@ -1,6 +1,6 @@
 """Grid convergence judged on sequences that were made from their limit."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -8,13 +8,11 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-from ringbalance.physics.grid_convergence import GridConvergence, Verdict, gci
+from ringbalance.physics.convergence.grid import GridConvergence, Verdict, gci
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table
-
-FloatArray = npt.NDArray[np.float64]
 
 _LIMIT: Final = 1.0
 _FORMAL: Final = 2.0
@@ -72,28 +70,12 @@ def _sequences() -> tuple[_Sequence, ...]:
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
-    """The order that was built in.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        References.
-    """
+    """The order that was built in."""
     return {"fitted_order": Reference(value=_FITTED)}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Verdicts, orders and half-widths of all sequences.
-
-    Args:
-        scene: not used.
-        level: not used.
-        defect: "cap_removed" or "signs_ignored".
-
-    Returns:
-        Evidence.
-    """
+    """Verdicts, orders and half-widths of all sequences."""
     sequences = _sequences()
     judged = {one.name: _judge(one, defect) for one in sequences}
     wrong = sum(judged[one.name].verdict not in one.expected for one in sequences)

@@ -1,6 +1,6 @@
 """Three-mesh grid convergence against the published worked examples."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
 
-from ringbalance.physics.grid_convergence import GridConvergence, Verdict, gci
+from ringbalance.physics.convergence.grid import GridConvergence, Verdict, gci
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Found, Level, Table, no_reference
 from ringbalance.verification.published import read_rows
@@ -33,16 +33,7 @@ reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Deviations from the printed results in units of their last digits.
-
-    Args:
-        scene: not used.
-        level: not used.
-        defect: "safety_dropped" or "sizes_by_count".
-
-    Returns:
-        Evidence.
-    """
+    """Deviations from the printed results in units of their last digits."""
     columns = _columns()
     found = [_judge(column, defect) for column in columns]
     digits = {

@@ -7,7 +7,7 @@ from typing import Final
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, no_reference
-from ringbalance.verification.gravity_study import gravity_evidence, gravity_study
+from ringbalance.verification.reference.gravity_study import gravity_evidence, gravity_study
 
 _FILL_SHARE: Final = 0.8
 _LEVELS: Final = {"light": (1, 2, 4, 8), "heavy": (1, 2, 4, 8, 16)}
@@ -17,16 +17,7 @@ reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Errors of surface and pressure over levels.
-
-    Args:
-        scene: the scene; its disc and density are used, its speed is not.
-        level: "heavy" adds a finer level.
-        defect: a fault of the liquid's right-hand sides.
-
-    Returns:
-        Evidence.
-    """
+    """Errors of surface and pressure over levels."""
     angular = default_cells(disc=scene.disc)[1] // 4
     study = gravity_study(
         disc=scene.disc,

@@ -1,30 +1,23 @@
 """Wall pressure, moment, volume and lambda by three routes."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from collections.abc import Mapping
 
 from ringbalance.mesh.geometry import chamber_volume
-from ringbalance.physics.ring import RingQuantities, ring_quantities
+from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, Reference
-from ringbalance.verification.exact_chamber import central_lambda, exact_moment, exact_wall_pressure
 from ringbalance.verification.paper_numbers import with_plate
+from ringbalance.verification.reference.exact_chamber import central_lambda, exact_moment, exact_wall_pressure
 from ringbalance.verification.rings import found_of, mesh_table, scaled
 
 _SCALARS = {"wall_pressure": "Pa", "moment": "kg m", "liquid_volume": "m^3"}
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
-    """The closed forms.
-
-    Args:
-        scene: the scene.
-
-    Returns:
-        References.
-    """
+    """The closed forms."""
     disc, full = scene.disc, scene.disc.max_fill_ratio
     pressure = exact_wall_pressure(
         disc=disc,
@@ -42,16 +35,7 @@ def reference(scene: Scene) -> Mapping[str, Reference]:
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Finite elements in two and three dimensions.
-
-    Args:
-        scene: the scene.
-        level: not used.
-        defect: "plates_left_out" or "source_off".
-
-    Returns:
-        Evidence.
-    """
+    """Finite elements in two and three dimensions."""
     flat, solid = (_ring(scene, dimension, defect) for dimension in (2, 3))
     found = {
         f"{name.removeprefix('liquid_')}_{d}d": found_of(ring, name, 0)

@@ -1,6 +1,6 @@
 """Every integrator on one operation, and Eq. 20's segments into a stall."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import math
@@ -8,23 +8,21 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-from ringbalance.controller.adaptive_ode import adaptive_ode
-from ringbalance.controller.closed_form import closed_form
-from ringbalance.controller.explicit_segments import explicit_segments
-from ringbalance.controller.quadrature import quadrature
-from ringbalance.controller.transfer import Drive
-from ringbalance.reduced_model.paper import stall_pressure
-from ringbalance.reduced_model.paper_law import PaperLaw, paper_law
+from ringbalance.controller.liquid_ring.closed_form import closed_form
+from ringbalance.controller.liquid_ring.quadrature import quadrature
+from ringbalance.controller.liquid_ring.transfer import Drive
+from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_law
+from ringbalance.reduced_model.paper.formulas import stall_pressure
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.cases.integrator_orders.side_by_side import side_by_side, tapered_error
 from ringbalance.verification.cases.integrator_orders.slowed_law import SlowedLaw
 from ringbalance.verification.cases.integrator_orders.stall import stall_study
 from ringbalance.verification.evidence import Convergence, Evidence, Found, Level, no_reference
 from ringbalance.verification.orders import OrderStudy, order_study
-
-FloatArray = npt.NDArray[np.float64]
+from ringbalance.verification.reference.adaptive_ode import adaptive_ode
+from ringbalance.verification.reference.explicit_segments import explicit_segments
 
 _COUNTS: Final = (8, 16, 32, 64, 128, 256)
 _INSTANTS: Final = 200
@@ -45,16 +43,7 @@ reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Errors of every integrator.
-
-    Args:
-        scene: the scene; its own gas pressure is not used.
-        level: not used.
-        defect: "exchange_rate_off", "frozen_velocity" or "stall_rate_off".
-
-    Returns:
-        Evidence.
-    """
+    """Errors of every integrator."""
     law = paper_law(scene)
     empties = float(
         stall_pressure(disc=scene.disc, density=scene.liquid.density, angular_velocity=scene.rotor.speed)

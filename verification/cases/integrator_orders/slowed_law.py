@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.reduced_model.flow_law import Flow
-from ringbalance.reduced_model.paper_law import PaperLaw
-
-FloatArray = npt.NDArray[np.float64]
+from ringbalance.reduced_model.law.flow_law import Flow
+from ringbalance.reduced_model.law.paper_law import PaperLaw
+from ringbalance.scene.arrays import FloatArray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,11 +26,7 @@ class TrialLaw:
         return self.base.max_fill_ratio
 
     def table(self) -> Mapping[str, FloatArray]:
-        """Of the paper's law.
-
-        Returns:
-            Its arrays.
-        """
+        """Of the paper's law."""
         return self.base.table()
 
 
@@ -52,14 +47,7 @@ class SlowedLaw(TrialLaw):
     ) -> Flow:
         """As the paper's law, slowed.
 
-        Args:
-            fill_ratio: x of the driven chamber, any shape.
-            opposite_fill_ratio: of the opposite one.
-            gas_pressure: gauge, Pa.
-            primed: not used.
-
-        Returns:
-            Flow.
+        Args: `fill_ratio`: x of the driven chamber, any shape. `gas_pressure`: gauge, Pa.
         """
         flow = self.base.evaluate(
             fill_ratio=fill_ratio,

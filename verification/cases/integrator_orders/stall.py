@@ -8,7 +8,7 @@ it flow back from there: the map's slope 1 - kappa/(2 sqrt(d)) leaves (-1, 1) wh
 steps end in the cycle d = +-kappa^2/4, in which that slope is zero, so that every start is drawn into it.
 """
 
-# ruff: noqa: ARG002 - every law answers to one interface
+# ruff: noqa: ARG002 - every law has the uniform case interface
 from __future__ import annotations
 
 import math
@@ -18,15 +18,14 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.controller.closed_form import closed_form
-from ringbalance.controller.explicit_segments import explicit_segments
-from ringbalance.controller.transfer import Drive
-from ringbalance.reduced_model.flow_law import Flow, Regime
-from ringbalance.reduced_model.paper_law import PaperLaw
+from ringbalance.controller.liquid_ring.closed_form import closed_form
+from ringbalance.controller.liquid_ring.transfer import Drive
+from ringbalance.reduced_model.law.flow_law import Flow, Regime
+from ringbalance.reduced_model.law.paper_law import PaperLaw
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.cases.integrator_orders.slowed_law import TrialLaw
 from ringbalance.verification.evidence import Axis, Curve, Series
-
-FloatArray = npt.NDArray[np.float64]
+from ringbalance.verification.reference.explicit_segments import explicit_segments
 
 COUNTS: Final = (8, 16, 32, 64, 128)
 _PHASES: Final = np.linspace(1.0, 1.3, 31)
@@ -53,14 +52,7 @@ class FullTube(TrialLaw):
     ) -> Flow:
         """u = sign(D) sqrt(|D|) with D the paper's u^2.
 
-        Args:
-            fill_ratio: x of the driven chamber, any shape.
-            opposite_fill_ratio: of the opposite one.
-            gas_pressure: gauge, Pa.
-            primed: not used.
-
-        Returns:
-            Flow.
+        Args: `fill_ratio`: x of the driven chamber, any shape. `gas_pressure`: gauge, Pa.
         """
         x, p = np.asarray(fill_ratio, dtype=np.float64), np.asarray(gas_pressure, dtype=np.float64)
         other = self.max_fill_ratio - x if opposite_fill_ratio is None else np.asarray(opposite_fill_ratio)
@@ -96,13 +88,8 @@ class StallStudy:
 def stall_study(drive: Drive, law: PaperLaw, *, spoiled: bool = False) -> StallStudy:
     """Run the segments into the stall.
 
-    Args:
-        drive: under the paper's law at a pressure that stalls.
-        law: the paper's law.
-        spoiled: whether the derivation's rate is off by a tenth on purpose.
-
-    Returns:
-        StallStudy.
+    Args: `drive`: under the paper's law at a pressure that stalls. `law`: the paper's law. `spoiled`: whether
+        the derivation's rate is off by a tenth on purpose.
     """
     stall, per_root = _stall(drive, law)
     rate = per_root * (1.1 if spoiled else 1.0)
@@ -110,7 +97,7 @@ def stall_study(drive: Drive, law: PaperLaw, *, spoiled: bool = False) -> StallS
     bound = np.array([(rate * end / n) ** 2 / 4 for n in COUNTS])
     over = np.array([_overshoots(drive, stall, end, n) for n in COUNTS])
     cycle = np.array([_cycle(drive, law, stall, end, n) for n in COUNTS])
-    # Durations differ a little between the runs of one count, so each is held against its own bound.
+    # Durations differ a little between the runs of one count, so each is compared with its own bound.
     share = over / (bound[:, None] * _PHASES**2)
     return StallStudy(
         overshoot_share=float(share.max()),

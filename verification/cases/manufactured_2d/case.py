@@ -5,22 +5,13 @@ from __future__ import annotations
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Evidence, Level, no_reference
-from ringbalance.verification.manufactured_evidence import manufactured_evidence
+from ringbalance.verification.reference.manufactured_evidence import manufactured_evidence
 
 reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Errors over four levels, five at level heavy.
-
-    Args:
-        scene: the scene; its disc gives the shape.
-        level: "heavy" adds a finer level.
-        defect: a fault of the right-hand sides.
-
-    Returns:
-        Evidence.
-    """
+    """Errors over four levels, five at level heavy."""
     return manufactured_evidence(disc=scene.disc, cells=_cells(scene.disc, level), defect=defect)
 
 

@@ -1,6 +1,6 @@
 """Orders of velocity and pressure on the curved half section."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from typing import Final
@@ -18,7 +18,7 @@ from ringbalance.verification.evidence import (
     Series,
     no_reference,
 )
-from ringbalance.verification.manufactured_flow import FlowStudy, flow_study
+from ringbalance.verification.reference.manufactured_flow import FlowStudy, flow_study
 
 _AROUND: Final = {"light": (1, 2, 4, 8), "heavy": (1, 2, 4, 8, 16)}
 
@@ -27,16 +27,7 @@ reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Errors over levels.
-
-    Args:
-        scene: not used: the section has unit bore.
-        level: "heavy" adds a finer level.
-        defect: a fault of the momentum equation's coefficients.
-
-    Returns:
-        Evidence.
-    """
+    """Errors over levels."""
     study = flow_study(around=_AROUND[level], defect=defect)
     return Evidence(
         found={

@@ -1,6 +1,6 @@
 """The friction formula beside a mixing-length solution, on smooth and on sand-rough walls."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import itertools
@@ -11,16 +11,15 @@ from types import MappingProxyType
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 from scipy.integrate import quad
 
-from ringbalance.physics.mixing_length import MixingLength, mixing_length, mixing_length_flow
-from ringbalance.physics.tube_friction import friction_factor, friction_uncertainty
+from ringbalance.physics.tube.friction import friction_factor, friction_uncertainty
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series, no_reference
 from ringbalance.verification.published import read_rows
+from ringbalance.verification.reference.mixing_length import MixingLength, mixing_length, mixing_length_flow
 
-FloatArray = npt.NDArray[np.float64]
 Friction = Callable[[FloatArray, FloatArray], FloatArray]
 
 _CLOSURES: Final = MappingProxyType(
@@ -60,16 +59,7 @@ reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Friction by mixing length against a quadrature, the formula and the measurements.
-
-    Args:
-        scene: not used.
-        level: "heavy" takes every measured point and a finer line.
-        defect: "karman_too_small", "undamped" or "sand_ignored".
-
-    Returns:
-        Evidence.
-    """
+    """Friction by mixing length against a quadrature, the formula and the measurements."""
     closure, cells = _CLOSURES[defect], _CELLS[level]
 
     def by_length(reynolds: FloatArray, roughness: FloatArray) -> FloatArray:

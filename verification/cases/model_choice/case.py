@@ -1,17 +1,17 @@
-"""Choices of models on a few random scenes, judged by the highest rung and by the cheapest that would do.
+"""Choices of models on a few random scenes, judged by the finest model and by the cheapest that would do.
 
 The loss of the tube on twelve scenes and the chamber of one; `model_choice_many` has the rest.
 """
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from typing import Final
 
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, no_reference
-from ringbalance.verification.trade_choices import CHAMBER
-from ringbalance.verification.trade_evidence import choices_evidence
+from ringbalance.verification.selection_studies.choices import CHAMBER
+from ringbalance.verification.selection_studies.evidence import choices_evidence
 
 SCENES: Final = 12
 _ALONE: Final = 2
@@ -22,26 +22,10 @@ reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Judge the choices.
-
-    Args:
-        scene: the base of the random scenes.
-        level: not used.
-        defect: "estimate_off" or "estimate_large".
-
-    Returns:
-        Evidence.
-    """
+    """Judge the choices."""
     return choices_evidence(scene, numbers=range(SCENES), quantities_of=quantities_of, defect=defect)
 
 
 def quantities_of(number: int) -> tuple[str, ...]:
-    """Quantities that are judged on a scene.
-
-    Args:
-        number: of the scene.
-
-    Returns:
-        Their names.
-    """
+    """Quantities that are judged on a scene. Returns: Their names."""
     return ("k", *CHAMBER) if number == _ALONE else ("k",)

@@ -1,18 +1,18 @@
-"""Choices of models on 300 random scenes, judged by the highest rung and by the cheapest that would do.
+"""Choices of models on 300 random scenes, judged by the finest model and by the cheapest that would do.
 
 Chamber, loss and velocity on all of them, the mass moved by one operation and the settling time on every
 tenth.
 """
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from typing import Final
 
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, no_reference
-from ringbalance.verification.trade_choices import CHAMBER
-from ringbalance.verification.trade_evidence import choices_evidence
+from ringbalance.verification.selection_studies.choices import CHAMBER
+from ringbalance.verification.selection_studies.evidence import choices_evidence
 
 SCENES: Final = 300
 _FEW: Final = 12
@@ -24,28 +24,12 @@ reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Judge the choices.
-
-    Args:
-        scene: the base of the random scenes.
-        level: not used: the case is heavy.
-        defect: "estimate_off" or "estimate_large", on a few scenes.
-
-    Returns:
-        Evidence.
-    """
+    """Judge the choices."""
     count = SCENES if defect is None else _FEW
     return choices_evidence(scene, numbers=range(count), quantities_of=quantities_of, defect=defect)
 
 
 def quantities_of(number: int) -> tuple[str, ...]:
-    """Quantities that are judged on a scene.
-
-    Args:
-        number: of the scene.
-
-    Returns:
-        Their names.
-    """
+    """Quantities that are judged on a scene. Returns: Their names."""
     more = ("transferred_mass", "settling_time") if number % _TENTH == 0 else ()
     return (*CHAMBER, "k", "velocity", *more)

@@ -1,6 +1,6 @@
 """The rotating section at rest, in slow rotation and in fast rotation."""
 
-# ruff: noqa: ARG001 - every case answers to one interface
+# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.physics.navier_stokes import FlowSystem
-from ringbalance.physics.rotating_section import (
+from ringbalance.physics.navier_stokes.newton import FlowSystem
+from ringbalance.physics.navier_stokes.rotating_section import (
     SectionMesh,
     friction_ratio,
     section_system,
@@ -30,14 +30,7 @@ _AROUND: Final = {"light": 8, "heavy": 20}
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
-    """The exact limits.
-
-    Args:
-        scene: not used.
-
-    Returns:
-        References.
-    """
+    """The exact limits."""
     return {
         "slow": Reference(value=1.0),
         "inertia": Reference(value=1.0),
@@ -46,16 +39,7 @@ def reference(scene: Scene) -> Mapping[str, Reference]:
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Friction ratios at rest, in slow and in fast rotation.
-
-    Args:
-        scene: not used: the section has unit bore.
-        level: "heavy" refines the mesh.
-        defect: "coriolis_off_by_a_percent" or "radius_for_bore".
-
-    Returns:
-        Evidence.
-    """
+    """Friction ratios at rest, in slow and in fast rotation."""
     around = _AROUND[level]
     system = section_system(cells=SectionMesh(around=around, across=3 * around // 2, wall_ratio=15.0))
     factor = _FACTORS[defect]

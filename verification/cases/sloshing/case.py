@@ -6,20 +6,18 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-from ringbalance.physics.sloshing import resonant_fills, sloshing_modes
-from ringbalance.physics.sloshing_response import SloshingResponse, sloshing_response
+from ringbalance.physics.sloshing.modes import resonant_fills, sloshing_modes
+from ringbalance.physics.sloshing.response import SloshingResponse, sloshing_response
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series, no_reference
-from ringbalance.verification.sloshing_exact import (
+from ringbalance.verification.reference.sloshing_exact import (
     cosine_amplification,
     cosine_frequencies,
     cosine_pressure_amplification,
     cosine_waves,
 )
-
-FloatArray = npt.NDArray[np.float64]
 
 _MODES: Final = 4
 _FILLS: Final = (0.1, 0.25, 0.5)
@@ -33,16 +31,7 @@ reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Deviations on a bare chamber, then the frequencies and swings of the scene's own.
-
-    Args:
-        scene: the scene.
-        level: "heavy" draws more fills.
-        defect: "coriolis_off_by_a_percent", "forcing_backwards" or "pressure_swings_as_the_moment".
-
-    Returns:
-        Evidence.
-    """
+    """Deviations on a bare chamber, then the frequencies and swings of the scene's own."""
     bare = replace(scene.disc, plate_thickness=0.0)
     depths = _depths(bare)
     fills = np.linspace(0.02, 1.0, _POINTS[level]) * scene.disc.max_fill_ratio

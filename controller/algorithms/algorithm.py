@@ -1,0 +1,97 @@
+"""The interface of every control algorithm: a pure step from state and measurement to state and command."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol, TypeVar
+
+from ringbalance.controller.formulas.control_law import valve_time
+
+StateT = TypeVar("StateT")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measurement:
+    """One sample of the vibration; a sensor may deliver NaN, or no sample at all (None in its place)."""
+
+    time: float
+    """s."""
+    amplitude: float
+    """m, zero-to-peak."""
+    phase: float
+    """rad, any multiple of a full turn away."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ValveCommand:
+    """Gas into one chamber for a time; the valves of one command open together."""
+
+    chamber: int
+    """Index of the driven chamber, A = 0."""
+    duration: float
+    """s, above zero."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Command:
+    """What the algorithm wants done now."""
+
+    valves: tuple[ValveCommand, ...] = ()
+    resting: bool = False
+    """True when the algorithm is content: the amplitude is not above its limit."""
+    reason: str = ""
+    """Why no valve opens although the algorithm is not content; empty otherwise."""
+
+
+class Controller(Protocol[StateT]):
+    """A control algorithm: settings are its fields, everything that changes is in the state."""
+
+    @property
+    def rises_tolerated(self) -> int:
+        """Operations in a row after which the amplitude may have risen without the loop diverging.
+
+        As many rises that end above the first sample, or one more, end a run.
+        """
+        ...
+
+    def start(self) -> StateT:
+        """The state before the first sample."""
+        ...
+
+    def step(self, state: StateT, measurement: Measurement | None) -> tuple[StateT, Command]:
+        """Decide on one sample; the same arguments always give the same answer.
+
+        Args: `state`: as returned by the previous step or by `start`. `measurement`: the sample, or None when
+            it was dropped.
+        Returns: The next state and the command.
+        """
+        ...
+
+
+def usable(measurement: Measurement | None, *, needs_phase: bool) -> bool:
+    """Whether a sample can be acted upon.
+
+    Args: `measurement`: the sample, or None when it was dropped. `needs_phase`: whether the algorithm reads
+        the phase.
+    Returns: False for a dropped sample and for one with a NaN or infinity in what the algorithm reads.
+    """
+    if measurement is None or not math.isfinite(measurement.time):
+        return False
+    return math.isfinite(measurement.amplitude) and (not needs_phase or math.isfinite(measurement.phase))
+
+
+def valve_commands(
+    times: tuple[tuple[int, float], ...], *, minimum_gas_time: float, maximum_gas_time: float
+) -> tuple[ValveCommand, ...]:
+    """Apply the valves' limits: a shorter command is not executed, a longer one is cut.
+
+    Args: `times`: (chamber index, valve-open time in s) for each valve. `minimum_gas_time`: s.
+    `maximum_gas_time`: s.
+    Returns: The valves that open.
+    """
+    valves = (
+        ValveCommand(chamber=chamber, duration=valve_time(share, minimum_gas_time, maximum_gas_time))
+        for chamber, share in times
+    )
+    return tuple(valve for valve in valves if valve.duration > 0)

@@ -1,0 +1,101 @@
+"""From a scene's words to the control algorithm that they name."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ringbalance.controller.algorithms.algorithm import Controller
+from ringbalance.controller.algorithms.law_based import LawBased
+from ringbalance.controller.algorithms.target_vector import TargetVector
+from ringbalance.controller.algorithms.trial import Trial
+from ringbalance.controller.liquid_ring.closed_form import closed_form, has_closed_form
+from ringbalance.controller.liquid_ring.plant import LiquidRing, initial_state
+from ringbalance.controller.liquid_ring.quadrature import quadrature
+from ringbalance.controller.rotor import chamber_letters, influence
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.scene.describe import scene_fault
+from ringbalance.scene.faults import SceneError
+from ringbalance.scene.models import Scene
+
+
+def controller_of(scene: Scene, model: BalancerModel | None = None) -> Controller[Any]:
+    """The control algorithm that a scene asks for.
+
+    Args: `model`: the balancer as the law-based algorithm assumes it; the others do without.
+    Returns: Controller, with the scene's settings.
+    Raises: SceneError: an algorithm that this program does not have.
+    Raises: ValueError: the law-based algorithm without a model.
+    """
+    kind = scene.controller.kind
+    if kind == "target_vector":
+        return target_vector_of(scene)
+    if kind == "trial":
+        return trial_of(scene)
+    if kind == "law_based":
+        if model is None:
+            raise ValueError("the law-based algorithm needs a model, such as calibrate(scene).model")
+        return law_based_of(scene, model)
+    fault = scene_fault(
+        scene=scene,
+        table="controller",
+        key="kind",
+        problem="this version does not simulate this algorithm",
+        allowed='"target_vector", "trial", "law_based"',
+    )
+    raise SceneError([fault])
+
+
+def target_vector_of(scene: Scene) -> TargetVector:
+    """The target-vector algorithm with a scene's settings."""
+    settings = scene.controller
+    return TargetVector(
+        chambers=scene.disc.chambers,
+        lag_angle=settings.assumed_lag_angle,
+        limit=settings.limit,
+        proportional=settings.proportional,
+        integral_time=settings.integral_time,
+        derivative_time=settings.derivative_time,
+        minimum_gas_time=settings.minimum_gas_time,
+        maximum_gas_time=settings.maximum_gas_time,
+    )
+
+
+def trial_of(scene: Scene) -> Trial:
+    """The one-by-one trial algorithm with a scene's settings."""
+    settings, letters = scene.controller, chamber_letters(scene.disc.chambers)
+    return Trial(
+        sequence=tuple(letters.index(letter) for letter in settings.sequence),
+        limit=settings.limit,
+        first_trial=settings.first_trial,
+        long_step=settings.long_step,
+        short_step=settings.short_step,
+        fine_below=settings.fine_below,
+        minimum_gas_time=settings.minimum_gas_time,
+        maximum_gas_time=settings.maximum_gas_time,
+    )
+
+
+def law_based_of(scene: Scene, model: BalancerModel) -> LawBased:
+    """The law-based algorithm with a scene's settings.
+
+    Args: `model`: the balancer as the algorithm assumes it, which need not be the one that is controlled.
+    """
+    settings = scene.controller
+    return LawBased(
+        ring=LiquidRing(
+            model=model,
+            chambers=scene.disc.chambers,
+            gas_pressure=scene.gas.pressure,
+            integrator=closed_form if has_closed_form(model.flow) else quadrature,
+        ),
+        initial=initial_state(disc=scene.disc),
+        influence=influence(
+            coefficient=settings.assumed_influence_coefficient, lag_angle=settings.assumed_lag_angle
+        ),
+        limit=settings.limit,
+        amplitude_noise=scene.sensor.amplitude_noise,
+        phase_noise=scene.sensor.phase_noise,
+        probe=settings.period,
+        minimum_gas_time=settings.minimum_gas_time,
+        maximum_gas_time=settings.maximum_gas_time,
+    )

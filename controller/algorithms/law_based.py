@@ -1,0 +1,200 @@
+"""The law-based algorithm: valve-open times straight from the flow law, and it learns the influence
+coefficient."""
+
+from __future__ import annotations
+
+import cmath
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from ringbalance.controller.algorithms.algorithm import (
+    Command,
+    Measurement,
+    ValveCommand,
+    usable,
+    valve_commands,
+)
+from ringbalance.controller.algorithms.law_based_estimate import InfluenceEstimate, updated
+from ringbalance.controller.algorithms.law_based_times import fill_for_moment, gas_time, pair_changes
+from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing, PairState
+from ringbalance.controller.liquid_ring.transfer import Drive
+from ringbalance.controller.rotor import disc_unbalance
+
+PRIOR_STANDARD_DEVIATION: Final = 0.5
+"""Standard deviation, relative, of the assumed influence coefficient before the first operation."""
+LEAST_LAW_STANDARD_DEVIATION: Final = 0.05
+"""Standard deviation, relative, below which no flow law's velocity is trusted."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LawBasedState:
+    """Everything that the algorithm remembers between samples."""
+
+    disc: DiscState
+    """The chambers' liquid as the law has it, when the valves last opened."""
+    influence: InfluenceEstimate
+    previous: Measurement | None = None
+    """The last usable sample."""
+    valves: tuple[ValveCommand, ...] = ()
+    """What was commanded on it."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LawBased:
+    """Valve-open times that take the whole residual away in one operation, t = (V/S) integral dx/u(x) for
+    each pair.
+
+    The residual unbalance V/K asks for a change of the disc's moment; the moment curve turns it into fill
+    ratios of the pairs, the flow law into valve-open times, with the chambers' fills followed by the same law
+    since the start.  After each operation K is re-estimated from what the vibration did (`updated`), so a
+    wrong influence coefficient, lag angle or speed of the flow spoils only the first operation.  There is no
+    gain to tune.
+
+    Limits: a valve whose time is below minimum_gas_time does not open, one above maximum_gas_time is cut to
+    it.  Where the law says that nothing flows, or that a chamber is empty, gas is given all the same, since
+    fills and law are only assumed: `probe` long, or as long as the missing moment would take.
+    At or below `limit` the algorithm rests.  A dropped sample or a NaN changes nothing: no valve opens, and
+    the next usable sample shows the response.
+    """
+
+    ring: LiquidRing
+    """The disc as the algorithm assumes it."""
+    initial: DiscState
+    """Its liquid at the start."""
+    influence: complex
+    """K before the first operation, m/(kg m)."""
+    limit: float
+    """m."""
+    amplitude_noise: float
+    """Standard deviation of a sample's amplitude, m."""
+    phase_noise: float
+    """Standard deviation of a sample's phase, rad."""
+    probe: float
+    """s."""
+    minimum_gas_time: float
+    """s."""
+    maximum_gas_time: float
+    """s."""
+
+    @property
+    def rises_tolerated(self) -> int:
+        """Two: the first response corrects a belief that was wrong."""
+        return 2
+
+    @property
+    def law_standard_deviation(self) -> float:
+        """Standard deviation of the law's velocity at the start, relative."""
+        pair, flow = self.initial.pairs[0], self.ring.model.flow
+        found = flow.evaluate(
+            fill_ratio=pair.fill, opposite_fill_ratio=pair.opposite_fill, gas_pressure=self.ring.gas_pressure
+        )
+        velocity = abs(float(found.velocity))
+        own = float(found.uncertainty) / (2 * velocity) if velocity > 0 else 0.0
+        return max(own, LEAST_LAW_STANDARD_DEVIATION)
+
+    def start(self) -> LawBasedState:
+        variance = abs(PRIOR_STANDARD_DEVIATION * self.influence) ** 2
+        estimate = InfluenceEstimate(value=self.influence, variance=variance)
+        return LawBasedState(disc=self.initial, influence=estimate)
+
+    def step(self, state: LawBasedState, measurement: Measurement | None) -> tuple[LawBasedState, Command]:
+        if measurement is None or not usable(measurement, needs_phase=True):
+            return state, Command(reason="no usable sample")
+        seen = self._seen(state, measurement)
+        if measurement.amplitude <= self.limit:
+            return seen, Command(resting=True)
+        asked = self._gas_times(seen, _vector(measurement))
+        valves = valve_commands(
+            asked, minimum_gas_time=self.minimum_gas_time, maximum_gas_time=self.maximum_gas_time
+        )
+        reason = "" if valves else "the valve-open time is below the minimum"
+        return replace(seen, valves=valves), Command(valves=valves, reason=reason)
+
+    def _seen(self, state: LawBasedState, now: Measurement) -> LawBasedState:
+        """Follow the liquid to the sample's time, and learn from the response."""
+        before = state.previous
+        if before is None or now.time <= before.time:
+            return replace(state, previous=now, valves=())
+        disc = self._advanced(state, now.time - before.time)
+        if not state.valves:
+            return replace(state, disc=disc, previous=now)
+        influence = updated(
+            state.influence,
+            moment_change=self._moment(disc) - self._moment(state.disc),
+            vibration_change=_vector(now) - _vector(before),
+            noise_variance=self._noise(now) + self._noise(before),
+            law_standard_deviation=self.law_standard_deviation,
+            assumed_magnitude=abs(self.influence),
+        )
+        return LawBasedState(disc=disc, influence=influence, previous=now)
+
+    def _advanced(self, state: LawBasedState, interval: float) -> DiscState:
+        times = {valve.chamber: min(valve.duration, interval) for valve in state.valves}
+        disc, rest = state.disc, interval
+        if times:
+            disc = self.ring.advance(disc, gas_times=times, duration=max(times.values()), points=1).state
+            rest -= max(times.values())
+        if rest > 0 and any(pair.primed for pair in disc.pairs):
+            disc = self.ring.advance(disc, gas_times={}, duration=rest, points=1).state
+        return disc
+
+    def _noise(self, sample: Measurement) -> float:
+        return self.amplitude_noise**2 + (sample.amplitude * self.phase_noise) ** 2
+
+    def _moment(self, disc: DiscState) -> complex:
+        return complex(disc_unbalance(moment=self.ring.model.moment, fill_ratio=disc.fills()))
+
+    def _gas_times(self, state: LawBasedState, vibration: complex) -> tuple[tuple[int, float], ...]:
+        pairs = state.disc.pairs
+        moments = [self._pair_moments(pair) for pair in pairs]
+        changes = pair_changes(
+            wanted=-vibration / state.influence.value,
+            bounds=[(low - now, high - now) for now, low, high in moments],
+        )
+        asked = [
+            self._pair_time(index, pair, now + change)
+            for index, (pair, (now, _, _), change) in enumerate(zip(pairs, moments, changes, strict=True))
+            if change != 0
+        ]
+        return tuple(asked)
+
+    def _pair_moments(self, pair: PairState) -> tuple[float, float, float]:
+        """Now, smallest and largest."""
+        low, high = self._range(pair)
+        x = np.array([pair.fill, low, high])
+        found = self.ring.model.moment.pair_moment(fill_ratio=x, opposite_fill_ratio=pair.total - x)
+        return float(found[0]), float(found[1]), float(found[2])
+
+    def _range(self, pair: PairState) -> tuple[float, float]:
+        largest = self.ring.model.flow.max_fill_ratio
+        return max(0.0, pair.total - largest), min(pair.total, largest)
+
+    def _pair_time(self, index: int, pair: PairState, moment: float) -> tuple[int, float]:
+        low, high = self._range(pair)
+        curve, total = self.ring.model.moment, pair.total
+        wanted = fill_for_moment(moment=curve, wanted=moment, total=total, lowest=low, highest=high)
+        first = wanted < pair.fill
+        chamber = index if first else index + self.ring.chambers // 2
+        target = wanted if first else total - wanted
+        drive = self._drive(pair, first=first)
+        found = gas_time(
+            drive=drive, fill=target, integrator=self.ring.integrator, longest=self.maximum_gas_time
+        )
+        blocked = found == 0 and target < drive.fill
+        return chamber, self.probe if blocked else found
+
+    def _drive(self, pair: PairState, *, first: bool) -> Drive:
+        return Drive(
+            law=self.ring.model.flow,
+            fill=pair.fill if first else pair.opposite_fill,
+            total=pair.total,
+            exchange_rate=self.ring.model.tube_area / self.ring.model.chamber_volume,
+            gas_pressure=self.ring.gas_pressure,
+            primed=pair.primed,
+        )
+
+
+def _vector(measurement: Measurement) -> complex:
+    return cmath.rect(measurement.amplitude, measurement.phase)

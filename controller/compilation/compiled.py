@@ -1,0 +1,109 @@
+"""Functions compiled to machine code by numba, kept between runs, compiled again when any of them changes.
+
+Numba looks only at a function's own file to see whether kept code is stale, though it holds the code of
+every compiled function that it calls.  The folder that it is kept in is therefore named after all of their
+sources.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, Final, ParamSpec, TypeVar, cast
+
+import numba
+from numba.core import registry
+
+from ringbalance.controller.compilation.cache import KeptCode
+from ringbalance.controller.compilation.folders import folder_name
+from ringbalance.controller.compilation.signals import signals_deferred, signals_live
+from ringbalance.scene.platform.files import cache_folder
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+_OPTIONS: Final[dict[str, Any]] = {"nogil": True, "fastmath": False, "error_model": "numpy"}
+_PLAIN: Final = frozenset(
+    {"None", "bool", "int", "float", "complex", "tuple", "FloatArray", "IntArray", "Pair"}
+)
+"""Names in the annotation of a result that numba makes without calling a Python function."""
+_MARK: Final = f"from {__name__} import".encode()
+"""In each source that holds compiled functions."""
+
+# A private part of numba: without it, functions are compiled as numba does and signals are not deferred.
+_Dispatcher: Any = getattr(registry, "CPUDispatcher", object)
+
+
+def compiled(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile a function of numbers and arrays, in strict floating point and free of the interpreter's lock.
+
+    Args: `function`: in the part of Python that numba knows; it may call other compiled functions. The plain
+        function stays at hand as the result's `py_func`.
+    Returns: The function, compiled at its first call, or taken from an earlier process. Ctrl-C during a call
+        acts when the call has ended.
+    Source: the documentation of numba, `@jit`.
+    """
+    dispatcher = numba.njit(function, **_OPTIONS)
+    if _gives_records(function) and _Dispatcher is not object:
+        dispatcher = _Guarded(
+            py_func=function, locals=dispatcher.locals, targetoptions=dispatcher.targetoptions
+        )
+    try:
+        dispatcher._cache = KeptCode(function, code_folder())
+    except (AttributeError, TypeError, RuntimeError, OSError):
+        # A numba that keeps code in another way, or a function without a file: compile in every process.
+        return cast(Callable[P, R], dispatcher)
+    return cast(Callable[P, R], dispatcher)
+
+
+def _gives_records(function: Callable[..., Any]) -> bool:
+    """Whether the result may hold a named tuple, as far as the annotation tells."""
+    told = str(function.__annotations__.get("return", "unknown"))
+    return not set(re.findall(r"\w+", told)) <= _PLAIN
+
+
+class _Guarded(_Dispatcher):  # type: ignore[misc]
+    """Numba's dispatcher, with signals deferred while a call from Python runs, but not while it compiles."""
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        """Call the compiled function."""
+        with signals_deferred():
+            return super().__call__(*args, **kwargs)
+
+    def _compile_for_args(self, *args: Any, **kwargs: Any) -> Any:
+        with signals_live():
+            return super()._compile_for_args(*args, **kwargs)
+
+
+def code_root() -> Path:
+    """Folder that holds the code of all versions.
+
+    Returns: The user's folder for what can be made again, unless numba has been given one by NUMBA_CACHE_DIR.
+    """
+    given = os.environ.get("NUMBA_CACHE_DIR")
+    return Path(given) / "ringbalance" if given else cache_folder()
+
+
+@cache
+def code_folder() -> Path:
+    """Folder of this version's code. Returns: Path; it may not exist yet."""
+    return code_root() / folder_name(checkout=Path(__file__).parent, digest=_digest())
+
+
+def _digest() -> str:
+    total = hashlib.sha256(numba.__version__.encode())
+    for path in compiled_sources():
+        total.update(path.read_bytes())
+    return total.hexdigest()[:16]
+
+
+def compiled_sources() -> tuple[Path, ...]:
+    """Every source of this room that holds functions that are compiled, and the machinery's own."""
+    machinery = Path(__file__).parent
+    whole = (machinery, machinery.parent / "formulas")
+    sources = sorted(machinery.parent.rglob("*.py"))
+    return tuple(path for path in sources if path.parent in whole or _MARK in path.read_bytes())

@@ -1,9 +1,0 @@
-"""Types of the flat arrays that compiled functions take."""
-
-from __future__ import annotations
-
-import numpy as np
-import numpy.typing as npt
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]

@@ -1,0 +1,240 @@
+"""The imbalance filter: a Kalman filter for rotor-fixed whirl with an unknown constant imbalance.
+
+It holds only while the masses are locked to the rotor and the speed is constant; `imbalance_filter_gate`
+is asked before every step.  The masses' own imbalance is known from their encoders and enters as an input,
+so they need not lie exactly opposite.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ringbalance.controller.compilation.compiled import compiled
+from ringbalance.controller.eccentric_mass.estimation.imbalance_model import (
+    FilterMatrices,
+    ProcessNoise,
+    WhirlModel,
+    filter_matrices,
+    sandwich,
+)
+from ringbalance.scene.arrays import FloatArray
+
+
+class ImbalanceEstimate(NamedTuple):
+    """Estimate of the imbalance filter."""
+
+    state: FloatArray
+    """Shape (6,): x, y (m), x', y' (m/s), imbalance along x and y (kg m), rotor-fixed."""
+    covariance: FloatArray
+    """Shape (6, 6)."""
+
+
+@compiled
+def predict(
+    estimate: ImbalanceEstimate, matrices: FilterMatrices, own_imbalance: FloatArray
+) -> ImbalanceEstimate:
+    """Carry the estimate one step on.
+
+    Args: `estimate`: at the last sample. `matrices`: at this speed. `own_imbalance`: b (cos phi_1 + cos
+        phi_2) and b (sin phi_1 + sin phi_2), kg m, shape (2,).
+    Returns: The estimate before the next sample.
+    Source: Eqs. 14 and 15 of the paper on eccentric masses.
+    """
+    x, a = estimate.state, matrices.transition
+    drive = x.copy()
+    drive[4] += own_imbalance[0]
+    drive[5] += own_imbalance[1]
+    state = np.zeros(6)
+    for i in range(4):
+        for k in range(6):
+            state[i] += a[i, k] * drive[k]
+    state[4], state[5] = x[4], x[5]
+    return ImbalanceEstimate(state, sandwich(a, estimate.covariance) + matrices.process)
+
+
+@compiled
+def correct(
+    estimate: ImbalanceEstimate, matrices: FilterMatrices, sample: FloatArray, variance: FloatArray
+) -> ImbalanceEstimate:
+    """Take in one sample, one sensor after the other, in Joseph's form.
+
+    P+ = (I - k h) P (I - k h)^T + r k k^T stays symmetric and positive whatever rounding does to the gain.
+    Args: `estimate`: before the sample. `matrices`: at this speed. `sample`: x, y, x', y' in the rotor's
+        axes, shape (4,); what is not finite is passed over. `variance`: r of each, shape (4,); the noises are
+        independent.
+    Source: Eqs. 16 to 21 of the paper on eccentric masses; Bucy and Joseph, "Filtering for Stochastic
+    Processes with Applications to Guidance" (1968).
+    """
+    state, covariance = estimate.state.copy(), estimate.covariance.copy()
+    cross_covariance = np.zeros(6)
+    for m in range(4):
+        h, r = matrices.observation[m], variance[m]
+        innovation, total = sample[m], r
+        for i in range(6):
+            innovation -= h[i] * state[i]
+            cross_covariance[i] = 0.0
+            for k in range(6):
+                cross_covariance[i] += covariance[i, k] * h[k]
+            total += h[i] * cross_covariance[i]
+        if total > 0 and math.isfinite(innovation):
+            for i in range(6):
+                state[i] += cross_covariance[i] / total * innovation
+            _joseph(covariance, total, h, cross_covariance, r)
+    return ImbalanceEstimate(state, covariance)
+
+
+@compiled
+def _joseph(p: FloatArray, total: float, h: FloatArray, cross_covariance: FloatArray, r: float) -> None:
+    """P <- (I - k h) P (I - k h)^T + r k k^T in place; `cross_covariance` is P h^T, k that over `total`."""
+    for i in range(6):
+        seen, gain = 0.0, cross_covariance[i] / total
+        for k in range(6):
+            p[i, k] -= gain * cross_covariance[k]
+            seen += p[i, k] * h[k]
+        for k in range(6):
+            p[i, k] += (r * gain - seen) * cross_covariance[k] / total
+    for i in range(6):
+        for k in range(i):
+            p[i, k] = p[k, i] = 0.5 * (p[i, k] + p[k, i])
+
+
+@compiled
+def turned_back(sample: FloatArray, rotor_angle: float) -> FloatArray:
+    """A laboratory sensor's sample along the rotor's axes.
+
+    Args: `sample`: X, Y, X', Y' of the fixed frame, shape (4,). `rotor_angle`: of the rotor's first axis,
+        rad.
+    Returns: The same vectors along the rotor's axes, shape (4,); the velocity is still the one seen from
+        outside.
+    """
+    c, s = math.cos(rotor_angle), math.sin(rotor_angle)
+    return np.array(
+        [
+            c * sample[0] + s * sample[1],
+            c * sample[1] - s * sample[0],
+            c * sample[2] + s * sample[3],
+            c * sample[3] - s * sample[2],
+        ]
+    )
+
+
+@compiled
+def own_imbalance(moment: float, first: float, second: float) -> FloatArray:
+    """Imbalance of the two masses themselves, from their encoders.
+
+    Args: `moment`: b = m_b r_b, kg m. `first`: angle of the first mass, rad. `second`: angle of the second
+        mass, rad.
+    Returns: Along the rotor's axes, kg m, shape (2,); zero when the masses lie opposite.
+    """
+    along, across = math.cos(first) + math.cos(second), math.sin(first) + math.sin(second)
+    return np.array([moment * along, moment * across])
+
+
+@compiled
+def with_fresh_whirl(estimate: ImbalanceEstimate, start: ImbalanceEstimate) -> ImbalanceEstimate:
+    """Forget the whirl and keep the imbalance, after a time in which the filter's model did not hold.
+
+    Args: `estimate`: before that time. `start`: belief before the first sample.
+    Returns: The estimate with the whirl of `start`.
+    """
+    state, covariance = start.state.copy(), start.covariance.copy()
+    for i in range(4, 6):
+        state[i] = estimate.state[i]
+        for k in range(4, 6):
+            covariance[i, k] = estimate.covariance[i, k]
+    return ImbalanceEstimate(state, covariance)
+
+
+@compiled
+def imbalance_deviation(covariance: FloatArray) -> float:
+    """Largest standard deviation of the imbalance in any direction.
+
+    Args: `covariance`: of the filter, shape (6, 6).
+    Returns: Square root of the larger eigenvalue of the imbalance's block, kg m.
+    """
+    a, b, c = covariance[4, 4], covariance[4, 5], covariance[5, 5]
+    return math.sqrt(max(0.5 * (a + c) + math.hypot(0.5 * (a - c), b), 0.0))
+
+
+@compiled
+def start_estimate(position: float, velocity: float, imbalance: float) -> ImbalanceEstimate:
+    """Initial estimate, before the first sample: nothing moves and nothing is out of balance.
+
+    Args: `position`: standard deviation of x and y, m. `velocity`: of x' and y', m/s. `imbalance`: of the
+        imbalance along each axis, kg m.
+    """
+    covariance = np.zeros((6, 6))
+    covariance[0, 0] = covariance[1, 1] = position * position
+    covariance[2, 2] = covariance[3, 3] = velocity * velocity
+    covariance[4, 4] = covariance[5, 5] = imbalance * imbalance
+    return ImbalanceEstimate(np.zeros(6), covariance)
+
+
+def imbalance_history(
+    start: ImbalanceEstimate,
+    *,
+    matrices: FilterMatrices,
+    samples: FloatArray,
+    variance: FloatArray,
+    mass_imbalance: tuple[float, float] = (0.0, 0.0),
+) -> tuple[FloatArray, FloatArray]:
+    """Run the filter over a record: predict, then take in the sample, for each.
+
+    Args: `start`: one step before the first sample. `matrices`: at the record's constant speed. `samples`: x,
+        y, x', y' in the rotor's axes, shape (n, 4). `variance`: of each sensor, shape (4,). `mass_imbalance`:
+        of the locked masses, kg m along the rotor's axes.
+    Returns: States, shape (n, 6), and covariances, shape (n, 6, 6), after each sample.
+    Raises: ValueError: a rotor at rest, which shows no imbalance.
+    Source: section 3.1 of the paper on eccentric masses.
+    """
+    if matrices.speed == 0:
+        raise ValueError("a rotor at rest shows no imbalance: the speed must not be zero")
+    own = np.asarray(mass_imbalance, dtype=np.float64)
+    return _history(start, matrices, np.ascontiguousarray(samples, dtype=np.float64), variance, own)
+
+
+@compiled
+def _history(
+    start: ImbalanceEstimate,
+    matrices: FilterMatrices,
+    samples: FloatArray,
+    variance: FloatArray,
+    own: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    count = samples.shape[0]
+    states, covariances = np.zeros((count, 6)), np.zeros((count, 6, 6))
+    estimate = start
+    for i in range(count):
+        estimate = correct(predict(estimate, matrices, own), matrices, samples[i], variance)
+        states[i], covariances[i] = estimate.state, estimate.covariance
+    return states, covariances
+
+
+def predicted_deviation(
+    start: ImbalanceEstimate,
+    *,
+    model: WhirlModel,
+    noise: ProcessNoise,
+    variance: FloatArray,
+    angular_velocity: float,
+    step: float,
+    duration: float,
+    laboratory: bool = False,
+) -> FloatArray:
+    """How well the imbalance can be known, before anything is measured.
+
+    The covariance does not depend on the samples.  The steady whirl is W^2/|K_B - M W^2 + j C_B W| per
+    imbalance, so that at low speed the deviation grows as 1/W^2.
+    Args: `start`: belief before the first sample. `model`: mass, damping and stiffness. `noise`: power per
+        unit time. `variance`: of each sensor, shape (4,). `angular_velocity`: W, rad/s, not zero. `step`: dt,
+        s. `duration`: of the estimation, s. `laboratory`: whether the sensor stands still.
+    Returns: Standard deviation of the imbalance after each step, kg m, shape (duration/step,).
+    Raises: ValueError: a rotor at rest.
+    """
+    matrices = filter_matrices(model, noise, angular_velocity, step, laboratory, False)
+    blank = np.zeros((max(round(duration / step), 1), 4))
+    _, covariances = imbalance_history(start, matrices=matrices, samples=blank, variance=variance)
+    return np.array([imbalance_deviation(covariance) for covariance in covariances])

@@ -1,0 +1,108 @@
+"""The plant alone over many steps: prescribed speed, prescribed voltages, no controller."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from ringbalance.controller.compilation.compiled import compiled
+from ringbalance.controller.eccentric_mass.plant.friction import LOCKED, STUCK
+from ringbalance.controller.eccentric_mass.plant.integrate import plant_step
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
+from ringbalance.controller.eccentric_mass.plant.plant import SIZE, rest_state, stuck_flags
+from ringbalance.controller.eccentric_mass.plant.speed import profile_arrays, speed_at
+from ringbalance.controller.eccentric_mass.plant.substep_limit import check_substeps
+from ringbalance.controller.eccentric_mass.stretches import stretches
+from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.eccentric_models import EccentricScene
+
+Progress = Callable[[float, float], None]
+"""Called with the simulated time and the time limit, s."""
+
+
+class PlantRun(NamedTuple):
+    """History of the plant."""
+
+    time: FloatArray
+    """s, shape (steps + 1,)."""
+    speed: FloatArray
+    """W, rad/s, shape (steps + 1,)."""
+    state: FloatArray
+    """Shape (steps + 1, 8)."""
+    stuck: IntArray
+    """Shape (steps + 1, 2)."""
+
+    @property
+    def amplitude(self) -> FloatArray:
+        """Zero-to-peak vibration sqrt(x^2 + y^2), m, shape (steps + 1,)."""
+        amplitude: FloatArray = np.hypot(self.state[:, 0], self.state[:, 1])
+        return amplitude
+
+
+@compiled
+def run_steps(
+    parameters: PlantParameters,
+    times: FloatArray,
+    speeds: FloatArray,
+    state: FloatArray,
+    stuck: IntArray,
+    commands: FloatArray,
+    step: float,
+    first: int = 0,
+) -> tuple[FloatArray, IntArray]:
+    """Carry the plant through steps of equal length.
+
+    Args:
+        times: of the speed profile's corners, s, shape (corners,).
+        speeds: at the corners, rad/s, shape (corners,).
+        state: at the beginning, shape (8,).
+        stuck: SLIDING, STUCK or LOCKED, shape (2,).
+        commands: voltages held in each step, V, shape (steps, 2).
+        step: s; corners of the profile are best multiples of it.
+        first: number of the first step, counted from time zero.
+    Returns: States, shape (steps + 1, 8), and flags, shape (steps + 1, 2).
+    """
+    count = commands.shape[0]
+    states, flags = np.empty((count + 1, state.size)), np.empty((count + 1, 2), np.int64)
+    for place in range(count + 1):
+        for entry in range(state.size):
+            states[place, entry] = state[entry]
+        flags[place, 0], flags[place, 1] = stuck[0], stuck[1]
+        if place < count:
+            speed, rate = speed_at(times, speeds, (first + place) * step)
+            state, stuck = plant_step(parameters, state, stuck, commands[place], speed, rate, step)
+    return states, flags
+
+
+def run_plant(
+    scene: EccentricScene,
+    *,
+    commands: FloatArray | None = None,
+    locked: bool = False,
+    progress: Progress | None = None,
+) -> PlantRun:
+    """Run a scene's plant from rest, with the voltages given.
+
+    Args: `scene`: speed profile, time limit and step are taken from it. `commands`: V, shape (steps, 2); None
+        for drives switched off. `locked`: whether both masses are clamped to the track. `progress`: called
+        several times a second; None for silence.
+    Raises: SceneError: a run that takes too many substeps.
+    """
+    check_substeps(scene)
+    step = scene.sensor.step
+    count = round(scene.run.time_limit / step)
+    voltages = np.zeros((count, 2)) if commands is None else np.ascontiguousarray(commands, dtype=np.float64)
+    times, speeds = profile_arrays(scene.rotor)
+    parameters = plant_parameters(scene)
+    states, flags = np.empty((count + 1, SIZE)), np.empty((count + 1, 2), dtype=np.int64)
+    states[0], flags[0] = rest_state(scene.masses.initial_angle), stuck_flags(LOCKED if locked else STUCK)
+    for begin, end in stretches(count):
+        states[begin : end + 1], flags[begin : end + 1] = run_steps(
+            parameters, times, speeds, states[begin], flags[begin], voltages[begin:end], step, begin
+        )
+        if progress is not None:
+            progress(end * step, scene.run.time_limit)
+    elapsed: FloatArray = np.arange(len(states), dtype=np.float64) * step
+    return PlantRun(elapsed, np.interp(elapsed, times, speeds), states, flags)

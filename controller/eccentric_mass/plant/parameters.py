@@ -1,0 +1,79 @@
+"""The plant's constants, gathered from a scene into plain numbers that compiled functions take."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from ringbalance.scene.eccentric_models import EccentricScene, Motor
+
+
+class PlantParameters(NamedTuple):
+    """Constants of rotor, masses and motors, SI."""
+
+    mass: float
+    """M = m_r + 2 m_b, kg."""
+    damping: float
+    """C_B, N s/m."""
+    stiffness: float
+    """K_B, N/m."""
+    unbalance: float
+    """U = m_im r_im, kg m."""
+    phase: float
+    """phi_m of the unbalance in the rotor's frame, rad."""
+    moment: float
+    """b = m_b r_b of one eccentric mass, kg m."""
+    inertia: float
+    """J = m_b r_b^2 of one eccentric mass, kg m^2."""
+    drive_inertia: float
+    """Motor and gear B reflected to phi, kg m^2."""
+    drive_damping: float
+    """Back-emf reflected to phi, N m s."""
+    drive_gain: float
+    """Torque on a mass per motor voltage, N m/V."""
+    friction_arm_1: float
+    """mu_f of the first mass, m."""
+    friction_arm_2: float
+    """mu_f of the second mass, m."""
+    gear_ratio: float
+    """Turns of the motor per turn of the mass, N_3 / N_1."""
+    back_emf_constant: float
+    """K_m, V s/rad."""
+    resistance: float
+    """R_m, ohm."""
+    maximum_voltage: float
+    """V; infinite for no limit."""
+
+
+def plant_parameters(scene: EccentricScene) -> PlantParameters:
+    """Gather the plant's constants.
+
+    J_add = (J_1 + J_2 (N_1/N_2)^2) (N_3/N_1)^2, C_add = K_i K_m / R_m (N_3/N_1)^2, B_add = K_i / R_m N_3/N_1.
+    Source: Appendix A of the paper on eccentric masses, rederived; its Eq. (A9) with all signs.
+    """
+    masses, rotor, imbalance, motor = scene.masses, scene.rotor, scene.imbalance, scene.motor
+    ratio = motor.teeth[2] / motor.teeth[0]
+    moment = masses.mass * masses.guide_radius
+    return PlantParameters(
+        mass=rotor.mass + 2 * masses.mass,
+        damping=rotor.damping,
+        stiffness=rotor.stiffness,
+        unbalance=imbalance.mass * imbalance.radius,
+        phase=imbalance.phase,
+        moment=moment,
+        inertia=moment * masses.guide_radius,
+        drive_inertia=_reflected_inertia(motor),
+        drive_damping=motor.torque_constant * motor.back_emf_constant / motor.resistance * ratio**2,
+        drive_gain=motor.torque_constant / motor.resistance * ratio,
+        friction_arm_1=masses.friction_arm[0],
+        friction_arm_2=masses.friction_arm[1],
+        gear_ratio=ratio,
+        back_emf_constant=motor.back_emf_constant,
+        resistance=motor.resistance,
+        maximum_voltage=math.inf if motor.maximum_voltage is None else motor.maximum_voltage,
+    )
+
+
+def _reflected_inertia(motor: Motor) -> float:
+    first, second, third = motor.teeth
+    return (motor.motor_inertia + motor.gear_inertia * (first / second) ** 2) * (third / first) ** 2

@@ -1,0 +1,249 @@
+"""One run of a scene with two eccentric masses: sensors, filters, supervisor, drives and plant."""
+
+from __future__ import annotations
+
+import itertools
+from typing import NamedTuple
+
+import numpy as np
+
+from ringbalance.controller.eccentric_mass.divergence import meaningful, rows
+from ringbalance.controller.eccentric_mass.estimation.imbalance_model import euler_step_limit
+from ringbalance.controller.eccentric_mass.plant.friction import STUCK
+from ringbalance.controller.eccentric_mass.plant.open_loop import Progress, run_plant
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
+from ringbalance.controller.eccentric_mass.plant.plant import rest_state, stuck_flags
+from ringbalance.controller.eccentric_mass.plant.speed import profile_arrays
+from ringbalance.controller.eccentric_mass.plant.substep_limit import check_substeps
+from ringbalance.controller.eccentric_mass.plant.whirl import steady_whirl
+from ringbalance.controller.eccentric_mass.run_loop import (
+    NOISES,
+    Profile,
+    Record,
+    SensorNoise,
+    empty_record,
+    measure,
+    run_stretch,
+)
+from ringbalance.controller.eccentric_mass.run_record import EccentricEstimates, EccentricRun, StageSpan
+from ringbalance.controller.eccentric_mass.run_status import RunFacts, outcome_of, status_text, warnings_of
+from ringbalance.controller.eccentric_mass.strategy.attainable import expected_deviation
+from ringbalance.controller.eccentric_mass.strategy.plan import RELEASED, Cause, Findings, Stage
+from ringbalance.controller.eccentric_mass.strategy.records import StrategySettings
+from ringbalance.controller.eccentric_mass.strategy.settings import believed_whirl, strategy_settings
+from ringbalance.controller.eccentric_mass.strategy.step import strategy_start
+from ringbalance.controller.eccentric_mass.strategy.targets import Targets, target_angles
+from ringbalance.controller.eccentric_mass.stretches import stretches
+from ringbalance.controller.judgement import settling_time
+from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.eccentric_models import EccentricScene
+
+STAGE_NAMES = {
+    Stage.WAITING: "waiting",
+    Stage.IMBALANCE: "imbalance estimation",
+    Stage.FRICTION: "friction estimation",
+    Stage.POSITIONING: "positioning",
+    Stage.CHECK: "check",
+    Stage.FINE_TUNING: "fine tuning",
+    Stage.REST: "rest",
+    Stage.FAILED: "failed",
+}
+
+
+def simulate_eccentric(
+    scene: EccentricScene,
+    *,
+    seed: int | None = None,
+    progress: Progress | None = None,
+    settings: StrategySettings | None = None,
+) -> EccentricRun:
+    """Run a scene from a rotor at its centre and masses at rest, to its time limit.
+
+    Args: `seed`: of numpy's default generator for the sensors' noise; default the scene's. `progress`: called
+        several times a second; None for silence. `settings`: of the strategy; default those of the scene.
+    Returns: EccentricRun; its status says how the run ended and what to do next. A run that diverges ends at
+        the last sample that means anything.
+    Raises: SceneError: a run that takes too many samples or steps.
+    Source: Fig. 3 of the paper on eccentric masses.
+    """
+    check_substeps(scene)
+    record, findings = _recorded(scene, seed, progress or _silent, settings or strategy_settings(scene))
+    cause = Cause(int(record.cause[-1]))
+    times, speeds = profile_arrays(scene.rotor)
+    time: FloatArray = np.arange(len(record.state), dtype=np.float64) * scene.sensor.step
+    speed = np.interp(time, times, speeds)
+    whirl = record.state[:, 0] + 1j * record.state[:, 1]
+    facts = _facts(scene, record, cause, findings, time, speed, np.abs(whirl))
+    outcome = outcome_of(facts)
+    settled = facts.settling_time is not None and outcome.value in {"settled", "locked"}
+    return EccentricRun(
+        balancer="eccentric_mass",
+        scene=scene.name,
+        outcome=outcome,
+        settled=settled,
+        settling_time=facts.settling_time if settled else None,
+        status=status_text(facts, outcome),
+        warnings=warnings_of(facts),
+        limit=scene.supervisor.limit,
+        time=time,
+        speed=speed,
+        whirl=whirl,
+        mass_angle=np.ascontiguousarray(record.state[:, 4:6].T),
+        mass_rate=np.ascontiguousarray(record.state[:, 6:8].T),
+        goal=np.ascontiguousarray(record.goal.T),
+        voltage=np.ascontiguousarray(record.voltage.T),
+        drive_off=record.hold == RELEASED,
+        energy=record.energy,
+        estimates=EccentricEstimates(
+            imbalance=record.imbalance,
+            imbalance_covariance=record.imbalance_covariance,
+            friction_arm=record.friction_arm,
+            friction_variance=record.friction_variance,
+        ),
+        stages=_stages(record.stage, time),
+        targets=_targets(scene, record),
+        unbalanced_amplitude=_unbalanced(scene, float(speed[-1])),
+    )
+
+
+def _silent(_: float, __: float) -> None:
+    """No progress wanted."""
+
+
+def _samples(scene: EccentricScene) -> int:
+    return round(scene.run.time_limit / scene.sensor.step) + 1
+
+
+class _Start(NamedTuple):
+    """A plant before its first sample."""
+
+    parameters: PlantParameters
+    state: FloatArray
+    stuck: IntArray
+
+
+def _recorded(
+    scene: EccentricScene, seed: int | None, progress: Progress, settings: StrategySettings
+) -> tuple[Record, Findings]:
+    samples = _samples(scene)
+    if scene.supervisor.strategy == "locked":
+        return _locked(scene, empty_record(samples), progress), Findings(False, 0.0, np.inf, 0, 0)
+    numbers = np.random.default_rng(scene.run.seed if seed is None else seed)
+    return _driven(scene, settings, numbers.standard_normal((samples, NOISES)), progress)
+
+
+def _locked(scene: EccentricScene, record: Record, progress: Progress) -> Record:
+    """The masses clamped to the track, no drive, no filter."""
+    states = run_plant(scene, locked=True, progress=progress).state
+    record.state[:], record.goal[:] = states, states[:, 4:6]
+    record.cause[:], record.hold[:] = int(Cause.LOCKED), RELEASED
+    return meaningful(record, scene)
+
+
+def _driven(
+    scene: EccentricScene, settings: StrategySettings, numbers: FloatArray, progress: Progress
+) -> tuple[Record, Findings]:
+    start, record = _start(scene), empty_record(len(numbers))
+    profile, sensor = Profile(*profile_arrays(scene.rotor)), scene.sensor
+    noise = SensorNoise(
+        sensor.position_noise, sensor.velocity_noise, sensor.encoder_noise, sensor.encoder_rate_noise
+    )
+    first = measure(start.state, profile, 0.0, settings.laboratory, noise, numbers[0])
+    memory, state, stuck = strategy_start(settings, first), start.state, start.stuck
+    for begin, end in stretches(len(numbers)):
+        memory, state, stuck = run_stretch(
+            settings,
+            start.parameters,
+            profile,
+            noise,
+            numbers,
+            memory,
+            state,
+            stuck,
+            record,
+            begin,
+            end,
+        )
+        progress(end * settings.step, scene.run.time_limit)
+        kept = meaningful(rows(record, end), scene, since=begin)
+        if len(kept.state) < end:
+            record = kept
+            break
+    return _shifted(record), memory.plan.findings
+
+
+def _start(scene: EccentricScene) -> _Start:
+    rest = rest_state(scene.masses.initial_angle)
+    return _Start(plant_parameters(scene), rest, stuck_flags(STUCK))
+
+
+def _shifted(record: Record) -> Record:
+    """The energy of the last sample's voltage would be spent after the run."""
+    record.energy[1:] = record.energy[:-1]
+    record.energy[0] = 0.0
+    return record
+
+
+def _facts(
+    scene: EccentricScene,
+    record: Record,
+    cause: Cause,
+    findings: Findings,
+    time: FloatArray,
+    speed: FloatArray,
+    amplitude: FloatArray,
+) -> RunFacts:
+    content = np.flatnonzero(record.cause == int(Cause.BALANCED))
+    most = plant_parameters(scene).maximum_voltage
+    at_limit = np.any(np.abs(record.voltage) >= most, axis=1)
+    estimating = np.flatnonzero(record.stage == int(Stage.IMBALANCE))
+    fastest = float(np.max(np.abs(speed[estimating]))) if estimating.size else 0.0
+    slowest = float(np.min(np.abs(speed[estimating]))) if estimating.size else 0.0
+    angles = record.state[:, 4:6]
+    return RunFacts(
+        scene=scene,
+        cause=cause,
+        stage=Stage(int(record.stage[-1])),
+        findings=findings,
+        time=float(time[-1]),
+        diverged=len(time) < _samples(scene),
+        speed=speed,
+        amplitude=amplitude,
+        checked=int(content[0]) if content.size else None,
+        settling_time=settling_time(time=time, amplitude=amplitude, limit=scene.supervisor.limit),
+        deviation=float(np.sqrt(np.max(np.linalg.eigvalsh(record.imbalance_covariance[-1])))),
+        imbalance=float(np.hypot(*record.imbalance[-1])),
+        saturation=float(np.count_nonzero(at_limit)) * scene.sensor.step,
+        hold=int(record.hold[-1]),
+        least_gap=float(np.min(_separations(angles))),
+        euler_limit=float(euler_step_limit(model=believed_whirl(scene), angular_velocity=fastest)),
+        predicted=expected_deviation(scene, speed=slowest) if cause is Cause.IMBALANCE_UNCERTAIN else 0.0,
+    )
+
+
+def _separations(angles: FloatArray) -> FloatArray:
+    difference = angles[:, 1] - angles[:, 0]
+    return np.abs(np.pi - np.mod(np.pi - difference, 2 * np.pi))
+
+
+def _stages(stage: IntArray, time: FloatArray) -> tuple[StageSpan, ...]:
+    edges = [0, *(np.flatnonzero(np.diff(stage)) + 1), len(stage) - 1]
+    return tuple(
+        StageSpan(name=STAGE_NAMES[Stage(int(stage[a]))], start=float(time[a]), end=float(time[b]))
+        for a, b in itertools.pairwise(edges)
+    )
+
+
+def _targets(scene: EccentricScene, record: Record) -> Targets | None:
+    if not np.any(record.stage == int(Stage.POSITIONING)):
+        return None
+    x, y = record.imbalance[-1]
+    gap = scene.masses.arc_length / scene.masses.guide_radius
+    moment = plant_parameters(scene).moment
+    return target_angles(float(np.hypot(x, y)), float(np.arctan2(y, x)), moment, gap)
+
+
+def _unbalanced(scene: EccentricScene, speed: float) -> float:
+    if speed == 0:
+        return 0.0
+    return abs(steady_whirl(plant_parameters(scene), speed, scene.masses.initial_angle))

@@ -1,0 +1,143 @@
+"""The record of one run with two eccentric masses, frozen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from ringbalance.controller.eccentric_mass.strategy.targets import Targets
+from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray
+
+
+class EccentricOutcome(StrEnum):
+    """How a run ended."""
+
+    SETTLED = "settled"
+    RISES_AGAIN = "rises_again"
+    SATURATED = "saturated"
+    RESIDUAL = "residual"
+    TUNING_TIME = "tuning_time"
+    SPEED_CHANGED = "speed_changed"
+    TOO_SLOW = "too_slow"
+    SPEED_NOT_CONSTANT = "speed_not_constant"
+    MASSES_MOVE = "masses_move"
+    IMBALANCE_UNCERTAIN = "imbalance_uncertain"
+    FRICTION_UNCERTAIN = "friction_uncertain"
+    STALLED = "stalled"
+    NOT_ARRIVED = "not_arrived"
+    TIME_LIMIT = "time_limit"
+    DIVERGED = "diverged"
+    LOCKED = "locked"
+
+
+@dataclass(frozen=True, kw_only=True)
+class StageSpan:
+    """One stage of the strategy."""
+
+    name: str
+    start: float
+    """s."""
+    end: float
+    """s."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EccentricEstimates:
+    """The filters' estimates, sample by sample; constant outside their stages."""
+
+    imbalance: FloatArray
+    """Along the rotor's axes, kg m, shape (n, 2)."""
+    imbalance_covariance: FloatArray
+    """kg^2 m^2, shape (n, 2, 2)."""
+    friction_arm: FloatArray
+    """m, shape (n, 2)."""
+    friction_variance: FloatArray
+    """m^2, shape (n, 2)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EccentricRun:
+    """One run of the whole strategy on the plant."""
+
+    balancer: str
+    """ "eccentric_mass"."""
+    scene: str
+    """Its name."""
+    outcome: EccentricOutcome
+    settled: bool
+    """Whether the amplitude ends at or below the limit and stays there."""
+    settling_time: float | None
+    """s, from which on the amplitude stays at or below the limit; None when not settled."""
+    status: str
+    """How the run ended and what to do next."""
+    warnings: tuple[str, ...]
+    limit: float
+    """m."""
+    time: FloatArray
+    """s, shape (n,)."""
+    speed: FloatArray
+    """W, rad/s, shape (n,)."""
+    whirl: ComplexArray
+    """True displacement of the rotor along its own axes, m, shape (n,)."""
+    mass_angle: FloatArray
+    """True angles of the masses, rad, not wrapped, shape (2, n)."""
+    mass_rate: FloatArray
+    """rad/s, shape (2, n)."""
+    goal: FloatArray
+    """Where the masses should be, rad, shape (2, n)."""
+    voltage: FloatArray
+    """V, shape (2, n)."""
+    drive_off: BoolArray
+    """Whether both drives are off, shape (n,)."""
+    energy: FloatArray
+    """Electrical, taken from the supply since the start, J, shape (n,)."""
+    estimates: EccentricEstimates
+    stages: tuple[StageSpan, ...]
+    targets: Targets | None
+    """For the imbalance as it was estimated; None when it never came to that."""
+    unbalanced_amplitude: float
+    """Steady amplitude that the masses' first places would give at the last speed, m."""
+
+    @property
+    def amplitude(self) -> FloatArray:
+        """True vibration, m zero-to-peak, shape (n,)."""
+        return np.asarray(np.abs(self.whirl), dtype=np.float64)
+
+    @property
+    def phase(self) -> FloatArray:
+        """Of the true vibration in the rotor's frame, rad within (-pi, pi], shape (n,)."""
+        return np.asarray(np.angle(self.whirl), dtype=np.float64)
+
+    @property
+    def final_amplitude(self) -> float:
+        """Mean over the last second, m."""
+        last = self.time >= self.time[-1] - FINAL_TIME
+        return float(np.mean(self.amplitude[last]))
+
+    @property
+    def residual_ratio(self) -> float | None:
+        """Final amplitude over what the first places would give at the same speed.
+
+        At constant speed that is final over initial steady amplitude.  None where nothing would vibrate.
+        """
+        if self.unbalanced_amplitude < NOTHING * self.limit:
+            return None
+        return self.final_amplitude / self.unbalanced_amplitude
+
+    @property
+    def electrical_energy(self) -> float:
+        """Taken by both motors in the whole run, J."""
+        return float(self.energy[-1])
+
+    @property
+    def worst_amplitude(self) -> float:
+        """Largest true vibration on the way, m."""
+        return float(np.max(self.amplitude))
+
+
+NOTHING = 1e-6
+"""Share of the limit below which a vibration is round-off."""
+FINAL_TIME = 1.0
+"""Over which the final amplitude is averaged, s."""

@@ -1,0 +1,231 @@
+"""What the supervisor remembers, what it goes by, and the names of stages and causes."""
+
+from __future__ import annotations
+
+import math
+from enum import IntEnum
+from typing import Final, NamedTuple
+
+from ringbalance.controller.compilation.compiled import compiled
+from ringbalance.controller.eccentric_mass.strategy.fine_tuning import Tuning, tuning_start
+
+Pair = tuple[float, float]
+
+NOT_YET: Final = -1.0
+
+MOVING: Final = 0
+"""The drives bring the masses to their goal."""
+RELEASED: Final = 1
+"""The drives are off: friction holds the masses."""
+HELD: Final = 2
+"""The drives hold the masses, because friction does not, or is not known to."""
+
+
+class Stage(IntEnum):
+    """What the strategy is doing; letters are the paper's periods."""
+
+    WAITING = 0
+    IMBALANCE = 1
+    """(A): the masses are held, the imbalance is estimated."""
+    FRICTION = 2
+    """(B): both masses go round together, their friction is estimated."""
+    POSITIONING = 3
+    """(C): the masses go to their targets."""
+    CHECK = 4
+    """(D): the drives rest, the vibration is averaged."""
+    FINE_TUNING = 5
+    """(E): by trial."""
+    REST = 6
+    """(F): nothing more to do."""
+    FAILED = 7
+    """Nothing more that can be done; the masses are held where they are."""
+
+
+class Cause(IntEnum):
+    """Why the last stage was entered."""
+
+    NONE = 0
+    BALANCED = 1
+    SATURATED = 2
+    RESIDUAL = 3
+    TUNING_TIME = 4
+    SPEED_CHANGED = 5
+    TOO_SLOW = 6
+    SPEED_NOT_CONSTANT = 7
+    IMBALANCE_UNCERTAIN = 8
+    FRICTION_UNCERTAIN = 9
+    STALLED = 10
+    NOT_ARRIVED = 11
+    LOCKED = 12
+    MASSES_MOVE = 13
+
+
+class Gates(NamedTuple):
+    """Limits between the stages."""
+
+    start: float
+    """s."""
+    limit: float
+    """Amplitude that is good enough, m."""
+    lowest_speed: float
+    """rad/s."""
+    arrival_angle: float
+    """rad."""
+    arrival_rate: float
+    """rad/s."""
+    dwell: float
+    """For which a mass must have arrived, s."""
+    imbalance_time: float
+    """s."""
+    friction_time: float
+    """s."""
+    positioning_time: float
+    """s."""
+    fine_tuning_time: float
+    """s."""
+    imbalance_gate: float
+    """Relative standard deviation."""
+    friction_gate: float
+    """Relative standard deviation."""
+    friction_torque: float
+    """Standard deviation of the friction torque that makes no difference to arrival, N m."""
+    least_estimate: float
+    """Shortest time of imbalance estimation, s."""
+    least_drive: float
+    """Shortest time of friction estimation, s."""
+    stall_rate: float
+    """Rate below which the drive nearly stalls, rad/s."""
+    tuning_step: float
+    """rad."""
+    tuning_stop: float
+    """rad."""
+    tuning_near: float
+    """Closest that a mass is brought to a place, rad."""
+    wait: float
+    """s."""
+    average: float
+    """s."""
+    margin: float
+    """By which a trial must be better, m."""
+    move_time: float
+    """Longest move of one trial, s."""
+    moment: float
+    """b, kg m."""
+    gap: float
+    """Angle that one mass takes up, rad."""
+    target_error: Pair
+    """rad."""
+
+
+class Facts(NamedTuple):
+    """The supervisor's inputs at each sample."""
+
+    time: float
+    speed: float
+    constant: bool
+    """Whether the speed is constant."""
+    visible: bool
+    """Whether the imbalance filter's model holds now."""
+    position: complex
+    """m, rotor-fixed."""
+    angle: Pair
+    """Smoothed, rad."""
+    rate: Pair
+    """Smoothed, rad/s."""
+    imbalance: complex
+    """kg m."""
+    deviation: float
+    """Standard deviation of the imbalance, kg m."""
+    reach: float
+    """Steady amplitude per imbalance, m/(kg m)."""
+    arm: Pair
+    """m."""
+    arm_deviation: Pair
+    """m."""
+    load: float
+    """Largest share of what friction holds for sure that holding takes; infinite when it holds nothing."""
+
+
+class Progress(NamedTuple):
+    """Of the present move, and of the mean that is taken after it."""
+
+    moving: float
+    """Since when the masses have been under way to the present goal, s."""
+    arrived: float
+    """Since when they have been there, s; NOT_YET."""
+    averaging: float
+    """From when on the vibration is averaged, s; NOT_YET while the masses move."""
+    total: complex
+    """Sum of the rotor-fixed vibration, m."""
+    samples: int
+    """Samples in the sum."""
+
+
+class Findings(NamedTuple):
+    """What a stage leaves behind for those after it and for the status."""
+
+    saturated: bool
+    """Whether the imbalance is more than the masses can undo."""
+    residual: float
+    """Imbalance that the targets leave, kg m."""
+    objective: float
+    """Mean amplitude at the place that the masses have or go to, m; infinite before the first mean."""
+    driven: int
+    """Samples of the friction stage, without its beginning."""
+    stalled: int
+    """Those of them in which a mass was nearly at a standstill."""
+
+
+class Plan(NamedTuple):
+    """What the supervisor remembers."""
+
+    stage: int
+    entered: float
+    """s."""
+    cause: int
+    goal: Pair
+    """Where the masses should be, rad, unwrapped."""
+    hold: int
+    """MOVING, RELEASED or HELD."""
+    progress: Progress
+    tuning: Tuning
+    findings: Findings
+
+
+@compiled
+def first_plan(goal: Pair, time: float) -> Plan:
+    """The plan before the first sample.
+
+    Args: `goal`: where the masses are, rad. `time`: s.
+    Returns: Plan, waiting.
+    """
+    nothing = Findings(False, 0.0, math.inf, 0, 0)
+    tuning = tuning_start(goal[0], goal[1], math.inf, 1.0)
+    return Plan(0, time, 0, goal, MOVING, setting_out(time), tuning, nothing)
+
+
+@compiled
+def setting_out(time: float) -> Progress:
+    """Progress at the beginning of a move.
+
+    Args: `time`: now, s.
+    Returns: Progress, with nothing arrived or averaged yet.
+    """
+    return Progress(time, NOT_YET, NOT_YET, 0.0j, 0)
+
+
+@compiled
+def enter(plan: Plan, stage: int, time: float, cause: int, goal: Pair) -> Plan:
+    """Begin a stage.
+
+    Args: `plan`: so far. `time`: now, s. `cause`: why. `goal`: where the masses should be, rad.
+    Returns: The plan, with its tuning and findings.
+    """
+    return Plan(stage, time, cause, goal, MOVING, setting_out(time), plan.tuning, plan.findings)
+
+
+@compiled
+def follow(plan: Plan, progress: Progress, findings: Findings) -> Plan:
+    """Stay in the stage. Args: `plan`: so far. `progress`: of the present move. `findings`: so far."""
+    stage, entered, cause, goal, hold, _, tuning, _ = plan
+    return Plan(stage, entered, cause, goal, hold, progress, tuning, findings)

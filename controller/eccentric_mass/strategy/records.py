@@ -1,0 +1,134 @@
+"""Settings, state and sampled inputs of the strategy."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from ringbalance.controller.eccentric_mass.estimation.friction_filter import FrictionEstimate, FrictionNoise
+from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import ImbalanceEstimate
+from ringbalance.controller.eccentric_mass.estimation.imbalance_model import FilterMatrices, ProcessNoise
+from ringbalance.controller.eccentric_mass.strategy.lqr_law import DriveLaw
+from ringbalance.controller.eccentric_mass.strategy.plan import Gates, Plan
+from ringbalance.scene.arrays import FloatArray
+
+Pair = tuple[float, float]
+
+
+class EccentricMeasurement(NamedTuple):
+    """One sample of everything that the strategy may look at."""
+
+    time: float
+    """s."""
+    speed: float
+    """W, rad/s."""
+    speed_rate: float
+    """W', rad/s^2."""
+    rotor_angle: float
+    """Of the rotor's first axis, rad."""
+    vibration: FloatArray
+    """Displacement (m) and velocity (m/s) in the sensor's frame: x, y, x', y', shape (4,)."""
+    angle: Pair
+    """Of the masses, rad, not wrapped."""
+    rate: Pair
+    """Of the masses, rad/s."""
+
+
+class ImbalanceSettings(NamedTuple):
+    """Of the imbalance filter."""
+
+    noise: ProcessNoise
+    position_deviation: float
+    """Of the displacement sensors as assumed, m."""
+    velocity_deviation: float
+    """Of the velocity sensors as assumed, m/s."""
+    start_position: float
+    """Standard deviation before the first sample, m."""
+    start_velocity: float
+    """m/s."""
+    start_imbalance: float
+    """kg m."""
+    euler: bool
+    """The paper's transition in place of the exact one."""
+    every: int
+    """Samples between two steps."""
+
+
+class FrictionSettings(NamedTuple):
+    """Of the friction filter and the drive meanwhile."""
+
+    start: FrictionEstimate
+    noise: FrictionNoise
+    euler: bool
+    """The paper's transition in place of the exponential one."""
+    every: int
+    """Samples between two steps."""
+    drive_speed: float
+    """rad/s."""
+    speed_gain: float
+    """gamma, V s/rad."""
+    pair_gain: float
+    """V/rad; zero: the paper's law."""
+
+
+class StrategySettings(NamedTuple):
+    """All that does not change."""
+
+    step: float
+    """Between samples, s."""
+    laboratory: bool
+    """Whether the vibration is measured in the fixed frame."""
+    smoothing: float
+    """Share of a new sample in the smoothed angles, rates and vibration."""
+    voltage_every: int
+    """Samples for which a voltage is held."""
+    law: DriveLaw
+    gates: Gates
+    imbalance: ImbalanceSettings
+    friction: FrictionSettings
+
+
+class Smoothed(NamedTuple):
+    """Slow copies of what is measured, in the rotor's frame."""
+
+    position: complex
+    """m."""
+    velocity: complex
+    """m/s."""
+    angle: Pair
+    """rad."""
+    rate: Pair
+    """rad/s."""
+
+
+class Whirl(NamedTuple):
+    """The imbalance filter's part of the memory."""
+
+    estimate: ImbalanceEstimate
+    matrices: FilterMatrices
+    running: bool
+    """Whether the filter took in the last sample that was its turn."""
+
+
+class Beliefs(NamedTuple):
+    """The filters' estimates, as far as the voltages depend on them."""
+
+    imbalance: complex
+    """kg m."""
+    deviation: float
+    """Largest standard deviation of the imbalance, kg m."""
+    friction: tuple[FrictionEstimate, FrictionEstimate]
+
+
+class StrategyState(NamedTuple):
+    """All that changes."""
+
+    sample: int
+    """Number of the next sample."""
+    plan: Plan
+    smoothed: Smoothed
+    whirl: Whirl
+    beliefs: Beliefs
+    torque: Pair
+    """Known torques summed over the samples since the friction filter's last step, N m."""
+    voltage: Pair
+    """V."""

@@ -1,0 +1,170 @@
+"""From a scene to what the strategy is given."""
+
+from __future__ import annotations
+
+import math
+
+from ringbalance.controller.eccentric_mass.estimation.friction_filter import (
+    FrictionEstimate,
+    FrictionNoise,
+    TrackModel,
+)
+from ringbalance.controller.eccentric_mass.estimation.imbalance_model import ProcessNoise, WhirlModel
+from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
+from ringbalance.controller.eccentric_mass.strategy.lqr import lqr_gain
+from ringbalance.controller.eccentric_mass.strategy.lqr_law import (
+    BREAK_AWAY,
+    NO_COMPENSATION,
+    PRINTED,
+    DriveLaw,
+)
+from ringbalance.controller.eccentric_mass.strategy.plan import Gates
+from ringbalance.controller.eccentric_mass.strategy.records import (
+    FrictionSettings,
+    ImbalanceSettings,
+    StrategySettings,
+)
+from ringbalance.scene.eccentric_control_models import FrictionFilter, ImbalanceFilter
+from ringbalance.scene.eccentric_models import EccentricScene
+
+SMOOTHING_TIME = 0.05
+"""Of the angles and rates that arrival is judged by, s."""
+DWELL_TIME = 0.2
+"""For which a mass must have arrived, s."""
+DECAYS = 2.0
+"""Decay times of the rotor that the imbalance is estimated for at least."""
+LONGEST_ESTIMATE = 0.5
+"""Share of the estimation's time limit that this may take at most."""
+LEAST_DRIVE_TIME = 1.0
+"""Of the friction stage, s: long against the drive's own time constants."""
+LONGEST_TRIAL_MOVE = 10.0
+"""s."""
+SLOWEST_RATE = 1e-3
+"""Below which a mass rests, however good the encoder, rad/s."""
+FRICTION_ERROR = 0.1
+"""Share of the arrival angle that unknown friction may hold a mass off."""
+
+COMPENSATIONS = {"none": NO_COMPENSATION, "break_away": BREAK_AWAY, "printed": PRINTED}
+
+
+def believed_whirl(scene: EccentricScene) -> WhirlModel:
+    """The rotor as configured in filter and controller.
+
+    Returns: WhirlModel; its mass includes the eccentric masses.
+    """
+    told = scene.imbalance_filter
+    return WhirlModel(told.assumed_mass + 2 * scene.masses.mass, told.assumed_damping, told.assumed_stiffness)
+
+
+def track_model(scene: EccentricScene) -> TrackModel:
+    """One eccentric mass with its drive."""
+    plant = plant_parameters(scene)
+    return TrackModel(plant.inertia + plant.drive_inertia, plant.drive_damping, plant.moment)
+
+
+def strategy_settings(scene: EccentricScene) -> StrategySettings:
+    """Gather what the strategy needs."""
+    step = scene.sensor.step
+    return StrategySettings(
+        step=step,
+        laboratory=scene.sensor.frame == "laboratory",
+        smoothing=-math.expm1(-step / SMOOTHING_TIME),
+        voltage_every=max(round(scene.lqr.step / step), 1),
+        law=drive_law(scene),
+        gates=_gates(scene),
+        imbalance=_imbalance(scene.imbalance_filter, step),
+        friction=_friction(scene.friction_filter, step),
+    )
+
+
+def _imbalance(told: ImbalanceFilter, step: float) -> ImbalanceSettings:
+    return ImbalanceSettings(
+        noise=ProcessNoise(told.velocity_walk**2, told.unbalance_walk**2),
+        position_deviation=told.position_noise,
+        velocity_deviation=told.velocity_noise,
+        start_position=told.initial_position,
+        start_velocity=told.initial_velocity,
+        start_imbalance=told.initial_unbalance,
+        euler=told.discretisation == "euler",
+        every=max(round(told.step / step), 1),
+    )
+
+
+def _friction(told: FrictionFilter, step: float) -> FrictionSettings:
+    return FrictionSettings(
+        start=FrictionEstimate(0.0, 0.0, told.initial_rate**2, 0.0, told.initial_friction**2),
+        noise=FrictionNoise(told.rate_noise**2, told.rate_walk**2, told.friction_walk**2),
+        euler=told.discretisation == "euler",
+        every=max(round(told.step / step), 1),
+        drive_speed=told.drive_speed,
+        speed_gain=told.speed_gain,
+        pair_gain=told.pair_gain,
+    )
+
+
+def drive_law(scene: EccentricScene) -> DriveLaw:
+    """What the law of the voltages knows."""
+    plant, track = plant_parameters(scene), track_model(scene)
+    gain = lqr_gain(
+        track=track, state_weight=scene.lqr.state_weight, input_weight=scene.lqr.input_weight
+    ).gain
+    return DriveLaw(
+        whirl=believed_whirl(scene),
+        track=track,
+        mass_inertia=plant.inertia,
+        torque_per_volt=plant.drive_gain,
+        maximum_voltage=plant.maximum_voltage,
+        position_gain=float(gain[0, 0]),
+        rate_gain=float(gain[0, 2]),
+        compensation=COMPENSATIONS[scene.lqr.friction_compensation],
+        slow=max(3 * scene.sensor.encoder_rate_noise, SLOWEST_RATE),
+        near=_near(scene),
+    )
+
+
+def _near(scene: EccentricScene) -> float:
+    """A quarter of the finest move asked for, but not finer than the smoothed encoder can tell."""
+    finest = min(scene.fine_tuning.stop, scene.supervisor.arrival_angle)
+    smooth = scene.sensor.encoder_noise * math.sqrt(scene.sensor.step / (2 * SMOOTHING_TIME))
+    return max(0.25 * finest, 3 * smooth)
+
+
+def _least_estimate(scene: EccentricScene) -> float:
+    """Until the rotor's own transient, which hangs most on the assumed bearing, has died down."""
+    whirl = believed_whirl(scene)
+    longest = LONGEST_ESTIMATE * scene.supervisor.imbalance_time
+    return min(DECAYS * 2 * whirl.mass / whirl.damping, longest) if whirl.damping > 0 else longest
+
+
+def _gates(scene: EccentricScene) -> Gates:
+    told, tuning = scene.supervisor, scene.fine_tuning
+    plant, law = plant_parameters(scene), drive_law(scene)
+    averaged = max(tuning.average / scene.sensor.step, 1.0)
+    return Gates(
+        start=told.start,
+        limit=told.limit,
+        lowest_speed=told.lowest_speed,
+        arrival_angle=told.arrival_angle,
+        arrival_rate=told.arrival_rate,
+        dwell=DWELL_TIME,
+        imbalance_time=told.imbalance_time,
+        friction_time=told.friction_time,
+        positioning_time=told.positioning_time,
+        fine_tuning_time=told.fine_tuning_time,
+        imbalance_gate=scene.imbalance_filter.gate,
+        friction_gate=scene.friction_filter.gate,
+        friction_torque=FRICTION_ERROR * law.position_gain * told.arrival_angle,
+        least_estimate=_least_estimate(scene),
+        least_drive=LEAST_DRIVE_TIME,
+        stall_rate=scene.friction_filter.stall_share * scene.friction_filter.drive_speed,
+        tuning_step=tuning.step,
+        tuning_stop=tuning.stop,
+        tuning_near=2 * law.near,
+        wait=tuning.wait,
+        average=tuning.average,
+        margin=2 * scene.sensor.position_noise / math.sqrt(averaged),
+        move_time=LONGEST_TRIAL_MOVE,
+        moment=plant.moment,
+        gap=scene.masses.arc_length / scene.masses.guide_radius,
+        target_error=told.target_error,
+    )

@@ -1,0 +1,325 @@
+"""The whole strategy as one pure step: estimate, decide, drive.
+
+`strategy_step` takes the state and a measurement and gives the next state and the motors' voltages; it looks
+at nothing else, so that a run can be repeated, cut and compared.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from ringbalance.controller.compilation.compiled import compiled
+from ringbalance.controller.eccentric_mass.estimation.friction_filter import (
+    FrictionEstimate,
+    friction_restart,
+    friction_step,
+)
+from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import (
+    correct,
+    imbalance_deviation,
+    own_imbalance,
+    predict,
+    start_estimate,
+    turned_back,
+    with_fresh_whirl,
+)
+from ringbalance.controller.eccentric_mass.estimation.imbalance_model import FilterMatrices, filter_matrices
+from ringbalance.controller.eccentric_mass.strategy.lqr_law import (
+    BREAK_AWAY,
+    DriveLaw,
+    Motion,
+    friction_torque,
+    regulator_torque,
+    rotor_load,
+    steady_load,
+    voltage_for,
+)
+from ringbalance.controller.eccentric_mass.strategy.plan import RELEASED, Facts, Plan, first_plan
+from ringbalance.controller.eccentric_mass.strategy.records import (
+    Beliefs,
+    EccentricMeasurement,
+    Pair,
+    Smoothed,
+    StrategySettings,
+    StrategyState,
+    Whirl,
+)
+from ringbalance.controller.eccentric_mass.strategy.supervisor import (
+    CHECK,
+    FAILED,
+    FRICTION,
+    IMBALANCE,
+    REST,
+    supervise,
+)
+from ringbalance.controller.eccentric_mass.strategy.targets import wrapped
+from ringbalance.scene.arrays import FloatArray
+
+STEADY: Final = 1e-6
+"""Speed rate that counts as none, rad/s^2."""
+
+
+@compiled
+def strategy_start(settings: StrategySettings, measurement: EccentricMeasurement) -> StrategyState:
+    """The state before the first sample.
+
+    Args: `measurement`: of which only the masses' angles, the speed and the time are read.
+    Returns: The state; the strategy waits for its start.
+    """
+    told, friction = settings.imbalance, settings.friction.start
+    estimate = start_estimate(told.start_position, told.start_velocity, told.start_imbalance)
+    whirl = Whirl(estimate, _matrices(settings, measurement.speed), False)
+    beliefs = Beliefs(0.0j, told.start_imbalance, (friction, friction))
+    smoothed = Smoothed(0.0j, 0.0j, measurement.angle, (0.0, 0.0))
+    plan = first_plan(measurement.angle, measurement.time)
+    return StrategyState(0, plan, smoothed, whirl, beliefs, (0.0, 0.0), (0.0, 0.0))
+
+
+@compiled
+def strategy_step(
+    settings: StrategySettings, state: StrategyState, measurement: EccentricMeasurement
+) -> tuple[StrategyState, Pair]:
+    """Decide on one sample; the same arguments always give the same answer.
+
+    Args: `state`: as returned by the previous step or by `strategy_start`. `measurement`: the sample; with
+        anything in it that is not finite it is passed over, the voltages kept.
+    Returns: The next state and the voltages of both motors, V.
+    """
+    count, old, smoothed, whirl, beliefs, torque, voltage = state
+    if not _usable(measurement):
+        return StrategyState(count + 1, old, smoothed, whirl, beliefs, torque, voltage), voltage
+    sample = measurement.vibration
+    if settings.laboratory:
+        sample = turned_back(sample, measurement.rotor_angle)
+    motion = _motion(settings, measurement, sample)
+    smoothed = _smoothed(settings.smoothing if count else 1.0, smoothed, motion)
+    visible = _visible(settings, motion, smoothed)
+    if old.stage == IMBALANCE and count % settings.imbalance.every == 0:
+        whirl = _with_sample(settings, whirl, motion, sample, visible)
+        beliefs = _with_imbalance(whirl, beliefs)
+    if old.stage == FRICTION and count % settings.friction.every == 0:
+        beliefs, torque = _with_friction(settings, beliefs, torque, motion), (0.0, 0.0)
+    facts = _facts(settings.law, old, beliefs, motion, smoothed, visible and whirl.running, measurement.time)
+    plan = supervise(settings.gates, old, facts)
+    asked, load = _torques(settings, plan, beliefs, motion, smoothed)
+    if count % settings.voltage_every == 0:
+        voltage = (voltage_for(settings.law, asked[0]), voltage_for(settings.law, asked[1]))
+    torque = _known(settings.law, torque, load, voltage)
+    return StrategyState(count + 1, plan, smoothed, whirl, beliefs, torque, voltage), voltage
+
+
+@compiled
+def _usable(measurement: EccentricMeasurement) -> bool:
+    total = measurement.time + measurement.speed + measurement.speed_rate + measurement.rotor_angle
+    for i in range(4):
+        total += measurement.vibration[i]
+    for i in range(2):
+        total += measurement.angle[i] + measurement.rate[i]
+    return math.isfinite(total)
+
+
+@compiled
+def _matrices(settings: StrategySettings, speed: float) -> FilterMatrices:
+    told = settings.imbalance
+    step, noise = settings.step * told.every, told.noise
+    return filter_matrices(settings.law.whirl, noise, speed, step, settings.laboratory, told.euler)
+
+
+@compiled
+def _motion(settings: StrategySettings, measurement: EccentricMeasurement, sample: FloatArray) -> Motion:
+    """Along the rotor's axes; a laboratory sensor's velocity holds the rotor's turning."""
+    position, velocity = complex(sample[0], sample[1]), complex(sample[2], sample[3])
+    if settings.laboratory:
+        velocity -= complex(0.0, measurement.speed) * position
+    angle, rate = measurement.angle, measurement.rate
+    return Motion(measurement.speed, measurement.speed_rate, position, velocity, angle, rate)
+
+
+@compiled
+def _smoothed(new: float, old: Smoothed, motion: Motion) -> Smoothed:
+    return Smoothed(
+        old.position + new * (motion.position - old.position),
+        old.velocity + new * (motion.velocity - old.velocity),
+        (
+            old.angle[0] + new * (motion.angle[0] - old.angle[0]),
+            old.angle[1] + new * (motion.angle[1] - old.angle[1]),
+        ),
+        (
+            old.rate[0] + new * (motion.rate[0] - old.rate[0]),
+            old.rate[1] + new * (motion.rate[1] - old.rate[1]),
+        ),
+    )
+
+
+@compiled
+def _visible(settings: StrategySettings, motion: Motion, smoothed: Smoothed) -> bool:
+    """Whether the imbalance filter's model holds: turning, at constant speed, with masses at rest."""
+    turning = abs(motion.speed) >= settings.gates.lowest_speed and abs(motion.speed_rate) < STEADY
+    fastest = max(abs(smoothed.rate[0]), abs(smoothed.rate[1]))
+    return turning and fastest <= settings.law.slow
+
+
+@compiled
+def _with_sample(
+    settings: StrategySettings, old: Whirl, motion: Motion, sample: FloatArray, visible: bool
+) -> Whirl:
+    """One step of the imbalance filter; after a gap in which its model did not hold the whirl starts
+    again."""
+    if not visible:
+        return Whirl(old.estimate, old.matrices, False)
+    told, matrices, estimate = settings.imbalance, old.matrices, old.estimate
+    if matrices.speed != motion.speed:
+        matrices = _matrices(settings, motion.speed)
+    if not old.running:
+        start = start_estimate(told.start_position, told.start_velocity, told.start_imbalance)
+        estimate = with_fresh_whirl(estimate, start)
+    own = own_imbalance(settings.law.track.moment, motion.angle[0], motion.angle[1])
+    place, pace = told.position_deviation**2, told.velocity_deviation**2
+    variance = np.array([place, place, pace, pace])
+    return Whirl(correct(predict(estimate, matrices, own), matrices, sample, variance), matrices, True)
+
+
+@compiled
+def _with_imbalance(whirl: Whirl, old: Beliefs) -> Beliefs:
+    state = whirl.estimate.state
+    deviation = imbalance_deviation(whirl.estimate.covariance)
+    return Beliefs(complex(state[4], state[5]), deviation, old.friction)
+
+
+@compiled
+def _with_friction(settings: StrategySettings, old: Beliefs, torque: Pair, motion: Motion) -> Beliefs:
+    one, two = old.friction
+    first = _one_friction(settings, one, torque[0], motion.rate[0], motion.speed)
+    second = _one_friction(settings, two, torque[1], motion.rate[1], motion.speed)
+    return Beliefs(old.imbalance, old.deviation, (first, second))
+
+
+@compiled
+def _one_friction(
+    settings: StrategySettings, estimate: FrictionEstimate, torque: float, rate: float, speed: float
+) -> FrictionEstimate:
+    """One step of a mass's filter, if the mass moves and has not turned round."""
+    told, law = settings.friction, settings.law
+    if abs(rate) <= law.slow or estimate.rate * rate <= 0:
+        return friction_restart(estimate, told.noise, rate)
+    mean, step = torque / told.every, settings.step * told.every
+    return friction_step(estimate, law.track, told.noise, rate, speed, mean, step, told.euler)
+
+
+@compiled
+def _known(law: DriveLaw, old: Pair, load: Pair, voltage: Pair) -> Pair:
+    """The torques that the friction filter knows of, one sample more."""
+    return (
+        old[0] + law.torque_per_volt * voltage[0] - load[0],
+        old[1] + law.torque_per_volt * voltage[1] - load[1],
+    )
+
+
+@compiled
+def _facts(
+    law: DriveLaw,
+    plan: Plan,
+    beliefs: Beliefs,
+    motion: Motion,
+    smoothed: Smoothed,
+    visible: bool,
+    time: float,
+) -> Facts:
+    w = motion.speed
+    stiffness = complex(law.whirl.stiffness - law.whirl.mass * w * w, law.whirl.damping * w)
+    one, two = beliefs.friction
+    deviation = (math.sqrt(max(one.arm_variance, 0.0)), math.sqrt(max(two.arm_variance, 0.0)))
+    load = 0.0
+    if plan.stage == CHECK or plan.stage == REST or plan.stage == FAILED:
+        sure = (max(one.arm - 2 * deviation[0], 0.0), max(two.arm - 2 * deviation[1], 0.0))
+        load = _share_of_friction(law, motion, smoothed, beliefs.imbalance, sure)
+    return Facts(
+        time,
+        w,
+        abs(motion.speed_rate) < STEADY,
+        visible,
+        motion.position,
+        smoothed.angle,
+        smoothed.rate,
+        beliefs.imbalance,
+        beliefs.deviation,
+        w * w / abs(stiffness),
+        (one.arm, two.arm),
+        deviation,
+        load,
+    )
+
+
+@compiled
+def _share_of_friction(
+    law: DriveLaw, motion: Motion, smoothed: Smoothed, imbalance: complex, arm: Pair
+) -> float:
+    """Largest share of what these friction arms hold at most that holding the masses takes."""
+    w, place, velocity = motion.speed, smoothed.position, smoothed.velocity
+    quiet = Motion(w, motion.speed_rate, place, velocity, smoothed.angle, (0.0, 0.0))
+    load = rotor_load(law, quiet, imbalance, (0.0, 0.0))
+    share = 0.0
+    for i in range(2):
+        most = arm[i] * law.track.moment * w * w
+        share = max(share, abs(load[i]) / most if most > 0 else math.inf)
+    return share
+
+
+@compiled
+def _torques(
+    settings: StrategySettings, plan: Plan, beliefs: Beliefs, motion: Motion, smoothed: Smoothed
+) -> tuple[Pair, Pair]:
+    """What the motors should give at standstill, and what of it rotor and speed rate take."""
+    law = settings.law
+    if plan.stage == FRICTION:
+        asked = _pair_torques(settings, motion)
+    else:
+        asked = (
+            regulator_torque(law, motion.angle[0], motion.rate[0], plan.goal[0]),
+            regulator_torque(law, motion.angle[1], motion.rate[1], plan.goal[1]),
+        )
+    if plan.stage <= IMBALANCE:
+        load = steady_load(law, motion)
+        return (asked[0] + load[0], asked[1] + load[1]), load
+    wanted = (
+        (asked[0] - law.track.damping * motion.rate[0]) / law.track.inertia,
+        (asked[1] - law.track.damping * motion.rate[1]) / law.track.inertia,
+    )
+    load = rotor_load(law, motion, beliefs.imbalance, wanted)
+    if plan.hold == RELEASED:
+        return (0.0, 0.0), load
+    one = _friction_of(settings, plan, beliefs, motion, smoothed, 0)
+    two = _friction_of(settings, plan, beliefs, motion, smoothed, 1)
+    return (asked[0] + load[0] + one, asked[1] + load[1] + two), load
+
+
+@compiled
+def _pair_torques(settings: StrategySettings, motion: Motion) -> Pair:
+    """The paper's speed control of each mass, and one of the 180 degrees between them."""
+    error = wrapped(motion.angle[1] - motion.angle[0] - math.pi)
+    told, per_volt = settings.friction, settings.law.torque_per_volt
+    first = told.speed_gain * (told.drive_speed - motion.rate[0]) + told.pair_gain * error
+    second = told.speed_gain * (told.drive_speed - motion.rate[1]) - told.pair_gain * error
+    return per_volt * first, per_volt * second
+
+
+@compiled
+def _friction_of(
+    settings: StrategySettings,
+    plan: Plan,
+    beliefs: Beliefs,
+    motion: Motion,
+    smoothed: Smoothed,
+    mass: int,
+) -> float:
+    law, distance = settings.law, plan.goal[mass] - smoothed.angle[mass]
+    if plan.stage == FRICTION:
+        # The paper's law of the pair compensates nothing.
+        if law.compensation != BREAK_AWAY or settings.friction.pair_gain == 0:
+            return 0.0
+        distance = math.copysign(math.inf, settings.friction.drive_speed)
+    arm = beliefs.friction[mass].arm
+    return friction_torque(law, arm, motion.speed, motion.angle[mass], motion.rate[mass], distance)

@@ -1,0 +1,278 @@
+"""The order of the stages: estimate, drive round, go, look, tune by trial, rest; and when each is left."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from typing import Final
+
+from ringbalance.controller.compilation.compiled import compiled
+from ringbalance.controller.eccentric_mass.strategy.fine_tuning import (
+    Tuning,
+    separation,
+    tuning_next,
+    tuning_place,
+    tuning_start,
+)
+from ringbalance.controller.eccentric_mass.strategy.plan import (
+    HELD,
+    MOVING,
+    NOT_YET,
+    RELEASED,
+    Cause,
+    Facts,
+    Findings,
+    Gates,
+    Plan,
+    Progress,
+    Stage,
+    enter,
+    follow,
+    setting_out,
+)
+from ringbalance.controller.eccentric_mass.strategy.targets import assign, target_angles
+
+# Plain numbers: the compiler takes enumerations, but not as fast.
+WAITING: Final = int(Stage.WAITING)
+IMBALANCE: Final = int(Stage.IMBALANCE)
+FRICTION: Final = int(Stage.FRICTION)
+POSITIONING: Final = int(Stage.POSITIONING)
+CHECK: Final = int(Stage.CHECK)
+FINE_TUNING: Final = int(Stage.FINE_TUNING)
+REST: Final = int(Stage.REST)
+FAILED: Final = int(Stage.FAILED)
+
+NONE: Final = int(Cause.NONE)
+BALANCED: Final = int(Cause.BALANCED)
+SATURATED: Final = int(Cause.SATURATED)
+RESIDUAL: Final = int(Cause.RESIDUAL)
+TUNING_TIME: Final = int(Cause.TUNING_TIME)
+SPEED_CHANGED: Final = int(Cause.SPEED_CHANGED)
+TOO_SLOW: Final = int(Cause.TOO_SLOW)
+SPEED_NOT_CONSTANT: Final = int(Cause.SPEED_NOT_CONSTANT)
+IMBALANCE_UNCERTAIN: Final = int(Cause.IMBALANCE_UNCERTAIN)
+FRICTION_UNCERTAIN: Final = int(Cause.FRICTION_UNCERTAIN)
+STALLED: Final = int(Cause.STALLED)
+NOT_ARRIVED: Final = int(Cause.NOT_ARRIVED)
+MASSES_MOVE: Final = int(Cause.MASSES_MOVE)
+
+HOLDS_FOR_SURE: Final = 0.7
+"""Share of the friction known to be there that the drives may be switched off on."""
+STALLED_SHARE: Final = 0.5
+"""Of the friction stage, beyond which its failure is blamed on the drive."""
+
+
+@compiled
+def supervise(gates: Gates, plan: Plan, facts: Facts) -> Plan:
+    """Decide what to do next; the same arguments always give the same answer.
+
+    Args: `gates`: limits between the stages. `plan`: as left by the last sample. `facts`: of this sample.
+    Source: Fig. 3 of the paper on eccentric masses, with gates on relative uncertainty and ways out.
+    """
+    if plan.stage == WAITING:
+        begins = facts.time >= gates.start
+        return enter(plan, IMBALANCE, facts.time, NONE, plan.goal) if begins else plan
+    if plan.stage == IMBALANCE:
+        return _imbalance(gates, plan, facts)
+    if plan.stage == FRICTION:
+        return _friction(gates, plan, facts)
+    if plan.stage == POSITIONING:
+        return _positioning(gates, plan, facts)
+    if plan.stage == CHECK:
+        return _check(gates, plan, facts)
+    if plan.stage == FINE_TUNING:
+        return _fine_tuning(gates, plan, facts)
+    return _rest(gates, plan, facts)
+
+
+@compiled
+def _imbalance(gates: Gates, plan: Plan, facts: Facts) -> Plan:
+    """Until the imbalance is known relative to itself, or so well that it makes no difference."""
+    known = facts.deviation <= gates.imbalance_gate * abs(facts.imbalance)
+    settled = 2 * facts.deviation * facts.reach <= 0.1 * gates.limit
+    if facts.visible and (known or settled) and facts.time - plan.entered >= gates.least_estimate:
+        return enter(plan, FRICTION, facts.time, NONE, facts.angle)
+    if facts.time - plan.entered < gates.imbalance_time:
+        return plan
+    cause = IMBALANCE_UNCERTAIN
+    if abs(facts.speed) < gates.lowest_speed:
+        cause = TOO_SLOW
+    elif not facts.constant:
+        cause = SPEED_NOT_CONSTANT
+    elif not facts.visible:
+        cause = MASSES_MOVE
+    return enter(plan, FAILED, facts.time, cause, facts.angle)
+
+
+@compiled
+def _friction(gates: Gates, plan: Plan, facts: Facts) -> Plan:
+    """Until both friction arms are known relative to themselves, or so well that it makes no difference."""
+    elapsed = facts.time - plan.entered
+    now = _watched(gates, plan, facts)
+    known = True
+    for i in range(2):
+        torque = facts.arm_deviation[i] * gates.moment * facts.speed**2
+        relative = facts.arm_deviation[i] <= gates.friction_gate * facts.arm[i]
+        known = known and (relative or torque <= gates.friction_torque)
+    if known and elapsed >= gates.least_drive:
+        return _towards(gates, now, facts)
+    if elapsed < gates.friction_time:
+        return now
+    stalled = now.findings.stalled > STALLED_SHARE * now.findings.driven
+    cause = STALLED if stalled else FRICTION_UNCERTAIN
+    return enter(now, FAILED, facts.time, cause, facts.angle)
+
+
+@compiled
+def _watched(gates: Gates, plan: Plan, facts: Facts) -> Plan:
+    """Count the samples in which a mass hardly moves, once the drives have had a moment to get going."""
+    if facts.time - plan.entered < 0.5 * gates.least_drive:
+        return plan
+    slow = min(abs(facts.rate[0]), abs(facts.rate[1])) < gates.stall_rate
+    saturated, residual, objective, driven, stalled = plan.findings
+    found = Findings(saturated, residual, objective, driven + 1, stalled + (1 if slow else 0))
+    return follow(plan, plan.progress, found)
+
+
+@compiled
+def _towards(gates: Gates, plan: Plan, facts: Facts) -> Plan:
+    """Targets for the estimated imbalance, and who goes where."""
+    phase = cmath.phase(facts.imbalance)
+    targets = target_angles(abs(facts.imbalance), phase, gates.moment, gates.gap)
+    travel = assign(facts.angle[0], facts.angle[1], targets.first, targets.second)
+    goal = (
+        facts.angle[0] + travel.first + gates.target_error[0],
+        facts.angle[1] + travel.second + gates.target_error[1],
+    )
+    old = plan.findings
+    found = Findings(targets.saturated, targets.residual, old.objective, old.driven, old.stalled)
+    return enter(follow(plan, plan.progress, found), POSITIONING, facts.time, NONE, goal)
+
+
+@compiled
+def _positioning(gates: Gates, plan: Plan, facts: Facts) -> Plan:
+    now = _with_arrival(gates, plan, facts, gates.arrival_angle)
+    if _there(gates, now, facts):
+        return _averaging(enter(now, CHECK, facts.time, NONE, now.goal), facts.time + gates.wait)
+    late = facts.time - now.entered >= gates.positioning_time
+    return enter(now, FAILED, facts.time, NOT_ARRIVED, facts.angle) if late else now
+
+
+@compiled
+def _check(gates: Gates, plan: Plan, facts: Facts) -> Plan:
+    if not facts.constant:
+        return enter(plan, REST, facts.time, SPEED_CHANGED, plan.goal)
+    now = _with_sample(_rest(gates, plan, facts), facts)
+    if not _averaged(gates, now, facts):
+        return now
+    told = _judged(now, _mean(now))
+    if told.findings.objective <= gates.limit:
+        return enter(told, REST, facts.time, BALANCED, now.goal)
+    if told.findings.saturated:
+        return enter(told, REST, facts.time, SATURATED, now.goal)
+    first = tuning_start(now.goal[0], now.goal[1], told.findings.objective, gates.tuning_step)
+    return _try(gates, enter(told, FINE_TUNING, facts.time, NONE, now.goal), first, facts)
+
+
+@compiled
+def _fine_tuning(gates: Gates, plan: Plan, facts: Facts) -> Plan:
+    if not facts.constant:
+        return enter(plan, REST, facts.time, SPEED_CHANGED, plan.tuning.base)
+    if facts.time - plan.entered >= gates.fine_tuning_time:
+        return enter(plan, REST, facts.time, TUNING_TIME, plan.tuning.base)
+    if plan.progress.averaging == NOT_YET:
+        return _moving(gates, plan, facts)
+    now = _with_sample(plan, facts)
+    if not _averaged(gates, now, facts):
+        return now
+    tuning = tuning_next(now.tuning, _mean(now), gates.margin, gates.tuning_stop)
+    told = _judged(now, tuning.best)
+    if tuning.best <= gates.limit:
+        return enter(told, REST, facts.time, BALANCED, tuning.base)
+    return _try(gates, told, tuning, facts)
+
+
+@compiled
+def _moving(gates: Gates, plan: Plan, facts: Facts) -> Plan:
+    """A trial counts from where friction leaves the masses, even if not quite where they should be."""
+    now = _with_arrival(gates, plan, facts, max(0.1 * plan.tuning.step, gates.tuning_near))
+    late = facts.time - now.progress.moving >= gates.move_time
+    return _averaging(now, facts.time + gates.wait) if late or _there(gates, now, facts) else now
+
+
+@compiled
+def _try(gates: Gates, plan: Plan, tuning: Tuning, facts: Facts) -> Plan:
+    """Go to the next trial at which the masses do not overlap."""
+    chosen = tuning
+    place = tuning_place(chosen)
+    while not chosen.done and separation(place[0], place[1]) < gates.gap:
+        chosen = tuning_next(chosen, math.inf, gates.margin, gates.tuning_stop)
+        place = tuning_place(chosen)
+    if chosen.done:
+        return enter(plan, REST, facts.time, RESIDUAL, chosen.base)
+    stage, entered, cause = plan.stage, plan.entered, plan.cause
+    return Plan(stage, entered, cause, place, MOVING, setting_out(facts.time), chosen, plan.findings)
+
+
+@compiled
+def _rest(gates: Gates, plan: Plan, facts: Facts) -> Plan:
+    """Bring the masses home; then the drives rest while friction holds for sure, or hold from then on."""
+    now = _with_arrival(gates, plan, facts, gates.tuning_near)
+    hold = now.hold
+    if hold == MOVING and (_there(gates, now, facts) or facts.time - now.progress.moving >= gates.move_time):
+        hold = RELEASED
+    astray = False
+    for i in range(2):
+        astray = astray or abs(facts.angle[i] - now.goal[i]) > 2 * gates.arrival_angle
+    if hold == RELEASED and (astray or facts.load > HOLDS_FOR_SURE):
+        hold = HELD
+    return Plan(now.stage, now.entered, now.cause, now.goal, hold, now.progress, now.tuning, now.findings)
+
+
+@compiled
+def _with_arrival(gates: Gates, plan: Plan, facts: Facts, closeness: float) -> Plan:
+    there = True
+    for i in range(2):
+        close = abs(facts.angle[i] - plan.goal[i]) <= closeness
+        there = there and close and abs(facts.rate[i]) <= gates.arrival_rate
+    moving, arrived, averaging, total, count = plan.progress
+    since = facts.time if arrived == NOT_YET else arrived
+    progress = Progress(moving, since if there else NOT_YET, averaging, total, count)
+    return follow(plan, progress, plan.findings)
+
+
+@compiled
+def _there(gates: Gates, plan: Plan, facts: Facts) -> bool:
+    return plan.progress.arrived != NOT_YET and facts.time - plan.progress.arrived >= gates.dwell
+
+
+@compiled
+def _averaging(plan: Plan, begins: float) -> Plan:
+    moving, arrived, _, _, _ = plan.progress
+    return follow(plan, Progress(moving, arrived, begins, 0.0j, 0), plan.findings)
+
+
+@compiled
+def _with_sample(plan: Plan, facts: Facts) -> Plan:
+    """The mean is of the rotor-fixed vector: noise averages out of it, but not out of amplitudes."""
+    moving, arrived, averaging, total, count = plan.progress
+    if facts.time < averaging:
+        return plan
+    more = Progress(moving, arrived, averaging, total + facts.position, count + 1)
+    return follow(plan, more, plan.findings)
+
+
+@compiled
+def _averaged(gates: Gates, plan: Plan, facts: Facts) -> bool:
+    return plan.progress.samples > 0 and facts.time - plan.progress.averaging >= gates.average
+
+
+@compiled
+def _mean(plan: Plan) -> float:
+    return abs(plan.progress.total) / plan.progress.samples
+
+
+@compiled
+def _judged(plan: Plan, objective: float) -> Plan:
+    saturated, residual, _, driven, stalled = plan.findings
+    return follow(plan, plan.progress, Findings(saturated, residual, objective, driven, stalled))

@@ -1,0 +1,100 @@
+"""Where the two masses should lie, and which of them goes where.
+
+Angles are rotor-fixed, positive with the rotation.  The masses share one circular track and cannot pass each
+other; `gap` is the angle that one of them takes up, arc length over guide radius.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from ringbalance.controller.compilation.compiled import compiled
+
+
+class Targets(NamedTuple):
+    """Angles that undo an imbalance as far as two masses can."""
+
+    first: float
+    """phi_m + half_angle, rad within (-pi, pi]."""
+    second: float
+    """phi_m - half_angle, rad within (-pi, pi]."""
+    half_angle: float
+    """Of each mass from the imbalance, rad."""
+    residual: float
+    """Imbalance that is left, kg m."""
+    saturated: bool
+    """Whether the imbalance is more than the masses can undo, which takes them side by side."""
+
+
+class Assignment(NamedTuple):
+    """How far each mass goes."""
+
+    first: float
+    """Travel of the first mass, rad, signed, whole turns included."""
+    second: float
+    """Travel of the second mass, rad."""
+    swapped: bool
+    """Whether the first mass goes to the second target."""
+
+
+@compiled
+def wrapped(angle: float) -> float:
+    """An angle within (-pi, pi].
+
+    Args: `angle`: rad.
+    Returns: The same direction, rad.
+    """
+    return math.pi - (math.pi - angle) % (2 * math.pi)
+
+
+@compiled
+def target_angles(imbalance: float, phase: float, moment: float, gap: float) -> Targets:
+    """Angles at which the masses undo an imbalance.
+
+    phi = phi_m +- beta, beta = arccos(-U/2b), at most pi - gap/2 so that the masses do not overlap on the far
+    side of the imbalance.  Where it is cut, U - 2 b cos(gap/2) is left.
+    Args: `imbalance`: U, kg m, at least zero. `phase`: phi_m of the imbalance, rad. `moment`: b = m_b r_b of
+        one mass, kg m, above zero. `gap`: angle that one mass takes up, rad, below pi.
+    Source: Eqs. 25 and 26 of the paper on eccentric masses, whose arccos lost its sign and which lets masses
+    overlap.
+    """
+    reach = math.acos(max(-0.5 * imbalance / moment, -1.0))
+    half_angle = min(reach, math.pi - 0.5 * gap)
+    left = imbalance + 2 * moment * math.cos(half_angle)
+    saturated = half_angle < reach or imbalance > 2 * moment
+    return Targets(
+        wrapped(phase + half_angle),
+        wrapped(phase - half_angle),
+        half_angle,
+        max(left, 0.0) if saturated else 0.0,
+        saturated,
+    )
+
+
+@compiled
+def assign(first: float, second: float, target_one: float, target_two: float) -> Assignment:
+    """Send each mass to a target by the shortest pair of travels on which they do not meet.
+
+    The sum of squared travels is least over both assignments and all whole turns that keep the order of the
+    masses on the track.  Masses that share one law of motion then never come closer than they are at the
+    start or at the end.
+    Args: `first`: angle of the first mass, rad, any number of turns. `second`: angle of the second mass, rad.
+        `target_one`: rad. `target_two`: rad.
+    Returns: Assignment; of two equal ones the unswapped.
+    Source: Eqs. 27 and 28 of the paper on eccentric masses, with angles wrapped.
+    """
+    lead = (second - first) % (2 * math.pi)
+    best = Assignment(0.0, 0.0, False)
+    least = math.inf
+    for swapped in (False, True):
+        goal = target_two if swapped else target_one
+        other = target_one if swapped else target_two
+        # Keeping the order fixes the second travel once the first one is chosen.
+        change = (other - goal) % (2 * math.pi) - lead
+        for turn in (-1, 0, 1):
+            travel = wrapped(goal - first) + 2 * math.pi * turn
+            cost = travel**2 + (travel + change) ** 2
+            if cost < least - 1e-12:
+                least, best = cost, Assignment(travel, travel + change, swapped)
+    return best

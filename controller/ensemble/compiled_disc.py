@@ -1,0 +1,140 @@
+"""The disc of one member in plain numbers: all pairs through a command's valve-open time and through a
+wait."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from ringbalance.controller.compilation.compiled import compiled
+from ringbalance.controller.ensemble.compiled_records import Record
+from ringbalance.controller.ensemble.compiled_transfer import gas_off, gas_on
+from ringbalance.controller.formulas.path_piece import piece_rise
+
+_piece_rise: Final = compiled(piece_rise)
+
+
+@compiled
+def reset(shared: Record, run: Record) -> None:
+    """All pairs level, no tube full. Args: `shared`: of type `SHARED`. `run`: changed."""
+    for i in range(shared.chambers // 2):
+        run.fill[i], run.wet[i], run.side[i] = shared.initial_fill, 0.0, 1.0
+
+
+@compiled
+def any_wet(shared: Record, run: Record) -> bool:
+    """Whether any tube holds a column.
+
+    Args: `shared`: of type `SHARED`. `run`: the member.
+    Returns: True when one does.
+    """
+    found = False
+    for i in range(shared.chambers // 2):
+        found = found or run.wet[i] > 0.0
+    return found
+
+
+@compiled
+def _moment(shared: Record, fill: float) -> float:
+    """Of one pair, kg m, by `moment.MomentTable`."""
+    last = shared.moment.shape[0] - 1
+    place = min(max((fill - shared.lowest) / shared.moment_step, 0.0), float(last))
+    cell = min(int(place), last - 1)
+    y0, d0 = shared.moment[cell, 0], shared.moment[cell, 1]
+    rise, d1 = shared.moment[cell + 1, 0] - y0, shared.moment[cell + 1, 1]
+    return float(y0 + _piece_rise(place - cell, rise, d0, d1))
+
+
+@compiled
+def vibration(shared: Record, run: Record, trial: bool) -> tuple[float, float]:
+    """Vibration of the rotor with the disc's liquid.
+
+    Args: `shared`: of type `SHARED`. `run`: the member. `trial`: whether by its fills on trial.
+    Returns: Real and imaginary part, m.
+    """
+    real, imaginary = 0.0, 0.0
+    for i in range(shared.chambers // 2):
+        moment = _moment(shared, (run.trial[i] if trial else run.fill[i]))
+        real += shared.axis[i, 0] * moment
+        imaginary += shared.axis[i, 1] * moment
+    return (
+        shared.start_real + run.gain_real * real - run.gain_imaginary * imaginary,
+        shared.start_imaginary + run.gain_real * imaginary + run.gain_imaginary * real,
+    )
+
+
+@compiled
+def _pair_at(shared: Record, run: Record, i: int, time: float) -> tuple[float, bool, bool, float]:
+    """One pair some time into a stretch: fill, column, side, and how far liquid ran back."""
+    fill, wet, first = run.fill_before[i], run.wet_before[i] > 0.0, run.side_before[i] > 0.0
+    left = time
+    if i == run.pair or i == run.other_pair:
+        duration = run.duration if i == run.pair else run.other_duration
+        first = (run.first if i == run.pair else run.other_first) != 0
+        left = time - duration
+        driven = fill if first else shared.total - fill
+        driven, wet = gas_on(shared, driven, wet, min(time, duration) * run.speed)
+        fill = driven if first else shared.total - driven
+    if left <= 0.0 or not wet:
+        return fill, wet, first, 0.0
+    driven = fill if first else shared.total - fill
+    driven, wet = gas_off(shared, driven, left * run.speed)
+    after = driven if first else shared.total - driven
+    return after, wet, first, abs(after - fill)
+
+
+@compiled
+def move(shared: Record, run: Record, time: float) -> float:
+    """Let time pass with some valves open from its start.
+
+    Args: `shared`: of type `SHARED`. `run`: the member, with its open valves; its liquid and its drift are
+        changed, and what was before kept. `time`: s.
+    Returns: How far liquid ran back with the gas off, the most of any pair.
+    """
+    drift = 0.0
+    for i in range(shared.chambers // 2):
+        run.fill_before[i], run.wet_before[i], run.side_before[i] = run.fill[i], run.wet[i], run.side[i]
+        fill, wet, first, ran = _pair_at(shared, run, i, time)
+        run.fill[i], run.wet[i], run.side[i] = fill, 1.0 if wet else 0.0, 1.0 if first else 0.0
+        drift = max(drift, ran)
+    run.drift = max(run.drift, drift)
+    return drift
+
+
+@compiled
+def note_settling(shared: Record, run: Record, length: float, points: int) -> None:
+    """Keep since when the amplitude has not been above the limit, over a stretch that `simulate` records.
+
+    Args: `shared`: of type `SHARED`. `run`: the member after `move`, its time still the one before; its
+        `since` is changed. `length`: of the stretch, s. `points`: equally spaced instants recorded beside the
+        closing of each valve.
+    """
+    if run.amplitude > shared.limit:
+        run.since = math.inf
+        return
+    closing = length if run.other_pair < 0 else min(run.duration, run.other_duration)
+    for k in range(1, points + 1):
+        early, late = length * (k - 1) / points, length * k / points
+        if early < closing < late:
+            _note(shared, run, closing)
+        _note(shared, run, late)
+
+
+@compiled
+def back_at(shared: Record, run: Record, time: float) -> tuple[float, float]:
+    """One instant of the stretch that was last moved through.
+
+    Args: `shared`: of type `SHARED`. `run`: the member, its valves still those of the stretch; its `trial`
+        becomes the fills then. `time`: s from the start of the stretch.
+    Returns: Real and imaginary part of the vibration then, m.
+    """
+    for i in range(shared.chambers // 2):
+        run.trial[i] = _pair_at(shared, run, i, time)[0]
+    return vibration(shared, run, True)
+
+
+@compiled
+def _note(shared: Record, run: Record, time: float) -> None:
+    real, imaginary = back_at(shared, run, time)
+    above = math.hypot(real, imaginary) > shared.limit
+    run.since = math.inf if above else min(run.since, run.time + time)

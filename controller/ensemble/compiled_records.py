@@ -1,0 +1,145 @@
+"""What compiled code works on: one record of what members share, and one record for each member's run.
+
+Compiled functions take a record as a single pointer, where arrays and tuples of arrays are taken apart and
+counted at every call, which costs more than the work itself.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from ringbalance.controller.ensemble.moment import MOMENT_NODES
+from ringbalance.controller.rotor import MAX_CHAMBERS
+
+Record = Any
+"""One element of an array with one of the types below; compiled code changes it in place."""
+
+_REAL: Final = (
+    "squared_per_pressure",  # a, m^3/kg, of u^2 = a (p + b (x_A - x_C)); zero for a law that is tabled
+    "pressure_per_fill",  # b, Pa
+    "gas_pressure",  # gauge, Pa
+    "exchange_rate",  # S/V, 1/m
+    "total",  # x_A + x_C
+    "lowest",  # smallest x
+    "highest",  # largest x
+    "initial_fill",
+    "moment_step",  # between the nodes of the moment's table, in x
+    "start_real",  # vibration with level chambers, m
+    "start_imaginary",
+    "limit",  # m
+    "period",  # s
+    "time_limit",  # s
+    "amplitude_noise",  # standard deviation, m
+    "phase_noise",  # standard deviation, rad
+    "noise_floor",  # m
+    "assumed_lag",  # rad
+    "integral_time",  # s, infinite for no integral part
+    "derivative_time",  # s
+    "minimum_gas_time",  # s
+    "maximum_gas_time",  # s
+)
+_WHOLE: Final = (
+    "linear",  # whether the law has a closed form
+    "lowest_empties",  # whether the driven chamber has no liquid left at `lowest`
+    "highest_empties",  # whether the opposite chamber has none left at `highest`
+    "chambers",
+    "rises_tolerated",
+    "idle_tolerated",
+    "confirming",
+    "gas_points",
+    "drift_points",
+    "most_samples",
+)
+INTERVALS: Final = 256
+"""Room for the intervals of all flows, fixed as are all sizes, so that compiled code serves every law."""
+PATH_NODES: Final = 16_384
+"""Room for the nodes of all paths."""
+ON: Final = 0
+"""The flows with gas on and a full tube."""
+DRY: Final = 1
+"""With gas on and an empty tube."""
+OFF: Final = 2
+"""With gas off and a full tube."""
+SHARED: Final = np.dtype(
+    [(name, np.float64) for name in _REAL]
+    + [(name, np.int64) for name in _WHOLE]
+    + [(name, np.uint64) for name in ("key_0", "key_1")]
+    + [
+        ("begin", np.int64, (OFF + 2,)),  # first interval of ON, DRY and OFF, and behind the last
+        ("edge", np.float64, (INTERVALS,)),  # lowest x of an interval
+        ("sense", np.int64, (INTERVALS,)),  # 1: out of the driven chamber, -1: back into it, 0: none
+        ("holds", np.int64, (INTERVALS,)),  # whether the tube holds a column afterwards
+        ("first", np.int64, (INTERVALS,)),  # node of the interval's path, where it has one
+        ("last", np.int64, (INTERVALS,)),
+        ("node", np.float64, (PATH_NODES, 4)),  # time, x, leaving and arriving dx/dt
+        ("moment", np.float64, (MOMENT_NODES, 2)),  # of a pair: value, and slope per step
+        ("axis", np.float64, (MAX_CHAMBERS // 2, 2)),  # directions of the pairs
+    ]
+)
+"""What all members of an ensemble share."""
+
+_RUN_REAL: Final = (
+    "speed",  # factor of the flow's velocity
+    "gain_real",  # vibration per balancing moment, m/(kg m)
+    "gain_imaginary",
+    "proportional",  # Kc, s/m
+    "time",  # s
+    "since",  # s, from which on the amplitude was not above the limit; infinite while it is
+    "real",  # of the true vibration, m
+    "imaginary",
+    "amplitude",  # true, m
+    "phase",  # true, rad
+    "phase_before",  # true, rad, at the sample before
+    "certain",  # uniform number from which on no noise lifts the amplitude above the limit
+    "seen_amplitude",  # of this sample, m
+    "seen_phase",  # rad
+    "first_seen",  # m, of the first sample
+    "last_seen",  # m, of the last sample that was looked at
+    "integral",  # what the controller remembers, m s
+    "before_amplitude",  # of its last sample above the limit, m
+    "before_phase",  # rad
+    "before_time",  # s, infinite for none
+    "duration",  # s, of the first open valve
+    "other_duration",  # s, of the second
+    "noise_before",  # of the phase of the last sample taken in full, in standard deviations
+    "drift",  # how far liquid has run back with the gas off
+    "start",  # first amplitude, m
+    "settling_time",  # s, infinite when not settled
+)
+_RUN_WHOLE: Final = (
+    "noise_sample",  # its number in the run
+    "number",  # of the member in the ensemble
+    "pair",  # of the first open valve, -1 for none
+    "first",  # whether it drives the positive side
+    "other_pair",
+    "other_first",
+    "operated",  # whether a valve has opened since the last sample
+    "stale",  # whether the vibration has changed since its phase was taken
+    "calm",  # whether nothing has moved since the last sample and nothing can
+    "rises",
+    "idle",
+    "overshoots",
+    "misadjustments",
+    "samples",
+    "cause",
+    "settled",
+    "diverged",
+    "drifted",
+)
+_RUN_PAIRS: Final = (
+    "fill",  # x of the chamber on the positive side
+    "wet",  # whether the tube holds a continuous column
+    "side",  # whether the last gas went into the chamber on the positive side
+    "fill_before",  # the three at the start of the stretch of time that was last moved through
+    "wet_before",
+    "side_before",
+    "trial",  # room for the fills at one instant
+)
+RUN: Final = np.dtype(
+    [(name, np.float64) for name in _RUN_REAL]
+    + [(name, np.int64) for name in _RUN_WHOLE]
+    + [(name, np.float64, (MAX_CHAMBERS // 2,)) for name in _RUN_PAIRS]
+)
+"""One member's run."""

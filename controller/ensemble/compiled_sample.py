@@ -1,0 +1,233 @@
+"""Whole closed-loop runs in plain numbers, member after member, each as `simulate` does one."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+
+from ringbalance.controller.compilation.compiled import compiled
+from ringbalance.controller.ensemble.compiled_disc import any_wet, move, note_settling, reset, vibration
+from ringbalance.controller.ensemble.compiled_noise import noise_pair, uniform_radii
+from ringbalance.controller.ensemble.compiled_pid import decide, forget
+from ringbalance.controller.ensemble.compiled_records import Record
+from ringbalance.controller.formulas.stopping import (
+    AT_REST,
+    NONE,
+    NOTICEABLE,
+    TIME,
+    has_grown,
+    has_risen,
+    has_turned,
+    stop_cause,
+)
+from ringbalance.scene.arrays import FloatArray
+
+_CERTAIN: Final = 1 + 1e-9
+_stop_cause: Final = compiled(stop_cause)
+_has_grown: Final = compiled(has_grown)
+_has_risen: Final = compiled(has_risen)
+_has_turned: Final = compiled(has_turned)
+
+
+@compiled
+def run_members(shared: Record, runs: Any) -> None:
+    """Run members one after the other.
+
+    Args: `shared`: of type `SHARED`. `runs`: array of type `RUN`, with what differs between members; filled.
+    """
+    clock = np.zeros(shared.confirming)
+    for i in range(runs.size):
+        run = runs[i]
+        start(shared, run)
+        while run.cause == NONE and run.samples < shared.most_samples:
+            if run.calm:
+                _pass_calm(shared, run, clock)
+            if run.cause == NONE and run.samples < shared.most_samples:
+                clock[run.samples % shared.confirming] = run.time
+                run.samples += 1
+                _sample(shared, run)
+                if run.cause == NONE:
+                    if run.pair >= 0:
+                        gas(shared, run)
+                    wait(shared, run)
+        judge(shared, run, clock[max(run.samples - shared.confirming, 0) % shared.confirming])
+
+
+@compiled
+def _pass_calm(shared: Record, run: Record, clock: FloatArray) -> None:
+    """Pass over samples that are below the limit however their noise turns out, while nothing moves.
+
+    A normal pair of radius r moves the amplitude by sigma r at the most, whatever its angle, and r follows
+    from one of two uniform numbers alone.
+    """
+    time, samples, slot = run.time, run.samples, run.samples % shared.confirming
+    even, odd = uniform_radii(shared, run.number, samples // 2)
+    while samples < shared.most_samples and (odd if samples & 1 else even) >= run.certain:
+        clock[slot] = time
+        samples += 1
+        slot = slot + 1 if slot + 1 < shared.confirming else 0
+        left = shared.time_limit - time
+        if left <= 0.0:
+            run.cause = TIME
+            break
+        time += min(shared.period, left)
+        if samples & 1 == 0:
+            even, odd = uniform_radii(shared, run.number, samples // 2)
+    if samples > run.samples:
+        # A sample in full would have left no memory and no valve.
+        forget(run)
+        run.phase_before = run.phase
+    run.time, run.samples = time, samples
+
+
+@compiled
+def start(shared: Record, run: Record) -> None:
+    """Level chambers, nothing remembered.
+
+    Args: `shared`: of type `SHARED`. `run`: with what is its own filled in, all else zero.
+    """
+    reset(shared, run)
+    forget(run)
+    _look(shared, run)
+    _expect(shared, run)
+    run.start, run.phase_before = run.amplitude, run.phase
+    run.since = 0.0 if run.amplitude <= shared.limit else math.inf
+
+
+@compiled
+def _look(shared: Record, run: Record) -> None:
+    """True vibration."""
+    run.real, run.imaginary = vibration(shared, run, False)
+    run.amplitude, run.stale = math.hypot(run.real, run.imaginary), 1
+
+
+@compiled
+def _expect(shared: Record, run: Record) -> None:
+    """The phase, and the uniform number from which on noise cannot lift the amplitude above the limit."""
+    run.phase, run.stale = math.atan2(run.imaginary, run.real), 0
+    room = shared.limit - run.amplitude
+    if room < 0.0:
+        run.certain = 2.0
+    elif shared.amplitude_noise == 0.0:
+        # Without any noise a resting run ends, which takes a sample in full.
+        run.certain = 0.0 if shared.phase_noise > 0.0 else 2.0
+    else:
+        run.certain = math.exp(-((room / shared.amplitude_noise) ** 2) / 2.0) * _CERTAIN
+
+
+@compiled
+def _sample(shared: Record, run: Record) -> None:
+    """One look at the vibration, with noise of its own."""
+    now = noise_pair(shared, run.number, run.samples - 1)
+    before = 0.0
+    if run.samples > 1 and abs(run.amplitude + shared.amplitude_noise * now[0]) > shared.limit:
+        if run.noise_sample == run.samples - 2:
+            before = run.noise_before
+        else:
+            # The sample before was passed over: its noise is made now.
+            before = noise_pair(shared, run.number, run.samples - 2)[1]
+    run.noise_before, run.noise_sample = now[1], run.samples - 1
+    react(shared, run, now, before)
+
+
+@compiled
+def react(shared: Record, run: Record, noise: tuple[float, float], noise_before: float) -> None:
+    """What the sensor shows, one step of the controller, and whether the run ends here.
+
+    Args: `shared`: of type `SHARED`. `run`: the member; its `samples` counts this one already. `noise`: of
+        amplitude and phase, in standard deviations. `noise_before`: of the phase of the sample before, in
+        standard deviations.
+    """
+    run.seen_amplitude = abs(run.amplitude + shared.amplitude_noise * noise[0])
+    run.seen_phase = run.phase + shared.phase_noise * noise[1]
+    _watch(shared, run, run.phase_before + shared.phase_noise * noise_before)
+    decide(shared, run)
+    run.cause = _cause(shared, run)
+    run.phase_before = run.phase
+
+
+@compiled
+def _watch(shared: Record, run: Record, seen_before: float) -> None:
+    """Overshoots, rises and misadjustments, as `judgement` counts them."""
+    if run.samples == 1:
+        run.first_seen = run.seen_amplitude
+    elif run.seen_amplitude > shared.limit:
+        run.overshoots += 1 if _has_turned(seen_before, run.seen_phase) else 0
+    if run.operated:
+        higher = _has_risen(run.last_seen, run.seen_amplitude, shared.noise_floor)
+        run.rises = run.rises + 1 if higher else 0
+        run.misadjustments += 1 if higher else 0
+    run.last_seen, run.operated = run.seen_amplitude, 0
+
+
+@compiled
+def _cause(shared: Record, run: Record) -> int:
+    """Why the loop stops cycling, as `simulate` tells it."""
+    exact = shared.amplitude_noise == 0.0 and shared.phase_noise == 0.0
+    return int(
+        _stop_cause(
+            run.rises,
+            shared.rises_tolerated,
+            _has_risen(run.first_seen, run.last_seen, shared.noise_floor),
+            run.idle,
+            shared.idle_tolerated,
+            exact and run.seen_amplitude <= shared.limit and not any_wet(shared, run),
+            shared.time_limit - run.time,
+        )
+    )
+
+
+@compiled
+def wait(shared: Record, run: Record) -> None:
+    """Until the next sample, or the end.
+
+    Args: `shared`: of type `SHARED`. `run`: the member; its liquid moves where a tube is full.
+    """
+    length = max(min(shared.period, shared.time_limit - run.time), 0.0)
+    run.pair, run.other_pair = -1, -1
+    if length > 0.0 and any_wet(shared, run):
+        move(shared, run, length)
+        _look(shared, run)
+        note_settling(shared, run, length, shared.drift_points)
+    run.time += length
+    if run.stale:
+        _expect(shared, run)
+    run.calm = 0 if run.operated or run.rises >= shared.rises_tolerated or any_wet(shared, run) else 1
+
+
+@compiled
+def gas(shared: Record, run: Record) -> None:
+    """All valves of a command open together; pairs flow in parallel.
+
+    Args: `shared`: of type `SHARED`. `run`: the member, with its open valves.
+    """
+    both = run.other_pair >= 0
+    length = max(run.duration, run.other_duration) if both else run.duration
+    working = run.other_pair if both and run.other_duration > run.duration else run.pair
+    real, imaginary = run.real, run.imaginary
+    move(shared, run, length)
+    _look(shared, run)
+    note_settling(shared, run, length, shared.gas_points)
+    change = math.hypot(run.real - real, run.imaginary - imaginary)
+    moved = abs(run.fill[working] - run.fill_before[working]) > NOTICEABLE or change > shared.limit
+    run.idle = 0 if moved else run.idle + 1
+    run.time += length
+    run.operated = 1
+
+
+@compiled
+def judge(shared: Record, run: Record, confirmed: float) -> None:
+    """As `outcome_of` does.
+
+    Args: `shared`: of type `SHARED`. `run`: at its end; its verdict is filled in. `confirmed`: time of the
+        sample from which on the amplitude must have stayed, s.
+    """
+    if run.cause == AT_REST:
+        confirmed = run.time
+    run.settled = 1 if run.since <= confirmed else 0
+    run.settling_time = run.since if run.settled else math.inf
+    run.drifted = 1 if run.drift > NOTICEABLE and not run.settled else 0
+    grown = _has_grown(run.cause, run.amplitude > run.start + shared.noise_floor)
+    run.diverged = 1 if grown and not run.settled and not run.drifted else 0

@@ -1,0 +1,305 @@
+"""Monte-Carlo of noisy closed-loop runs over what nobody knows exactly, block by block in flat memory."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from ringbalance.controller.checks import check_fit
+from ringbalance.controller.ensemble.run import EnsemblePlan, MemberRuns, ensemble_plan
+from ringbalance.controller.ensemble.samples import (
+    BLOCK,
+    NORMAL_95,
+    Members,
+    MemberUncertainty,
+    drawn_members,
+    member_uncertainty,
+    members_alike,
+)
+from ringbalance.controller.ensemble.transfer import PairTransfer, pair_transfer
+from ringbalance.controller.terms import run_models, terms_modelled
+from ringbalance.reduced_model.chamber.gravity import check_ring
+from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw, balancer_model
+from ringbalance.scene.arrays import IntArray
+from ringbalance.scene.describe import scene_fault
+from ringbalance.scene.faults import SceneError
+from ringbalance.scene.models import Scene
+
+Progress = Callable[[int, int], None]
+"""Called with the members done and their number."""
+
+QUANTILES: Final = (0.05, 0.25, 0.5, 0.75, 0.95)
+TIME_BINS: Final = 20_000
+"""In which settling times are counted; a quantile is known to a bin's width."""
+SHOWN_BINS: Final = 40
+MOST_COUNTED: Final = 10
+"""Overshoots or misadjustments in one run that are still counted apart."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Probability:
+    """A share of the members."""
+
+    value: float
+    low: float
+    """95 % interval of a binomial share."""
+    high: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Ensemble:
+    """What becomes of a scene's closed loop when what is uncertain varies."""
+
+    law: str
+    members: int
+    seed: int
+    uncertainty_95: MemberUncertainty
+    settled: Probability
+    not_settled: Probability
+    overshoot: Probability
+    """At least one overshoot."""
+    misadjustment: Probability
+    """At least one misadjustment."""
+    diverged: Probability
+    drifted: Probability
+    """Not settled, and liquid ran back with the gas off."""
+    left_out: tuple[str, ...]
+    """Terms that `simulate` models for this scene and an ensemble does not."""
+    settling_quantiles: tuple[float, ...]
+    """s, at `QUANTILES` of the members that settled; empty when none did."""
+    mean_settling_time: float | None
+    """s, of the members that settled."""
+    bin_width: float
+    """s."""
+    time_counts: IntArray
+    """Settled members by settling time, shape (TIME_BINS,)."""
+    overshoot_counts: IntArray
+    """Members by number of overshoots, the last entry is that many or more."""
+    misadjustment_counts: IntArray
+    """Members by number of misadjustments, likewise."""
+
+
+def simulate_ensemble(
+    scene: Scene,
+    flow_law: CompleteLaw | BalancerModel,
+    n: int,
+    seed: int,
+    *,
+    uncertainty_95: MemberUncertainty | None = None,
+    transfer: PairTransfer | None = None,
+    workers: int = 2,
+    progress: Progress | None = None,
+) -> Ensemble:
+    """Distributions over n noisy runs of the target-vector algorithm under a flow law.
+
+    Every member has its own speed of flow, moment, influence coefficient, lag angle and noise; the algorithm
+    keeps the beliefs and the gain of the scene.  The flow law alone drives the liquid, whatever other terms
+    the scene's tolerance asks a single run to model (`Ensemble.left_out`).  The same seed gives the same
+    numbers for any `workers`, and a larger ensemble begins with the members of a smaller one.
+    Args:
+        scene: the scene; its controller's `kind` is not looked at.
+        flow_law: a law that carries its own moments, or a balancer model.
+        n: members, above zero.
+        seed: of all random numbers.
+        uncertainty_95: half-widths; default `member_uncertainty(scene, model)`.
+        transfer: of `ensemble_transfer`, when it is at hand already.
+        workers: threads, at least 1.
+        progress: called once per block of members; None for silence.
+    Raises: SceneError: a rotor too slow to form a ring, a model made for another disc, or more samples than a
+        run may take.
+    Raises: ValueError: no members, no workers, or a law that an ensemble cannot follow.
+    Source: as `simulate`, member by member.
+    """
+    if n < 1 or workers < 1:
+        raise ValueError(f"an ensemble needs members and workers, not n={n} and workers={workers}")
+    model = flow_law if isinstance(flow_law, BalancerModel) else balancer_model(flow_law)
+    followed = ensemble_transfer(scene, model) if transfer is None else transfer
+    widths = member_uncertainty(scene, model) if uncertainty_95 is None else uncertainty_95
+    plan = ensemble_plan(scene=scene, model=model, transfer=followed)
+    tally = _Tally(time_limit=scene.run.time_limit)
+
+    def run(block: int) -> MemberRuns:
+        return _block(scene, plan, widths, seed=seed, block=block, size=n - block * BLOCK)
+
+    for runs in _in_order(run, blocks=math.ceil(n / BLOCK), workers=workers):
+        tally.add(runs)
+        if progress is not None:
+            progress(tally.members, n)
+    return tally.ensemble(law=model.name, seed=seed, uncertainty_95=widths, left_out=_left_out(scene, model))
+
+
+def _left_out(scene: Scene, model: BalancerModel) -> tuple[str, ...]:
+    return terms_modelled(run_models(scene=scene, model=model))
+
+
+def simulate_members(
+    scene: Scene,
+    model: BalancerModel,
+    *,
+    members: Members | None = None,
+    transfer: PairTransfer | None = None,
+    size: int = 1,
+    seed: int = 0,
+) -> MemberRuns:
+    """Run given members, at most one block of them, and keep each one's end.
+
+    Args: `members`: what differs; default `size` alike ones. `transfer`: of `ensemble_transfer`, when it is
+        at hand already. `size`: how many alike ones. `seed`: of the noise.
+    Raises: SceneError: as `simulate_ensemble`.
+    Raises: ValueError: more members than a block holds, or a law that an ensemble cannot follow.
+    """
+    given = members_alike(scene, size=size) if members is None else members
+    if given.proportional.size > BLOCK:
+        raise ValueError(f"at most {BLOCK} members at once")
+    followed = ensemble_transfer(scene, model) if transfer is None else transfer
+    return ensemble_plan(scene=scene, model=model, transfer=followed).run(given, seed=seed)
+
+
+def ensemble_transfer(scene: Scene, model: BalancerModel) -> PairTransfer:
+    """The vectorised operation of a scene's balancer, after the checks that `simulate` makes.
+
+    Raises: SceneError: a rotor too slow to form a ring, or a model made for another disc.
+    Raises: ValueError: a law that an ensemble cannot follow.
+    """
+    check_ring(scene)
+    check_fit(scene, model)
+    longest = scene.run.time_limit
+    if longest / scene.controller.period > 50_000:
+        fault = scene_fault(
+            scene=scene,
+            table="controller",
+            key="period",
+            problem="an ensemble takes at most 50000 samples in run.time_limit",
+            allowed=f"at least {longest / 50_000:.3g} s",
+        )
+        raise SceneError([fault])
+    return pair_transfer(model=model, total=2 * scene.disc.initial_fill, gas_pressure=scene.gas.pressure)
+
+
+def _block(
+    scene: Scene, plan: EnsemblePlan, widths: MemberUncertainty, *, seed: int, block: int, size: int
+) -> MemberRuns:
+    """The first `size` members of one block."""
+    drawn = drawn_members(scene, uncertainty_95=widths, seed=seed, block=block)
+    held = Members(**{name: values[:size] for name, values in vars(drawn).items()})
+    return plan.run(held, seed=seed, number=block * BLOCK)
+
+
+def _in_order(run: Callable[[int], MemberRuns], *, blocks: int, workers: int) -> Iterator[MemberRuns]:
+    """Blocks in their order, a few ahead in threads, so that no more than those are in memory."""
+    if workers == 1 or blocks == 1:
+        yield from map(run, range(blocks))
+        return
+    with ThreadPoolExecutor(workers) as pool:
+        waiting = [pool.submit(run, block) for block in range(min(workers, blocks))]
+        for block in range(len(waiting), blocks + len(waiting)):
+            first, *waiting = waiting
+            if block < blocks:
+                waiting.append(pool.submit(run, block))
+            yield first.result()
+
+
+class _Tally:
+    """Counts that grow with the members while the memory does not."""
+
+    def __init__(self, *, time_limit: float) -> None:
+        self.members = self.settled = self.diverged = self.drifted = 0
+        self.time_sum = 0.0
+        self.width = time_limit / TIME_BINS
+        self.times = np.zeros(TIME_BINS, dtype=np.int64)
+        self.overshoots, self.misadjustments = (np.zeros(MOST_COUNTED + 1, dtype=np.int64) for _ in range(2))
+
+    def add(self, runs: MemberRuns) -> None:
+        """Count the members of a block."""
+        times = runs.settling_time[runs.settled]
+        self.members += runs.settled.size
+        self.settled += times.size
+        self.diverged += int(runs.diverged.sum())
+        self.drifted += int(runs.drifted.sum())
+        self.time_sum += math.fsum(times)
+        bins = np.minimum((times / self.width).astype(np.int64), TIME_BINS - 1)
+        self.times += np.bincount(bins, minlength=TIME_BINS)
+        for counts, found in ((self.overshoots, runs.overshoots), (self.misadjustments, runs.misadjustments)):
+            counts += np.bincount(np.minimum(found, MOST_COUNTED), minlength=MOST_COUNTED + 1)
+
+    def ensemble(
+        self, *, law: str, seed: int, uncertainty_95: MemberUncertainty, left_out: tuple[str, ...]
+    ) -> Ensemble:
+        """Freeze the counts."""
+
+        def share(count: int) -> Probability:
+            return binomial_share(count=count, of=self.members)
+
+        return Ensemble(
+            law=law,
+            members=self.members,
+            seed=seed,
+            uncertainty_95=uncertainty_95,
+            settled=share(self.settled),
+            not_settled=share(self.members - self.settled),
+            overshoot=share(self.members - int(self.overshoots[0])),
+            misadjustment=share(self.members - int(self.misadjustments[0])),
+            diverged=share(self.diverged),
+            drifted=share(self.drifted),
+            left_out=left_out,
+            settling_quantiles=self._quantiles(),
+            mean_settling_time=self.time_sum / self.settled if self.settled else None,
+            bin_width=self.width,
+            time_counts=self.times,
+            overshoot_counts=self.overshoots,
+            misadjustment_counts=self.misadjustments,
+        )
+
+    def _quantiles(self) -> tuple[float, ...]:
+        if not self.settled:
+            return ()
+        reached = np.concatenate([[0], np.cumsum(self.times)]) / self.settled
+        edges = self.width * np.arange(TIME_BINS + 1)
+        return tuple(float(np.interp(q, reached, edges)) for q in QUANTILES)
+
+
+def binomial_share(*, count: int, of: int) -> Probability:
+    """A share with its 95 % interval.
+
+    Args: `count`: members that have it. `of`: all members, above zero.
+    Source: Wilson, "Probable Inference, the Law of Succession, and Statistical Inference", JASA 22 (1927).
+    """
+    p, z2 = count / of, NORMAL_95**2 / of
+    centre = (p + z2 / 2) / (1 + z2)
+    half = math.sqrt(p * (1 - p) * z2 + z2**2 / 4) / (1 + z2)
+    return Probability(value=p, low=max(centre - half, 0.0), high=min(centre + half, 1.0))
+
+
+def ensemble_document(ensemble: Ensemble) -> dict[str, Any]:
+    """Turn an ensemble into plain numbers, lists and text, all in SI, arrays of at most 41 entries.
+
+    Returns: Document that `json.dumps(..., allow_nan=False)` accepts.
+    """
+    shares = ("settled", "not_settled", "overshoot", "misadjustment", "diverged", "drifted")
+    last = int(np.max(np.flatnonzero(ensemble.time_counts), initial=0)) + 1
+    per_bin = -(-last // SHOWN_BINS)
+    padded = np.zeros(per_bin * SHOWN_BINS, dtype=np.int64)
+    padded[:last] = ensemble.time_counts[:last]
+    edges = ensemble.bin_width * per_bin * np.arange(SHOWN_BINS + 1)
+    return {
+        "law": ensemble.law,
+        "members": ensemble.members,
+        "seed": ensemble.seed,
+        "spread_95": asdict(ensemble.uncertainty_95),
+        "left_out": list(ensemble.left_out),
+        "probability": {name: asdict(getattr(ensemble, name)) for name in shares},
+        "settling_time_s": {
+            "quantiles": dict(zip(map(str, QUANTILES), ensemble.settling_quantiles, strict=False)),
+            "mean": ensemble.mean_settling_time,
+            "resolution": ensemble.bin_width,
+            "edges": edges.tolist(),
+            "counts": padded.reshape(SHOWN_BINS, per_bin).sum(axis=1).tolist(),
+        },
+        "overshoots": ensemble.overshoot_counts.tolist(),
+        "misadjustments": ensemble.misadjustment_counts.tolist(),
+    }

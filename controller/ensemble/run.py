@@ -1,0 +1,133 @@
+"""Many closed-loop runs of the target-vector algorithm, each as `simulate` does one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.controller.algorithms.by_name import target_vector_of
+from ringbalance.controller.ensemble.compiled_noise import noise_key
+from ringbalance.controller.ensemble.compiled_records import RUN
+from ringbalance.controller.ensemble.compiled_sample import run_members
+from ringbalance.controller.ensemble.moment import moment_table
+from ringbalance.controller.ensemble.samples import Members
+from ringbalance.controller.ensemble.transfer import PairTransfer
+from ringbalance.controller.judgement import noise_floor
+from ringbalance.controller.loop import DRIFT_POINTS, GAS_POINTS, IDLE_OPERATIONS
+from ringbalance.controller.outcome import CONFIRMING_SAMPLES
+from ringbalance.controller.rotor import chamber_directions, initial_vibration
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
+from ringbalance.scene.models import Scene
+
+MOST_SAMPLES: Final = 100_000
+"""Of one compiled run, which costs a thousandth of an interpreted one."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MemberRuns:
+    """How each member's run ended; arrays of one length."""
+
+    settled: BoolArray
+    settling_time: FloatArray
+    """s; infinite when not settled."""
+    overshoots: IntArray
+    misadjustments: IntArray
+    diverged: BoolArray
+    drifted: BoolArray
+    """Not settled, and liquid ran back with the gas off."""
+    samples: IntArray
+    final_amplitude: FloatArray
+    """m."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class EnsemblePlan:
+    """What all members of an ensemble share, ready for compiled code."""
+
+    shared: npt.NDArray[np.void]
+    """Type `SHARED`, shape (1,)."""
+
+    def run(self, members: Members, *, seed: int, number: int = 0) -> MemberRuns:
+        """Run some members.
+
+        Args: `members`: what differs between the runs. `seed`: of the noise. `number`: of the first of them
+            in the ensemble, which identifies its noise.
+        Returns: MemberRuns, each entry as `simulate` judges that member.
+        Source: as `simulate`.
+        """
+        gain = members.moment_factor * members.influence_coefficient * np.exp(-1j * members.lag_angle)
+        runs = np.zeros(members.proportional.size, dtype=RUN)
+        runs["number"] = number + np.arange(runs.size)
+        runs["speed"], runs["proportional"] = members.velocity_factor, members.proportional
+        runs["gain_real"], runs["gain_imaginary"] = gain.real, gain.imag
+        shared = self.shared.copy()
+        shared["key_0"], shared["key_1"] = noise_key(seed=seed)
+        run_members(shared[0], runs)
+        return MemberRuns(
+            settled=runs["settled"] > 0,
+            settling_time=runs["settling_time"],
+            overshoots=runs["overshoots"],
+            misadjustments=runs["misadjustments"],
+            diverged=runs["diverged"] > 0,
+            drifted=runs["drifted"] > 0,
+            samples=runs["samples"],
+            final_amplitude=runs["amplitude"],
+        )
+
+
+def ensemble_plan(*, scene: Scene, model: BalancerModel, transfer: PairTransfer) -> EnsemblePlan:
+    """Prepare the runs of an ensemble.
+
+    Args: `scene`: rotor, sensor, controller settings and time limit. `transfer`: its operations, of
+        `pair_transfer`.
+    """
+    shared, chambers = transfer.shared.copy(), scene.disc.chambers
+    axes = chamber_directions(chambers)[: chambers // 2]
+    moment = moment_table(model=model, total=2 * scene.disc.initial_fill)
+    shared["moment"], shared["moment_step"] = np.stack([moment.value, moment.slope], axis=1), moment.step
+    shared["axis"][0, : axes.size] = np.stack([axes.real, axes.imag], axis=1)
+    for name, value in (_loop(scene) | _controller(scene)).items():
+        shared[name] = value
+    return EnsemblePlan(shared=shared)
+
+
+def _loop(scene: Scene) -> dict[str, float]:
+    """Rotor, sensor, clock and bounds."""
+    start, sensor = initial_vibration(rotor=scene.rotor), scene.sensor
+    return {
+        "initial_fill": scene.disc.initial_fill,
+        "start_real": start.real,
+        "start_imaginary": start.imag,
+        "time_limit": scene.run.time_limit,
+        "amplitude_noise": sensor.amplitude_noise,
+        "phase_noise": sensor.phase_noise,
+        "noise_floor": noise_floor(
+            amplitude_noise=sensor.amplitude_noise, initial_amplitude=scene.rotor.initial_amplitude
+        ),
+        "rises_tolerated": target_vector_of(scene).rises_tolerated,
+        "idle_tolerated": IDLE_OPERATIONS + scene.disc.chambers,
+        "confirming": CONFIRMING_SAMPLES,
+        "gas_points": GAS_POINTS,
+        "drift_points": DRIFT_POINTS,
+        "most_samples": MOST_SAMPLES,
+    }
+
+
+def _controller(scene: Scene) -> dict[str, float]:
+    """The target-vector algorithm's settings."""
+    settings = scene.controller
+    return {
+        "chambers": scene.disc.chambers,
+        "period": settings.period,
+        "limit": settings.limit,
+        "assumed_lag": settings.assumed_lag_angle,
+        "integral_time": math.inf if settings.integral_time is None else settings.integral_time,
+        "derivative_time": settings.derivative_time,
+        "minimum_gas_time": settings.minimum_gas_time,
+        "maximum_gas_time": settings.maximum_gas_time,
+    }

@@ -1,0 +1,154 @@
+"""The members of an ensemble: what differs between them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from ringbalance.reduced_model.chamber.moment import CalibratedMoment
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.paper_law import PaperLaw
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Scene
+from ringbalance.scene.uncertain import nominal_value
+
+BLOCK: Final = 8192
+"""Members that are drawn and carried together."""
+NORMAL_95: Final = 1.959963984540054
+"""Expanded uncertainty (95 %) of a normal distribution in standard deviations."""
+PAPER_DRAG_UNCERTAINTY: Final = 0.1
+"""Relative half-width taken for "k is about 50"."""
+PAPER_MOMENT_UNCERTAINTY: Final = 0.007
+"""Relative half-width that the liquid-ring paper states for lambda."""
+ASSUMED_INFLUENCE: Final = 0.05
+ASSUMED_LAG: Final = math.radians(3.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MemberUncertainty:
+    """Expanded uncertainties (95 %) of what differs between members, and where each comes from."""
+
+    velocity: float
+    """Relative, of the flow's velocity: k + 1 enters with half its relative half-width."""
+    moment: float
+    """Relative, of the balancing moment, so of lambda."""
+    influence_coefficient: float
+    """Relative."""
+    lag_angle: float
+    """rad."""
+    sources: tuple[str, ...] = ()
+    """One text for each of the four."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Members:
+    """Arrays of one length."""
+
+    velocity_factor: FloatArray
+    """Of the flow's velocity, sqrt((k + 1)/(k' + 1)) where only k differs."""
+    moment_factor: FloatArray
+    """Of the balancing moment, lambda'/lambda."""
+    influence_coefficient: FloatArray
+    """m/(kg m)."""
+    lag_angle: FloatArray
+    """rad."""
+    proportional: FloatArray
+    """Kc, s/m."""
+
+
+def members_alike(scene: Scene, *, size: int) -> Members:
+    """Members that do not differ.
+
+    Args: `size`: how many.
+    Returns: Members with the scene's own values.
+    """
+    one = np.ones(size)
+    return Members(
+        velocity_factor=one,
+        moment_factor=one,
+        influence_coefficient=scene.rotor.influence_coefficient * one,
+        lag_angle=scene.rotor.lag_angle * one,
+        proportional=scene.controller.proportional * one,
+    )
+
+
+def drawn_members(scene: Scene, *, uncertainty_95: MemberUncertainty, seed: int, block: int) -> Members:
+    """Draw one block of members; relative quantities log-normal, the lag angle normal.
+
+    Args: `uncertainty_95`: half-widths. `seed`: of the ensemble. `block`: its number; the same block has the
+        same members in an ensemble of any size.
+    """
+    random = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(block, 0)))
+    z = random.standard_normal((4, BLOCK)) / NORMAL_95
+    alike = members_alike(scene, size=BLOCK)
+    return Members(
+        velocity_factor=np.exp(math.log1p(uncertainty_95.velocity) * z[0]),
+        moment_factor=np.exp(math.log1p(uncertainty_95.moment) * z[1]),
+        influence_coefficient=alike.influence_coefficient
+        * np.exp(math.log1p(uncertainty_95.influence_coefficient) * z[2]),
+        lag_angle=alike.lag_angle + uncertainty_95.lag_angle * z[3],
+        proportional=alike.proportional,
+    )
+
+
+def member_uncertainty(scene: Scene, model: BalancerModel) -> MemberUncertainty:
+    """Half-widths for a scene under a law: the law's own, the scene's, and assumed ones where neither tells.
+
+    Returns: MemberUncertainty, with where each half-width comes from.
+    """
+    velocity, moment = _velocity(scene, model), _moment(scene, model)
+    influence = _stated(scene, "influence_coefficient")
+    lag = _stated(scene, "lag_angle")
+    own, assumed = "the scene's uncertainty", "assumed: the scene states none"
+    coefficient = scene.rotor.influence_coefficient
+    return MemberUncertainty(
+        velocity=velocity[0],
+        moment=moment[0],
+        influence_coefficient=ASSUMED_INFLUENCE if influence is None else influence / coefficient,
+        lag_angle=ASSUMED_LAG if lag is None else lag,
+        sources=(
+            velocity[1],
+            moment[1],
+            assumed if influence is None else own,
+            assumed if lag is None else own,
+        ),
+    )
+
+
+def _stated(scene: Scene, quantity: str) -> float | None:
+    """Absolute half-width that the scene states."""
+    for entry in scene.uncertainty:
+        if entry.quantity == quantity:
+            value = nominal_value(scene=scene, quantity=quantity)
+            return entry.half_width * (abs(value) if entry.relative and value is not None else 1.0)
+    return None
+
+
+def _velocity(scene: Scene, model: BalancerModel) -> tuple[float, str]:
+    if isinstance(model.flow, PaperLaw):
+        k = model.flow.drag_coefficient
+        stated = _stated(scene, "drag_coefficient")
+        width = PAPER_DRAG_UNCERTAINTY * k if stated is None else stated
+        why = "assumed: k within 10 %" if stated is None else "the scene's uncertainty of k"
+        return width / (k + 1) / 2, why
+    x = scene.disc.initial_fill
+    flow = model.flow.evaluate(
+        fill_ratio=x, opposite_fill_ratio=x, gas_pressure=scene.gas.pressure, primed=True
+    )
+    u = abs(float(flow.velocity))
+    return (float(flow.uncertainty) / u if u > 0 else 0.0), "the law's own, at equal fills"
+
+
+def _moment(scene: Scene, model: BalancerModel) -> tuple[float, str]:
+    stated = _stated(scene, "density")
+    rho = scene.liquid.density
+    density = scene.liquid.density_uncertainty if stated is None else stated / rho
+    if not isinstance(model.moment, CalibratedMoment):
+        return math.hypot(PAPER_MOMENT_UNCERTAINTY, density), "the paper's 0.7 %, and the density"
+    top = model.flow.max_fill_ratio
+    ends = model.moment.half_width(np.array([0.0, top]))
+    pair = float(model.moment.pair_moment(fill_ratio=top, opposite_fill_ratio=0.0))
+    return math.hypot(float(np.hypot(*ends)) / pair, density), "the law's own, and the density"

@@ -1,0 +1,73 @@
+"""The target-vector algorithm's law: from what a sensor shows to valve-open times of valves."""
+
+from __future__ import annotations
+
+import math
+
+
+def vector_gas_time(
+    amplitude: float,
+    phase: float,
+    time: float,
+    integral: float,
+    before_amplitude: float,
+    before_phase: float,
+    before_time: float,
+    proportional: float,
+    integral_time: float,
+    derivative_time: float,
+    maximum_gas_time: float,
+    resets: bool,
+) -> tuple[float, float]:
+    """PID on the amplitude, T = Kc (e + 1/Ti int e dt + Td de/dt), not limited yet.
+
+    Args:
+        amplitude: e, m.
+        phase: rad.
+        time: s.
+        integral: of e over time until the sample before, m s.
+        before_amplitude: of the sample before, m.
+        before_phase: rad.
+        before_time: s; infinite: there was none.
+        proportional: Kc, s/m.
+        integral_time: Ti, s; infinite: no integral part.
+        derivative_time: Td, s.
+        maximum_gas_time: s; above it the integral stands still.
+        resets: whether the integral is dropped when the residual has turned by more than 90 degrees.
+    Returns: T, s, and the integral to remember.
+    """
+    dt = time - before_time
+    if not dt > 0.0:
+        return proportional * amplitude, integral
+    turned = resets and math.cos(phase - before_phase) < 0.0
+    summed = 0.0 if turned else integral + (amplitude + before_amplitude) / 2.0 * dt
+    slope = derivative_time * (amplitude - before_amplitude) / dt
+    wanted = proportional * (amplitude + summed / integral_time + slope)
+    if turned or wanted <= maximum_gas_time:
+        return wanted, summed
+    return wanted, integral
+
+
+def vector_shares(chambers: int, angle: float, length: float) -> tuple[int, float, int, float]:
+    """Split a vector over the two chamber directions on either side of it; see `target_vector.components`.
+
+    Returns: Chamber index and share of either; a share of zero where one chamber takes all.
+    """
+    if chambers == 2:
+        along = length * math.cos(angle)
+        return (0, along, 1, 0.0) if along >= 0.0 else (1, -along, 0, 0.0)
+    spacing = 2.0 * math.pi / chambers
+    turn = angle % (2.0 * math.pi)
+    before = min(int(turn / spacing), chambers - 1)
+    past, scale = turn - before * spacing, length / math.sin(spacing)
+    return (
+        before,
+        scale * max(math.sin(spacing - past), 0.0),
+        (before + 1) % chambers,
+        scale * max(math.sin(past), 0.0),
+    )
+
+
+def valve_time(share: float, minimum_gas_time: float, maximum_gas_time: float) -> float:
+    """Time for which a valve opens: none below the minimum, no longer than the maximum, s."""
+    return min(share, maximum_gas_time) if share > 0.0 and share >= minimum_gas_time else 0.0

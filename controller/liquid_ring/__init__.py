@@ -1,0 +1,5 @@
+"""The liquid-ring plant: pairs of chambers, the transfer of liquid, and the dynamics of tube and gas.
+
+A new effect on an injection goes into `motion` (what moves the liquid) or `gas`; a new way to integrate a
+transfer implements `transfer`.
+"""

@@ -1,0 +1,282 @@
+"""The plant: the liquid-ring disc with its pairs of chambers, advanced through open valves and waiting."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ringbalance.controller.formulas.stopping import NOTICEABLE
+from ringbalance.controller.liquid_ring.interval import pass_time
+from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, Record, Switch
+from ringbalance.controller.liquid_ring.transfer import Drive, Event, Integrator, Transfer
+from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Disc
+
+
+@dataclass(frozen=True, kw_only=True)
+class PairState:
+    """Liquid of two opposite chambers: one fill is stored, the other follows from the total."""
+
+    fill: float
+    """x of the chamber on the positive side of the pair's axis (A, B, ...)."""
+    total: float
+    """Sum of the two fill ratios, constant."""
+    primed: bool = False
+    """Whether the connecting tube holds a continuous column."""
+    driven_first: bool = True
+    """Whether the last gas went into the chamber on the positive side."""
+    motion: Motion = field(default_factory=Motion)
+    """Velocity, gas and valves, where the plant models them; at rest otherwise."""
+
+    @property
+    def opposite_fill(self) -> float:
+        """x of the chamber on the negative side, total - x."""
+        return self.total - self.fill
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiscState:
+    """All pairs of the disc, in the order of their first chamber."""
+
+    pairs: tuple[PairState, ...]
+
+    def fills(self) -> tuple[float, ...]:
+        """Fill ratios of all chambers. Returns: x in the order of the letters, n numbers."""
+        first = tuple(pair.fill for pair in self.pairs)
+        return first + tuple(pair.opposite_fill for pair in self.pairs)
+
+    @property
+    def rests(self) -> bool:
+        """Whether no liquid can move until a valve is commanded to open."""
+        return not any(pair.primed for pair in self.pairs) and all(p.motion.rests for p in self.pairs)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Operation:
+    """What one command to one valve did: by its closing or, where terms are modelled, by the next sample."""
+
+    chamber: int
+    """Index of the driven chamber."""
+    duration: float
+    """Commanded, s."""
+    fill_before: float
+    """x of the driven chamber at the command."""
+    fill_after: float
+    """x of the driven chamber when the valve closed; with terms modelled, at the next sample."""
+    regime_start: Regime
+    regime_end: Regime
+    event: Event
+    energy: float
+    """Work of the driven chamber's gas against the surroundings, integral of (p - ambient) dV, J."""
+
+    @property
+    def moved(self) -> bool:
+        """Whether any liquid passed."""
+        return abs(self.fill_after - self.fill_before) > NOTICEABLE
+
+
+@dataclass(frozen=True, kw_only=True)
+class Advance:
+    """The disc over one stretch of time."""
+
+    instants: FloatArray
+    """s from the start of the stretch, shape (m,), ascending, the last one its end."""
+    fill_ratio: FloatArray
+    """x of every chamber, shape (n, m)."""
+    state: DiscState
+    """At the end."""
+    operations: tuple[Operation, ...]
+    drift: float
+    """Largest change of a fill ratio while a pair's gas was off."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LiquidRing:
+    """The disc's flow law, moments and gas, with the integrator that carries it through time."""
+
+    model: BalancerModel
+    chambers: int
+    """n, even."""
+    gas_pressure: float
+    """Gauge, Pa, in a chamber while its valve is open."""
+    integrator: Integrator
+    dynamics: Dynamics | None = None
+    """Terms that the flow law does not know; None: none of them is modelled."""
+
+    def advance(
+        self, state: DiscState, *, gas_times: Mapping[int, float], duration: float, points: int
+    ) -> Advance:
+        """Let time pass with some valves open from its start, all pairs in parallel.
+
+        Args: `gas_times`: s for each driven chamber's index, at most `duration`; empty while waiting.
+            `duration`: s, above zero. `points`: equally spaced instants to record beside the closing of each
+            valve, at least 1.
+        Raises: ValueError: gas into both chambers of a pair at once.
+        """
+        spaced = duration * np.arange(1, points + 1) / points
+        instants = np.unique(np.concatenate([spaced, np.fromiter(gas_times.values(), dtype=np.float64)]))
+        half = self.chambers // 2
+        carry = self._pair if self.dynamics is None else self._moving_pair
+        paths = [
+            carry(pair, index, _open_valve(gas_times, index, index + half), instants)
+            for index, pair in enumerate(state.pairs)
+        ]
+        operations = [path.operation for path in paths if path.operation is not None]
+        first = np.array([path.fill for path in paths])
+        totals = np.array([[pair.total] for pair in state.pairs])
+        return Advance(
+            instants=instants,
+            fill_ratio=np.concatenate([first, totals - first]),
+            state=DiscState(pairs=tuple(path.state for path in paths)),
+            operations=tuple(sorted(operations, key=lambda operation: operation.chamber)),
+            drift=max(path.drift for path in paths),
+        )
+
+    def _pair(self, pair: PairState, index: int, valve: _Valve | None, instants: FloatArray) -> _Path:
+        """Gas on until the valve closes, then gas off to the end."""
+        if valve is None:
+            return self._gas_off(pair, instants)
+        on = instants[instants <= valve.duration]
+        first = valve.chamber == index
+        transfer = self.integrator(self._drive(pair, first=first, gas_pressure=self.gas_pressure), on)
+        after = _moved(pair, transfer, first=first)
+        off = self._gas_off(after, instants[on.size :] - valve.duration)
+        before = pair.fill if first else pair.opposite_fill
+        operation = Operation(
+            chamber=valve.chamber,
+            duration=valve.duration,
+            fill_before=before,
+            fill_after=float(transfer.fill[-1]),
+            regime_start=transfer.regime_start,
+            regime_end=transfer.regime_end,
+            event=transfer.event,
+            energy=self.gas_pressure * self.model.chamber_volume * (before - float(transfer.fill[-1])),
+        )
+        fill = np.concatenate([_first_fill(pair, transfer, first=first), off.fill])
+        return replace(off, fill=fill, operation=operation)
+
+    def _gas_off(self, pair: PairState, instants: FloatArray) -> _Path:
+        """A full tube lets the levels run back; one that does not hold its column empties at once."""
+        if instants.size == 0 or not pair.primed:
+            return _Path(state=pair, fill=np.full(instants.shape, pair.fill), operation=None, drift=0.0)
+        first = pair.driven_first
+        transfer = self.integrator(self._drive(pair, first=first, gas_pressure=0.0), instants)
+        after = _moved(pair, transfer, first=first)
+        fill = _first_fill(pair, transfer, first=first)
+        return _Path(state=after, fill=fill, operation=None, drift=abs(after.fill - pair.fill))
+
+    def _moving_pair(self, pair: PairState, index: int, valve: _Valve | None, instants: FloatArray) -> _Path:
+        """Fill, velocity, gas and valves as one system; a command is added to what is under way."""
+        if self.dynamics is None:
+            raise ValueError("this plant has no terms to carry through time")
+        begun = pair if valve is None else self._commanded(pair, valve, index)
+        passage = pass_time(
+            self.dynamics,
+            fill=begun.fill,
+            total=begun.total,
+            primed=begun.primed,
+            motion=begun.motion,
+            instants=instants,
+        )
+        after = replace(begun, fill=passage.fill, primed=passage.primed, motion=passage.motion)
+        operation = None if valve is None else self._operation(after, valve)
+        return _Path(state=after, fill=passage.fills, operation=operation, drift=passage.ran_back)
+
+    def _commanded(self, pair: PairState, valve: _Valve, index: int) -> PairState:
+        """The valve opens and closes a lag after its command."""
+        lag = 0.0 if self.dynamics is None else self.dynamics.valve_lag
+        side = int(valve.chamber != index)
+        switches = (
+            Switch(after=lag, chamber=side, opens=True),
+            Switch(after=lag + valve.duration, chamber=side, opens=False),
+        )
+        motion = replace(
+            pair.motion,
+            pending=tuple(sorted((*pair.motion.pending, *switches), key=lambda switch: switch.after)),
+            record=Record(chamber=side, fill=pair.opposite_fill if side else pair.fill),
+        )
+        return replace(pair, motion=motion, driven_first=side == 0)
+
+    def _operation(self, pair: PairState, valve: _Valve) -> Operation:
+        record = pair.motion.record
+        return Operation(
+            chamber=valve.chamber,
+            duration=valve.duration,
+            fill_before=record.fill,
+            fill_after=pair.opposite_fill if record.chamber else pair.fill,
+            regime_start=record.regime_start,
+            regime_end=record.regime_end,
+            event=record.event,
+            energy=record.work,
+        )
+
+    def concluded(self, state: DiscState, operation: Operation) -> Operation:
+        """What a pair's last command has done by now, its tail included.
+
+        Args: `operation`: of the last command to its pair, as first returned.
+        Returns: Operation; the same where no term is modelled.
+        """
+        if self.dynamics is None:
+            return operation
+        pair = state.pairs[operation.chamber % (self.chambers // 2)]
+        return self._operation(pair, _Valve(chamber=operation.chamber, duration=operation.duration))
+
+    def _drive(self, pair: PairState, *, first: bool, gas_pressure: float) -> Drive:
+        return Drive(
+            law=self.model.flow,
+            fill=pair.fill if first else pair.opposite_fill,
+            total=pair.total,
+            exchange_rate=self.model.tube_area / self.model.chamber_volume,
+            gas_pressure=gas_pressure,
+            primed=pair.primed,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Valve:
+    chamber: int
+    duration: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Path:
+    """One pair over one stretch of time."""
+
+    state: PairState
+    fill: FloatArray
+    operation: Operation | None
+    drift: float
+
+
+def initial_state(*, disc: Disc) -> DiscState:
+    """All chambers at the scene's initial fill, no tube primed."""
+    pair = PairState(fill=disc.initial_fill, total=2 * disc.initial_fill)
+    return DiscState(pairs=(pair,) * (disc.chambers // 2))
+
+
+def longest(operations: Sequence[Operation]) -> Operation:
+    """The operation of a command that was given the most gas.
+
+    Args: `operations`: of one command, at least one.
+    """
+    return max(operations, key=lambda operation: operation.duration)
+
+
+def _first_fill(pair: PairState, transfer: Transfer, *, first: bool) -> FloatArray:
+    return transfer.fill if first else np.asarray(pair.total - transfer.fill, dtype=np.float64)
+
+
+def _moved(pair: PairState, transfer: Transfer, *, first: bool) -> PairState:
+    fill = float(_first_fill(pair, transfer, first=first)[-1])
+    return replace(pair, fill=fill, primed=transfer.primed, driven_first=first)
+
+
+def _open_valve(gas_times: Mapping[int, float], first: int, opposite: int) -> _Valve | None:
+    asked = [_Valve(chamber=i, duration=gas_times[i]) for i in (first, opposite) if i in gas_times]
+    if len(asked) > 1:
+        raise ValueError(f"gas into chambers {first} and {opposite} of one pair at once")
+    return asked[0] if asked else None

@@ -1,0 +1,128 @@
+"""The transfer under any law by the quadrature t = (V/S) integral dx/u(x), tabulated by gas pressure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+
+from ringbalance.controller.formulas.path_piece import piece_part, piece_rise
+from ringbalance.controller.liquid_ring.closed_form import boundary_event
+from ringbalance.controller.liquid_ring.pair_path import FlowPaths, UntabulatedError, flow_paths
+from ringbalance.controller.liquid_ring.transfer import (
+    Drive,
+    Event,
+    Transfer,
+    checked_instants,
+    finished,
+    still,
+)
+from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
+from ringbalance.scene.arrays import FloatArray
+
+KEPT: Final = 16
+"""Tables kept: a run needs one with gas and one without."""
+
+
+@dataclass(frozen=True, eq=False)
+class _SameLaw:
+    """A law that equals itself alone, whatever its own equality says."""
+
+    law: FlowLaw
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _SameLaw) and other.law is self.law
+
+    def __hash__(self) -> int:
+        return id(self.law)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Way:
+    """The part of a path that lies ahead of a pair."""
+
+    fill: FloatArray
+    """x at the instants."""
+    end: float
+    """x at which the flow ends by itself."""
+    duration: float
+    """s until then."""
+
+
+def quadrature(drive: Drive, instants: FloatArray) -> Transfer:
+    """Transfer under any law, to about 1e-11 in fill.
+
+    All flows under one gas pressure are tabulated at the first call, as `pair_path` describes; an ensemble
+    walks along the same tables.  A velocity that vanishes like the distance to a stall is followed until
+    1e-12 of fill is left.
+    Args: `drive`: law, fills, pressure and priming. `instants`: s from the start, shape (m,), ascending.
+    Returns: Transfer; its event is UNFINISHED, and nothing moves, under a law that cannot be tabulated.
+    Raises: ValueError: instants that do not ascend from zero.
+    Source: section 5.1 of the liquid-ring paper in the limit of small segments, dx/dt = -u S/V.
+    """
+    t = checked_instants(instants)
+    before = drive.flow(drive.fill, primed=drive.primed)
+    if float(before.velocity) == 0:
+        return still(drive, t, flow=before)
+    try:
+        paths = _paths(_SameLaw(drive.law), drive.total, drive.exchange_rate, drive.gas_pressure)
+        way = _way(paths, drive.fill, t)
+        event = _event(drive, way, float(t[-1]))
+    except UntabulatedError:
+        way = _Way(fill=np.full(t.shape, drive.fill), end=drive.fill, duration=0.0)
+        event = Event.UNFINISHED
+    return finished(
+        drive,
+        t,
+        way.fill,
+        regime_start=Regime(int(before.regime)),
+        event=event,
+        event_time=None if event is Event.NONE else way.duration,
+    )
+
+
+@lru_cache(maxsize=KEPT)
+def _paths(law: _SameLaw, total: float, exchange_rate: float, gas_pressure: float) -> FlowPaths:
+    drive = Drive(
+        law=law.law,
+        fill=total / 2,
+        total=total,
+        exchange_rate=exchange_rate,
+        gas_pressure=gas_pressure,
+        primed=True,
+    )
+    return flow_paths(drive, primed=True)
+
+
+def _way(paths: FlowPaths, fill: float, instants: FloatArray) -> _Way:
+    """Follow the path on which a fill lies."""
+    interval = int(np.searchsorted(paths.edges, fill, side="right"))
+    number, sign = int(paths.path[interval]), -float(paths.sense[interval])
+    if number < 0:
+        return _Way(fill=np.full(instants.shape, fill), end=fill, duration=0.0)
+    time, x, after, before = paths.nodes[:, paths.begin[number] : paths.begin[number + 1]]
+    span, rise = np.diff(time), np.diff(x)
+    d0, d1 = after[:-1] * span, before[1:] * span
+    start = _piece(sign * x, np.array(sign * fill))
+    part = piece_part(fill - x[start], float(rise[start]), float(d0[start]), float(d1[start]))
+    begun = time[start] + part * span[start]
+    clock = begun + instants
+    flowing, reached = clock < time[-1], np.full(clock.shape, x[-1])
+    at = _piece(time, clock[flowing])
+    moved = piece_rise((clock[flowing] - time[at]) / span[at], rise[at], d0[at], d1[at])
+    reached[flowing] = sign * np.maximum(sign * (x[at] + moved), sign * fill)
+    return _Way(fill=reached, end=float(x[-1]), duration=max(float(time[-1] - begun), 0.0))
+
+
+def _piece(ascending: FloatArray, wanted: FloatArray) -> FloatArray:
+    """The last node that is not above what is wanted; never the very last one."""
+    return np.clip(np.searchsorted(ascending, wanted, side="right") - 1, 0, ascending.size - 2)
+
+
+def _event(drive: Drive, way: _Way, duration: float) -> Event:
+    if duration < way.duration:
+        return Event.NONE
+    ended = way.end in {drive.lowest, drive.highest}
+    return boundary_event(drive, way.end) if ended else Event.STALLED

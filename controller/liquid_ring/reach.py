@@ -1,0 +1,80 @@
+"""What unbalance the disc can cancel at all, and what gas pressure starts a flow at all."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
+from ringbalance.controller.rotor import chamber_directions
+from ringbalance.reduced_model.law.flow_law import FlowLaw
+
+MAX_DOUBLINGS: Final = 40
+BISECTIONS: Final = 50
+
+
+def largest_pair_moment(*, plant: LiquidRing, state: DiscState) -> float:
+    """Moment of a pair with its liquid moved as far as it goes to one side.
+
+    Args: `plant`: the disc. `state`: its liquid; all pairs hold the same amount.
+    Returns: Moment, kg m.
+    Source: Eq. 7 of the liquid-ring paper for a pair, by the model's own moment curve.
+    """
+    total = state.pairs[0].total
+    highest = min(total, plant.model.flow.max_fill_ratio)
+    moment = plant.model.moment.pair_moment(fill_ratio=highest, opposite_fill_ratio=total - highest)
+    return float(moment)
+
+
+def unreachable_moment(*, plant: LiquidRing, state: DiscState, wanted: complex) -> float:
+    """Distance of a moment from the nearest one that the disc can form.
+
+    The moments within reach fill a polygon whose corners have every pair fully to one side or the other.
+    Args: `state`: its liquid. `wanted`: moment asked of the disc, kg m.
+    Returns: Distance, kg m; zero within reach.
+    Source: Eq. 8 of the liquid-ring paper, in every direction and for any number of chambers.
+    """
+    n = plant.chambers
+    axes = chamber_directions(n)[: n // 2]
+    seen_from = np.exp(1j * np.pi * (2 * np.arange(n) + 1) / n + 0.5j * np.pi)
+    signs = np.sign((axes[None, :] * seen_from[:, None].conj()).real)
+    corners = largest_pair_moment(plant=plant, state=state) * (signs @ axes)
+    edges = np.roll(corners, -1) - corners
+    offset = wanted - corners
+    if n > 2 and np.all((edges.conj() * offset).imag >= 0):
+        return 0.0
+    along = np.clip((edges.conj() * offset).real / np.maximum(np.abs(edges) ** 2, 1e-300), 0.0, 1.0)
+    return float(np.min(np.abs(offset - along * edges)))
+
+
+def starting_pressure(
+    *, law: FlowLaw, fill: float, opposite_fill: float, primed: bool, above: float
+) -> float | None:
+    """Smallest gas pressure at which liquid leaves a chamber.
+
+    Args: `fill`: x of the driven chamber. `opposite_fill`: x of the opposite chamber. `primed`: whether the
+        tube holds a continuous column beforehand. `above`: a gauge pressure, Pa, above zero, where the search
+        begins.
+    Returns: Gauge pressure, Pa, to 12 digits; None when no pressure found does.
+    """
+
+    def flows(pressure: float) -> bool:
+        flow = law.evaluate(
+            fill_ratio=fill, opposite_fill_ratio=opposite_fill, gas_pressure=pressure, primed=primed
+        )
+        return bool(flow.velocity > 0)
+
+    if flows(above):
+        return above
+    low, high = above, 2 * above
+    for _ in range(MAX_DOUBLINGS):
+        if flows(high):
+            break
+        low, high = high, 2 * high
+    else:
+        return None
+    for _ in range(BISECTIONS):
+        middle = (low + high) / 2
+        low, high = (low, middle) if flows(middle) else (middle, high)
+    return high

@@ -1,0 +1,162 @@
+"""One stretch of flow through the tube of one pair: what is asked of an integrator, and what it returns.
+
+The driven chamber's fill ratio x obeys dx/dt = -(S/V) u(x_A, x_C, p) with x_C = total - x, which is taken in
+`Drive.opposite` and nowhere else: liquid is conserved by construction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.reduced_model.law.flow_law import Flow, FlowLaw, Regime
+from ringbalance.scene.arrays import FloatArray
+
+
+class Event(StrEnum):
+    """What ended the flow before its time."""
+
+    NONE = "none"
+    BLOCKED = "blocked"
+    """Nothing flowed from the start."""
+    STALLED = "stalled"
+    """The velocity fell to zero."""
+    EMPTY = "empty"
+    """The giving chamber ran empty."""
+    FULL = "full"
+    """The receiving chamber reached its largest fill."""
+    UNFINISHED = "unfinished"
+    """The integrator's bound on its work was reached; the fills after that are the last ones found."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drive:
+    """One chamber under a constant gas pressure, its opposite chamber vented."""
+
+    law: FlowLaw
+    fill: float
+    """x of the driven chamber at the start."""
+    total: float
+    """x_A + x_C, constant."""
+    exchange_rate: float
+    """S/V, 1/m: fill ratio that passes per metre of flow in the tube."""
+    gas_pressure: float
+    """Gauge, Pa; zero with the valve closed."""
+    primed: bool
+    """Whether the tube holds a continuous column at the start."""
+
+    @property
+    def lowest(self) -> float:
+        """Smallest x that the pair's liquid allows."""
+        return max(0.0, self.total - self.law.max_fill_ratio)
+
+    @property
+    def highest(self) -> float:
+        """Largest x that the pair's liquid allows."""
+        return min(self.total, self.law.max_fill_ratio)
+
+    def opposite(self, fill: npt.ArrayLike) -> FloatArray:
+        """Fill ratio of the opposite chamber, x_C = total - x.
+
+        Args: `fill`: x of the driven chamber, any shape.
+        Returns: x_C, the shape of `fill`, held within the law's range against round-off.
+        """
+        other = self.total - np.asarray(fill, dtype=np.float64)
+        return np.asarray(np.clip(other, 0.0, self.law.max_fill_ratio), dtype=np.float64)
+
+    def flow(self, fill: npt.ArrayLike, *, primed: bool = True) -> Flow:
+        """The law's answer for fill ratios of the driven chamber under this drive's gas pressure.
+
+        Args: `fill`: x, any shape. `primed`: whether the tube holds a continuous column.
+        Returns: Flow, the shape of `fill`.
+        """
+        return self.law.evaluate(
+            fill_ratio=np.clip(fill, 0.0, self.law.max_fill_ratio),
+            opposite_fill_ratio=self.opposite(fill),
+            gas_pressure=self.gas_pressure,
+            primed=primed,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Transfer:
+    """Fills of the driven chamber over one stretch of flow."""
+
+    instants: FloatArray
+    """s from the start of the stretch, ascending."""
+    fill: FloatArray
+    """x at those instants."""
+    regime_start: Regime
+    regime_end: Regime
+    event: Event
+    event_time: float | None
+    """s from the start; None without an event."""
+    primed: bool
+    """Whether the tube holds a continuous column at the end, under the same gas pressure."""
+
+
+Integrator = Callable[[Drive, FloatArray], Transfer]
+"""Takes a drive and ascending instants (s from the start, shape (m,), the last one the duration)."""
+
+
+def checked_instants(instants: npt.ArrayLike) -> FloatArray:
+    """Check the instants of a transfer.
+
+    Args: `instants`: s, shape (m,), m at least 1.
+    Raises: ValueError: none given, negative, descending or not finite.
+    """
+    t = np.asarray(instants, dtype=np.float64)
+    # A NaN fails every comparison, an infinity stands last.
+    if t.ndim != 1 or t.size == 0 or not (t[0] >= 0 and t[-1] < np.inf and bool(np.all(t[1:] >= t[:-1]))):
+        raise ValueError("instants must be at least one finite time >= 0, in ascending order")
+    return t
+
+
+def still(drive: Drive, instants: FloatArray, *, flow: Flow) -> Transfer:
+    """A stretch in which nothing flows.
+
+    Args: `instants`: s, shape (m,). `flow`: what the law says of the tube at the start, a velocity of zero.
+    Returns: Transfer with the initial fill throughout.
+    """
+    regime = Regime(int(flow.regime))
+    return Transfer(
+        instants=instants,
+        fill=np.full(instants.shape, drive.fill),
+        regime_start=regime,
+        regime_end=regime,
+        event=Event.BLOCKED,
+        event_time=0.0,
+        primed=bool(flow.primed),
+    )
+
+
+def finished(
+    drive: Drive,
+    instants: FloatArray,
+    fill: FloatArray,
+    *,
+    regime_start: Regime,
+    event: Event,
+    event_time: float | None,
+) -> Transfer:
+    """A stretch that flowed, with the tube's state at its end.
+
+    Args: `instants`: s, shape (m,). `fill`: x at the instants, shape (m,). `regime_start`: what the law said
+        of the tube at the start. `event`: what ended the flow. `event_time`: s; None without an event.
+    Returns: Transfer; gas that has blown through an emptied chamber leaves no column.
+    """
+    held = np.clip(fill, drive.lowest, drive.highest)
+    after = drive.flow(held[-1])
+    return Transfer(
+        instants=instants,
+        fill=held,
+        regime_start=regime_start,
+        regime_end=Regime(int(after.regime)),
+        event=event,
+        event_time=event_time,
+        primed=bool(after.primed) and event is not Event.EMPTY,
+    )

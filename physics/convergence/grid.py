@@ -1,0 +1,215 @@
+"""How far a number is from its limit of vanishing mesh size, judged from three meshes or more.
+
+Three meshes: the procedure of Celik et al. (2008), with the order capped at the formal one of the quantity at
+hand.  More: the least-squares fit of Eca and Hoekstra (2014).  Differences that are only round-off, oscillate
+or grow are said to be so; none of them is dressed up as an order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from ringbalance.physics.convergence.least_squares import Fit, best_fit
+from ringbalance.scene.arrays import FloatArray
+
+_LOWEST_ORDER = 0.5
+_HIGHEST_ORDER = 50.0
+_EPSILON = float(np.finfo(np.float64).eps)
+
+
+class Verdict(StrEnum):
+    """What the sequence of values looks like."""
+
+    MONOTONE = "monotone"
+    OSCILLATORY = "oscillatory"
+    ROUND_OFF = "round_off"
+    NOT_ASYMPTOTIC = "not_asymptotic"
+    DIVERGING = "diverging"
+
+
+_TEXT = {
+    Verdict.MONOTONE: "converges steadily at about its formal order",
+    Verdict.OSCILLATORY: "oscillates from mesh to mesh: add a finer mesh before trusting the order",
+    Verdict.ROUND_OFF: "has converged to round-off: no order can be seen, and none is needed",
+    Verdict.NOT_ASYMPTOTIC: "is not yet in its asymptotic range: add a finer mesh",
+    Verdict.DIVERGING: "does not converge on these meshes: look for an error before refining",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class GridConvergence:
+    """Order, limit and uncertainty of one number computed on several meshes."""
+
+    verdict: Verdict
+    observed_order: float
+    """As found, with its sign and before any cap; zero where none can be seen."""
+    order: float
+    """The order that the uncertainty rests on, within [0.5, formal order]; zero where none was used."""
+    extrapolated: float
+    """Limit for vanishing mesh size with the observed order; the finest value where there is no order."""
+    approximate_error: float
+    """Change from the second mesh to the finest, relative."""
+    extrapolated_error: float
+    """Distance from the finest value to the limit, relative to the limit."""
+    index: float
+    """Grid convergence index of the finest mesh with the observed order, relative; zero at round-off."""
+    uncertainty: float
+    """Expanded uncertainty (95 %) about the finest value, in its own unit."""
+    text: str
+    """What was seen and what to do next."""
+
+
+def gci(
+    *,
+    values: Sequence[float],
+    sizes: Sequence[float],
+    formal_order: float,
+    round_off: float = 0.0,
+    safety: float = 1.25,
+) -> GridConvergence:
+    """Grid convergence of one number: Celik's procedure for three meshes, least squares for more.
+
+    p = |ln|e32/e21| + q(p)| / ln r21, q(p) = ln((r21^p - s)/(r32^p - s)), s = sign(e32/e21),
+    GCI = 1.25 e_a / (r21^p - 1); the half-width takes p no higher than the formal order, and no less than
+    what the two coarser meshes foretell.
+    Args:
+        values: of the number, finest mesh first, in any one unit, at least three.
+        sizes: of the cells, finest first, in any one unit, strictly increasing.
+        formal_order: at which this number should converge; a functional gains over the field it comes from.
+        round_off: bound of the noise in each value, in its unit; never taken below 8 ulp of the largest
+            value.
+        safety: factor on the estimated error.
+    Returns: The record; its uncertainty is a half-width about values[0].
+    Raises: ValueError: fewer than three values, sizes that do not grow, or a value that is not finite.
+    Source: Celik et al. (2008), doi:10.1115/1.2960953; Eca and Hoekstra (2014),
+    doi:10.1016/j.jcp.2014.01.006.
+    """
+    phi, h = np.asarray(values, dtype=np.float64), np.asarray(sizes, dtype=np.float64)
+    _check(phi, h, formal_order)
+    noise = max(round_off, 8 * _EPSILON * float(np.abs(phi).max()))
+    if _is_noise(phi, h, formal_order, noise):
+        return _at_round_off(phi, noise)
+    if phi.size > 3:
+        return _from_fit(phi, best_fit(phi, h, formal_order=formal_order), formal_order, noise, safety)
+    return _from_three(phi, h, formal_order, noise, safety)
+
+
+def _check(phi: FloatArray, h: FloatArray, formal_order: float) -> None:
+    if phi.ndim != 1 or phi.size < 3 or phi.shape != h.shape:
+        raise ValueError("values and sizes must be two sequences of one length, at least three")
+    if not (np.all(np.isfinite(phi)) and np.all(np.isfinite(h)) and formal_order > 0):
+        raise ValueError("values and sizes must be finite, and formal_order positive")
+    if h[0] <= 0 or np.any(np.diff(h) <= 0):
+        raise ValueError("sizes must be positive and grow from the finest mesh to the coarsest")
+
+
+def _is_noise(phi: FloatArray, h: FloatArray, formal_order: float, noise: float) -> bool:
+    """Whether the last change is rounding, and no accident of errors that cross zero on the finest meshes."""
+    first, second = np.abs(np.diff(phi[:3]))
+    foretold = second / ((h[2] / h[1]) ** formal_order - 1) / (h[1] / h[0]) ** formal_order
+    return bool(first <= noise and foretold <= 10 * noise)
+
+
+def celik_order(*, first_change: float, second_change: float, r21: float, r32: float) -> float:
+    """Observed order from two changes, by fixed-point iteration; negative when the changes grow.
+
+    Args: `first_change`: e21 = phi2 - phi1, finest mesh 1; zero counts as the highest order. `second_change`:
+        e32 = phi3 - phi2; not zero. `r21`: h2/h1, above 1. `r32`: h3/h2, above 1.
+    Returns: p with the sign that Celik's absolute value drops; limited to +-50.
+    Source: Celik et al. (2008), Eqs. 5a to 5c, doi:10.1115/1.2960953.
+    """
+    if first_change == 0:
+        return _HIGHEST_ORDER
+    ratio = second_change / first_change
+    s, logarithm = np.sign(ratio), np.log(abs(ratio))
+    p = float(logarithm / np.log(r21))
+    if abs(r21 - r32) <= 1e-12 * r21:
+        return float(np.clip(p, -_HIGHEST_ORDER, _HIGHEST_ORDER))
+    for _ in range(200):
+        size = float(np.clip(abs(p), 1e-6, _HIGHEST_ORDER))
+        update = float((logarithm + np.log((r21**size - s) / (r32**size - s))) / np.log(r21))
+        if abs(update - p) <= 1e-12 * max(1.0, abs(p)):
+            break
+        p = update
+    return float(np.clip(p, -_HIGHEST_ORDER, _HIGHEST_ORDER))
+
+
+def _from_three(
+    phi: FloatArray, h: FloatArray, formal_order: float, noise: float, safety: float
+) -> GridConvergence:
+    e21, e32 = float(phi[1] - phi[0]), float(phi[2] - phi[1])
+    r21, r32 = float(h[1] / h[0]), float(h[2] / h[1])
+    if abs(e32) <= noise:
+        return _record(Verdict.DIVERGING, phi, 0.0, 0.0, phi[0], 0.0, 3 * abs(e21) + noise)
+    observed = celik_order(first_change=e21, second_change=e32, r21=r21, r32=r32)
+    verdict = _verdict(observed, e21 * e32 < 0, formal_order)
+    if observed <= 0:
+        return _record(verdict, phi, observed, 0.0, phi[0], 0.0, 3 * max(abs(e21), abs(e32)) + noise)
+    gain = r21**observed - 1
+    order = float(np.clip(observed, _LOWEST_ORDER, formal_order))
+    # An order above the formal one means that leading errors cancel here; the coarser pair still sees them.
+    foretold = abs(e32) / (r32**order - 1) / r21**order
+    error = max(abs(e21) / (r21**order - 1), foretold if observed > formal_order else 0.0)
+    if verdict is Verdict.OSCILLATORY:
+        error = max(error, float(np.ptp(phi)) / 2)
+    half_width = safety * error + noise
+    return _record(verdict, phi, observed, order, phi[0] - e21 / gain, safety * abs(e21) / gain, half_width)
+
+
+def _verdict(observed: float, oscillates: bool, formal_order: float) -> Verdict:
+    if observed <= 0:
+        return Verdict.DIVERGING
+    if oscillates:
+        return Verdict.OSCILLATORY
+    near = 0.5 * formal_order <= observed <= 1.5 * formal_order
+    return Verdict.MONOTONE if near else Verdict.NOT_ASYMPTOTIC
+
+
+def _from_fit(phi: FloatArray, fit: Fit, formal_order: float, noise: float, safety: float) -> GridConvergence:
+    error, misfit = abs(fit.error), fit.deviation + abs(fit.misfit)
+    spread = float(np.ptp(phi)) / (phi.size - 1)
+    good = fit.deviation < spread and _LOWEST_ORDER <= fit.observed_order <= 1.05 * formal_order
+    if fit.deviation < spread:
+        half_width = (safety if good else 3.0) * error + misfit
+    else:
+        half_width = 3 * fit.deviation / spread * (error + misfit)
+    changes = np.diff(phi)
+    if good:
+        verdict = _verdict(fit.observed_order, False, formal_order)
+    elif np.any(changes[1:] * changes[:-1] < 0):
+        verdict = Verdict.OSCILLATORY
+    else:
+        verdict = Verdict.DIVERGING if fit.observed_order <= 0 else Verdict.NOT_ASYMPTOTIC
+    index = half_width
+    return _record(verdict, phi, fit.observed_order, fit.order, fit.limit, index, half_width + noise)
+
+
+def _at_round_off(phi: FloatArray, noise: float) -> GridConvergence:
+    return _record(Verdict.ROUND_OFF, phi, 0.0, 0.0, float(phi[0]), 0.0, noise + abs(float(phi[1] - phi[0])))
+
+
+def _record(
+    verdict: Verdict,
+    phi: FloatArray,
+    observed: float,
+    order: float,
+    limit: float,
+    index: float,
+    half_width: float,
+) -> GridConvergence:
+    scale = float(abs(phi[0])) or float(np.abs(phi).max()) or 1.0
+    return GridConvergence(
+        verdict=verdict,
+        observed_order=observed,
+        order=order,
+        extrapolated=float(limit),
+        approximate_error=abs(float(phi[1] - phi[0])) / scale,
+        extrapolated_error=abs(float(limit - phi[0])) / (abs(float(limit)) or scale),
+        index=float(index) / scale,
+        uncertainty=float(half_width),
+        text=f"{_TEXT[verdict]} (observed order {observed:.2f})",
+    )

@@ -1,0 +1,24 @@
+"""Solvers that few scenes need, loaded when first used: importing them takes longer than a calibration.
+
+`from ringbalance.physics import deferred`, then `deferred.multigrid(...)`.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from types import MappingProxyType
+from typing import Any, Final
+
+_HOME: Final = MappingProxyType(
+    {
+        "multigrid": "ringbalance.physics.pressure.multigrid",
+        "sloshing_response": "ringbalance.physics.sloshing.response",
+        "nnls": "scipy.optimize",
+    }
+)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_HOME[name]), name)

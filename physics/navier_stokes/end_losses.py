@@ -1,0 +1,180 @@
+"""Laminar loss of a tube's two ends: entrance from a reservoir and exit into one, axisymmetric.
+
+The tube ends flush in a plane wall with a sharp edge.  Lengths over the bore d, velocities over the mean
+velocity U, pressure over mu U/d:
+
+    Re (u . grad) u = -grad p + lap u,   div u = 0
+
+Far away in the reservoir the surface is free of force at zero pressure (its side lets liquid through at right
+angles only, where a jet leaves the tube); deep inside the tube the flow is
+developed, so that p is a straight line of slope -32 there.  With that line carried on to the tube's end,
+
+    K_ent  = 2 (p_reservoir - p_end)/(rho U^2)      (it contains the leaving stream's kinetic factor 2)
+    K_exit = 2 (p_end - p_reservoir)/(rho U^2)
+
+and K Re stays finite at Re = 0, where both ends have the same loss because creeping flow is reversible.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from ringbalance.physics.navier_stokes.meshes import patch_mesh, tensor_patch, with_midpoints
+from ringbalance.physics.navier_stokes.newton import (
+    Coefficients,
+    Dirichlet,
+    FlowSolution,
+    FlowSystem,
+    NewtonSettings,
+    flow_system,
+    solve_flow,
+)
+from ringbalance.physics.navier_stokes.space import taylor_hood
+from ringbalance.physics.navier_stokes.transfer import probe
+from ringbalance.scene.arrays import FloatArray
+
+__all__ = [
+    "EndMesh",
+    "end_loss_times_reynolds",
+    "end_mesh",
+    "end_system",
+    "entry_length",
+    "graded_line",
+    "solve_end",
+]
+
+End = Literal["entrance", "exit"]
+
+DEVELOPED_SLOPE = 32.0
+"""-dp/dx of developed flow, over mu U/d^2."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EndMesh:
+    """Domain and grading; lengths over the bore."""
+
+    cells_per_fold: float = 2.0
+    """Cells in which the cell size grows by a factor e, away from the edge."""
+    edge_cell: float = 1e-4
+    """Size of the cells at the sharp edge."""
+    reservoir: float = 40.0
+    """Extent of the reservoir along the axis and across."""
+    tube: float = 300.0
+    """Length of tube."""
+    longest_cell: float = 0.15
+    """Share of a line's length that no cell exceeds, at two cells per fold."""
+    tube_cell: float = 6.0
+    """Longest cell along the tube, at two cells per fold."""
+    jet_cell: float = 6.0
+    """Longest cell along the axis of the reservoir, at two cells per fold."""
+
+
+def graded_line(*, length: float, longest: float, cells: EndMesh) -> FloatArray:
+    """Vertices from 0 to a length whose cells grow geometrically from the edge cell up to the longest one.
+
+    Args: `longest`: cell allowed, at two cells per fold. `cells`: grading.
+    Returns: Vertices, first 0, last the length.
+    """
+    growth = np.exp(1 / cells.cells_per_fold)
+    limit = 2 * longest / cells.cells_per_fold
+    steps = [cells.edge_cell]
+    while sum(steps) < length:
+        steps.append(min(steps[-1] * growth, limit))
+    vertices = np.concatenate([[0.0], np.cumsum(steps)])
+    return np.asarray(vertices * (length / vertices[-1]), dtype=np.float64)
+
+
+def _line(length: float, longest: float, cells: EndMesh) -> FloatArray:
+    return with_midpoints(vertices=graded_line(length=length, longest=longest, cells=cells))
+
+
+def end_mesh(*, cells: EndMesh, end: End) -> Any:
+    """Mesh in (x, r) of a reservoir and a tube of unit bore, flow in the direction of x, the end at x = 0.
+
+    Args: `cells`: domain and grading. `end`: "entrance" (tube at x > 0) or "exit" (tube at x < 0).
+    Returns: Quadratic mesh with boundaries axis, wall, far (normal to x), side (far, normal to r), deep (in
+        the tube).
+    """
+    sign = 1.0 if end == "entrance" else -1.0
+    longest = cells.longest_cell * cells.reservoir
+    outside = -sign * _line(cells.reservoir, min(cells.jet_cell, longest), cells)
+    inside = sign * _line(cells.tube, min(cells.tube_cell, cells.longest_cell * cells.tube), cells)
+    core = 0.5 - _line(0.5, cells.longest_cell * 0.5, cells)[::-1]
+    core[0] = 0.0
+    around = 0.5 + _line(cells.reservoir, longest, cells)
+    patches = [
+        tensor_patch(x=outside, y=core, sides={"east": "far", "south": "axis"}),
+        tensor_patch(x=outside, y=around, sides={"east": "far", "west": "wall", "north": "side"}),
+        tensor_patch(x=inside, y=core, sides={"east": "deep", "south": "axis", "north": "wall"}),
+    ]
+    return patch_mesh(patches=patches, shape="quad")
+
+
+def end_system(*, cells: EndMesh, end: End) -> FlowSystem:
+    """Discrete equations of an end: developed flow deep in the tube, no force on the far reservoir.
+
+    Args: `end`: "entrance" or "exit".
+    """
+    space = taylor_hood(mesh=end_mesh(cells=cells, end=end), axisymmetric=True)
+    developed = Dirichlet(boundary="deep", component=0, value=lambda x: 2 * (1 - 4 * x[1] ** 2))
+    conditions = [
+        developed,
+        Dirichlet(boundary="deep", component=1),
+        Dirichlet(boundary="wall", component=0),
+        Dirichlet(boundary="wall", component=1),
+        Dirichlet(boundary="axis", component=1),
+    ]
+    if end == "exit":
+        # The jet draws liquid in through the side; left free along it, that goes unstable near Re 1950.
+        conditions.append(Dirichlet(boundary="side", component=0))
+    return flow_system(space=space, conditions=conditions)
+
+
+def solve_end(
+    *,
+    system: FlowSystem,
+    reynolds: float,
+    start: FlowSolution | None = None,
+    settings: NewtonSettings | None = None,
+) -> FlowSolution:
+    """Flow at an end of the tube.
+
+    Args: `reynolds`: Re = U d/nu, at least 0. `start`: a neighbouring flow. `settings`: of Newton's method.
+    """
+    c = Coefficients(inertia=reynolds, viscosity=1.0)
+    return solve_flow(system=system, coefficients=c, start=start, settings=settings)
+
+
+def end_loss_times_reynolds(
+    *, system: FlowSystem, solution: FlowSolution, end: End, cells: EndMesh, share: float = 0.9
+) -> float:
+    """K Re of an end, from the pressure deep in the tube beyond developed friction.
+
+    K_ent Re = -2 (p + 32 x), K_exit Re = 2 (p - 32 |x|), p on the axis at |x| = share of the tube's length.
+    Args: `end`: "entrance" or "exit". `share`: where to take the pressure.
+    """
+    distance = share * cells.tube
+    at = distance if end == "entrance" else -distance
+    pressure = float(probe(system=system, solution=solution, points=[[at], [0.0]])[-1, 0])
+    if end == "entrance":
+        return -2 * (pressure + DEVELOPED_SLOPE * distance)
+    return 2 * (pressure - DEVELOPED_SLOPE * distance)
+
+
+def entry_length(*, system: FlowSystem, solution: FlowSolution, cells: EndMesh, share: float = 0.99) -> float:
+    """Length over the bore in which the velocity on the axis reaches a share of its developed value 2 U.
+
+    Args: `system`: from `end_system` for an entrance.
+    Returns: L/d, measured from the entrance; the last crossing counts.
+    """
+    x = np.geomspace(1e-2, 0.95 * cells.tube, 1500)
+    axis = probe(system=system, solution=solution, points=np.stack([x, np.zeros_like(x)]))[0]
+    below = np.flatnonzero(axis < 2 * share)
+    if below.size == 0:
+        return float(x[0])
+    last = min(int(below[-1]), x.size - 2)
+    rise = (2 * share - axis[last]) / (axis[last + 1] - axis[last])
+    return float(x[last] + rise * (x[last + 1] - x[last]))

@@ -1,0 +1,336 @@
+"""Laminar flow fields of the tube, ready to draw: its rotating section, its entrance and its exit.
+
+Lengths over the bore d, velocities over the mean velocity U, on meshes coarse enough to take about a second.
+Beyond the parameters that can be drawn, the flow at the nearest ones is given, and its status says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import spsolve
+
+from ringbalance.physics.navier_stokes.continuation import StepRule, follow
+from ringbalance.physics.navier_stokes.end_losses import End, EndMesh, end_mesh, end_system, solve_end
+from ringbalance.physics.navier_stokes.newton import (
+    Dirichlet,
+    FlowSolution,
+    FlowSystem,
+    NewtonSettings,
+    flow_system,
+)
+from ringbalance.physics.navier_stokes.rotating_section import (
+    SectionMesh,
+    friction_ratio,
+    section_system,
+    solve_section,
+)
+from ringbalance.physics.navier_stokes.space import FlowSpace, at_points, stiffness_entries, taylor_hood
+from ringbalance.physics.results import Status, StatusCode
+from ringbalance.scene.arrays import FloatArray, IntArray
+
+__all__ = ["EndFlow", "SectionFlow", "entrance_flow", "exit_flow", "section_flow"]
+
+
+LARGEST_KL: Final = 1e6
+"""R Re up to which the section is drawn; near it further steady flows appear."""
+LARGEST_ROTATION: Final = 1e4
+"""R up to which the drawing's mesh resolves the layer at the wall."""
+LARGEST_END_REYNOLDS: Final = 2000.0
+_KL_SCALE, _END_SCALE, _EASY = 300.0, 5.0, 2.0
+_SECTION: Final = SectionMesh(around=6, across=9, wall_ratio=15.0)
+_WINDOWS: Final = {"entrance": (-2.5, 5.0, 2.5), "exit": (-2.0, 8.0, 2.5)}
+_FLOW_THROUGH: Final = 1 / 8
+"""Stream function at the tube's wall: integral of u_x r dr over the radius, in U d^2."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SectionFlow:
+    """Developed flow in the whole section of the rotating tube."""
+
+    points: FloatArray
+    """(y, z)/d, shape (2, n): z along the rotation axis, y = z cross the axial direction."""
+    triangles: IntArray
+    """Node numbers, counter-clockwise, shape (m, 3)."""
+    axial_velocity: FloatArray
+    """w/U, shape (n,)."""
+    velocity: FloatArray
+    """In-plane (u, v)/U along (y, z), shape (2, n)."""
+    stream_function: FloatArray
+    """psi/(U d), u = dpsi/dz, v = -dpsi/dy, 0 at the wall, shape (n,)."""
+    reynolds: float
+    """Re of the flow given."""
+    rotation_reynolds: float
+    """R of the flow given."""
+    friction_ratio: float
+    """F of the flow given, on this coarse mesh."""
+    status: Status
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class EndFlow:
+    """Axisymmetric flow near a mouth of the tube; the mouth lies at x = 0, liquid flows towards larger x."""
+
+    points: FloatArray
+    """(x, r)/d, shape (2, n), r >= 0."""
+    triangles: IntArray
+    """Node numbers, counter-clockwise, shape (m, 3)."""
+    velocity: FloatArray
+    """(u_x, u_r)/U, shape (2, n)."""
+    speed: FloatArray
+    """Magnitude of the velocity over U, shape (n,)."""
+    stream_function: FloatArray
+    """psi/(U d^2), u_x = dpsi/dr / r, 0 on the axis, 1/8 on the tube's wall, shape (n,)."""
+    pressure: FloatArray
+    """2 (p - p_reservoir)/(rho U^2), shape (n,)."""
+    reynolds: float
+    """Re of the flow given."""
+    status: Status
+
+
+def _followed(
+    solve: Callable[[float, FlowSolution | None], FlowSolution], to: float, first: float
+) -> FlowSolution:
+    """Flow at the end of a path that starts where a start from rest still converges."""
+    start = solve(min(to, _EASY), None)
+    if to <= _EASY or not start.status.ok:
+        return start
+    rule = StepRule(first=first, smallest=0.02, largest=3.0)
+    path = follow(solve=solve, start=start, start_at=_EASY, targets=[to], rule=rule)
+    if not path.status.ok:
+        raise ArithmeticError(f"the flow to draw was not found: {path.status.text}")
+    return path.solutions[0]
+
+
+def quarter_cells(*, space: FlowSpace, cells: IntArray | slice = slice(None)) -> IntArray:
+    """Four straight quadrilaterals per nine-node cell, counter-clockwise.
+
+    Args: `space`: on a plane mesh of quadrilaterals. `cells`: of the mesh; default all.
+    Returns: Node numbers, shape (m, 4).
+    """
+    v0, v1, v2, v3, s, e, n, w, c = space.velocity.element_dofs[:, cells]
+    quads = [(v0, s, c, w), (s, v1, e, c), (c, e, v2, n), (w, c, n, v3)]
+    nodes = np.concatenate([np.stack(quad, axis=1) for quad in quads]).astype(np.int64)
+    x, y = space.node_coordinates()[:, nodes]
+    area = (x[:, 2] - x[:, 0]) * (y[:, 3] - y[:, 1]) - (x[:, 3] - x[:, 1]) * (y[:, 2] - y[:, 0])
+    return np.where((area > 0)[:, None], nodes, nodes[:, ::-1])
+
+
+def _triangles(space: FlowSpace, cells: IntArray | slice = slice(None)) -> IntArray:
+    """Eight straight triangles per nine-node cell, counter-clockwise, shape (m, 3)."""
+    quads = quarter_cells(space=space, cells=cells)
+    return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+
+
+def _potential(space: FlowSpace, gradient: FloatArray, known: IntArray, values: FloatArray) -> FloatArray:
+    """Nodal psi with known values at some nodes whose gradient is nearest to a given one."""
+    reference = np.einsum("eq,deq,kdeq->keq", space.weights, gradient, space.inverse, optimize=True)
+    local = np.einsum("keq,kiq->ei", reference, space.slope, optimize=True)
+    size = space.velocity_nodes
+    right = np.bincount(space.velocity.element_dofs.T.ravel(), weights=local.ravel(), minlength=size)
+    pattern = space.velocity_pattern
+    matrix = sparse.csc_matrix((stiffness_entries(space), (pattern.rows, pattern.cols)), shape=(size, size))
+    psi = np.zeros(size)
+    psi[known] = values
+    free = np.setdiff1d(np.arange(size), known)
+    psi[free] = spsolve(matrix[free][:, free], (right - matrix @ psi)[free])
+    return psi
+
+
+def _section_status(clipped: bool) -> Status:
+    if not clipped:
+        return Status()
+    text = (
+        f"drawn at the nearest flow of the same R/Re with R Re <= {LARGEST_KL:.0e} and "
+        f"R <= {LARGEST_ROTATION:.0e}: beyond, steady flow in one pair of vortices is not to be expected"
+    )
+    return Status(code=StatusCode.OUT_OF_RANGE, text=text)
+
+
+def _in_plane_stream_function(system: FlowSystem, flow: FlowSolution) -> FloatArray:
+    space = system.space
+    u, v = at_points(space, flow.velocity)[0][:2]
+    edge = np.concatenate([space.boundary_nodes(name) for name in ("wall", "symmetry")])
+    return _potential(space, np.stack([-v, u]), np.unique(edge).astype(np.int64), np.zeros(1))
+
+
+def section_flow(*, reynolds: float, rotation_reynolds: float) -> SectionFlow:
+    """Developed laminar flow in the section of a tube that turns about an axis across it.
+
+    Args: `reynolds`: Re = U d/nu, above zero. `rotation_reynolds`: R = omega d^2/nu, zero or more.
+    Returns: The flow over the whole disc; beyond R Re = 1e6 or R = 1e4 the nearest flow of the same R/Re, its
+        status OUT_OF_RANGE.
+    Raises: ValueError: an argument that is not finite or out of its bounds.
+    Raises: ArithmeticError: the flow was not found.
+    Source: `rotating_section`.
+    """
+    _check(reynolds, "reynolds", above=True)
+    _check(rotation_reynolds, "rotation_reynolds", above=False)
+    kl, s = reynolds * rotation_reynolds, rotation_reynolds / reynolds
+    drawn = min(kl, LARGEST_KL, LARGEST_ROTATION * (LARGEST_ROTATION / s)) if s > 0.0 else 0.0
+    system = section_system(cells=_SECTION)
+    settings = NewtonSettings(max_iterations=10, tolerance=1e-6)
+
+    def solve(a: float, start: FlowSolution | None) -> FlowSolution:
+        at = _KL_SCALE * float(np.expm1(a))
+        return solve_section(system=system, kl=at, s=s, start=start, settings=settings)
+
+    flow = _followed(solve, float(np.log1p(drawn / _KL_SCALE)), 2.0)
+    re = reynolds if drawn == kl else float(np.sqrt(drawn / s))
+    status = flow.status if not flow.status.ok else _section_status(drawn < kl)
+    return _whole_section(system, flow, re, re * s, status)
+
+
+def _whole_section(
+    system: FlowSystem, flow: FlowSolution, re: float, rotation: float, status: Status
+) -> SectionFlow:
+    """The half section and its mirror image, which share the nodes on the symmetry line."""
+    space = system.space
+    half = space.node_coordinates()
+    on_line = np.zeros(half.shape[1], dtype=bool)
+    on_line[space.boundary_nodes("symmetry")] = True
+    off = np.flatnonzero(~on_line)
+    image = np.arange(half.shape[1])
+    image[off] = half.shape[1] + np.arange(off.size)
+    triangles = _triangles(space)
+    u, v, w = flow.velocity
+    psi = _in_plane_stream_function(system, flow)
+
+    def both(values: FloatArray, sign: float) -> FloatArray:
+        return np.concatenate([values, sign * values[off]])
+
+    return SectionFlow(
+        points=np.stack([both(half[0], 1.0), both(half[1], -1.0)]),
+        triangles=np.concatenate([triangles, image[triangles][:, ::-1]]),
+        axial_velocity=both(w, 1.0),
+        velocity=np.stack([both(u, 1.0), both(v, -1.0)]) / re,
+        stream_function=both(psi, -1.0) / re,
+        reynolds=re,
+        rotation_reynolds=rotation,
+        friction_ratio=friction_ratio(flow),
+        status=status,
+    )
+
+
+def _check(value: float, name: str, *, above: bool) -> None:
+    if not (np.isfinite(value) and (value > 0.0 if above else value >= 0.0)):
+        raise ValueError(f"{name} must be finite and {'above zero' if above else 'not negative'}")
+
+
+def entrance_flow(*, reynolds: float) -> EndFlow:
+    """Laminar flow from a large reservoir into a sharp-edged tube.
+
+    Args: `reynolds`: Re = U d/nu, above zero.
+    Returns: The flow near the mouth; beyond Re = 2000 the one there, its status OUT_OF_RANGE.
+    Raises: ValueError: an argument that is not finite or not above zero.
+    Raises: ArithmeticError: the flow was not found.
+    Source: `end_losses`.
+    """
+    _check(reynolds, "reynolds", above=True)
+    length = 10.0 + 0.1 * min(reynolds, LARGEST_END_REYNOLDS)
+    cells = EndMesh(cells_per_fold=1.8, edge_cell=1e-2, reservoir=10.0, tube=length)
+    return _end_flow("entrance", _entrance_system(cells), reynolds, 3.0)
+
+
+def exit_flow(*, reynolds: float) -> EndFlow:
+    """Laminar developed flow from a sharp-edged tube into a large reservoir.
+
+    Args: `reynolds`: Re = U d/nu, above zero.
+    Returns: The flow near the mouth; beyond Re = 2000 the one there, its status OUT_OF_RANGE.
+    Raises: ValueError: an argument that is not finite or not above zero.
+    Raises: ArithmeticError: the flow was not found.
+    Source: `end_losses`.
+    """
+    _check(reynolds, "reynolds", above=True)
+    cells = EndMesh(cells_per_fold=1.3, edge_cell=1e-2, reservoir=15.0, tube=2.0, jet_cell=1.0)
+    return _end_flow("exit", end_system(cells=cells, end="exit"), reynolds, 1.2)
+
+
+def _sink(component: int) -> Callable[[FloatArray], FloatArray]:
+    """Velocity of a half-space that drains U pi d^2/4 at the origin."""
+
+    def velocity(at: FloatArray) -> FloatArray:
+        distance = np.maximum(np.hypot(at[0], at[1]), 0.5)
+        return np.asarray(-at[component] / (8 * distance**3), dtype=np.float64)
+
+    return velocity
+
+
+def _entrance_system(cells: EndMesh) -> FlowSystem:
+    """An entrance fed by a sink's flow: let in freely so near, liquid at high Re makes the solve unstable."""
+    space = taylor_hood(mesh=end_mesh(cells=cells, end="entrance"), axisymmetric=True)
+    conditions = [Dirichlet(boundary=b, component=c, value=_sink(c)) for b in ("far", "side") for c in (0, 1)]
+    conditions += [Dirichlet(boundary="wall", component=c) for c in (0, 1)]
+    conditions += [Dirichlet(boundary="deep", component=1), Dirichlet(boundary="axis", component=1)]
+    return flow_system(space=space, conditions=conditions)
+
+
+def _reservoir_pressure(space: FlowSpace, pressure: FloatArray) -> float:
+    """Mean over the far surface."""
+    basis: Any = space.pressure
+    return float(pressure[basis.get_dofs("far").flatten()].mean())
+
+
+def _end_flow(end: End, system: FlowSystem, reynolds: float, first: float) -> EndFlow:
+    re = min(reynolds, LARGEST_END_REYNOLDS)
+    settings = NewtonSettings(max_iterations=10, tolerance=1e-5)
+
+    def solve(a: float, start: FlowSolution | None) -> FlowSolution:
+        at = _END_SCALE * float(np.expm1(a))
+        return solve_end(system=system, reynolds=at, start=start, settings=settings)
+
+    flow = _followed(solve, float(np.log1p(re / _END_SCALE)), first)
+    status = flow.status
+    if status.ok and re < reynolds:
+        text = f"drawn at Re = {re:.0f}: beyond, steady laminar flow is not to be expected"
+        status = Status(code=StatusCode.OUT_OF_RANGE, text=text)
+    return _near_the_mouth(end, system, flow, re, status)
+
+
+def _meridional_stream_function(system: FlowSystem, flow: FlowSolution) -> FloatArray:
+    space = system.space
+    u, v = at_points(space, flow.velocity)[0]
+    axis, wall = (space.boundary_nodes(name) for name in ("axis", "wall"))
+    values = np.concatenate([np.zeros(axis.size), np.full(wall.size, _FLOW_THROUGH)])
+    r = space.points[1]
+    # Weighted so that the fit is of the velocity, whose every component is a derivative of psi over r.
+    fitted = replace(space, weights=space.weights / r**2)
+    return _potential(fitted, np.stack([-r * v, r * u]), np.concatenate([axis, wall]), values)
+
+
+def nodal_pressure(*, space: FlowSpace, pressure: FloatArray) -> FloatArray:
+    """The linear pressure at all nodes of the velocity.
+
+    Args: `pressure`: nodal, shape (pressure nodes,).
+    Returns: Shape (velocity nodes,).
+    """
+    basis: Any = space.pressure
+    at = np.asarray(space.velocity.elem.doflocs, dtype=np.float64).T
+    shape = np.stack([np.broadcast_to(basis.elem.lbasis(at, i)[0], at.shape[1]) for i in range(basis.Nbfun)])
+    out = np.zeros(space.velocity_nodes)
+    out[space.velocity.element_dofs] = np.einsum("in,ie->ne", shape, pressure[basis.element_dofs])
+    return out
+
+
+def _near_the_mouth(end: End, system: FlowSystem, flow: FlowSolution, re: float, status: Status) -> EndFlow:
+    space = system.space
+    at = space.node_coordinates()
+    low, high, radius = _WINDOWS[end]
+    x, r = (c[space.velocity.element_dofs[8]] for c in at)
+    cells = np.flatnonzero((x > low) & (x < high) & (r < radius))
+    reservoir = _reservoir_pressure(space, flow.pressure)
+    used, triangles = np.unique(_triangles(space, cells), return_inverse=True)
+    return EndFlow(
+        points=at[:, used],
+        triangles=triangles.reshape(-1, 3).astype(np.int64),
+        velocity=flow.velocity[:, used],
+        speed=np.asarray(np.hypot(*flow.velocity[:, used]), dtype=np.float64),
+        stream_function=_meridional_stream_function(system, flow)[used],
+        pressure=2 / re * nodal_pressure(space=space, pressure=flow.pressure - reservoir)[used],
+        reynolds=re,
+        status=status,
+    )

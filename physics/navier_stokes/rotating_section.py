@@ -1,0 +1,157 @@
+"""Laminar fully developed flow in a straight tube that rotates about an axis at right angles to its own.
+
+Half of the circular section, lengths over the bore d, velocities over the mean velocity U.  With x along the
+tube, z along the rotation axis, w the axial and (u, v) the velocity along (y, z), and p the reduced pressure:
+
+    Re (u w_y + v w_z) - 2 R u = G + lap w
+    Re (u u_y + v u_z) + 2 R w = -p_y + lap u
+    Re (u v_y + v v_z)         = -p_z + lap v,     u_y + v_z = 0,     mean(w) = 1
+
+Re = U d/nu, R = omega d^2/nu.  The friction ratio is F = G/32, 1 without rotation.  Equivalent pairs are
+Kl = R Re and S = R/Re; at Re = 0 (S infinite) the problem is linear.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ringbalance.physics.navier_stokes.meshes import (
+    Patch,
+    geometric_vertices,
+    patch_mesh,
+    ruled_patch,
+    with_midpoints,
+)
+from ringbalance.physics.navier_stokes.newton import (
+    Coefficients,
+    Dirichlet,
+    FlowSolution,
+    FlowSystem,
+    NewtonSettings,
+    flow_system,
+    solve_flow,
+)
+from ringbalance.physics.navier_stokes.space import taylor_hood
+from ringbalance.scene.arrays import FloatArray
+
+__all__ = [
+    "SectionMesh",
+    "friction_ratio",
+    "section_mesh",
+    "section_system",
+    "solve_section",
+    "solve_section_without_inertia",
+]
+
+
+POISEUILLE_GRADIENT = 32.0
+"""G of a tube at rest: -dp/dx d^2/(mu U)."""
+CORIOLIS = ((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (-1.0, 0.0, 0.0))
+"""e_z x velocity for components along (y, z, x)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SectionMesh:
+    """Cells of the half section: a core of 2 n x n cells inside a ring of 4 n cells around."""
+
+    around: int = 6
+    """n."""
+    across: int = 12
+    """Cells of the ring between core and wall."""
+    wall_ratio: float = 12.0
+    """Innermost cell of the ring over the cell at the wall."""
+    shape: str = "quad"
+
+
+def _lines(points: FloatArray, count: int) -> FloatArray:
+    """Nodes on a straight line between two points, shape (2 count + 1, 2)."""
+    share = np.linspace(0.0, 1.0, 2 * count + 1)[:, None]
+    return np.asarray((1 - share) * points[0] + share * points[1], dtype=np.float64)
+
+
+def _core(n: int, half_width: float, corner: float) -> tuple[FloatArray, list[FloatArray]]:
+    """Nodes of the core, and its right, top and left edges in the order of growing angle."""
+    bottom = _lines(np.array([[-half_width, 0.0], [half_width, 0.0]]), 2 * n)
+    angles = np.pi * np.linspace(0.75, 0.25, 4 * n + 1)
+    straight = _lines(np.array([[-corner, corner], [corner, corner]]), 2 * n)
+    bulge = np.stack([np.cos(angles), np.sin(angles)], axis=1) * corner * np.sqrt(2.0)
+    top = (straight + bulge) / 2
+    nodes = ruled_patch(inner=bottom, outer=top, blend=np.linspace(0.0, 1.0, 2 * n + 1)).nodes
+    return nodes, [nodes[-1], nodes[::-1, -1], nodes[0, ::-1]]
+
+
+def section_mesh(*, cells: SectionMesh) -> Any:
+    """Curved mesh of the half section (y, z >= 0) of a tube of unit bore, refined towards the wall.
+
+    Args: `cells`: numbers of cells and their grading.
+    Returns: Quadratic mesh with boundaries wall and symmetry.
+    """
+    n = cells.around
+    core, edges = _core(n, 0.26, 0.2)
+    blend = 1 - with_midpoints(vertices=geometric_vertices(cells=cells.across, ratio=cells.wall_ratio))[::-1]
+    patches = [Patch(nodes=core, sides={"south": "symmetry"})]
+    ranges = ((0.0, 0.25, n), (0.25, 0.75, 2 * n), (0.75, 1.0, n))
+    for edge, (first, last, count), flat in zip(edges, ranges, ("west", "", "east"), strict=True):
+        angles = np.pi * np.linspace(first, last, 2 * count + 1)
+        wall = 0.5 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        wall[np.abs(wall) < 1e-15] = 0.0
+        sides = {"north": "wall"} | ({flat: "symmetry"} if flat else {})
+        patches.append(ruled_patch(inner=edge, outer=wall, blend=blend, sides=sides))
+    return patch_mesh(patches=patches, shape=cells.shape)
+
+
+def section_system(*, cells: SectionMesh) -> FlowSystem:
+    """Discrete equations of the half section: no slip at the wall, mirror symmetry about z = 0.
+
+    Returns: The system, to be solved by `solve_section`.
+    """
+    space = taylor_hood(mesh=section_mesh(cells=cells), components=3)
+    conditions = [Dirichlet(boundary="symmetry", component=1)]
+    conditions += [Dirichlet(boundary="wall", component=c) for c in range(3)]
+    return flow_system(space=space, conditions=conditions, enclosed=True, flow_component=2, coriolis=CORIOLIS)
+
+
+def solve_section(
+    *,
+    system: FlowSystem,
+    kl: float,
+    s: float,
+    start: FlowSolution | None = None,
+    settings: NewtonSettings | None = None,
+) -> FlowSolution:
+    """Fully developed flow in the rotating tube at given Kl = R Re and S = R/Re.
+
+    The in-plane velocity is measured in nu/d: Re and R then enter through Kl and S alone, and S may be zero.
+
+        u w_y + v w_z - 2 S u = G + lap w,    u u_y + v u_z + 2 Kl w = -p_y + lap u,    ...
+    Args: `kl`: Kl, at least 0. `s`: S, at least 0. `start`: a neighbouring flow; needed once Kl exceeds a few
+        thousand. `settings`: of Newton's method.
+    Returns: The flow; nodal velocity components along (y, z) over nu/d, and along x over U.
+    """
+    rotation = ((0.0, 0.0, 2 * kl), (0.0, 0.0, 0.0), (2 * s, 0.0, 0.0))
+    c = Coefficients(inertia=1.0, viscosity=1.0, rotation=rotation)
+    area = float(system.space.weights.sum())
+    return solve_flow(system=system, coefficients=c, flow_rate=area, start=start, settings=settings)
+
+
+def solve_section_without_inertia(*, system: FlowSystem, rotation_reynolds: float) -> FlowSolution:
+    """Fully developed flow in the rotating tube in the limit Re = 0, where it is linear.
+
+    Args: `rotation_reynolds`: R = omega d^2/nu.
+    Returns: The flow; nodal velocity components along (y, z, x) over U.
+    """
+    c = Coefficients(inertia=0.0, viscosity=1.0, rotation=2 * rotation_reynolds)
+    area = float(system.space.weights.sum())
+    return solve_flow(system=system, coefficients=c, flow_rate=area)
+
+
+def friction_ratio(solution: FlowSolution) -> float:
+    """F = G/32, the pressure gradient over that of the tube at rest at the same flow rate.
+
+    Args: `solution`: of the section, made dimensionless with bore and mean velocity.
+    Returns: F, dimensionless.
+    """
+    return solution.driving_gradient / POISEUILLE_GRADIENT

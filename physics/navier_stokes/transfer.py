@@ -1,0 +1,106 @@
+"""Values of a flow at points and on another mesh, on curved elements too."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.physics.navier_stokes.newton import FlowSolution, FlowSystem
+from ringbalance.physics.navier_stokes.space import FlowSpace
+from ringbalance.physics.navier_stokes.system import split
+from ringbalance.scene.arrays import FloatArray, IntArray
+
+_MARGIN = 0.05
+"""Share of an element by which a point may lie outside it: a chord's sagitta on a coarser curved mesh."""
+
+
+def _candidates(space: FlowSpace, points: FloatArray) -> tuple[IntArray, IntArray]:
+    """Pairs (point, element) whose bounding box holds the point."""
+    corners = space.node_coordinates()[:, space.velocity.element_dofs]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    margin = _MARGIN * (high - low) + 1e-12
+    inside = np.ones((points.shape[1], low.shape[1]), dtype=bool)
+    for x, below, above, m in zip(points, low, high, margin, strict=True):
+        inside &= (x[:, None] >= below - m) & (x[:, None] <= above + m)
+    point, element = np.nonzero(inside)
+    return point.astype(np.int64), element.astype(np.int64)
+
+
+def _shape_at(element: Any, local: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
+    pairs = [element.lbasis(local, i) for i in range(count)]
+    shape = np.stack([np.broadcast_to(phi, local.shape[1]) for phi, _ in pairs])
+    return shape, np.stack([np.broadcast_to(dphi, local.shape) for _, dphi in pairs])
+
+
+def _reference_coordinates(space: FlowSpace, points: FloatArray, elements: IntArray) -> FloatArray:
+    """Newton's inverse of the element map, shape (dimension, pairs)."""
+    basis = space.velocity
+    nodes = space.node_coordinates()[:, basis.element_dofs[:, elements]]
+    local = np.full(points.shape, 0.5 if nodes.shape[1] in (9, 27) else 1 / 3)
+    for _ in range(12):
+        shape, slope = _shape_at(basis.elem, local, basis.Nbfun)
+        gap = np.einsum("din,in->dn", nodes, shape) - points
+        jacobian = np.einsum("din,ikn->ndk", nodes, slope)
+        local = local - np.linalg.solve(jacobian, gap.T[:, :, None])[:, :, 0].T
+        local = np.clip(local, -1.0, 2.0)
+    return local
+
+
+def _outside(local: FloatArray, simplex: bool) -> FloatArray:
+    """How far reference coordinates lie outside the element, 0 inside."""
+    excess = np.maximum(-local.min(axis=0), (local.sum(axis=0) if simplex else local.max(axis=0)) - 1)
+    return np.asarray(np.maximum(excess, 0.0), dtype=np.float64)
+
+
+def locate(*, space: FlowSpace, points: npt.ArrayLike) -> tuple[IntArray, FloatArray]:
+    """Element and reference coordinates of points.
+
+    Args: `points`: shape (dimension, n).
+    Returns: Elements (n,) and reference coordinates (dimension, n).
+    Raises: ValueError: a point outside the mesh.
+    """
+    at = np.asarray(points, dtype=np.float64)
+    point, element = _candidates(space, at)
+    local = _reference_coordinates(space, at[:, point], element)
+    outside = _outside(local, space.mesh.refdom.__name__ in ("RefTri", "RefTet"))
+    order = np.lexsort((outside, point))
+    found, first = np.unique(point[order], return_index=True)
+    best = order[first]
+    if found.size < at.shape[1] or np.any(outside[best] > _MARGIN):
+        raise ValueError("a point lies outside the mesh")
+    return element[best], local[:, best]
+
+
+def probe(*, system: FlowSystem, solution: FlowSolution, points: npt.ArrayLike) -> FloatArray:
+    """Velocity and pressure at points.
+
+    Args: `points`: shape (dimension, n), inside the mesh.
+    Returns: Shape (components + 1, n), pressure last.
+    Raises: ValueError: a point outside the mesh.
+    """
+    return _evaluate(system.space, solution.vector, np.asarray(points, dtype=np.float64))
+
+
+def _evaluate(space: FlowSpace, vector: FloatArray, points: FloatArray) -> FloatArray:
+    element, local = locate(space=space, points=points)
+    velocity, pressure = split(space, vector)
+    rows = []
+    for basis, values in [(space.velocity, v) for v in velocity] + [(space.pressure, pressure)]:
+        shape, _ = _shape_at(basis.elem, local, basis.Nbfun)
+        rows.append((values[basis.element_dofs[:, element]] * shape).sum(axis=0))
+    return np.stack(rows)
+
+
+def transfer(*, source: FlowSystem, solution: FlowSolution, target: FlowSystem) -> FloatArray:
+    """A flow on another mesh of the same domain, as a start for Newton's method there.
+
+    Args: `target`: system on the other mesh.
+    Returns: Full vector of the target.
+    """
+    space = target.space
+    velocity = _evaluate(source.space, solution.vector, space.node_coordinates())[:-1]
+    pressure_points = np.asarray(space.pressure.doflocs, dtype=np.float64)
+    pressure = _evaluate(source.space, solution.vector, pressure_points)[-1]
+    return np.concatenate([velocity.ravel(), pressure])

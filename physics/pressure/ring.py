@@ -1,0 +1,304 @@
+"""What the liquid ring in one chamber does to its disc: volume, wall pressure, moment and wall forces.
+
+Every number comes from finite elements on three meshes or more and carries the half-width that the grid
+convergence of exactly this number gives it.  With gravity across the shaft each number is the mean over a
+turn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.mesh.chamber import default_cells
+from ringbalance.mesh.geometry import half_angle, surface_radius
+from ringbalance.physics.convergence.grid import GridConvergence, gci
+from ringbalance.physics.pressure.ring_bounds import Case, rounding_bound, stated_widths
+from ringbalance.physics.pressure.ring_samples import (
+    COLUMNS,
+    SCALARS,
+    WALLS,
+    WIDTH,
+    Sample,
+    Turn,
+    empty_sample,
+    turn_mean,
+)
+from ringbalance.physics.pressure.solve import RotatingLiquid
+from ringbalance.physics.results import Estimate, Statistics, Status
+from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.scene.models import Disc, Shaft
+
+FORMAL_ORDER = 4.0
+"""Of integrals on quadratic geometry: twice the order of the elements, and that of an arc's drawing."""
+PLATE_ORDER = 3.0
+"""Of what a plate alone feels: its edge on the free surface, where the conditions change, costs one order."""
+
+_SHALLOWEST = 1e-10
+"""Depth over outer radius at which coordinates still resolve the nodes of a film."""
+_AVERAGING = 1e-8
+"""Left-over harmonics in the mean over a turn, relative; decides the number of samples."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RingQuantities:
+    """Totals of the liquid in one chamber along an array of fill ratios, SI; arrays start with that axis.
+
+    Axes: x outward through the middle of the chamber, y with the rotation, z along the shaft.
+    """
+
+    fill_ratio: FloatArray
+    """x, shape (n,)."""
+    surface_radius: FloatArray
+    """Radius of the concentric free surface that holds the same volume, m, shape (n,)."""
+    liquid_volume: Estimate
+    """m^3, shape (n,)."""
+    wall_pressure: Estimate
+    """Mean over the outer wall, of the liquid alone (gas counted as zero), Pa, shape (n,)."""
+    moment: Estimate
+    """U = rho times the integral of x over the liquid, kg m, shape (n,)."""
+    moment_per_volume: Estimate
+    """dU/dV' as liquid is added, kg/m^2, shape (n,)."""
+    wall_force: Mapping[str, Estimate]
+    """Force of the liquid on each wall, N, shape (n, 3)."""
+    resultant_force: Estimate
+    """Sum over the walls, N, shape (n, 3)."""
+    wall_torque: Mapping[str, Estimate]
+    """Torque of the liquid on each wall about the shaft, with the rotation, N m, shape (n,)."""
+    resultant_torque: Estimate
+    """Sum over the walls, N m, shape (n,)."""
+    ripple: Mapping[str, FloatArray]
+    """First harmonic over a turn of "wall_pressure" (Pa) and "moment" (kg m), zero-to-peak, shape (n,)."""
+    convergence: Mapping[str, tuple[GridConvergence, ...]]
+    """Judgement on each scalar quantity by its name, one per fill ratio."""
+    mesh_values: Mapping[str, FloatArray]
+    """Each scalar quantity on every mesh, finest first, shape (meshes, n)."""
+    cells: tuple[tuple[int, ...], ...]
+    """Cells of the meshes, finest first."""
+    closed: BoolArray
+    """Whether gravity leaves a closed ring, shape (n,); where not, values are those without gravity."""
+    solved: BoolArray
+    """Whether there are values at all, shape (n,); where not, zeros stand for them, which are no result."""
+    status: Status
+    statistics: Statistics
+
+    @property
+    def observed_order(self) -> Mapping[str, FloatArray]:
+        """Observed order of each scalar quantity, shape (n,); zero where round-off hides it."""
+        return {
+            name: np.array([record.observed_order for record in records])
+            for name, records in self.convergence.items()
+        }
+
+
+def ring_quantities(
+    *,
+    disc: Disc,
+    density: float,
+    angular_velocity: float,
+    fill_ratio: npt.ArrayLike,
+    gravity: float = 0.0,
+    shaft: Shaft = "horizontal",
+    dimension: int | None = None,
+    cells: Sequence[tuple[int, ...]] | None = None,
+    turn_samples: int | None = None,
+    source_factor: float = 1.0,
+    wall_factor: float = 1.0,
+) -> RingQuantities:
+    """Finite-element totals of one chamber's liquid over fill ratios, each with its uncertainty.
+
+    laplace(p) = 2 rho omega^2, n.grad p = rho (omega^2 r e_r + g).n on walls, p = 0 on the free surface; then
+    volume, mean p on the outer wall, U = int rho x, dU/dV' = rho int x/|n.grad p| / int 1/|n.grad p|, and
+    the forces int p n.
+    Args:
+        density: rho, kg/m^3.
+        angular_velocity: omega, rad/s, not zero.
+        fill_ratio: x, any shape, flattened to (n,), within [0, 1]; an empty chamber is exact.
+        gravity: g, m/s^2; zero leaves it out.
+        shaft: "horizontal" turns gravity across the chamber, "vertical" points it along -z.
+        dimension: 2 or 3; default 2, or 3 for a vertical shaft with gravity, which 2 cannot describe.
+        cells: meshes, finest first, each with half the cells of the one before; default `default_cells` and
+            two coarser ones; they decide the dimension when given.
+        turn_samples: even number of angles of gravity over a turn; default enough for a mean within 1e-8.
+        source_factor: multiplies the source term; anything but 1 is a deliberate error.
+        wall_factor: multiplies the walls' condition; anything but 1 is a deliberate error.
+    Returns: The totals. Where gravity leaves no closed ring, or its surface is not found, status says so,
+        `closed` is False and the values are those without gravity, their half-widths widened by all that
+        gravity could do to the liquid there.
+    Raises: ValueError: fill ratios outside [0, 1], or above 0 but too small for a mesh; density, speed or
+        number of samples that make no sense; two dimensions for gravity along the shaft; fewer than three
+        meshes.
+    Source: Eqs. 3 to 12 of the liquid-ring paper, with exact plates; Celik et al. (2008),
+    doi:10.1115/1.2960953.
+    """
+    fills = np.atleast_1d(np.asarray(fill_ratio, dtype=np.float64)).ravel()
+    _check(fills, density, angular_velocity, gravity)
+    _check_depth(disc, fills)
+    axial = gravity > 0 and shaft == "vertical"
+    meshes = _meshes(disc, cells, dimension or (3 if axial else 2))
+    if axial and len(meshes[0]) == 2:
+        raise ValueError("gravity along the shaft needs dimension 3")
+    liquid = RotatingLiquid(
+        density=density,
+        angular_velocity=angular_velocity,
+        source_factor=source_factor,
+        wall_factor=wall_factor,
+    )
+    turn = Turn(gravity=gravity, shaft=shaft, samples=_turn_samples(disc, liquid, gravity, turn_samples))
+    case = Case(disc=disc, liquid=liquid, fills=fills, meshes=meshes, turn=turn)
+    return _collect(case, [_on_meshes(case, float(x), turn) for x in fills])
+
+
+def _check(fills: FloatArray, density: float, omega: float, gravity: float) -> None:
+    if fills.size == 0 or not np.all((fills >= 0) & (fills <= 1)):
+        raise ValueError("fill_ratio must lie within [0, 1], and there must be at least one")
+    if not (density > 0 and np.isfinite(density) and np.isfinite(omega) and omega != 0):
+        raise ValueError("density must be positive and angular_velocity not zero, both finite")
+    if not (gravity >= 0 and np.isfinite(gravity)):
+        raise ValueError("gravity must be zero or positive")
+
+
+def _check_depth(disc: Disc, fills: FloatArray) -> None:
+    depth = 1 - surface_radius(disc=disc, fill_ratio=fills) / disc.outer_radius
+    thin = fills[(fills > 0) & (depth < _SHALLOWEST)]
+    if thin.size:
+        raise ValueError(
+            f"fill_ratio {thin[0]:.3g} leaves a ring shallower than {_SHALLOWEST:g} of the outer radius, "
+            "which no mesh resolves; give zero instead"
+        )
+
+
+def _meshes(
+    disc: Disc, cells: Sequence[tuple[int, ...]] | None, dimension: int
+) -> tuple[tuple[int, ...], ...]:
+    finest = default_cells(disc=disc, dimension=dimension)
+    meshes = tuple(cells) if cells else tuple(tuple(n // k for n in finest) for k in (1, 2, 4))
+    if len(meshes) < 3 or any(len(c) != len(meshes[0]) for c in meshes):
+        raise ValueError("cells must list at least three meshes of one dimension, finest first")
+    return meshes
+
+
+def _turn_samples(disc: Disc, liquid: RotatingLiquid, gravity: float, wanted: int | None) -> int:
+    if wanted is not None:
+        if wanted < 2 or wanted % 2:
+            raise ValueError("turn_samples must be even and at least two")
+        return wanted
+    tilt = gravity / (liquid.angular_velocity**2 * disc.inner_radius)
+    if tilt == 0:
+        return 2
+    harmonics = np.log(_AVERAGING) / np.log(min(tilt, 0.3))
+    return 2 * max(2, int(np.ceil(harmonics / 2)))
+
+
+def _on_meshes(case: Case, x: float, turn: Turn) -> tuple[Sample, ...]:
+    """Samples on every mesh, finest first, each starting from the surfaces of the coarser one."""
+    disc, liquid, meshes = case.disc, case.liquid, case.meshes
+    if x == 0:
+        half = float(half_angle(disc=disc, radius=disc.outer_radius))
+        drop = liquid.density * disc.outer_radius * np.sin(half) / half
+        return (empty_sample(moment_per_volume=drop),) * len(meshes)
+    found: list[Sample] = []
+    for k, cells in reversed(list(enumerate(meshes))):
+        halves = found and all(n == 2 * m for n, m in zip(cells, meshes[k + 1], strict=True))
+        sample = turn_mean(
+            disc=disc,
+            liquid=liquid,
+            fill_ratio=x,
+            cells=cells,
+            turn=turn,
+            coarser=found[-1] if halves else None,
+        )
+        found.append(sample)
+    return tuple(reversed(found))
+
+
+def _collect(case: Case, samples: Sequence[tuple[Sample, ...]]) -> RingQuantities:
+    failed = [next((s.status for s in levels if not s.status.ok), Status()) for levels in samples]
+    still = Turn(gravity=0.0, shaft="horizontal", samples=2)
+    kept = [
+        levels if status.ok else _on_meshes(case, float(x), still)
+        for levels, status, x in zip(samples, failed, case.fills, strict=True)
+    ]
+    missing = [next((s.status for s in levels if not s.status.ok), Status()) for levels in kept]
+    values = np.array([[sample.values for sample in levels] for levels in kept])
+    records = _judge(case, kept, values)
+    closed = np.array([status.ok for status in failed])
+    widths = np.array([[record.uncertainty for record in row] for row in records])
+    widths = stated_widths(case=case, samples=kept, widths=widths, closed=closed)
+    status = _status(case, failed) if all(s.ok for s in missing) else _status(case, missing, solved=False)
+    parts = {
+        name: Estimate(value=_part(values[:, 0], name), uncertainty=_part(widths, name), status=status)
+        for name in COLUMNS
+    }
+    return RingQuantities(
+        fill_ratio=case.fills,
+        surface_radius=surface_radius(disc=case.disc, fill_ratio=case.fills),
+        **{name: parts[name] for name in SCALARS},
+        wall_force={name: parts[f"force {name}"] for name in WALLS},
+        resultant_force=parts["force resultant"],
+        wall_torque={name: parts[f"torque {name}"] for name in WALLS},
+        resultant_torque=parts["torque resultant"],
+        ripple=_ripple(kept),
+        convergence={name: tuple(row[k] for row in records) for k, name in enumerate(SCALARS)},
+        mesh_values={name: values[:, :, k].T.copy() for k, name in enumerate(SCALARS)},
+        cells=case.meshes,
+        closed=closed,
+        solved=np.array([status.ok for status in missing]),
+        status=status,
+        statistics=_statistics(kept),
+    )
+
+
+def _ripple(samples: Sequence[tuple[Sample, ...]]) -> dict[str, FloatArray]:
+    ripple = np.array([levels[0].ripple for levels in samples])
+    return {"wall_pressure": ripple[:, 0], "moment": ripple[:, 1]}
+
+
+def _statistics(samples: Sequence[tuple[Sample, ...]]) -> Statistics:
+    finest = [levels[0] for levels in samples]
+    return Statistics(
+        unknowns=max(sample.unknowns for sample in finest),
+        relative_residual=max(sample.residual for levels in samples for sample in levels),
+        extra={"surface_flux_mismatch": max(sample.flux_mismatch for sample in finest)},
+    )
+
+
+def _part(table: FloatArray, name: str) -> FloatArray:
+    columns = table[:, COLUMNS[name]]
+    return np.array(columns if columns.shape[1] > 1 else columns[:, 0])
+
+
+def _judge(
+    case: Case, samples: Sequence[tuple[Sample, ...]], values: FloatArray
+) -> list[list[GridConvergence]]:
+    sizes = [float(np.prod(cells)) ** (-1 / len(cells)) for cells in case.meshes]
+    orders = np.full(WIDTH, FORMAL_ORDER)
+    for name, columns in COLUMNS.items():
+        if "plate" in name:
+            orders[columns] = PLATE_ORDER
+    rows = []
+    for x, levels, found in zip(case.fills, samples, values, strict=True):
+        noise = rounding_bound(case=case, fill_ratio=float(x), samples=levels)
+        rows.append(
+            [
+                gci(
+                    values=found[:, k],
+                    sizes=sizes,
+                    formal_order=float(orders[k]),
+                    round_off=float(noise[k]),
+                )
+                for k in range(WIDTH)
+            ]
+        )
+    return rows
+
+
+def _status(case: Case, failed: Sequence[Status], *, solved: bool = True) -> Status:
+    for x, status in zip(case.fills, failed, strict=True):
+        if not status.ok:
+            said = "; values there are without gravity" if case.turn.gravity and solved else ""
+            return Status(code=status.code, text=f"at a fill ratio of {x:.4g}: {status.text}{said}")
+    return Status()

@@ -1,0 +1,208 @@
+"""The pressure of the liquid in a chamber that turns: a Poisson problem with the gas on its free surface.
+
+In the rotating frame liquid at rest obeys grad p = rho (omega^2 r e_r + g).  Its divergence is the equation,
+its normal component the condition on walls:
+
+    laplace(p) = f                  in the liquid,        f = 2 rho omega^2
+    n . grad p = q                  on walls,             q = rho (omega^2 r e_r + g) . n
+    p = p_gas                       on the free surface
+
+and the weak form is int grad p . grad v = - int f v + int_walls q v.  Manufactured solutions put their own
+f, q and p_gas into the same record, so they run through the same lines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from ringbalance.mesh.chamber import ChamberMesh
+from ringbalance.physics.pressure.assembly import (
+    facet_load,
+    facet_mass,
+    facet_points,
+    stiffness,
+    volume_load,
+    volume_points,
+)
+from ringbalance.physics.pressure.linear import LinearSolution, linear_prolongation, solve_linear
+from ringbalance.physics.results import Statistics, Status
+from ringbalance.scene.arrays import FloatArray
+
+FREE_SURFACE = "free_surface"
+
+
+@dataclass(frozen=True, kw_only=True)
+class PressureProblem:
+    """Right-hand sides of the pressure problem, as functions of the place; all lengths in metres."""
+
+    source: Callable[[FloatArray], FloatArray]
+    """f(x), Pa/m^2, from places of shape (dimension, ...)."""
+    wall_flux: Callable[[FloatArray, FloatArray], FloatArray]
+    """q(x, n), Pa/m, from places and outward unit normals."""
+    surface_pressure: Callable[[FloatArray], FloatArray]
+    """p_gas(x), Pa, gauge."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RotatingLiquid:
+    """Liquid at rest in the rotating frame, with gravity frozen at one instant of the turn."""
+
+    density: float
+    """rho, kg/m^3."""
+    angular_velocity: float
+    """omega, rad/s."""
+    gravity: tuple[float, ...] = ()
+    """g in the chamber's axes at this instant, m/s^2, two or three components; empty: left out."""
+    gas_pressure: float = 0.0
+    """On the free surface, Pa, gauge."""
+    source_factor: float = 1.0
+    """Multiplies the source term; anything but 1 is a deliberate error, to show that checks notice."""
+    wall_factor: float = 1.0
+    """Multiplies the walls' condition; anything but 1 is a deliberate error."""
+
+    def body_force(self, places: FloatArray) -> FloatArray:
+        """Force per volume, rho (omega^2 r e_r + g).
+
+        Args: `places`: m, shape (dimension, ...).
+        Returns: N/m^3, the shape of `places`.
+        Source: Eq. 9 of the liquid-ring paper, with gravity added.
+        """
+        force = np.array(places, dtype=np.float64) * self.angular_velocity**2
+        force[2:] = 0.0
+        for axis, component in enumerate(self.gravity[: len(force)]):
+            force[axis] += component
+        return self.density * force
+
+    def problem(self) -> PressureProblem:
+        """The right-hand sides of this liquid's pressure problem.
+
+        Returns: f = 2 rho omega^2, q = rho (omega^2 r e_r + g) . n and the gas pressure, each with its
+            factor.
+        """
+        source = 2 * self.density * self.angular_velocity**2 * self.source_factor
+        return PressureProblem(
+            source=lambda places: np.full(places.shape[1:], source),
+            wall_flux=lambda places, normals: (
+                self.wall_factor * np.einsum("i...,i...->...", self.body_force(places), normals)
+            ),
+            surface_pressure=lambda places: np.full(places.shape[1:], self.gas_pressure),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class PressureSolution:
+    """Nodal pressure on a mesh, with the flux through its free surface."""
+
+    chamber: ChamberMesh
+    pressure: FloatArray
+    """At the nodes of `chamber.mesh`, Pa, gauge, shape (nodes,)."""
+    surface_gradient: FloatArray
+    """n . grad p at the nodes of the free surface, Pa/m, n out of the liquid; the shape of
+    chamber.grid[0]."""
+    status: Status
+    statistics: Statistics
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiscreteProblem:
+    """Matrix and load of the weak form, before any condition on the free surface; lengths in mesh units."""
+
+    matrix: csr_matrix
+    load: FloatArray
+    """- int f v + int_walls q v."""
+
+
+def solve_pressure(
+    *, chamber: ChamberMesh, problem: PressureProblem, direct_limit: int | None = None
+) -> PressureSolution:
+    """Solve the pressure problem on the mesh of a chamber's liquid.
+
+    int grad p . grad v = - int f v + int_walls q v for all v that vanish on the free surface, p = p_gas
+    there.
+    Args: `chamber`: mesh, two- or three-dimensional, with its named boundaries. `problem`: right-hand sides;
+        `RotatingLiquid.problem` gives the physical ones. `direct_limit`: unknowns up to which the matrix is
+        factorised; default as in `solve_linear`.
+    Returns: The nodal pressure; its status is NOT_CONVERGED when the true residual of the linear system is
+        too large.
+    Source: Eqs. 9 to 11 of the liquid-ring paper as a boundary-value problem; quadratic elements, order three
+    in the pressure and four in integrals of it, as long as the geometry is quadratic.
+    """
+    discrete = discretise(chamber=chamber, problem=problem)
+    surface = chamber.grid[0].ravel()
+    pressure = np.zeros(discrete.load.size)
+    pressure[surface] = problem.surface_pressure(places(chamber)[:, surface])
+    free = chamber.grid[1:].ravel()
+    rows = discrete.matrix[free]
+    linear = solve_linear(
+        rows[:, free],
+        discrete.load[free] - rows @ pressure,
+        dimension=chamber.dimension,
+        prolongation=lambda: linear_prolongation(chamber, pinned_surface=True),
+        direct_limit=direct_limit,
+    )
+    pressure[free] = linear.values
+    return _solution(chamber, discrete, pressure, linear)
+
+
+def discretise(*, chamber: ChamberMesh, problem: PressureProblem) -> DiscreteProblem:
+    """Matrix and load of the weak form; the free surface is left without a condition.
+
+    Args: `chamber`: mesh with its named boundaries. `problem`: right-hand sides.
+    Returns: Matrix and load in the mesh's unit of length, pressures in Pa.
+    """
+    mesh, unit = chamber.mesh, chamber.length_scale
+    unknowns = mesh.doflocs.shape[1]
+    volume = volume_points(mesh)
+    load = -(unit**2) * volume_load(volume, problem.source(unit * volume.points), unknowns=unknowns)
+    for name in mesh.boundaries:
+        if name != FREE_SURFACE:
+            load += wall_load(chamber=chamber, problem=problem, boundary=name)
+    return DiscreteProblem(matrix=stiffness(mesh), load=load)
+
+
+def wall_load(*, chamber: ChamberMesh, problem: PressureProblem, boundary: str) -> FloatArray:
+    """Part of the load that one boundary contributes, int q v.
+
+    Args: `chamber`: mesh with its named boundaries. `problem`: right-hand sides. `boundary`: name of the
+        boundary.
+    Returns: Vector over the nodes, in the mesh's unit of length.
+    """
+    unit = chamber.length_scale
+    facets = facet_points(chamber.mesh, boundary)
+    flux = problem.wall_flux(unit * facets.points, facets.normals)
+    return unit * facet_load(facets, flux, unknowns=chamber.mesh.doflocs.shape[1])
+
+
+def places(chamber: ChamberMesh) -> FloatArray:
+    """Places of the nodes. Returns: m, shape (dimension, nodes)."""
+    return np.asarray(chamber.length_scale * chamber.mesh.doflocs)
+
+
+def _solution(
+    chamber: ChamberMesh, discrete: DiscreteProblem, pressure: FloatArray, linear: LinearSolution
+) -> PressureSolution:
+    gradient = _surface_gradient(chamber, discrete, pressure)
+    return PressureSolution(
+        chamber=chamber,
+        pressure=pressure,
+        surface_gradient=gradient.values.reshape(chamber.grid[0].shape) / chamber.length_scale,
+        status=gradient.status if linear.status.ok else linear.status,
+        statistics=linear.statistics,
+    )
+
+
+def _surface_gradient(
+    chamber: ChamberMesh, discrete: DiscreteProblem, pressure: FloatArray
+) -> LinearSolution:
+    """Flux that balances the weak form on the surface: more accurate than the gradient of the field.
+
+    In units of the mesh.
+    """
+    nodes = chamber.grid[0].ravel()
+    residual = discrete.matrix[nodes] @ pressure - discrete.load[nodes]
+    mass = facet_mass(facet_points(chamber.mesh, FREE_SURFACE), unknowns=pressure.size)
+    return solve_linear(mass[nodes][:, nodes], residual, dimension=chamber.dimension)

@@ -1,0 +1,318 @@
+"""The free surface under gravity, found and not assumed: the isobar below which the liquid just fits.
+
+The force field has a potential, so the pressure that it makes can be had up to a constant without knowing
+which boundary is free: with the normal force given on all of them.  Where that pressure is not constant along
+the surface, the surface is in the wrong place; its nodes move along their radii until it is, the volume held.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ringbalance.mesh.chamber import ChamberMesh, chamber_mesh
+from ringbalance.mesh.geometry import half_angle, liquid_area, surface_radius
+from ringbalance.physics.pressure.assembly import at_facets, facet_points, volume_points
+from ringbalance.physics.pressure.linear import linear_prolongation, solve_linear
+from ringbalance.physics.pressure.solve import (
+    FREE_SURFACE,
+    PressureSolution,
+    RotatingLiquid,
+    discretise,
+    places,
+    solve_pressure,
+    wall_load,
+)
+from ringbalance.physics.results import Statistics, Status, StatusCode
+from ringbalance.physics.splines import CubicSpline
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Disc
+
+_MAX_STEPS = 40
+_STEP_TOLERANCE = 1e-9
+"""Largest last move of a node, in mean depths."""
+_ROUNDING = 1e-5
+"""Below this a move that no longer shrinks is rounding, in mean depths: in a film depths are differences."""
+_SAFE_SHARE = 0.9
+"""Share of the way to a wall that a node may go in one step."""
+_NEAREST = 1e-3
+"""Gap to a wall, in mean depths, at which the search gives up: the surface wants to cross the wall."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FoundSurface:
+    """A mesh whose free surface has constant pressure and holds the given volume."""
+
+    chamber: ChamberMesh
+    status: Status
+    steps: int
+    last_move: float
+    """Largest move of a node in the last step, in mean depths."""
+    rounding: float
+    """Of the surface's place, in mean depths; zero when the search ended on its tolerance."""
+    volume_error: float
+    """Relative."""
+
+
+def solve_with_gravity(
+    *,
+    disc: Disc,
+    liquid: RotatingLiquid,
+    fill_ratio: float,
+    cells: tuple[int, ...],
+    start: FloatArray | None = None,
+) -> PressureSolution:
+    """Find the free surface under gravity, then solve the pressure problem below it.
+
+    Args:
+        liquid: with gravity in the chamber's axes; two components on a two-dimensional mesh.
+        fill_ratio: x, above 0 and at most 1.
+        cells: along the radius, the angle and, for a three-dimensional mesh, the axis.
+        start: radii to start from, m, at the surface nodes; default concentric.
+    Returns: The solution; NO_RING when no closed ring fits, NOT_CONVERGED when the search or the solve
+        failed; a failed search leaves a concentric mesh with no pressure on it.
+        statistics.extra["surface_flux_mismatch"] is the root mean square of n.grad p - rho (omega^2 r + g).n
+        over the surface relative to that of the force: zero only if surface, pressure and force belong
+        together.
+    Raises: ValueError: a fill ratio outside (0, 1].
+    Source: quasi-static balance, Eq. 9 of the liquid-ring paper with gravity.
+    """
+    found = find_surface(disc=disc, liquid=liquid, fill_ratio=fill_ratio, cells=cells, start=start)
+    if not found.status.ok:
+        return _unsolved(found)
+    solution = solve_pressure(chamber=found.chamber, problem=liquid.problem())
+    extra = {
+        **solution.statistics.extra,
+        "surface_flux_mismatch": surface_flux_mismatch(solution=solution, liquid=liquid),
+        "surface_last_move": found.last_move,
+        "surface_rounding": found.rounding,
+        "volume_error": found.volume_error,
+    }
+    statistics = replace(solution.statistics, iterations=found.steps, extra=extra)
+    return replace(solution, statistics=statistics)
+
+
+def _unsolved(found: FoundSurface) -> PressureSolution:
+    chamber = found.chamber
+    return PressureSolution(
+        chamber=chamber,
+        pressure=np.zeros(chamber.grid.size),
+        surface_gradient=np.zeros(chamber.grid[0].shape),
+        status=found.status,
+        statistics=Statistics(unknowns=0, iterations=found.steps),
+    )
+
+
+def find_surface(
+    *,
+    disc: Disc,
+    liquid: RotatingLiquid,
+    fill_ratio: float,
+    cells: tuple[int, ...],
+    start: FloatArray | None = None,
+) -> FoundSurface:
+    """Move the nodes of the free surface until the pressure is constant along it, at the given volume.
+
+    Each step solves laplace(p) = f with n.grad p given on the whole boundary, then moves every surface node
+    by (c - p) / (dp/dr), with the level c that keeps the volume.
+    Args: `liquid`: with gravity in the chamber's axes. `fill_ratio`: x, above 0 and at most 1. `cells`: along
+        the radius, the angle and, for a three-dimensional mesh, the axis. `start`: radii to start from, m, at
+        the surface nodes; default concentric.
+    Returns: The mesh and how the search ended.
+    Raises: ValueError: a fill ratio outside (0, 1].
+    Source: Newton's method on the position of an isobar; the slope is that of the hydrostatic force.
+    """
+    if not 0 < fill_ratio <= 1:
+        raise ValueError("fill_ratio must lie within (0, 1] to search a surface")
+    concentric = float(surface_radius(disc=disc, fill_ratio=fill_ratio))
+    no_ring = _no_ring(disc, liquid, concentric)
+    if no_ring is None:
+        return _search(disc, liquid, fill_ratio, cells, concentric if start is None else start)
+    chamber = chamber_mesh(disc=disc, surface_radius=concentric, cells=cells)
+    return FoundSurface(
+        chamber=chamber, status=no_ring, steps=0, last_move=0.0, rounding=0.0, volume_error=0.0
+    )
+
+
+def _search(
+    disc: Disc,
+    liquid: RotatingLiquid,
+    fill_ratio: float,
+    cells: tuple[int, ...],
+    start: FloatArray | float,
+) -> FoundSurface:
+    target = _target(disc, fill_ratio, len(cells))
+    first = chamber = chamber_mesh(disc=disc, surface_radius=start, cells=cells)
+    depth = disc.outer_radius - float(np.mean(first.surface_radius))
+    move, before, steps, status = np.inf, np.inf, 0, Status()
+    while steps < _MAX_STEPS and status.ok and not _settled(move, before):
+        wanted = _wanted_move(chamber, liquid, target)
+        radius = chamber.surface_radius + wanted * _damping(disc, chamber.surface_radius, wanted)
+        chamber = chamber_mesh(disc=disc, surface_radius=radius, cells=cells)
+        move, before, steps = float(np.abs(wanted).max()) / depth, move, steps + 1
+        status = _near_walls(disc, radius, depth)
+    if status.ok:
+        status = _end_of_search(disc, chamber.surface_radius, move, _settled(move, before))
+    chamber = _hold_volume(disc, chamber, target) if status.ok else first
+    error = _measure(chamber) / target - 1 if status.ok else 0.0
+    return FoundSurface(
+        chamber=chamber,
+        status=status,
+        steps=steps,
+        last_move=move,
+        rounding=move if move > _STEP_TOLERANCE else 0.0,
+        volume_error=error,
+    )
+
+
+def _settled(move: float, before: float) -> bool:
+    return move <= _STEP_TOLERANCE or before / 4 <= move <= _ROUNDING
+
+
+def refined_surface(radius: FloatArray) -> FloatArray:
+    """Surface radii carried to a mesh with twice the cells along each direction of the surface.
+
+    Args: `radius`: at the surface nodes of the coarser mesh, m.
+    Returns: Cubic interpolation at the nodes of the finer one, m; a start, not a result.
+    """
+    for axis, count in enumerate(radius.shape):
+        at, lines = np.arange(count, dtype=np.float64), np.moveaxis(radius, axis, -1)
+        finer = np.linspace(0, count - 1, 2 * count - 1)
+        if count < 4:
+            carried = [np.interp(finer, at, line) for line in lines.reshape(-1, count)]
+        else:
+            carried = [CubicSpline.through(at, line)(finer) for line in lines.reshape(-1, count)]
+        radius = np.moveaxis(np.reshape(carried, (*lines.shape[:-1], -1)), -1, axis)
+    return radius
+
+
+def surface_flux_mismatch(*, solution: PressureSolution, liquid: RotatingLiquid) -> float:
+    """How far the flux through the free surface is from the force on it, root mean square, relative.
+
+    Args: `solution`: with the gas pressure imposed on the surface. `liquid`: whose force should balance it.
+    Returns: |n.grad p - rho (omega^2 r + g).n| / |rho (omega^2 r + g).n| over the surface.
+    """
+    facets = facet_points(solution.chamber.mesh, FREE_SURFACE)
+    gradient = np.zeros(solution.pressure.size)
+    gradient[solution.chamber.grid[0]] = solution.surface_gradient
+    force = _normal_force(liquid, solution.chamber.length_scale * facets.points, facets.normals)
+    difference = at_facets(facets, gradient) - force
+    return float(np.sqrt(np.sum(facets.weights * difference**2) / np.sum(facets.weights * force**2)))
+
+
+def _normal_force(liquid: RotatingLiquid, points: FloatArray, normals: FloatArray) -> FloatArray:
+    return np.asarray(np.einsum("i...,i...->...", liquid.body_force(points), normals))
+
+
+def _target(disc: Disc, fill_ratio: float, dimension: int) -> float:
+    """Area or volume in units of the mesh."""
+    area = fill_ratio * float(liquid_area(disc=disc, surface_radius=disc.inner_radius)) / disc.outer_radius**2
+    return area if dimension == 2 else area * disc.axial_width / disc.outer_radius
+
+
+def _measure(chamber: ChamberMesh) -> float:
+    return float(volume_points(chamber.mesh).weights.sum())
+
+
+def _no_ring(disc: Disc, liquid: RotatingLiquid, radius: float) -> Status | None:
+    """Why there is no ring, where that is known without a search."""
+    across = float(np.linalg.norm(liquid.gravity[:2]))
+    lowest = float(np.sqrt(across / radius))
+    if abs(liquid.angular_velocity) > lowest:
+        return _DRY if _far_too_thin(disc, liquid, radius) else None
+    return Status(
+        code=StatusCode.NO_RING,
+        text=f"gravity across the shaft exceeds the centrifugal force at {1e3 * radius:.4g} mm: "
+        f"no ring forms; turn faster than {lowest:.4g} rad/s ({lowest * 30 / np.pi:.4g} rpm)",
+    )
+
+
+def _far_too_thin(disc: Disc, liquid: RotatingLiquid, radius: float) -> bool:
+    """Whether gravity would tilt the surface by a hundred times the depth over the outer wall."""
+    half = float(half_angle(disc=disc, radius=disc.outer_radius))
+    angle = np.linspace(-half, half, 33)
+    pull = np.pad(np.asarray(liquid.gravity, dtype=np.float64), (0, 3 - len(liquid.gravity)))
+    across = disc.outer_radius * (pull[0] * np.cos(angle) + pull[1] * np.sin(angle))
+    fall = float(np.ptp(across)) + abs(float(pull[2])) * disc.axial_width
+    return fall > 100 * liquid.angular_velocity**2 * radius * (disc.outer_radius - radius)
+
+
+def _free_pressure(chamber: ChamberMesh, liquid: RotatingLiquid) -> FloatArray:
+    """Pressure up to a constant, with the normal force given on the whole boundary."""
+    problem = liquid.problem()
+    discrete = discretise(chamber=chamber, problem=problem)
+    on_surface = replace(problem, wall_flux=lambda x, n: _normal_force(liquid, x, n))
+    load = discrete.load + wall_load(chamber=chamber, problem=on_surface, boundary=FREE_SURFACE)
+    load -= load.mean()  # what quadrature leaves of the balance would become a spike at the pinned node
+    free = chamber.grid.ravel()[:-1]
+    linear = solve_linear(
+        discrete.matrix[free][:, free],
+        load[free],
+        dimension=chamber.dimension,
+        prolongation=lambda: linear_prolongation(chamber, pinned_surface=False),
+    )
+    pressure = np.zeros(load.size)
+    pressure[free] = linear.values
+    return pressure
+
+
+def _wanted_move(chamber: ChamberMesh, liquid: RotatingLiquid, target: float) -> FloatArray:
+    """Radial move of every surface node, m."""
+    pressure, unit = _free_pressure(chamber, liquid), chamber.length_scale
+    facets = facet_points(chamber.mesh, FREE_SURFACE)
+    compliance = facets.weights / _normal_force(liquid, unit * facets.points, facets.normals)
+    here = at_facets(facets, pressure)
+    shortage = unit * (target - _measure(chamber))
+    level = (shortage + np.sum(compliance * here)) / np.sum(compliance)
+    nodes = places(chamber)[:, chamber.grid[0]]
+    radial = np.zeros_like(nodes)
+    radial[:2] = nodes[:2] / np.hypot(nodes[0], nodes[1])
+    return np.asarray((level - pressure[chamber.grid[0]]) / _normal_force(liquid, nodes, radial))
+
+
+def _damping(disc: Disc, radius: FloatArray, move: FloatArray) -> float:
+    """Share of a step that keeps every node off the outer wall and off the plates' inner edge."""
+    room = np.where(move > 0, disc.outer_radius - radius, radius - max(disc.plate_thickness, 0.0))
+    with np.errstate(divide="ignore"):
+        return float(min(1.0, _SAFE_SHARE * np.min(room / np.abs(move))))
+
+
+def _hold_volume(disc: Disc, chamber: ChamberMesh, target: float) -> ChamberMesh:
+    """Take the last rounding out of the volume by equal moves of all nodes."""
+    for _ in range(3):
+        measure = _measure(chamber)
+        facets = facet_points(chamber.mesh, FREE_SURFACE)
+        move = chamber.length_scale * (measure - target) / facets.weights.sum()
+        radius = chamber.surface_radius + move
+        chamber = chamber_mesh(disc=disc, surface_radius=radius, cells=chamber.cells)
+    return chamber
+
+
+_DRY = Status(
+    code=StatusCode.NO_RING,
+    text="the free surface would run dry on the outer wall: raise the speed or the fill ratio",
+)
+_SPILLS = Status(
+    code=StatusCode.NO_RING,
+    text="the free surface would pass the inner radius: raise the speed or lower the fill ratio",
+)
+
+
+def _near_walls(disc: Disc, radius: FloatArray, depth: float) -> Status:
+    if disc.outer_radius - float(radius.max()) < _NEAREST * depth:
+        return _DRY
+    # A surface that ends outside the inner radius may pass it on the way, so there is some room below.
+    if float(radius.min()) < max(disc.inner_radius / 2, 1.001 * disc.plate_thickness):
+        return _SPILLS
+    return Status()
+
+
+def _end_of_search(disc: Disc, radius: FloatArray, move: float, settled: bool) -> Status:
+    if not settled:
+        return Status(
+            code=StatusCode.NOT_CONVERGED,
+            text=f"the free surface still moves by {move:.1e} of its depth; "
+            "raise the speed or refine the mesh",
+        )
+    return _SPILLS if float(radius.min()) < disc.inner_radius * (1 - 1e-9) else Status()

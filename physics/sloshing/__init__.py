@@ -1,0 +1,5 @@
+"""Small oscillations of the liquid ring: natural frequencies and the response to gravity.
+
+A new force on the free surface or another damping goes into `system`, which builds the matrices; `modes` and
+`response` only solve them.
+"""

@@ -1,0 +1,164 @@
+"""Natural frequencies of the liquid ring in a chamber, in units of the speed, by finite elements.
+
+They scale with the speed, so a fill at which one of them equals it is resonant with gravity across the shaft
+at every speed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import cholesky, solve_triangular
+from scipy.optimize import brentq
+
+from ringbalance.mesh.chamber import default_cells
+from ringbalance.mesh.geometry import surface_radius
+from ringbalance.physics.convergence.grid import gci
+from ringbalance.physics.results import Estimate, Statistics
+from ringbalance.physics.sloshing.system import SloshingSystem, sloshing_system
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Disc
+
+FORMAL_ORDER: Final = 4.0
+"""Of an eigenvalue of quadratic elements: twice the order of its mode in the energy's norm."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SloshingModes:
+    """Planar modes of the liquid in one chamber, lowest first."""
+
+    fill_ratio: FloatArray
+    """x, shape (n,)."""
+    surface_radius: FloatArray
+    """a, m, shape (n,)."""
+    frequency_ratio: Estimate
+    """s, natural angular frequency seen in the disc over the angular velocity, shape (n, modes)."""
+    cells: tuple[tuple[int, int], ...]
+    """Cells of the meshes, finest first."""
+    statistics: Statistics
+
+
+def sloshing_modes(
+    *,
+    disc: Disc,
+    fill_ratio: npt.ArrayLike,
+    modes: int = 4,
+    cells: tuple[tuple[int, int], ...] | None = None,
+    coriolis_factor: float = 1.0,
+) -> SloshingModes:
+    """Lowest natural frequencies of the liquid in one chamber, over the angular velocity.
+
+    (-s^2 S + 2 i s C + A) psi = 0; without Coriolis force and plates s_n^2 = k tanh(k ln(R2/a)), k = n
+    pi/theta.
+    Args:
+        fill_ratio: x, any shape, flattened to (n,), above 0 and at most 1.
+        modes: how many, at least 1.
+        cells: three meshes or more, finest first; default twice `default_cells` and two coarser ones, with
+            more cells along the angle for many modes.
+        coriolis_factor: multiplies the Coriolis force; 0 gives waves in a chamber that does not turn, under
+            the same gravity; anything else but 1 is a deliberate error.
+    Raises: ValueError: fill ratios outside (0, 1], no modes, or fewer than three meshes.
+    Validity: small planar waves without viscosity on a circular surface, that is g much smaller than
+    omega^2 a; the ends are flat, so gravity across the shaft drives no others.
+    Source: Eq. 10 of the liquid-ring paper with the inertia that it leaves out; derived in `sloshing_system`.
+    """
+    fills = np.atleast_1d(np.asarray(fill_ratio, dtype=np.float64)).ravel()
+    if fills.size == 0 or not np.all((fills > 0) & (fills <= 1)) or modes < 1:
+        raise ValueError("fill_ratio must lie within (0, 1], and at least one mode must be asked for")
+    meshes = cells or default_sloshing_cells(disc=disc, modes=modes)
+    if len(meshes) < 3:
+        raise ValueError("cells must list at least three meshes, finest first")
+    radii = np.atleast_1d(surface_radius(disc=disc, fill_ratio=fills))
+    found = np.array(
+        [[_lowest(disc, float(a), counts, modes, coriolis_factor) for counts in meshes] for a in radii]
+    )
+    widths = np.apply_along_axis(_half_width, 1, found, meshes)
+    return SloshingModes(
+        fill_ratio=fills,
+        surface_radius=radii,
+        frequency_ratio=Estimate(value=found[:, 0].copy(), uncertainty=widths),
+        cells=meshes,
+        statistics=Statistics(unknowns=(2 * meshes[0][0] + 1) * (2 * meshes[0][1] + 1)),
+    )
+
+
+def default_sloshing_cells(*, disc: Disc, modes: int = 4) -> tuple[tuple[int, int], ...]:
+    """Three meshes that keep the lowest four frequencies of a chamber within 1e-4.
+
+    Args: `disc`: the disc; only its central angle counts. `modes`: how many are wanted; each has half a wave
+        more along the angle than the one before.
+    Returns: Cells along the radius and the angle, finest first.
+    Source: about five cells a wave on the coarsest mesh bring a quadratic element into its asymptotic range.
+    """
+    radial, angular = default_cells(disc=disc)
+    more = max(2, -(-4 * modes // angular) * 2)
+    return tuple((more * radial // k, more * angular // k) for k in (1, 2, 4))
+
+
+def resonant_fills(
+    *, disc: Disc, modes: int = 4, highest: float | None = None
+) -> tuple[tuple[int, float], ...]:
+    """Fills at which a natural frequency equals the speed, s_n(x) = 1, whatever the speed.
+
+    Args: `modes`: how many of the lowest modes are looked at; higher ones resonate in thinner rings and are
+        damped more. `highest`: fill ratio up to which to look; default the disc's largest.
+    Returns: Mode number (from 1) and fill ratio of each, by mode.
+    Raises: ValueError: no modes, or a highest fill outside (0, 1].
+    Source: `sloshing_modes`; the frequencies grow with the fill.
+    """
+    top = disc.max_fill_ratio if highest is None else highest
+    if not 0 < top <= 1 or modes < 1:
+        raise ValueError("highest must lie within (0, 1], and at least one mode must be asked for")
+    middle = default_sloshing_cells(disc=disc, modes=modes)[1]
+
+    def excess(logarithm: float, mode: int) -> float:
+        a = float(surface_radius(disc=disc, fill_ratio=np.exp(logarithm)))
+        return float(_lowest(disc, a, middle, modes, 1.0)[mode - 1] - 1)
+
+    found = []
+    low, high = np.log(1e-4 * top), float(np.log(top))
+    for mode in range(1, modes + 1):
+        if excess(high, mode) > 0 > excess(low, mode):
+            high = float(brentq(excess, low, high, args=(mode,), xtol=1e-6))
+            found.append((mode, float(np.exp(high))))
+    return tuple(found)
+
+
+def natural_frequencies(*, system: SloshingSystem, coriolis_factor: float = 1.0) -> FloatArray:
+    """All positive s of one mesh's system, ascending.
+
+    With S = L L^T and y = L^T psi the oscillator y'' + 2 C y' + A y = 0 is d/dt (y', A^(1/2) y) = B (...)
+    with a real antisymmetric B, whose eigenvalues are +- i s.
+    Args: `system`: the condensed problem. `coriolis_factor`: multiplies the Coriolis force.
+    Returns: s, shape (n,).
+    Source: linear algebra of gyroscopic systems.
+    """
+    lower = cholesky(system.kinetic, lower=True)
+
+    def reduced(matrix: FloatArray) -> FloatArray:
+        half = solve_triangular(lower, matrix, lower=True)
+        return np.asarray(solve_triangular(lower, half.T, lower=True).T, dtype=np.float64)
+
+    turning, stiff = coriolis_factor * reduced(system.coriolis), reduced(system.centrifugal)
+    squares, shapes = np.linalg.eigh((stiff + stiff.T) / 2)
+    root = (shapes * np.sqrt(np.maximum(squares, 0.0))) @ shapes.T
+    first_order = np.block([[turning.T - turning, -root], [root, np.zeros_like(root)]])
+    ratios = np.linalg.eigvalsh(1j * first_order)
+    return np.asarray(ratios[squares.size :], dtype=np.float64)
+
+
+def _lowest(disc: Disc, a: float, cells: tuple[int, int], modes: int, coriolis_factor: float) -> FloatArray:
+    system = sloshing_system(disc=disc, surface_radius=a, cells=cells)
+    ratios = natural_frequencies(system=system, coriolis_factor=coriolis_factor)
+    if ratios.size < modes:
+        raise ValueError(f"a mesh of {cells} cells has {ratios.size} modes, not {modes}")
+    return ratios[:modes]
+
+
+def _half_width(values: FloatArray, meshes: tuple[tuple[int, int], ...]) -> float:
+    sizes = [1 / counts[1] for counts in meshes]
+    noise = 1e-12 * float(np.abs(values).max())
+    return gci(values=list(values), sizes=sizes, formal_order=FORMAL_ORDER, round_off=noise).uncertainty

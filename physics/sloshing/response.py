@@ -1,0 +1,156 @@
+"""How strongly the liquid ring in a chamber answers to gravity across the shaft, which turns once a turn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.mesh.geometry import surface_radius
+from ringbalance.physics.convergence.grid import gci
+from ringbalance.physics.results import Estimate, Statistics, Status, StatusCode
+from ringbalance.physics.sloshing.modes import FORMAL_ORDER, default_sloshing_cells
+from ringbalance.physics.sloshing.range import SMALL
+from ringbalance.physics.sloshing.system import SloshingSystem, sloshing_system
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Disc
+
+
+@dataclass(frozen=True, kw_only=True)
+class SloshingResponse:
+    """Forced planar oscillation of the liquid in one chamber, along an array of fill ratios."""
+
+    fill_ratio: FloatArray
+    """x, shape (n,)."""
+    surface_radius: FloatArray
+    """a, m, shape (n,)."""
+    amplification: Estimate
+    """Change of the chamber's moment over that of a surface which follows gravity at once, shape (n,)."""
+    pressure_amplification: Estimate
+    """Change of the mean pressure on the outer wall over that under such a surface, shape (n,)."""
+    surface_amplitude: Estimate
+    """Largest displacement of the surface, m zero-to-peak, shape (n,)."""
+    damped_share: FloatArray
+    """Amplification with the walls' Stokes layers over that without any viscosity, shape (n,): near 1 away
+    from resonance, and where it is small the peak rests on an estimate of the damping."""
+    statistics: Statistics
+    status: Status
+
+
+def sloshing_response(
+    *,
+    disc: Disc,
+    fill_ratio: npt.ArrayLike,
+    angular_velocity: float,
+    kinematic_viscosity: float,
+    gravity: float,
+    frequency_ratio: float = 1.0,
+    cells: tuple[tuple[int, int], ...] | None = None,
+) -> SloshingResponse:
+    """Answer of the liquid in one chamber to gravity that turns in the disc's frame.
+
+    (-s^2 S + 2 i s C + A + i s sqrt(i s E) W) psi = i s F with G = g r exp(i (angle + s omega t)), E =
+    nu/(omega R2^2); the reference is A psi = i s F, a surface always across the sum of both fields.  The
+    wall pressure follows from psi by p'/rho = G + c - i s phi - 2 psi.
+    Args:
+        fill_ratio: x, any shape, flattened to (n,), above 0 and at most 1.
+        angular_velocity: omega, rad/s, above 0.
+        kinematic_viscosity: nu, m^2/s, zero or more; zero leaves resonance without a limit.
+        gravity: g across the shaft, m/s^2, zero or more.
+        frequency_ratio: s, above 0; 1 for gravity.
+        cells: three meshes or more, finest first; default those of `sloshing_modes`.
+    Returns: SloshingResponse; status says where the waves would not be small, or gravity leaves no ring.
+    Raises: ValueError: fill ratios outside (0, 1], or an argument outside its range.
+    Validity: small planar waves; thin Stokes layers on all walls without the Coriolis force, which makes the
+    damping, and with it a peak, good to a factor of about two.
+    Source: derived in `sloshing_system`; the layers as in Landau and Lifshitz, "Fluid Mechanics", section 24.
+    """
+    fills = np.atleast_1d(np.asarray(fill_ratio, dtype=np.float64)).ravel()
+    _check(fills, angular_velocity, kinematic_viscosity, gravity, frequency_ratio)
+    meshes = cells or default_sloshing_cells(disc=disc)
+    radii = np.atleast_1d(surface_radius(disc=disc, fill_ratio=fills))
+    ekman = kinematic_viscosity / (angular_velocity * disc.outer_radius**2)
+
+    def on_mesh(radius: float, counts: tuple[int, int]) -> tuple[float, ...]:
+        system = sloshing_system(disc=disc, surface_radius=radius, cells=counts)
+        return _answer(system, frequency_ratio, ekman)
+
+    found = np.array([[on_mesh(float(a), counts) for counts in meshes] for a in radii])
+    widths = _half_widths(found, meshes)
+    scale = gravity / angular_velocity**2
+    amplitude = Estimate(value=scale * found[:, 0, 1], uncertainty=scale * widths[:, 1])
+    return SloshingResponse(
+        fill_ratio=fills,
+        surface_radius=radii,
+        amplification=Estimate(value=found[:, 0, 0].copy(), uncertainty=widths[:, 0]),
+        pressure_amplification=Estimate(value=found[:, 0, 3].copy(), uncertainty=widths[:, 3]),
+        surface_amplitude=amplitude,
+        damped_share=found[:, 0, 2].copy(),
+        statistics=Statistics(unknowns=(2 * meshes[0][0] + 1) * (2 * meshes[0][1] + 1)),
+        status=_status(fills, disc.outer_radius - radii, amplitude.value, scale - radii),
+    )
+
+
+def _half_widths(found: FloatArray, meshes: tuple[tuple[int, int], ...]) -> FloatArray:
+    """By fill and quantity, from values by fill, mesh and quantity."""
+    sizes = [1 / counts[1] for counts in meshes]
+
+    def of(values: FloatArray) -> float:
+        return gci(values=list(values), sizes=sizes, formal_order=FORMAL_ORDER).uncertainty
+
+    return np.asarray(np.apply_along_axis(of, 1, found), dtype=np.float64)
+
+
+def _check(fills: FloatArray, omega: float, viscosity: float, gravity: float, ratio: float) -> None:
+    if fills.size == 0 or not np.all((fills > 0) & (fills <= 1)):
+        raise ValueError("fill_ratio must lie within (0, 1], and there must be at least one")
+    if not (np.isfinite([omega, ratio]).all() and omega > 0 and ratio > 0):
+        raise ValueError("angular_velocity and frequency_ratio must be finite and above zero")
+    if not (np.isfinite([viscosity, gravity]).all() and viscosity >= 0 and gravity >= 0):
+        raise ValueError("kinematic_viscosity and gravity must be finite and not negative")
+
+
+def _answer(system: SloshingSystem, ratio: float, ekman: float) -> tuple[float, ...]:
+    """Amplification, largest displacement for g/omega^2 = 1 (any unit of length), share left by damping, and
+
+    amplification of the wall pressure.
+    """
+    forcing = system.outflow[1] + 1j * system.outflow[2]
+    swinging = -(ratio**2) * system.kinetic + 2j * ratio * system.coriolis + system.centrifugal
+    layers = 1j * ratio * np.sqrt(1j * ratio * ekman) * system.wall_loss
+    damped, free, still = (
+        np.linalg.solve(matrix, 1j * ratio * forcing)
+        for matrix in (swinging + layers, swinging, system.centrifugal.astype(np.complex128))
+    )
+    moment, reference, undamped = (_size(system, psi) for psi in (damped, still, free))
+    displacement = float(np.abs(system.flux @ damped).max()) / ratio
+    pressure = (
+        system.wall_drive - 1j * ratio * (system.potential @ damped) + 2 * (system.surface_mean @ damped)
+    )
+    return moment / reference, displacement, moment / undamped, float(abs(pressure / system.wall_drive))
+
+
+def _size(system: SloshingSystem, psi: npt.NDArray[np.complexfloating]) -> float:
+    """Of the swing of the liquid's first moment, both components."""
+    return float(np.linalg.norm(system.outflow[1:] @ psi))
+
+
+def _status(fills: FloatArray, depth: FloatArray, amplitude: FloatArray, beyond: FloatArray) -> Status:
+    if np.any(beyond >= 0):
+        x = fills[np.argmax(beyond)]
+        return Status(
+            code=StatusCode.NO_RING,
+            text=f"at a fill ratio of {x:.3g} gravity is stronger than omega^2 a: turn the disc faster",
+        )
+    share = amplitude / depth
+    worst = int(np.argmax(share))
+    if share[worst] > SMALL:
+        return Status(
+            code=StatusCode.OUT_OF_RANGE,
+            text=(
+                f"at a fill ratio of {fills[worst]:.3g} waves would reach {share[worst]:.2g} of the ring's "
+                "depth, too high for this theory: avoid that fill, or turn the disc faster"
+            ),
+        )
+    return Status()

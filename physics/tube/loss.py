@@ -1,0 +1,128 @@
+"""Loss coefficient k(u) of the connecting tube, k = 2 (H_A - H_C)/u^2 - 1, from laminar to turbulent flow."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.physics.results import Estimate, Status, StatusCode
+from ringbalance.physics.tube.range import FULLY_TURBULENT_REYNOLDS, range_notes
+from ringbalance.physics.tube.rotation import STRAIGHT_CRITICAL_REYNOLDS
+from ringbalance.physics.tube.state import TubeState, tube_state, upstream_loss
+from ringbalance.physics.tube.uncertainty import uncertainty_parts
+from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.scene.models import InputUncertainty, Liquid, Tube
+
+
+class FlowState(StrEnum):
+    """State of the flow in the tube."""
+
+    LAMINAR = "laminar"
+    TRANSITIONAL = "transitional"
+    TURBULENT = "turbulent"
+
+
+@dataclass(frozen=True, kw_only=True)
+class TubeLoss:
+    """Loss coefficient of the tube over an array of velocities."""
+
+    velocity: FloatArray
+    """u, m/s, positive."""
+    reynolds: FloatArray
+    """Re."""
+    rotation_reynolds: float
+    """R_Om."""
+    k: Estimate
+    """k with its expanded uncertainty (95 %), all parts combined as the root of the sum of their squares."""
+    terms: Mapping[str, FloatArray]
+    """What k is the sum of: entrance, friction, rotation, bends, exit, extra; or "decree" alone."""
+    uncertainty_parts: Mapping[str, FloatArray]
+    """What k's half-width is made of."""
+    flow_state: npt.NDArray[np.str_]
+    """Values of `FlowState`."""
+    in_range: BoolArray
+    """False wherever a correlation is used outside the range that its source states."""
+    range_notes: Mapping[str, BoolArray]
+    """Why not: a sentence, and where it holds."""
+    upstream_k: FloatArray
+    """The part of k between the driven chamber and the crest, beyond the profile's kinetic energy there."""
+    kinetic_factor: FloatArray
+    """alpha of the velocity profile."""
+
+
+def tube_loss(
+    *,
+    tube: Tube,
+    liquid: Liquid,
+    angular_velocity: float,
+    velocity: npt.ArrayLike,
+    inputs: tuple[InputUncertainty, ...] = (),
+) -> TubeLoss:
+    """Loss coefficient k(u) of a full tube between two chambers.
+
+    k + 1 = f L/d + rotation + K_entrance + K_bends + extra + (1 + K_exit); the "1" is the exit loss of
+    turbulent flow, so K_exit holds only what a laminar exit adds.  k is smooth in u and (k + 1) u^2 grows
+    with u, so that a head has one velocity.
+    Args: `tube`: the tube; a `drag_coefficient` prescribes k. `angular_velocity`: omega, rad/s.
+        `velocity`: u, mean over the bore, m/s, any shape, positive. `inputs`: expanded uncertainties (95 %)
+        of scene quantities; those of the tube, the viscosity and the speed are used.
+    Returns: TubeLoss, arrays of the shape of `velocity`.
+    Raises: ValueError: a velocity that is not positive and finite, or arcs longer than the tube.
+    Range: calibrated from 0.1 to 20 m/s; `in_range` and `range_notes` say where a correlation is stretched.
+    Source: definition of k from Eq. 14 of the liquid-ring paper; the sources of the terms stand with them.
+    """
+    u = np.asarray(velocity, dtype=np.float64)
+    if not np.all(np.isfinite(u) & (u > 0)):
+        raise ValueError("velocity must be positive and finite")
+    state = tube_state(tube=tube, liquid=liquid, angular_velocity=angular_velocity, velocity=u)
+    parts = uncertainty_parts(
+        tube=tube, liquid=liquid, angular_velocity=angular_velocity, velocity=u, state=state, inputs=inputs
+    )
+    notes = range_notes(tube=tube, state=state, velocity=u)
+    outside = np.any(np.array([np.zeros(u.shape, dtype=np.bool_), *notes.values()]), axis=0)
+    return TubeLoss(
+        velocity=u,
+        reynolds=state.reynolds,
+        rotation_reynolds=float(state.rotation_reynolds),
+        k=_estimate(state, parts, bool(np.any(outside))),
+        terms=MappingProxyType(dict(state.terms)),
+        uncertainty_parts=MappingProxyType(dict(parts)),
+        flow_state=flow_states(state),
+        in_range=np.asarray(~outside),
+        range_notes=MappingProxyType(dict(notes)),
+        upstream_k=upstream_loss(tube=tube, state=state),
+        kinetic_factor=state.kinetic_factor,
+    )
+
+
+def _estimate(state: TubeState, parts: Mapping[str, FloatArray], stretched: bool) -> Estimate:
+    half_width = np.sqrt(np.asarray(sum(p**2 for p in parts.values()), dtype=np.float64))
+    if not stretched:
+        return Estimate(value=state.k, uncertainty=half_width)
+    text = "a correlation is used outside its stated range at some velocities: see in_range and range_notes"
+    return Estimate(
+        value=state.k,
+        uncertainty=half_width,
+        status=Status(code=StatusCode.OUT_OF_RANGE, text=text),
+    )
+
+
+def flow_states(state: TubeState) -> npt.NDArray[np.str_]:
+    """Laminar, transitional or turbulent, by the critical Re of the turning tube.
+
+    Args: `state`: the terms of k.
+    Returns: Values of `FlowState`, the shape of the state's arrays.
+    Source: `critical_reynolds`.
+    """
+    critical = state.critical_ratio * STRAIGHT_CRITICAL_REYNOLDS
+    turbulent = state.critical_ratio * FULLY_TURBULENT_REYNOLDS
+    return np.select(
+        [state.reynolds < critical, state.reynolds < turbulent],
+        [FlowState.LAMINAR.value, FlowState.TRANSITIONAL.value],
+        FlowState.TURBULENT.value,
+    ).astype(np.str_)

@@ -1,0 +1,247 @@
+"""Laminar friction ratio of the rotating tube from the table of finite-element solutions.
+
+Inside the table: bicubic splines, in coordinates in which F is smooth, of what ln F differs by from a closed
+formula that has F's exact slow limit; two rectangles joined smoothly between S = 2.5 and 4.5.  Outside:
+carried on from the table's edge with a wide uncertainty, and said so.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import resources
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.physics.results import Estimate, Status, StatusCode
+from ringbalance.physics.splines import Surface
+from ringbalance.physics.tube.rotation_grid import (
+    KL_LIMIT,
+    KL_SCALE,
+    ROTATION_LIMIT,
+    ROTATION_SCALE,
+    fast_first,
+    least_s,
+    slow_first,
+)
+from ringbalance.scene.arrays import BoolArray, FloatArray
+
+__all__ = [
+    "FrictionTable",
+    "friction_table",
+    "ito_nanbu_laminar",
+    "rotating_friction_ratio",
+    "rotation_table_covers",
+]
+
+Rows = Sequence[Mapping[str, str]]
+
+_JOIN = (2.5, 4.5)
+_OUTSIDE = 0.3
+"""Relative expanded uncertainty (95 %) outside the table: no source holds there, and flow is likely to be
+unsteady."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Rectangle:
+    """One rectangle of the table."""
+
+    table: str
+    """"slow" or "fast"."""
+    difference: Surface
+    """Spline of ln F - ln F_base over (a, b)."""
+    numerical: Surface
+    """Bilinear interpolant of the relative discretisation uncertainty."""
+    a_limit: float
+    b_limit: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FrictionTable:
+    """The table with its interpolants."""
+
+    slow: Rectangle
+    fast: Rectangle
+    interpolation_error: float
+    """Largest relative gap to the points solved between nodes for Kl up to 1e6; R up to 1e4 at least."""
+    edge_interpolation_error: float
+    """The same, towards the edge of the table."""
+    rows: tuple[Mapping[str, str], ...]
+    """As they stand in the file."""
+    header: tuple[str, ...]
+
+
+def _base_at(table: str, a: FloatArray, b: FloatArray) -> FloatArray:
+    """ln F_base = ln(1 + n E)/n with the exact excess E of slow rotation and F's power of it when fast.
+
+    Slow: E = R^2/9216 + Kl^2/16515072, F ~ Kl^(1/4), n = 8.  Fast: E = R^2/9216, F ~ R^(1/2), n = 4.
+    """
+    if table == "slow":
+        kl = KL_SCALE * np.expm1(a)
+        return np.asarray(np.log1p(8 * (kl * b / (1 - b) / 9216 + kl**2 / 16515072)) / 8, dtype=np.float64)
+    return np.asarray(np.log1p(4 * (ROTATION_SCALE * np.expm1(a)) ** 2 / 9216) / 4, dtype=np.float64)
+
+
+def _columns(rows: Rows) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """a, b, F on the finest mesh and its relative discretisation uncertainty."""
+    a, b, fine, uncertainty_95 = (
+        np.array([float(row[name]) for row in rows]) for name in ("a", "b", "fine", "uncertainty")
+    )
+    return a, b, fine, uncertainty_95 / fine
+
+
+def _rectangle(table: str, rows: Rows) -> Rectangle:
+    """Splines over the nodes; a = 0, where F = 1, is not in the file."""
+    a, b, fine, relative = _columns(rows)
+    first, i = np.unique(a, return_inverse=True)
+    second, j = np.unique(b, return_inverse=True)
+    gap, uncertainty_95 = (np.zeros((first.size + 1, second.size)) for _ in range(2))
+    gap[i + 1, j] = np.log(fine) - _base_at(table, a, b)
+    uncertainty_95[i + 1, j] = relative
+    nodes = np.concatenate([[0.0], first])
+    # The difference starts with an even power of a: mirrored nodes give the spline its flat start.
+    mirrored = np.concatenate([-nodes[3:0:-1], nodes])
+    return Rectangle(
+        table=table,
+        difference=Surface.bicubic(mirrored, second, np.concatenate([gap[3:0:-1], gap])),
+        numerical=Surface.bilinear(nodes, second, uncertainty_95),
+        a_limit=float(nodes[-1]),
+        b_limit=float(second[-1]),
+    )
+
+
+def _looked_up(rectangle: Rectangle, a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """ln F and its relative discretisation uncertainty, at the nearest point of the rectangle."""
+    a, b = np.clip(a, 0.0, rectangle.a_limit), np.clip(b, 0.0, rectangle.b_limit)
+    logarithm = _base_at(rectangle.table, a, b) + rectangle.difference(a, b)
+    return np.where(a > 0.0, logarithm, 0.0), rectangle.numerical(a, b)
+
+
+def _gap(rectangle: Rectangle, rows: Rows) -> FloatArray:
+    """Relative gaps of the interpolant to points solved between the nodes."""
+    a, b, fine, _ = _columns(rows)
+    return np.asarray(np.abs(np.exp(_looked_up(rectangle, a, b)[0]) / fine - 1), dtype=np.float64)
+
+
+@lru_cache(maxsize=1)
+def friction_table() -> FrictionTable:
+    """The table that comes with the package. Returns: The table, read once."""
+    path = resources.files("ringbalance.physics") / "data" / "rotating_friction.csv"
+    lines = path.read_text(encoding="utf-8").splitlines()
+    header = tuple(line[2:] for line in lines if line.startswith("#"))
+    rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    part = {name: [r for r in rows if r["table"] == name] for name in {row["table"] for row in rows}}
+    slow, fast = (_rectangle(name, part[name]) for name in ("slow", "fast"))
+    inner = {"slow_check": float(slow_first(1e6)), "fast_check": float(fast_first(1e4))}
+    gaps = {name: _gap(slow if name == "slow_check" else fast, part[name]) for name in inner}
+    near = {name: np.array([float(r["a"]) <= inner[name] for r in part[name]]) for name in inner}
+    return FrictionTable(
+        slow=slow,
+        fast=fast,
+        interpolation_error=max(float(gaps[n][near[n]].max()) for n in inner),
+        edge_interpolation_error=max(float(gaps[n][~near[n]].max(initial=0.0)) for n in inner),
+        rows=tuple(rows),
+        header=header,
+    )
+
+
+def _smooth_step(x: FloatArray) -> FloatArray:
+    """0 below 0, 1 above 1, twice continuously differentiable."""
+    c = np.clip(x, 0.0, 1.0)
+    return np.asarray(c**3 * (10 - 15 * c + 6 * c**2), dtype=np.float64)
+
+
+def _coordinates(re: FloatArray, rotation: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Kl, b = S/(1 + S) and 1/S; without rotation 1/S is taken as 0, where F = 1 for any S."""
+    turning = np.where(rotation > 0.0, rotation, 1.0)
+    total = np.where(rotation + re > 0.0, rotation + re, 1.0)
+    return rotation * re, rotation / total, np.where(rotation > 0.0, re / turning, 0.0)
+
+
+def rotation_table_covers(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike) -> BoolArray:
+    """Whether the table of laminar friction ratios holds: Kl <= 1e7 and R <= 1e5.
+
+    Args: `reynolds`: Re, any shape. `rotation_reynolds`: R = omega d^2/nu, any shape that broadcasts.
+    Returns: True inside, of the broadcast shape.
+    """
+    rotation = np.asarray(rotation_reynolds, dtype=np.float64)
+    kl = rotation * np.asarray(reynolds, dtype=np.float64)
+    return np.asarray((kl <= KL_LIMIT) & (rotation <= ROTATION_LIMIT))
+
+
+def _carried_on(slow: FloatArray, fast: FloatArray, kl: FloatArray, rotation: FloatArray) -> Any:
+    """F of both rectangles, beyond the edge with the growth that Ito and Nanbu, and fast rotation, have."""
+    growth = ito_nanbu_laminar(kl=np.maximum(kl, KL_LIMIT)) / ito_nanbu_laminar(kl=KL_LIMIT)
+    more = 0.07863 * (np.sqrt(np.maximum(rotation, ROTATION_LIMIT)) - np.sqrt(ROTATION_LIMIT))
+    return np.exp(slow) * growth, np.exp(fast) + more
+
+
+def _status(inside: BoolArray) -> Status:
+    if np.all(inside):
+        return Status()
+    text = (
+        f"outside the table (R Re <= {KL_LIMIT:.0e} and R <= {ROTATION_LIMIT:.0e}), carried on from its "
+        "edge: use a smaller bore or a more viscous liquid, or allow for the wide uncertainty"
+    )
+    return Status(code=StatusCode.OUT_OF_RANGE, text=text)
+
+
+def rotating_friction_ratio(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike) -> Estimate:
+    """Laminar friction factor with rotation over the one without, F = f/(64/Re), developed flow.
+
+    F depends on Kl = R Re and S = R/Re alone; its exact slow limit is 1 + R^2/9216 + Kl^2/16515072, its
+    fast one (Re = 0) tends to 0.07863 sqrt(R).
+    Args: `reynolds`: Re = U d/nu, any shape, zero or more. `rotation_reynolds`: R = omega d^2/nu, any shape
+        that broadcasts, zero or more.
+    Returns: Estimate of F, of the broadcast shape; the uncertainty adds discretisation and interpolation. Its
+        status says OUT_OF_RANGE when any point lies outside the table, where 30 % is added.
+    Raises: ValueError: a negative or undefined argument.
+    Range: steady, symmetric, developed laminar flow, Kl <= 1e7, R <= 1e5, any S.
+    Source: finite elements, `rotating_section`; the limits are exact.
+    """
+    re, rotation = np.broadcast_arrays(
+        *(np.asarray(v, dtype=np.float64) for v in (reynolds, rotation_reynolds))
+    )
+    if not (np.all(re >= 0.0) and np.all(rotation >= 0.0) and np.all(np.isfinite(re + rotation))):
+        raise ValueError("reynolds and rotation_reynolds must be finite and not negative")
+    table = friction_table()
+    kl, share, inverse = _coordinates(re, rotation)
+    slow, slow_uncertainty = _looked_up(table.slow, slow_first(kl), share)
+    fast, fast_uncertainty = _looked_up(table.fast, fast_first(rotation), inverse * least_s(rotation))
+    s = share / np.maximum(1 - share, 1e-300)
+    weight = _smooth_step(np.log(np.maximum(s, 1e-300) / _JOIN[0]) / np.log(_JOIN[1] / _JOIN[0]))
+    slow, fast = _carried_on(slow, fast, kl, rotation)
+    ratio = (1 - weight) * slow + weight * fast
+    inside = rotation_table_covers(reynolds=re, rotation_reynolds=rotation)
+    uncertainty_95 = (
+        (1 - weight) * slow_uncertainty
+        + weight * fast_uncertainty
+        + _interpolation_uncertainty(table, kl, rotation)
+    )
+    # Both vanish with the excess: without rotation F is 1 exactly.
+    relative = uncertainty_95 * np.minimum((ratio - 1) / 0.05, 1.0) + np.where(inside, 0.0, _OUTSIDE)
+    return Estimate(value=ratio, uncertainty=np.asarray(ratio * relative), status=_status(inside))
+
+
+def _interpolation_uncertainty(table: FrictionTable, kl: FloatArray, rotation: FloatArray) -> FloatArray:
+    """Measured interpolation error, rising from its inner to its edge value over half a decade."""
+    near_edge = np.maximum(kl / 1e6, rotation / 1e4)
+    weight = _smooth_step(np.log10(np.maximum(near_edge, 1e-300)) / 0.5)
+    inner, edge = table.interpolation_error, max(table.edge_interpolation_error, table.interpolation_error)
+    return np.asarray((1 - weight) * inner + weight * edge, dtype=np.float64)
+
+
+def ito_nanbu_laminar(*, kl: npt.ArrayLike) -> FloatArray:
+    """Ito and Nanbu's laminar friction ratio, 0.0883 Kl^(1/4) (1 + 11.2 Kl^-0.325), for comparison.
+
+    Args: `kl`: Kl = R Re, any shape, above zero.
+    Returns: F, the same shape.
+    Range: stated for 220 < Kl < 1e7 and S = R/Re < 0.5.
+    Source: Ito and Nanbu, J. Basic Eng. 93 (1971) 383, doi 10.1115/1.3425260, as recalled.
+    """
+    k = np.asarray(kl, dtype=np.float64)
+    return np.asarray(0.0883 * k**0.25 * (1 + 11.2 * k**-0.325), dtype=np.float64)

@@ -1,0 +1,164 @@
+"""The terms of k at given velocities, without their uncertainty."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.physics.tube.bends import bend_loss, straight_length
+from ringbalance.physics.tube.ends import entrance_loss, exit_loss, kinetic_factor
+from ringbalance.physics.tube.friction import friction_factor
+from ringbalance.physics.tube.numbers import reynolds_number, rotation_reynolds_number
+from ringbalance.physics.tube.rotation import (
+    STRAIGHT_CRITICAL_REYNOLDS,
+    critical_reynolds,
+    rotating_friction_ratio,
+    turbulent_friction_ratio,
+)
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Liquid, Tube
+
+
+@dataclass(frozen=True, kw_only=True)
+class TubeState:
+    """Numbers and terms of the tube's loss; arrays of one shape."""
+
+    reynolds: FloatArray
+    """Re."""
+    rotation_reynolds: FloatArray
+    """R_Om."""
+    critical_ratio: FloatArray
+    """Critical Re over the straight tube's."""
+    straight_friction: FloatArray
+    """f without rotation."""
+    rotating_friction: FloatArray
+    """f with rotation."""
+    laminar_ratio: FloatArray
+    """F, laminar friction with rotation over that without."""
+    bends: tuple[FloatArray, ...]
+    """K of each bend, in order along the path."""
+    bend_half_width: FloatArray
+    """Expanded uncertainty (95 %) of their sum: one cause, so theirs add up."""
+    kinetic_factor: FloatArray
+    """alpha."""
+    terms: Mapping[str, FloatArray]
+    """What k is the sum of."""
+
+    @property
+    def k(self) -> FloatArray:
+        """Sum of the terms."""
+        return np.asarray(sum(self.terms.values()), dtype=np.float64)
+
+
+def tube_state(*, tube: Tube, liquid: Liquid, angular_velocity: float, velocity: npt.ArrayLike) -> TubeState:
+    """Evaluate every term of k.
+
+    Args: `angular_velocity`: omega, rad/s. `velocity`: u, m/s, any shape, positive.
+    Returns: TubeState, arrays of the shape of `velocity`.
+    Raises: ValueError: arcs longer than the tube.
+    Source: the sources of the terms stand with them.
+    """
+    nu = liquid.kinematic_viscosity
+    return tube_state_at(
+        tube=tube,
+        reynolds=reynolds_number(velocity=velocity, bore=tube.bore, kinematic_viscosity=nu),
+        rotation_reynolds=rotation_reynolds_number(
+            angular_velocity=angular_velocity, bore=tube.bore, kinematic_viscosity=nu
+        ),
+    )
+
+
+def tube_state_at(*, tube: Tube, reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike) -> TubeState:
+    """Evaluate every term of k from the two numbers that it depends on, for many liquids at once.
+
+    Args: `reynolds`: Re, any shape, positive. `rotation_reynolds`: R_Om, any shape that broadcasts to that of
+        `reynolds`.
+    Returns: TubeState, arrays of the shape of `reynolds`.
+    Raises: ValueError: arcs longer than the tube.
+    Source: the sources of the terms stand with them.
+    """
+    re, rotation = (np.asarray(v, dtype=np.float64) for v in (reynolds, rotation_reynolds))
+    critical = critical_reynolds(rotation_reynolds=rotation) / STRAIGHT_CRITICAL_REYNOLDS
+    rough = tube.roughness / tube.bore
+    straight = friction_factor(reynolds=re, relative_roughness=rough)
+    laminar = rotating_friction_ratio(reynolds=re, rotation_reynolds=rotation).value
+    turning = friction_factor(
+        reynolds=re,
+        relative_roughness=rough,
+        laminar_ratio=laminar,
+        turbulent_ratio=turbulent_friction_ratio(reynolds=re, rotation_reynolds=rotation).value,
+        critical_ratio=critical,
+    )
+    bends = _bends(tube, re, rotation, critical, straight)
+    return TubeState(
+        reynolds=re,
+        rotation_reynolds=rotation,
+        critical_ratio=critical,
+        straight_friction=straight,
+        rotating_friction=turning,
+        bends=tuple(k for k, _ in bends),
+        bend_half_width=np.asarray(sum((w for _, w in bends), start=np.zeros(re.shape))),
+        laminar_ratio=laminar,
+        kinetic_factor=kinetic_factor(reynolds=re, critical_ratio=critical, friction_ratio=laminar),
+        terms=_terms(tube, re, critical, laminar, straight, turning, [k for k, _ in bends]),
+    )
+
+
+def _bends(
+    tube: Tube, re: FloatArray, rotation: FloatArray, critical: FloatArray, straight: FloatArray
+) -> list[tuple[FloatArray, FloatArray]]:
+    """K and half-width of each bend; bends of one shape are evaluated once."""
+    known = {
+        bend: bend_loss(
+            bend=bend,
+            bore=tube.bore,
+            friction_factor=straight,
+            reynolds=re,
+            rotation_reynolds=rotation,
+            critical_ratio=critical,
+        )
+        for bend in set(tube.bends)
+    }
+    return [known[bend] for bend in tube.bends]
+
+
+def _terms(
+    tube: Tube,
+    re: FloatArray,
+    critical: FloatArray,
+    laminar: FloatArray,
+    straight: FloatArray,
+    turning: FloatArray,
+    bends: Sequence[FloatArray],
+) -> dict[str, FloatArray]:
+    if tube.drag_coefficient is not None:
+        return {"decree": np.full(re.shape, tube.drag_coefficient)}
+    # The arcs turn too: rotation acts on the whole length, friction without it on the straights alone.
+    return {
+        "entrance": entrance_loss(tube=tube, reynolds=re, critical_ratio=critical)[0],
+        "friction": straight_length(tube=tube) / tube.bore * straight,
+        "rotation": tube.length / tube.bore * (turning - straight),
+        "bends": np.asarray(sum(bends, start=np.zeros(re.shape)), dtype=np.float64),
+        "exit": exit_loss(tube=tube, reynolds=re, critical_ratio=critical, friction_ratio=laminar)[0],
+        "extra": np.full(re.shape, tube.extra_loss),
+    }
+
+
+def upstream_loss(*, tube: Tube, state: TubeState) -> FloatArray:
+    """The part of k between the driven chamber and the crest.
+
+    Entrance, the share `hump_position` of friction, rotation and extra loss, and the bends that lie before
+    the crest when all are spread evenly along the path; of a prescribed k the share `hump_position`.
+    Args: `state`: its terms.
+    Returns: k_up, the shape of the state's arrays.
+    Source: energy balance from the chamber to the crest; the scene does not say where the bends lie.
+    """
+    share = tube.hump_position
+    if "decree" in state.terms:
+        return np.asarray(share * state.terms["decree"], dtype=np.float64)
+    along = share * (state.terms["friction"] + state.terms["rotation"] + state.terms["extra"])
+    before = [k for i, k in enumerate(state.bends) if (i + 0.5) / len(state.bends) < share]
+    return np.asarray(state.terms["entrance"] + along + sum(before), dtype=np.float64)

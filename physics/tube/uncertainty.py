@@ -1,0 +1,166 @@
+"""What the uncertainty of k is made of: each correlation's spread, and each uncertain input's effect."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from ringbalance.physics.tube.bends import straight_length
+from ringbalance.physics.tube.development import developing_length, development_uncertainty
+from ringbalance.physics.tube.ends import entrance_loss, exit_loss
+from ringbalance.physics.tube.friction import friction_factor, friction_uncertainty, turbulent_share
+from ringbalance.physics.tube.rotation import rotating_friction_ratio, turbulent_friction_ratio
+from ringbalance.physics.tube.state import TubeState, tube_state
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import InputUncertainty, Liquid, Tube
+
+ASSUMED_ROUGHNESS_UNCERTAINTY: Final = 0.5
+"""Relative expanded uncertainty (95 %) of a roughness for which the scene states none."""
+TUBE_INPUTS: Final = ("bore", "length", "roughness", "extra_loss", "drag_coefficient")
+
+
+def uncertainty_parts(
+    *,
+    tube: Tube,
+    liquid: Liquid,
+    angular_velocity: float,
+    velocity: FloatArray,
+    state: TubeState,
+    inputs: tuple[InputUncertainty, ...],
+) -> Mapping[str, FloatArray]:
+    """Expanded uncertainties (95 %) of k, one per cause; independent, so they combine by the root of the sum
+    of squares.
+
+    Args: `liquid`: the liquid; its own viscosity uncertainty is used unless `inputs` has one.
+        `angular_velocity`: omega, rad/s. `velocity`: u, m/s, any shape. `state`: the terms of k at these
+        velocities. `inputs`: expanded uncertainties (95 %) of scene quantities.
+    Returns: Half-width of k by cause, each the shape of `velocity`; parts that vanish everywhere are kept.
+    Source: ASME V&V 20-2009, input uncertainty by sensitivity; model spreads stand with the correlations.
+    """
+    model = {} if tube.drag_coefficient is not None else model_parts(tube=tube, state=state)
+
+    def k_of(t: Tube, q: Liquid, w: float) -> FloatArray:
+        return tube_state(tube=t, liquid=q, angular_velocity=w, velocity=velocity).k
+
+    return model | input_parts(
+        tube=tube, liquid=liquid, angular_velocity=angular_velocity, inputs=inputs, k_of=k_of, k=state.k
+    )
+
+
+def model_parts(*, tube: Tube, state: TubeState) -> dict[str, FloatArray]:
+    """Expanded uncertainties (95 %) of k by the correlations and tables themselves.
+
+    Args: `state`: the terms of k.
+    Returns: Half-width of k by cause, each the shape of the state's arrays.
+    Source: the spreads stand with the correlations.
+    """
+    re, rough, ratio = state.reynolds, tube.roughness / tube.bore, state.critical_ratio
+    straight = straight_length(tube=tube) / tube.bore
+    lam = rotating_friction_ratio(reynolds=re, rotation_reynolds=state.rotation_reynolds)
+    tur = turbulent_friction_ratio(reynolds=re, rotation_reynolds=state.rotation_reynolds)
+    friction = friction_uncertainty(
+        reynolds=re,
+        relative_roughness=rough,
+        laminar_ratio=lam.value,
+        turbulent_ratio=tur.value,
+        critical_ratio=ratio,
+    )
+    higher = friction_factor(
+        reynolds=re,
+        relative_roughness=rough,
+        laminar_ratio=lam.value + lam.uncertainty,
+        turbulent_ratio=tur.value + tur.uncertainty,
+        critical_ratio=ratio,
+    )
+    ends = (
+        entrance_loss(tube=tube, reynolds=re, critical_ratio=ratio)[1],
+        exit_loss(tube=tube, reynolds=re, critical_ratio=ratio, friction_ratio=lam.value)[1],
+    )
+    return {
+        "friction correlation": straight * friction,
+        "rotation model": tube.length / tube.bore * (higher - state.rotating_friction),
+        "rotation entry": _development_part(tube, state, lam.value),
+        "ends": np.sqrt(sum(e**2 for e in ends)),
+        "bends": state.bend_half_width,
+    }
+
+
+def _development_part(tube: Tube, state: TubeState, friction_ratio: FloatArray) -> FloatArray:
+    """What laminar flow that is still developing may add to k."""
+    laminar = 1 - turbulent_share(reynolds=state.reynolds, critical_ratio=state.critical_ratio)
+    developing = developing_length(
+        reynolds=state.reynolds, rotation_reynolds=state.rotation_reynolds, friction_ratio=friction_ratio
+    )
+    return laminar * development_uncertainty(
+        length=tube.length, bore=tube.bore, developing=developing, rotation_loss=state.terms["rotation"]
+    )
+
+
+def input_parts(
+    *,
+    tube: Tube,
+    liquid: Liquid,
+    angular_velocity: float,
+    inputs: tuple[InputUncertainty, ...],
+    k_of: Callable[[Tube, Liquid, float], FloatArray],
+    k: FloatArray,
+) -> dict[str, FloatArray]:
+    """Expanded uncertainties (95 %) of k by what the scene leaves uncertain.
+
+    Args: `liquid`: the liquid; its own viscosity uncertainty is used unless `inputs` has one.
+        `angular_velocity`: omega, rad/s. `inputs`: expanded uncertainties (95 %) of scene quantities. `k_of`:
+        k for another tube, liquid and omega.
+    Returns: Half-width of k by input, each the shape of `k`.
+    Source: ASME V&V 20-2009, input uncertainty by sensitivity.
+    """
+
+    def effect(quantity: str, half_width: float) -> FloatArray:
+        sides = (
+            _shifted(tube, liquid, angular_velocity, quantity, sign * half_width) for sign in (-1.0, 1.0)
+        )
+        changes = [k_of(*side) - k for side in sides]
+        return np.asarray(np.max(np.abs(np.array(changes)), axis=0), dtype=np.float64)
+
+    widths = _half_widths(tube, liquid, angular_velocity, {i.quantity: i for i in inputs})
+    return {f"input: {name}": effect(name, width) for name, width in widths.items()}
+
+
+def _half_widths(
+    tube: Tube, liquid: Liquid, angular_velocity: float, stated: Mapping[str, InputUncertainty]
+) -> dict[str, float]:
+    """Absolute half-widths of the inputs that k knows, from the scene or, failing that, assumed."""
+    nominal = {name: getattr(tube, name) for name in TUBE_INPUTS}
+    nominal |= {"kinematic_viscosity": liquid.kinematic_viscosity, "speed": angular_velocity}
+    assumed = {
+        "kinematic_viscosity": liquid.viscosity_uncertainty * liquid.kinematic_viscosity,
+        "roughness": ASSUMED_ROUGHNESS_UNCERTAINTY * tube.roughness,
+    }
+    given = {
+        name: i.half_width * (abs(nominal[name]) if i.relative else 1.0)
+        for name, i in stated.items()
+        if nominal.get(name) is not None
+    }
+    return {name: width for name, width in (assumed | given).items() if width > 0}
+
+
+def _shifted(
+    tube: Tube, liquid: Liquid, angular_velocity: float, quantity: str, change: float
+) -> tuple[Tube, Liquid, float]:
+    if quantity == "speed":
+        return tube, liquid, angular_velocity + change
+    if quantity == "kinematic_viscosity":
+        # Never to zero or below: an interval that wide says "unknown", and a tenth already shows it.
+        value = max(liquid.kinematic_viscosity + change, 0.1 * liquid.kinematic_viscosity)
+        return tube, replace(liquid, kinematic_viscosity=value), angular_velocity
+    value = getattr(tube, quantity) + change
+    floor = {
+        "bore": 0.1 * tube.bore,
+        "length": sum(b.angle * b.radius for b in tube.bends) or 0.1 * tube.length,
+        "roughness": 0.0,
+        "extra_loss": 0.0,
+        "drag_coefficient": 0.0,
+    }[quantity]
+    return replace(tube, **{quantity: max(value, floor)}), liquid, angular_velocity

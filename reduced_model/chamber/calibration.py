@@ -1,0 +1,247 @@
+"""Wall pressure and moment of a chamber over its fill, checked by finite elements, with its uncertainty."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from ringbalance.mesh.geometry import chamber_volume
+from ringbalance.physics.results import Estimate, Statistics, Status
+from ringbalance.reduced_model.chamber.element_check import ElementCheck, element_check
+from ringbalance.reduced_model.chamber.gravity import SAFETY, GravityEffect, closed_ring, gravity_effect
+from ringbalance.reduced_model.chamber.gravity_choice import gravity_choice
+from ringbalance.reduced_model.chamber.gravity_open import open_ring_effect
+from ringbalance.reduced_model.chamber.inputs import InputEffect, input_effects
+from ringbalance.reduced_model.chamber.ring_values import RingValues, ring_values
+from ringbalance.reduced_model.selection.chamber_models import chamber_status, mean_gravity
+from ringbalance.reduced_model.selection.chamber_terms import unmodelled_fractions
+from ringbalance.reduced_model.tables.fit import table_from_samples
+from ringbalance.reduced_model.tables.hermite import HermiteTable
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Scene
+
+FILL_STEP: Final = 0.05
+"""Of the fill ratios that a calibration reports."""
+ROUND_OFF: Final = 16 * float(np.finfo(np.float64).eps)
+"""Relative floor of a numerical half-width."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Curve:
+    """One quantity over the fill ratio: values, their half-widths by cause, and a smooth table.
+
+    Arrays run along `ChamberCalibration.fill_ratio`, whose first entries are the table's nodes.
+    """
+
+    value: FloatArray
+    """By closed forms, or by quadrature where gravity is modelled."""
+    numerical: FloatArray
+    """Expanded uncertainty (95 %) by rounding, quadrature, and what finite elements contradict."""
+    left_out: FloatArray
+    """Expanded uncertainty (95 %) for gravity where it is left out; zero where it is modelled."""
+    unmodelled: FloatArray
+    """95 % uncertainty for terms that no model holds: surface tension and friction at the walls."""
+    inputs: FloatArray
+    """Expanded uncertainty (95 %) by the scene's uncertain inputs."""
+    table: HermiteTable
+    """Interpolates the values."""
+    interpolation: float
+    """Expanded uncertainty (95 %) of the table between its nodes."""
+
+    @property
+    def uncertainty(self) -> FloatArray:
+        """Half-width of the value for the scene's inputs as they stand: numerical and left-out terms."""
+        return np.sqrt(self.numerical**2 + self.left_out**2 + self.unmodelled**2)
+
+    def uncertainty_table(self, *, inputs: FloatArray) -> HermiteTable:
+        """Half-width over the fill ratio: numerical, left-out terms, interpolation and some inputs.
+
+        Args: `inputs`: expanded uncertainty (95 %) by those inputs, along the fill ratio.
+        """
+        squares = (self.uncertainty**2 + inputs**2 + self.interpolation**2)[: self.table.value.size]
+        nodes = self.table.nodes
+        return table_from_samples(start=float(nodes[0]), stop=float(nodes[-1]), value=np.sqrt(squares))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ChamberCalibration:
+    """Totals of one chamber over its fill ratio, and lambda."""
+
+    volume: float
+    """V, m^3."""
+    fill_ratio: FloatArray
+    """Nodes, equally spaced from zero to max_fill_ratio, and behind them those reported that are no nodes."""
+    ring: RingValues
+    """Closed forms at `fill_ratio`."""
+    check: ElementCheck
+    """Finite elements at a few of them."""
+    reported_fill_ratio: FloatArray
+    """0, 0.05, ... max_fill_ratio."""
+    reported: tuple[int, ...]
+    """Where these stand in `fill_ratio`."""
+    wall_pressure: Curve
+    """Liquid part, mean over the outer wall, Pa."""
+    moment: Curve
+    """U, kg m."""
+    moment_per_mass: Estimate
+    """lambda at equal fills, per transferred mass, m, shape (); half-width without the inputs."""
+    moment_per_mass_inputs: float
+    """Expanded uncertainty (95 %) of lambda by the scene's uncertain inputs, m."""
+    input_effects: Mapping[str, InputEffect]
+    """Effect of each uncertain input."""
+    gravity: GravityEffect
+    """A-priori estimate along `fill_ratio`."""
+    gravity_share: float
+    """Its largest estimated share of wall pressure or moment over the range of fills."""
+    gravity_modelled: bool
+    """Whether the values hold it."""
+    gravity_check: str
+    """What running the next model at a few fills said of that choice."""
+    status: Status
+    """Of the solves or, where these are sound, of the ring's waves over the range of fills."""
+    statistics: Statistics
+
+
+def fill_nodes(*, largest: float) -> tuple[FloatArray, FloatArray]:
+    """Fill ratios of the tables and of the report.
+
+    Args: `largest`: max_fill_ratio.
+    Returns: Nodes (an odd number, so that equal fills are one) and reported fill ratios (0, 0.05, ...
+        largest).
+    """
+    steps = math.ceil(largest / FILL_STEP - 1e-9)
+    # At least eleven nodes, so that even a small range has an error estimate from every second node.
+    nodes = np.linspace(0.0, largest, 2 * max(5, steps) + 1)
+    reported = np.append(np.round(FILL_STEP * np.arange(steps), 10), largest)
+    return nodes, reported
+
+
+def calibrate_chamber(scene: Scene) -> ChamberCalibration:
+    """Evaluate the closed forms over the fill range and check them by finite elements at a few fills.
+
+    Gravity is modelled when its second-order share exceeds the scene's tolerance, by the estimate and by a
+    check at a few fills; otherwise its estimate goes into the half-widths.
+    Args: `scene`: the scene; a ring must exist.
+    Raises: SceneError: as `scene_ring`.
+    Source: Eqs. 2 to 12 of the liquid-ring paper with exact plates.
+    """
+    choice = gravity_choice(scene=scene, share=mean_gravity(scene))
+    modelled = choice.modelled
+    nodes, reported = fill_nodes(largest=scene.disc.max_fill_ratio)
+    fills = np.append(nodes, [x for x in reported if np.min(np.abs(nodes - x)) > 1e-12])
+    effect = _gravity(scene, fills)
+    ring = ring_values(scene, fill_ratio=fills, gravity=modelled)
+    check = element_check(scene, values=ring, gravity=modelled)
+    unmodelled = unmodelled_fractions(scene, fills)
+    effects = input_effects(scene=scene, fill_ratio=fills)
+    scale = 0.0 if modelled else SAFETY
+    pressure, moment = (scale * np.abs(e) for e in (effect.wall_pressure, effect.moment))
+    pressures = [e.wall_pressure for e in effects.values()]
+    moments = [e.moment for e in effects.values()]
+    return ChamberCalibration(
+        volume=chamber_volume(disc=scene.disc),
+        fill_ratio=fills,
+        ring=ring,
+        check=check,
+        reported_fill_ratio=reported,
+        reported=tuple(int(np.argmin(np.abs(fills - x))) for x in reported),
+        wall_pressure=_curve(
+            nodes, ring.wall_pressure, check.excess, pressure, unmodelled["pressures"], pressures
+        ),
+        moment=_curve(nodes, ring.moment, check.excess, moment, unmodelled["moments"], moments),
+        moment_per_mass=_central(
+            scene,
+            nodes,
+            ring.moment_per_volume,
+            check.excess,
+            scale * effect.moment,
+            unmodelled["moments"],
+        ),
+        moment_per_mass_inputs=math.hypot(*(e.moment_per_mass for e in effects.values())),
+        input_effects=effects,
+        gravity=effect,
+        gravity_share=choice.share,
+        gravity_modelled=modelled,
+        gravity_check=choice.told,
+        status=next((s for s in (ring.status, check.status) if not s.ok), chamber_status(scene)),
+        statistics=check.elements.statistics,
+    )
+
+
+def _curve(
+    nodes: FloatArray,
+    estimate: Estimate,
+    excess: float,
+    gravity: FloatArray,
+    unmodelled: FloatArray,
+    inputs: list[FloatArray],
+) -> Curve:
+    value, n = estimate.value, nodes.size
+    table = table_from_samples(start=float(nodes[0]), stop=float(nodes[-1]), value=value[:n])
+    coarse = table_from_samples(start=float(nodes[0]), stop=float(nodes[-1]), value=value[:n:2])
+    # Twice the step at worst triples the error; half of what the coarse table misses is on the safe side.
+    missed = float(np.max(np.abs(coarse(nodes) - value[:n])))
+    return Curve(
+        value=value,
+        numerical=estimate.uncertainty + (ROUND_OFF + excess) * np.abs(value),
+        left_out=gravity,
+        unmodelled=unmodelled * np.abs(value),
+        inputs=np.sqrt(sum((i**2 for i in inputs), start=np.zeros_like(value))),
+        table=table,
+        interpolation=missed / 2,
+    )
+
+
+def _central(
+    scene: Scene,
+    nodes: FloatArray,
+    slope: Estimate,
+    excess: float,
+    gravity: FloatArray,
+    unmodelled: FloatArray,
+) -> Estimate:
+    """lambda at equal fills, 2 (dU/dV')/rho; gravity's share by how its moment changes with the fill."""
+    m, density = nodes.size // 2, scene.liquid.density
+    value = 2 * float(slope.value[m]) / density
+    numerical = 2 * float(slope.uncertainty[m]) / density + (ROUND_OFF + excess) * value
+    mass = density * chamber_volume(disc=scene.disc) * float(nodes[m + 1] - nodes[m - 1])
+    left_out = 2 * abs(float(gravity[m + 1] - gravity[m - 1])) / mass
+    return Estimate(
+        value=np.asarray(value),
+        uncertainty=np.asarray(math.hypot(numerical, left_out, float(unmodelled[m]) * value)),
+        status=slope.status,
+    )
+
+
+def _gravity(scene: Scene, fills: FloatArray) -> GravityEffect:
+    """Second-order effect; by quadrature where the ring is open."""
+    disc, speed, gravity = scene.disc, scene.rotor.speed, scene.environment.gravity
+    vertical = scene.environment.shaft == "vertical"
+    effect = gravity_effect(
+        disc=disc,
+        density=scene.liquid.density,
+        angular_velocity=speed,
+        gravity=gravity,
+        vertical=vertical,
+        fill_ratio=fills,
+    )
+    is_open = ~closed_ring(
+        disc=disc, angular_velocity=speed, gravity=gravity, vertical=vertical, fill_ratio=fills
+    )
+    if not np.any(is_open):
+        return effect
+    opened = open_ring_effect(
+        disc=disc,
+        density=scene.liquid.density,
+        angular_velocity=speed,
+        gravity=gravity,
+        vertical=vertical,
+        fill_ratio=fills[is_open],
+    )
+    pressure, moment = effect.wall_pressure.copy(), effect.moment.copy()
+    pressure[is_open], moment[is_open] = opened.wall_pressure, opened.moment
+    return GravityEffect(wall_pressure=pressure, moment=moment)

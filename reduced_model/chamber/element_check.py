@@ -1,0 +1,116 @@
+"""Finite elements beside a chamber's closed forms: at a few fills, on the mesh that the tolerance needs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from ringbalance.mesh.geometry import surface_radius
+from ringbalance.physics.pressure.ring import RingQuantities
+from ringbalance.physics.results import Status, StatusCode
+from ringbalance.reduced_model.chamber.ring_values import RingValues
+from ringbalance.reduced_model.chamber.scene_ring import scene_ring
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Scene
+
+CHECKED: Final = ("wall_pressure", "moment", "moment_per_volume")
+_SHARE: Final = 0.1
+"""Of the tolerance, that the mesh may leave at the thinnest ring checked."""
+_RADIAL_CELLS: Final = 4
+"""The pressure is quadratic in the place and so are the cells: only the arcs need more."""
+_MOST_ANGLE: Final = math.pi / 48
+"""Central angle of the smallest cell, rad."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ElementCheck:
+    """Finite elements at a few fills, and how far the closed forms are from them."""
+
+    elements: RingQuantities
+    """At the checked fills, with the half-widths of its own grid convergence."""
+    gravity: bool
+    """Whether it holds gravity."""
+    difference: Mapping[str, FloatArray]
+    """Closed form less finite elements, by `CHECKED`, SI, shape (n,)."""
+    allowed: Mapping[str, FloatArray]
+    """Error of both, 95 %, by `CHECKED`, SI, shape (n,)."""
+    excess: float
+    """Largest difference beyond what is allowed, relative to the value; zero where they agree."""
+    status: Status
+
+    @property
+    def solves(self) -> int:
+        """Meshes times fills that were solved."""
+        return len(self.elements.cells) * self.elements.fill_ratio.size
+
+
+def element_check(scene: Scene, *, values: RingValues, gravity: bool) -> ElementCheck:
+    """Solve the pressure at the thinnest ring of the table, at equal fills and at the largest fill.
+
+    Args: `values`: by the closed forms. `gravity`: whether these hold gravity.
+    Returns: ElementCheck; its status is NOT_CONVERGED where the two differ by more than both errors, or where
+        the finite elements found no tilted surface.
+    Raises: SceneError: as `scene_ring`, a chamber so narrow that nothing could be checked.
+    """
+    at = _checked_fills(scene, values)
+    held = gravity and bool(np.any(values.closed[at]))
+    at = at[values.closed[at]] if held else at
+    elements = scene_ring(
+        scene,
+        fill_ratio=values.fill_ratio[at],
+        gravity=held,
+        cells=_meshes(scene, float(values.fill_ratio[at].min()), 3 if _axial(scene, held) else 2),
+    )
+    difference, allowed = {}, {}
+    for name in CHECKED:
+        closed_form, solved = getattr(values, name), getattr(elements, name)
+        difference[name] = closed_form.value[at] - solved.value
+        allowed[name] = closed_form.uncertainty[at] + solved.uncertainty
+    beyond = [(np.abs(difference[n]) - allowed[n]) / np.abs(getattr(values, n).value[at]) for n in CHECKED]
+    excess = max(0.0, float(np.max(beyond)))
+    return ElementCheck(
+        elements=elements,
+        gravity=held,
+        difference=difference,
+        allowed=allowed,
+        excess=excess,
+        status=_status(elements, excess),
+    )
+
+
+def _checked_fills(scene: Scene, values: RingValues) -> np.ndarray:
+    """Places in `values` of the thinnest ring, of equal fills and of the largest fill."""
+    fills, largest = values.fill_ratio, scene.disc.max_fill_ratio
+    thinnest = float(fills[fills > 0].min())
+    return np.array([int(np.argmin(np.abs(fills - x))) for x in (thinnest, largest / 2, largest)])
+
+
+def _axial(scene: Scene, gravity: bool) -> bool:
+    return gravity and scene.environment.shaft == "vertical"
+
+
+def _meshes(scene: Scene, thinnest: float, dimension: int) -> tuple[tuple[int, ...], ...]:
+    """Cells of three meshes, finest first: an arc drawn by cells of angle h is off by (h/2)^4/32 R2/depth."""
+    disc = scene.disc
+    depth = disc.outer_radius - float(surface_radius(disc=disc, fill_ratio=thinnest))
+    angle = 2 * (32 * _SHARE * scene.tolerance * depth / disc.outer_radius) ** 0.25
+    angular = 4 * math.ceil(disc.central_angle / max(angle, _MOST_ANGLE) / 4)
+    finest = (_RADIAL_CELLS, max(8, angular), 4)[:dimension]
+    return tuple(tuple(n // k for n in finest) for k in (1, 2, 4))
+
+
+def _status(elements: RingQuantities, excess: float) -> Status:
+    if not elements.status.ok:
+        text = f"the closed forms stand unchecked, because the finite elements failed: {elements.status.text}"
+        return Status(code=StatusCode.NOT_CONVERGED, text=text)
+    if excess > 0:
+        text = (
+            f"finite elements and closed forms differ by {excess:.1e} more than their errors allow: take "
+            "that as the uncertainty, or lower accuracy.tolerance for a finer check"
+        )
+        return Status(code=StatusCode.NOT_CONVERGED, text=text)
+    return Status()

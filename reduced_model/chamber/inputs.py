@@ -1,0 +1,113 @@
+"""What uncertain inputs do to wall pressure, moment and lambda: linear sensitivities of the closed forms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.mesh.geometry import half_angle, liquid_first_moment, surface_radius
+from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import InputUncertainty, Scene
+from ringbalance.scene.uncertain import nominal_value, with_value
+
+CHAMBER_INPUTS: Final = (
+    "outer_radius",
+    "inner_radius",
+    "axial_width",
+    "central_angle",
+    "plate_thickness",
+    "density",
+    "speed",
+)
+_STEP: Final = 1e-3
+
+
+@dataclass(frozen=True, kw_only=True)
+class InputEffect:
+    """Expanded uncertainties (95 %) by input; arrays along the fill ratio."""
+
+    wall_pressure: FloatArray
+    """Pa."""
+    moment: FloatArray
+    """kg m."""
+    moment_per_mass: float
+    """lambda at equal fills, m."""
+
+
+def half_widths(scene: Scene) -> Mapping[str, float]:
+    """Absolute expanded uncertainties (95 %) of a scene's inputs; the liquid's own where the scene states
+    none.
+
+    Returns: SI half-width by quantity; only those above zero.
+    """
+    liquid = scene.liquid
+    found = {
+        "density": liquid.density_uncertainty * liquid.density,
+        "kinematic_viscosity": liquid.viscosity_uncertainty * liquid.kinematic_viscosity,
+    }
+    for stated in scene.uncertainty:
+        width = _absolute(scene, stated)
+        if width is not None:
+            found[stated.quantity] = width
+    return {name: width for name, width in found.items() if width > 0}
+
+
+def _absolute(scene: Scene, stated: InputUncertainty) -> float | None:
+    value = nominal_value(scene=scene, quantity=stated.quantity)
+    if value is None:
+        return None
+    return stated.half_width * (abs(value) if stated.relative else 1.0)
+
+
+def input_effects(*, scene: Scene, fill_ratio: FloatArray) -> Mapping[str, InputEffect]:
+    """Effect of each uncertain input of the chamber, at a fixed fill ratio.
+
+    Args: `fill_ratio`: x, shape (n,).
+    Returns: InputEffect by quantity; empty when every input is exact.
+    Source: ASME V&V 20-2009, propagation of input uncertainty by local sensitivities.
+    """
+    widths = {name: w for name, w in half_widths(scene).items() if name in CHAMBER_INPUTS}
+    return {name: _effect(scene, fill_ratio, name, width) for name, width in widths.items()}
+
+
+def _effect(scene: Scene, fill_ratio: FloatArray, quantity: str, width: float) -> InputEffect:
+    value = nominal_value(scene=scene, quantity=quantity)
+    if value is None:
+        raise ValueError(f"the scene has no {quantity}")
+    fills = np.append(fill_ratio, scene.disc.max_fill_ratio / 2)
+    sides = [
+        chamber_closed_forms(
+            scene=with_value(scene=scene, quantity=quantity, value=value + s * _STEP * width),
+            fill_ratio=fills,
+        )
+        for s in (-1.0, 1.0)
+    ]
+    pressure, moment, ratio = (np.abs(b - a) / (2 * _STEP) for a, b in zip(*sides, strict=True))
+    return InputEffect(wall_pressure=pressure[:-1], moment=moment[:-1], moment_per_mass=float(ratio[-1]))
+
+
+def chamber_closed_forms(
+    *, scene: Scene, fill_ratio: npt.ArrayLike
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Wall pressure, moment and lambda of a chamber without gravity.
+
+    P = rho omega^2 (R2^2 - a^2)/2, U = rho B int x dA, lambda = 2 a sin(alpha)/alpha.
+    Args: `fill_ratio`: x, any shape.
+    Returns: P, Pa, U, kg m, and lambda, m, the shape of `fill_ratio`.
+    Source: hydrostatics with the chamber's exact geometry.
+    """
+    disc, rho = scene.disc, scene.liquid.density
+    a = surface_radius(disc=disc, fill_ratio=fill_ratio)
+    alpha = half_angle(disc=disc, radius=a)
+    return (
+        hydrostatic_pressure(
+            density=rho, angular_velocity=scene.rotor.speed, inner=a, outer=disc.outer_radius
+        ),
+        rho * disc.axial_width * liquid_first_moment(disc=disc, surface_radius=a),
+        np.asarray(2 * a * np.sin(alpha) / alpha, dtype=np.float64),
+    )

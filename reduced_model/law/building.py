@@ -1,0 +1,91 @@
+"""From a calibrated chamber and the tube's heads to the flow law."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from ringbalance.physics.pressure.hydrostatics import Radius, hydrostatic_pressure
+from ringbalance.reduced_model.chamber.calibration import ChamberCalibration
+from ringbalance.reduced_model.chamber.inputs import half_widths
+from ringbalance.reduced_model.chamber.moment import CalibratedMoment
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
+from ringbalance.reduced_model.tube.heads import TubeHeads
+from ringbalance.reduced_model.tube.regime import TubePath
+from ringbalance.scene.models import Scene
+
+# Density and speed act on both wall pressures and on the tube at once, so the law handles them separately.
+_SHARED: Final = ("density", "speed")
+
+
+def calibrated_law(*, scene: Scene, chamber: ChamberCalibration, heads: TubeHeads) -> CalibratedLaw:
+    """Put the flow law together.
+
+    Args: `chamber`: its wall pressures and moments. `heads`: its tube's heads.
+    Returns: CalibratedLaw named "calibrated".
+    Source: Eqs. 13 to 18 of the liquid-ring paper, with finite-element wall pressures and k(u).
+    """
+    own = [e.wall_pressure for name, e in chamber.input_effects.items() if name not in _SHARED]
+    inputs = np.sqrt(sum((e**2 for e in own), start=np.zeros_like(chamber.fill_ratio)))
+    no_inputs = np.zeros_like(chamber.fill_ratio)
+    return CalibratedLaw(
+        name="calibrated",
+        max_fill_ratio=scene.disc.max_fill_ratio,
+        ambient_pressure=scene.gas.ambient_pressure,
+        chamber_volume=chamber.volume,
+        tube_area=math.pi / 4 * scene.tube.bore**2,
+        wall_pressure=chamber.wall_pressure.table,
+        wall_pressure_uncertainty=chamber.wall_pressure.uncertainty_table(inputs=inputs),
+        path=tube_path(scene),
+        heads=heads,
+        inputs=_drive_uncertainty(scene),
+        moment=CalibratedMoment(
+            chamber_moment=chamber.moment.table, half_width=chamber.moment.uncertainty_table(inputs=no_inputs)
+        ),
+    )
+
+
+def tube_path(scene: Scene) -> TubePath:
+    """Radii of the tube as pressures of a column that reaches from there to the outer wall.
+
+    Source: p(r) = rho omega^2 r^2/2 of liquid at rest in the rotating frame.
+    """
+    hump = scene.tube.hump_radius
+    return TubePath(
+        density=scene.liquid.density,
+        port_pressure=column_pressure(scene=scene, radius=scene.tube.port_radius),
+        hump_pressure=None if hump is None else column_pressure(scene=scene, radius=hump),
+        trapped=scene.tube.hump_gas == "trapped",
+        vapour_pressure=scene.liquid.vapour_pressure - scene.gas.ambient_pressure,
+    )
+
+
+def column_pressure(*, scene: Scene, radius: Radius) -> Radius:
+    """Pressure of a liquid column from a radius to the outer wall.
+
+    Args: `radius`: r, m, a number or an array.
+    Returns: Pa, the shape of `radius`.
+    Source: Eq. 11 of the liquid-ring paper, integrated.
+    """
+    return hydrostatic_pressure(
+        density=scene.liquid.density,
+        angular_velocity=scene.rotor.speed,
+        inner=radius,
+        outer=scene.disc.outer_radius,
+    )
+
+
+def _drive_uncertainty(scene: Scene) -> DriveUncertainty:
+    width = half_widths(scene)
+    hump = scene.tube.hump_radius or 0.0
+    moved = scene.liquid.density * scene.rotor.speed**2 * hump * width.get("hump_radius", 0.0)
+    return DriveUncertainty(
+        relative_density=width.get("density", 0.0) / scene.liquid.density,
+        relative_speed=width.get("speed", 0.0) / abs(scene.rotor.speed),
+        relative_gas_pressure=width.get("pressure", 0.0) / scene.gas.pressure if scene.gas.pressure else 0.0,
+        hump_pressure=moved,
+        vapour_pressure=math.hypot(width.get("vapour_pressure", 0.0), width.get("ambient_pressure", 0.0)),
+    )

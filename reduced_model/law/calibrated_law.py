@@ -1,0 +1,172 @@
+"""The flow law distilled from finite-element wall pressures and the tube's loss, with all its regimes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.reduced_model.chamber.moment import CalibratedMoment
+from ringbalance.reduced_model.law.conditions import Conditions, checked_conditions
+from ringbalance.reduced_model.law.flow_law import Flow, Regime
+from ringbalance.reduced_model.law.storage import save_record
+from ringbalance.reduced_model.tables.hermite import HermiteTable
+from ringbalance.reduced_model.tube.directed_flow import DirectedFlow, Drive, DriveUncertainty, directed_flow
+from ringbalance.reduced_model.tube.heads import TubeHeads
+from ringbalance.reduced_model.tube.regime import TubeEnds, TubePath
+from ringbalance.scene.arrays import BoolArray, FloatArray
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CalibratedLaw:
+    """Flow of the tube for any fills, gas pressure and history: blocked, siphon, separated or reverse.
+
+    The velocity is continuous in fills and pressure, except where the physics jumps: when an unprimed
+    tube starts to flow, when a column separates at rest, and when a chamber's liquid leaves the port open.
+
+    `table()` holds `log_velocity` (ln m/s), `log_head`, `log_hump_head` and `log_return_hump_head`
+    (ln m^2/s^2; the last two only with a crest), `fill_ratio`, `wall_pressure` (Pa), and, of shape (1,),
+    `density`, `port_pressure`, `hump_pressure` (only with a crest) and `vapour_pressure` (gauge, Pa).
+    """
+
+    name: str
+    """ "calibrated"."""
+    max_fill_ratio: float
+    """Liquid of the pair as a share of one chamber's volume."""
+    ambient_pressure: float
+    """Absolute, Pa."""
+    chamber_volume: float
+    """V, m^3."""
+    tube_area: float
+    """S, m^2."""
+    wall_pressure: HermiteTable
+    """Level of a chamber, Pa, over its fill ratio."""
+    wall_pressure_uncertainty: HermiteTable
+    """Its expanded uncertainty (95 %), Pa, over the fill ratio."""
+    path: TubePath
+    """Radii of the tube, as pressures."""
+    heads: TubeHeads
+    """Loss of the tube."""
+    inputs: DriveUncertainty
+    """Half-widths of what drives the flow."""
+    moment: CalibratedMoment
+    """The moment that goes with this law."""
+
+    @property
+    def density(self) -> float:
+        return self.path.density
+
+    def evaluate(
+        self,
+        *,
+        fill_ratio: npt.ArrayLike,
+        opposite_fill_ratio: npt.ArrayLike | None = None,
+        gas_pressure: npt.ArrayLike,
+        primed: npt.ArrayLike = False,
+    ) -> Flow:
+        asked = checked_conditions(
+            max_fill_ratio=self.max_fill_ratio,
+            ambient_pressure=self.ambient_pressure,
+            fill_ratio=fill_ratio,
+            opposite_fill_ratio=opposite_fill_ratio,
+            gas_pressure=gas_pressure,
+            primed=primed,
+        )
+        forward = self._directed(asked, reverse=False)
+        if np.all(forward.velocity > 0):
+            return _joined(forward, forward, np.zeros_like(asked.primed))
+        backward = self._directed(asked, reverse=True)
+        return _joined(forward, backward, (backward.velocity > 0) & ~(forward.velocity > 0))
+
+    def ends(
+        self,
+        *,
+        fill_ratio: npt.ArrayLike,
+        opposite_fill_ratio: npt.ArrayLike | None = None,
+        gas_pressure: npt.ArrayLike = 0.0,
+    ) -> TubeEnds[FloatArray]:
+        """Pressures at the tube's ends for flow out of the driven chamber; not checked.
+
+        Args: `fill_ratio`: x of the driven chamber, any shape. `opposite_fill_ratio`: of the opposite
+            chamber; default max_fill_ratio - fill_ratio. `gas_pressure`: gauge, Pa, in the driven chamber;
+            the opposite one is vented.
+        Returns: TubeEnds, of the broadcast shape of the arguments.
+        """
+        x = np.asarray(fill_ratio, dtype=np.float64)
+        y = self.max_fill_ratio - x if opposite_fill_ratio is None else opposite_fill_ratio
+        gas, own, other = np.broadcast_arrays(
+            np.asarray(gas_pressure, dtype=np.float64),
+            np.maximum(self.wall_pressure(x), 0.0),
+            np.maximum(self.wall_pressure(y), 0.0),
+        )
+        return TubeEnds(
+            upstream_gas=gas,
+            downstream_gas=np.zeros_like(gas),
+            upstream_hydrostatic=own,
+            downstream_hydrostatic=other,
+            port_pressure=self.path.port_pressure,
+        )
+
+    def _directed(self, asked: Conditions, *, reverse: bool) -> DirectedFlow:
+        own, other = asked.fill_ratio, asked.opposite_fill_ratio
+        ends = self.ends(fill_ratio=own, opposite_fill_ratio=other, gas_pressure=asked.gas_pressure)
+        allowed = np.ones_like(asked.primed)
+        if self.path.hump_pressure is None:
+            allowed = (asked.gas_pressure > 0) & (asked.primed | (not reverse))
+        return directed_flow(
+            path=self.path,
+            heads=self.heads,
+            hump_head=self.heads.return_hump_head if reverse else self.heads.hump_head,
+            inputs=self.inputs,
+            drive=Drive(
+                ends=ends.reversed() if reverse else ends,
+                wall_pressure_uncertainty=np.hypot(
+                    self.wall_pressure_uncertainty(own), self.wall_pressure_uncertainty(other)
+                ),
+                primed=asked.primed,
+                allowed=allowed,
+            ),
+        )
+
+    def save(self, path: Path | str) -> Path:
+        return save_record(path=Path(path), record=self)
+
+    def table(self) -> Mapping[str, FloatArray]:
+        """Plain arrays for compiled code, named in the class's docstring.
+
+        Returns: Copies, so that nothing can change the law.
+        """
+        heads = {
+            "log_head": self.heads.head,
+            "log_hump_head": self.heads.hump_head,
+            "log_return_hump_head": self.heads.return_hump_head,
+        }
+        scalars = {
+            "density": self.path.density,
+            "port_pressure": self.path.port_pressure,
+            "hump_pressure": self.path.hump_pressure,
+            "vapour_pressure": self.path.vapour_pressure,
+        }
+        return (
+            {"log_velocity": self.heads.head.nodes}
+            | {name: table.value.copy() for name, table in heads.items() if table is not None}
+            | {"fill_ratio": self.wall_pressure.nodes, "wall_pressure": self.wall_pressure.value.copy()}
+            | {name: np.array([value]) for name, value in scalars.items() if value is not None}
+        )
+
+
+def _joined(forward: DirectedFlow, backward: DirectedFlow, reverse: BoolArray) -> Flow:
+    """One flow from both directions, of which at most one flows."""
+    ahead = forward.velocity > 0
+    regime = np.select(
+        [ahead & forward.separated, ahead, reverse], [Regime.SEPARATED, Regime.SIPHON, Regime.REVERSE]
+    )
+    return Flow(
+        velocity=np.where(reverse, -backward.velocity, forward.velocity),
+        regime=np.asarray(np.where(ahead | reverse, regime, Regime.BLOCKED), dtype=np.int64),
+        uncertainty=np.where(reverse, backward.half_width, forward.half_width),
+        primed=np.where(reverse, backward.primed, forward.primed),
+    )

@@ -1,0 +1,172 @@
+"""The liquid-ring paper as a balancer model: Eq. 19 for the flow, one lambda for the moment."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.reduced_model.law.conditions import checked_conditions
+from ringbalance.reduced_model.law.flow_law import Flow, Regime
+from ringbalance.reduced_model.law.model import BalancerModel, balancer_model
+from ringbalance.reduced_model.law.storage import save_record
+from ringbalance.reduced_model.paper import formulas as paper
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
+
+
+@dataclass(frozen=True, kw_only=True)
+class PaperMoment:
+    """Moment of a pair by one lambda: U = lambda rho V (x_A - x_C)/2, lambda per *transferred* mass.
+
+    Eq. 21's mass is the difference of the two chambers, twice the transferred one; with 72 mm Eq. 22 taken
+    literally would be twice Eq. 7.  The reading used here agrees with Eq. 7 and with Fig. 7.
+    """
+
+    moment_per_transferred_mass: float
+    """lambda, m."""
+    density: float
+    """rho, kg/m^3."""
+    chamber_volume: float
+    """V, m^3."""
+
+    def pair_moment(self, *, fill_ratio: npt.ArrayLike, opposite_fill_ratio: npt.ArrayLike) -> FloatArray:
+        x, y = (np.asarray(v, dtype=np.float64) for v in (fill_ratio, opposite_fill_ratio))
+        transferred = self.density * self.chamber_volume * (x - y) / 2
+        return np.asarray(self.moment_per_transferred_mass * transferred, dtype=np.float64)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PaperLaw:
+    """Eq. 19 as a flow law: u = sqrt(2/(rho (k+1)) [p0 + rho omega^2 V (x_A - x_C)/(B theta)]).
+
+    With the gas on and the bracket positive the tube is a full siphon; otherwise it is blocked.  The paper
+    states no uncertainty, so none is returned.  Between events du/dt = -2 omega^2 S/((k+1) B theta).
+
+    `table()` holds `velocity_squared_per_pressure` 2/(rho (k+1)), m^3/kg, and `pressure_per_fill_difference`
+    rho omega^2 V/(B theta), Pa: u^2 = the first times (p0 + the second times (x_A - x_C)).
+    """
+
+    density: float
+    """rho, kg/m^3."""
+    angular_velocity: float
+    """omega, rad/s."""
+    axial_width: float
+    """B, m."""
+    central_angle: float
+    """theta, rad."""
+    chamber_volume: float
+    """V of Eq. 4, m^3."""
+    tube_area: float
+    """S, m^2."""
+    drag_coefficient: float
+    """k."""
+    max_fill_ratio: float
+    """Liquid of the pair as a share of one chamber's volume; the paper's 0.5."""
+    ambient_pressure: float
+    """Absolute, Pa."""
+    moment: PaperMoment
+    """The moment that goes with this law."""
+
+    @property
+    def name(self) -> str:
+        return "paper"
+
+    @property
+    def velocity_squared_per_pressure(self) -> float:
+        """2/(rho (k + 1)), m^3/kg."""
+        return 2 / (self.density * (self.drag_coefficient + 1))
+
+    @property
+    def pressure_per_fill_difference(self) -> float:
+        """rho omega^2 V/(B theta), Pa."""
+        head = self.density * self.angular_velocity**2
+        return head * self.chamber_volume / (self.axial_width * self.central_angle)
+
+    def evaluate(
+        self,
+        *,
+        fill_ratio: npt.ArrayLike,
+        opposite_fill_ratio: npt.ArrayLike | None = None,
+        gas_pressure: npt.ArrayLike,
+        primed: npt.ArrayLike = False,
+    ) -> Flow:
+        """Flow by Eq. 19; blocked at and below the stall pressure and with the gas off.
+
+        Args:
+            fill_ratio: x of the driven chamber, any shape, within [0, max_fill_ratio].
+            opposite_fill_ratio: of the opposite chamber; default max_fill_ratio - fill_ratio.
+            gas_pressure: gauge, Pa, in the driven chamber; zero or less is gas off.
+            primed: not used by this law, which knows no hump.
+        Returns: Flow, of the broadcast shape of the arguments.
+        Raises: ValueError: a fill ratio outside the range, a NaN, or a negative absolute pressure.
+        """
+        asked = checked_conditions(
+            max_fill_ratio=self.max_fill_ratio,
+            ambient_pressure=self.ambient_pressure,
+            fill_ratio=fill_ratio,
+            opposite_fill_ratio=opposite_fill_ratio,
+            gas_pressure=gas_pressure,
+            primed=primed,
+        )
+        level = self.pressure_per_fill_difference * (asked.fill_ratio - asked.opposite_fill_ratio)
+        squared = self.velocity_squared_per_pressure * (asked.gas_pressure + level)
+        flows = (squared > 0) & (asked.gas_pressure > 0)
+        velocity = np.sqrt(np.where(flows, squared, 0.0))
+        return Flow(
+            velocity=velocity,
+            regime=np.where(flows, Regime.SIPHON, Regime.BLOCKED).astype(np.int64),
+            uncertainty=np.zeros_like(velocity),
+            primed=np.asarray(flows),
+        )
+
+    def save(self, path: Path | str) -> Path:
+        return save_record(path=Path(path), record=self)
+
+    def table(self) -> Mapping[str, FloatArray]:
+        """The two coefficients of u^2, named in the class's docstring. Returns: Arrays of shape (1,)."""
+        return {
+            "velocity_squared_per_pressure": np.array([self.velocity_squared_per_pressure]),
+            "pressure_per_fill_difference": np.array([self.pressure_per_fill_difference]),
+        }
+
+
+def paper_law(scene: AnyScene) -> PaperLaw:
+    """The paper's flow law for a scene, with k = 50 unless the scene fixes it.
+
+    Args: `scene`: the scene; its own uncertainty and crest are not known to this law.
+    Raises: SceneError: a balancer without liquid.
+    Source: Eqs. 4 and 19; lambda = 72 mm.
+    """
+    scene = liquid_ring_scene(scene)
+    volume = paper.chamber_volume_paper(disc=scene.disc)
+    drag = scene.tube.drag_coefficient
+    return PaperLaw(
+        density=scene.liquid.density,
+        angular_velocity=scene.rotor.speed,
+        axial_width=scene.disc.axial_width,
+        central_angle=scene.disc.central_angle,
+        chamber_volume=volume,
+        tube_area=float(np.pi / 4 * scene.tube.bore**2),
+        drag_coefficient=paper.PAPER_DRAG_COEFFICIENT if drag is None else drag,
+        max_fill_ratio=scene.disc.max_fill_ratio,
+        ambient_pressure=scene.gas.ambient_pressure,
+        moment=PaperMoment(
+            moment_per_transferred_mass=paper.PAPER_LAMBDA,
+            density=scene.liquid.density,
+            chamber_volume=volume,
+        ),
+    )
+
+
+def paper_model(scene: Scene) -> BalancerModel:
+    """The balancer as the paper has it: Eq. 19, V of Eq. 4, lambda = 72 mm per transferred mass.
+
+    Returns: BalancerModel named "paper".
+    Source: sections 3 and 5 of the liquid-ring paper.
+    """
+    return balancer_model(paper_law(scene))

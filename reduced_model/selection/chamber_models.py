@@ -1,0 +1,343 @@
+"""The model hierarchies of a chamber: wall pressure, moment and lambda, from formulas to finite elements."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from typing import Final
+
+import numpy as np
+
+from ringbalance.mesh.chamber import default_cells
+from ringbalance.mesh.geometry import surface_radius
+from ringbalance.physics.results import Status, StatusCode
+from ringbalance.physics.sloshing.range import SMALL
+from ringbalance.reduced_model.chamber.tilted_ring import (
+    POINTS,
+    RADIAL_POINTS,
+    TiltedRing,
+    tilted_ring,
+    turn_samples,
+)
+from ringbalance.reduced_model.chamber.values import (
+    ChamberValues,
+    by_closed_form,
+    by_elements,
+    by_paper,
+    by_quadrature,
+    by_series,
+    forget_solves,
+    sloshing_meshes,
+    with_sloshing,
+)
+from ringbalance.reduced_model.selection.chamber_terms import (
+    COARSE_MESH,
+    FINE_MESH,
+    HIGHER,
+    MEAN,
+    PLATES,
+    RIPPLE,
+    SLOSHING,
+    amplification,
+    capillary_share,
+    chamber_contributions,
+    mesh_error,
+    resonant_fill,
+)
+from ringbalance.reduced_model.selection.models import Contribution, Fidelity, ModelHierarchy, Work
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Scene
+
+FILLS: Final = (0.2, 0.5, 1.0)
+"""Fill ratios at which the model hierarchies are judged, as shares of max_fill_ratio."""
+_SWING_MESH: Final = 2e-3
+"""Discretisation error of the amplification near resonance, relative, on the safe side."""
+GRAVITY_SWEEPS: Final = 5
+"""Solves that one tilted surface takes, about."""
+
+Solver = Callable[[Scene, float], ChamberValues]
+Memo = dict[tuple[str, int], ChamberValues]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Kind:
+    """A model of both model hierarchies."""
+
+    name: str
+    models: Mapping[str, str]
+    lacks: tuple[str, ...]
+    solver: Solver
+    work: Work
+
+
+def chamber_fills(scene: Scene) -> FloatArray:
+    """Fill ratios at which a chamber is judged: those of the range at which gravity leaves a closed ring.
+
+    Returns: x, shape (n,); empty where there is none.
+    """
+    fills = range_fills(scene)
+    return fills[_tilted(scene, tuple(float(x) for x in fills)).closed]
+
+
+def range_fills(scene: Scene) -> FloatArray:
+    """Fill ratios of `FILLS`, with the one at which sloshing is resonant where that lies within.
+
+    Returns: x, shape (n,), ascending.
+    """
+    fills, resonant = scene.disc.max_fill_ratio * np.array(FILLS), resonant_fill(scene)
+    if resonant is None or not fills[0] < resonant < fills[-1]:
+        return fills
+    return np.unique(np.append(fills, resonant))
+
+
+def range_contributions(scene: Scene) -> Mapping[str, Mapping[str, Contribution]]:
+    """Contributions to wall pressure and moment at the worst fill of the range, as `chamber_contributions`.
+
+    Returns: By "pressures" and "moments", over `chamber_fills`; over the whole range where no ring is closed.
+    """
+    closed = chamber_fills(scene)
+    return chamber_contributions(scene, closed if closed.size else range_fills(scene))
+
+
+def mean_gravity(scene: Scene) -> float:
+    """Estimated contribution of gravity to the means over a turn, wall pressure or moment.
+
+    Returns: Relative, at the worst fill of the range.
+    Source: second order in g/(omega^2 a).
+    """
+    found = range_contributions(scene)
+    return max(found[part][MEAN].value or 0.0 for part in ("pressures", "moments"))
+
+
+def chamber_hierarchies(scene: Scene) -> tuple[ModelHierarchy, ModelHierarchy]:
+    """The model hierarchies of wall pressure and of moment with lambda.
+
+    Args: `scene`: the scene; a ring must exist.
+    Returns: Wall pressure; moment and lambda. Without a fill at which the ring is closed they have no points,
+        and their status says so.
+    Source: the formulas stand with the models.
+    """
+    fills = chamber_fills(scene)
+    kinds = _kinds(scene)
+    status = chamber_status(scene)
+    terms = chamber_contributions(scene, fills)
+    floor = mesh_error(scene, default_cells(disc=scene.disc)[1])
+    capillary = capillary_share(scene, fills)
+    swing = _swing_uncertainty(scene, fills, terms)
+    memo: Memo = {}
+    labels = tuple(f"fill ratio {x:.3g}" for x in fills)
+    check = tuple(range(fills.size))
+
+    def hierarchy(quantity: str, title: str, values: tuple[str, ...], part: str) -> ModelHierarchy:
+        return ModelHierarchy(
+            quantity=quantity,
+            title=title,
+            values=values,
+            points=labels,
+            check=check,
+            relative_to="each",
+            contributions=terms[part],
+            fidelities=tuple(_fidelity(scene, fills, kind, part, memo) for kind in kinds),
+            top_uncertainty=float(np.sqrt(floor**2 + capillary[part] ** 2 + swing[part] ** 2)),
+            top_uncertainty_from=(
+                f"grid convergence, about {floor:.1e}; surface tension, which no model includes, up to "
+                f"{capillary[part]:.1e}; waves beyond linear sloshing, about {swing[part]:.1e}"
+            ),
+            status=status,
+        )
+
+    pressure = ("mean over a turn, Pa", "largest over a turn, Pa")
+    moment = ("mean over a turn, kg m", "largest over a turn, kg m", "lambda of added liquid, m")
+    return (
+        hierarchy("wall_pressure", "wall pressure", pressure, "pressures"),
+        hierarchy("moment", "moment and lambda", moment, "moments"),
+    )
+
+
+def _swing_uncertainty(
+    scene: Scene, fills: FloatArray, terms: Mapping[str, Mapping[str, Contribution]]
+) -> Mapping[str, float]:
+    """What linear sloshing leaves open: its square, and the meshes of the swinging liquid."""
+    factor = max((amplification(scene, float(x)) for x in fills), default=1.0)
+    if scene.environment.shaft == "vertical":
+        return {"pressures": 0.0, "moments": 0.0}
+
+    def of(part: str, term: str) -> float:
+        return terms[part][term].value or 0.0
+
+    waves = (of("pressures", RIPPLE) * factor) ** 2
+    return {part: waves + _SWING_MESH * of(part, SLOSHING) for part in ("pressures", "moments")}
+
+
+def chamber_status(scene: Scene) -> Status:
+    """Whether linear sloshing and a closed ring hold over the range of fills, by estimates.
+
+    Returns: Status; every result over that range inherits it.
+    """
+    fills = chamber_fills(scene)
+    if fills.size == range_fills(scene).size:
+        return _waves(scene, fills)
+    lowest = f"above a fill ratio of {fills[0]:.3g} only" if fills.size else "at no fill of this scene"
+    return Status(
+        code=StatusCode.NO_RING if fills.size == 0 else StatusCode.OUT_OF_RANGE,
+        text=(
+            f"gravity leaves a closed ring {lowest}: elsewhere liquid runs along the wall every turn and no "
+            "model describes it; turn faster or fill more"
+        ),
+    )
+
+
+def _waves(scene: Scene, fills: FloatArray) -> Status:
+    """Whether the swinging surface stays small against the ring's depth, by the estimate of its swing."""
+    if scene.environment.shaft == "vertical":
+        return Status()
+    length = scene.environment.gravity / scene.rotor.speed**2
+    depth = scene.disc.outer_radius - surface_radius(disc=scene.disc, fill_ratio=fills)
+    swing = np.array([amplification(scene, float(x)) for x in fills]) * length / depth
+    worst = int(np.argmax(swing))
+    if swing[worst] <= SMALL:
+        return Status()
+    return Status(
+        code=StatusCode.OUT_OF_RANGE,
+        text=(
+            f"at a fill ratio of {fills[worst]:.3g} waves would reach about {swing[worst]:.2g} of the ring's "
+            "depth, too high for linear sloshing, the finest model: avoid that fill, or turn faster"
+        ),
+    )
+
+
+def _fidelity(scene: Scene, fills: FloatArray, kind: _Kind, part: str, memo: Memo) -> Fidelity:
+    def solve(point: int) -> FloatArray:
+        key = (kind.name, point)
+        if key not in memo:
+            memo[key] = kind.solver(scene, float(fills[point]))
+        return memo[key].pressures() if part == "pressures" else memo[key].moments()
+
+    def fresh(point: int) -> ChamberValues:
+        forget_solves()
+        return kind.solver(scene, float(fills[point]))
+
+    return Fidelity(
+        name=kind.name,
+        models=kind.models,
+        leaves_out=frozenset(kind.lacks),
+        work=kind.work,
+        solve=solve,
+        fresh=fresh,
+    )
+
+
+def _kinds(scene: Scene) -> tuple[_Kind, ...]:
+    pull = (RIPPLE, MEAN, HIGHER, SLOSHING)
+    plain = (
+        _kind("the paper's formula", "none", "left out", (PLATES, *pull), by_paper, formula=4),
+        _kind("closed form", "exact", "left out", pull, by_closed_form, formula=30),
+    )
+    meshes = tuple(_mesh_kind(scene, cells, heavy=False) for cells in _meshes(scene, 2))
+    solid = _mesh_kind(scene, _meshes(scene, 3)[0], heavy=False)
+    if scene.environment.gravity == 0:
+        return (*plain, *meshes[:1], solid, meshes[1])
+    turns = _turns(scene)
+    swing = () if scene.environment.shaft == "vertical" else (SLOSHING,)
+    gravity = (
+        _kind(
+            "closed form, gravity to second order",
+            "exact",
+            "second order",
+            (HIGHER, *swing),
+            by_series,
+            formula=60,
+        ),
+        _kind(
+            "quadrature, gravity to all orders",
+            "exact",
+            "all orders",
+            swing,
+            by_quadrature,
+            quadrature=turns * POINTS * RADIAL_POINTS,
+            formula=60,
+        ),
+    )
+    dimension = 3 if scene.environment.shaft == "vertical" else 2
+    tilted = tuple(_mesh_kind(scene, cells, heavy=True) for cells in _meshes(scene, dimension))
+    quasi_static = (*plain, *gravity, *meshes, solid, *tilted)
+    if not swing:
+        return quasi_static
+    return (*quasi_static, _swinging(scene, gravity[-1]), _swinging(scene, tilted[-1]))
+
+
+def _swinging(scene: Scene, still: _Kind) -> _Kind:
+    """A quasi-static model with its ripples as the swinging liquid makes them."""
+    sides = sum(float(angular) ** 3 for _, angular in sloshing_meshes(scene))
+    return _Kind(
+        name=f"{still.name}, sloshing",
+        models={
+            **still.models,
+            "sloshing": "1x response with Coriolis force and wall layers, finite elements",
+        },
+        lacks=tuple(term for term in still.lacks if term != SLOSHING),
+        solver=partial(with_sloshing, still=still.solver),
+        work={**still.work, "sloshing": sides},
+    )
+
+
+def _kind(
+    name: str, plates: str, gravity: str, lacks: tuple[str, ...], solver: Solver, **work: float
+) -> _Kind:
+    models = {"plates": plates, "gravity": gravity, "solution": name}
+    return _Kind(name=name, models=models, lacks=lacks, solver=solver, work=work)
+
+
+def _turns(scene: Scene) -> int:
+    if scene.environment.shaft == "vertical":
+        return 1
+    return turn_samples(
+        disc=scene.disc, angular_velocity=scene.rotor.speed, gravity=scene.environment.gravity
+    )
+
+
+def _meshes(scene: Scene, dimension: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Coarse and fine."""
+    fine = default_cells(disc=scene.disc, dimension=dimension)
+    coarse = tuple(max(4, n // 2) for n in fine)
+    return coarse, fine
+
+
+def _mesh_kind(scene: Scene, cells: tuple[int, ...], *, heavy: bool) -> _Kind:
+    """Finite elements on a mesh and two coarser ones; with gravity when `heavy`."""
+    fine = cells == default_cells(disc=scene.disc, dimension=len(cells))
+    swing = () if scene.environment.shaft == "vertical" or scene.environment.gravity == 0 else (SLOSHING,)
+    lacks = (FINE_MESH if fine else COARSE_MESH, *swing, *(() if heavy else (RIPPLE, MEAN, HIGHER)))
+    solves = _mesh_turns(scene) * GRAVITY_SWEEPS if heavy else 1
+    unknowns = sum(float(np.prod([2 * (n // k) + 1 for n in cells])) for k in (1, 2, 4))
+    named = " x ".join(str(n) for n in cells)
+    held = ", with gravity" if heavy else ""
+    kind = f"unknown_{len(cells)}d"
+    return _Kind(
+        name=f"{len(cells)}-D finite elements, {named} cells{held}",
+        models={"plates": "exact", "gravity": "all orders" if heavy else "left out", "solution": named},
+        lacks=lacks,
+        solver=partial(by_elements, cells=cells, gravity=heavy),
+        work={"solve": 3.0 * solves, kind: unknowns * solves},
+    )
+
+
+def _mesh_turns(scene: Scene) -> int:
+    """Angles of gravity that the finite elements take for a mean within 1e-8."""
+    if scene.environment.shaft == "vertical":
+        return 1
+    tilt = scene.environment.gravity / (scene.rotor.speed**2 * scene.disc.inner_radius)
+    return 2 * max(2, int(np.ceil(np.log(1e-8) / np.log(min(tilt, 0.3)) / 2)))
+
+
+@lru_cache(maxsize=64)
+def _tilted(scene: Scene, fills: tuple[float, ...]) -> TiltedRing:
+    return tilted_ring(
+        disc=scene.disc,
+        density=scene.liquid.density,
+        angular_velocity=scene.rotor.speed,
+        gravity=scene.environment.gravity,
+        shaft=scene.environment.shaft,
+        fill_ratio=np.array(fills),
+    )

@@ -1,0 +1,220 @@
+"""What each thing that a chamber's model may leave out is worth, before anything is solved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from ringbalance.mesh.chamber import default_cells
+from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_area, surface_radius
+from ringbalance.reduced_model.chamber.gravity_series import second_order
+from ringbalance.reduced_model.chamber.values import ChamberValues, by_closed_form
+from ringbalance.reduced_model.paper import formulas as paper
+from ringbalance.reduced_model.selection.models import Contribution
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Scene
+
+Terms = Mapping[str, Contribution]
+
+PLATES: Final = "plates between the chambers"
+RIPPLE: Final = "gravity, ripple at 1x"
+MEAN: Final = "gravity, mean over a turn"
+HIGHER: Final = "gravity, higher orders"
+SLOSHING: Final = "sloshing at 1x"
+COARSE_MESH: Final = "coarse mesh"
+FINE_MESH: Final = "fine mesh"
+
+SURFACE_TENSION: Final = 0.073
+"""Of water at 20 degC against air, N/m: taken for every ordinary liquid, as an upper bound."""
+METAL_SURFACE_TENSION: Final = 0.72
+"""Of gallium, N/m: taken above `METAL_DENSITY`."""
+METAL_DENSITY: Final = 3000.0
+"""kg/m^3."""
+LARGEST_SWING: Final = 30.0
+"""Amplification that damping leaves at resonance, about."""
+_SWING_FLOOR: Final = 0.2
+"""Of the moment's ripple: by so much the estimate of the amplification may be off."""
+_CORIOLIS: Final = 2.0
+"""Of the pressure's ripple, times the swing: 2 omega times the flux along the ring, which is about that under
+which a free particle follows gravity however thin the ring."""
+
+
+def surface_tension(scene: Scene) -> float:
+    """Surface tension to include; the scene gives none.
+
+    Returns: N/m, an upper bound.
+    Source: IAPWS R1-76(2014) for water; gallium near its melting point for metals.
+    """
+    return METAL_SURFACE_TENSION if scene.liquid.density > METAL_DENSITY else SURFACE_TENSION
+
+
+def capillary_share(scene: Scene, fills: FloatArray) -> Mapping[str, float]:
+    """Largest share of the wall pressure that surface tension can make, sigma (2/B + 1/(a alpha) + 1/a)/P.
+
+    The moment hardly feels it: the same share of a surface's shape, taken as a whole.
+    Args: `fills`: x, shape (n,).
+    Returns: Shares by "pressures" and "moments"; zero for no fills.
+    Source: contact line over area of the free surface, contact angle zero, plus the ring's own curvature.
+    """
+    if fills.size == 0:
+        return {"pressures": 0.0, "moments": 0.0}
+    disc, square = scene.disc, scene.rotor.speed**2
+    a = surface_radius(disc=disc, fill_ratio=fills)
+    alpha = half_angle(disc=disc, radius=a)
+    pressure = scene.liquid.density * square * (disc.outer_radius**2 - a**2) / 2
+    jump = surface_tension(scene) * (2 / disc.axial_width + 1 / (a * alpha) + 1 / a)
+    # A meniscus of length sqrt(sigma/(rho omega^2 a)) along each wall moves its own cross-section of liquid.
+    length = np.sqrt(surface_tension(scene) / (scene.liquid.density * square * a))
+    depth = disc.outer_radius - a
+    moved = length**2 * (1 / (a * alpha * depth) + 2 / (disc.axial_width * depth))
+    return {"pressures": float(np.max(jump / pressure)), "moments": float(np.max(moved))}
+
+
+def wall_layers(scene: Scene, fill: float) -> tuple[float, float]:
+    """Estimated contribution of friction at the walls, relative, and the Ekman number.
+
+    Source: g/(omega^2 a) sqrt(Ek), Ek = nu/(omega R2^2), of the liquid's swing on a horizontal shaft.
+    """
+    omega, a = abs(scene.rotor.speed), float(surface_radius(disc=scene.disc, fill_ratio=fill))
+    ekman = scene.liquid.kinematic_viscosity / (omega * scene.disc.outer_radius**2)
+    tilt = scene.environment.gravity / (omega**2 * a) if scene.environment.shaft == "horizontal" else 0.0
+    return tilt * ekman**0.5, ekman
+
+
+def unmodelled_fractions(scene: Scene, fills: FloatArray) -> Mapping[str, FloatArray]:
+    """Contribution of what no model of a chamber holds, surface tension and friction at the walls.
+
+    Args: `fills`: x, shape (n,).
+    Returns: Relative, of "pressures" and "moments", shape (n,) each; zero without liquid.
+    Source: sum of both estimates, errors of one sign at worst.
+    """
+    found = {"pressures": np.zeros(fills.shape), "moments": np.zeros(fills.shape)}
+    for place in np.flatnonzero(fills > 0):
+        layers, _ = wall_layers(scene, float(fills[place]))
+        for part, share in capillary_share(scene, fills[place : place + 1]).items():
+            found[part][place] = share + layers
+    return found
+
+
+def amplification(scene: Scene, fill: float) -> float:
+    """Estimate of how much the swinging liquid enlarges gravity's ripple, |1/(1 - 1/s^2)|.
+
+    Args: `fill`: x, above zero.
+    Returns: Factor, at most 30; 1 on a vertical shaft.
+    Source: s^2 = k tanh(k ln(R2/a)), the lowest mode without Coriolis force, undamped, driven at s = 1.
+    """
+    if scene.environment.shaft == "vertical":
+        return 1.0
+    disc, k = scene.disc, np.pi / scene.disc.central_angle
+    square = k * np.tanh(k * np.log(disc.outer_radius / float(surface_radius(disc=disc, fill_ratio=fill))))
+    return float(min(1 / max(abs(1 - 1 / square), 1e-9), LARGEST_SWING))
+
+
+def resonant_fill(scene: Scene) -> float | None:
+    """Fill ratio at which the lowest mode meets the speed, s = 1, by the same estimate.
+
+    Returns: x; None without gravity across the shaft, or where the mode stays below the speed at any fill.
+    Source: tanh(k ln(R2/a)) = 1/k.
+    """
+    disc, k = scene.disc, np.pi / scene.disc.central_angle
+    if scene.environment.shaft == "vertical" or scene.environment.gravity == 0 or k <= 1:
+        return None
+    radius = disc.outer_radius * float(np.exp(-np.arctanh(1 / k) / k))
+    if radius < disc.inner_radius:
+        return None
+    return float(liquid_area(disc=disc, surface_radius=radius)) * disc.axial_width / chamber_volume(disc=disc)
+
+
+def mesh_error(scene: Scene, angular_cells: int) -> float:
+    """Discretisation error of a mesh, relative: an arc drawn by cells of angle h, (h/2)^4/32 R2/depth.
+
+    Args: `angular_cells`: of the chamber.
+    Returns: Share of the wall pressure at a fifth of the largest fill.
+    Source: remainder of a quadratic interpolation of a circle.
+    """
+    outer = scene.disc.outer_radius
+    surface = float(surface_radius(disc=scene.disc, fill_ratio=0.2 * scene.disc.max_fill_ratio))
+    h = scene.disc.central_angle / angular_cells
+    return (h / 2) ** 4 / 32 * outer / (outer - surface)
+
+
+def chamber_contributions(scene: Scene, fills: FloatArray) -> Mapping[str, Terms]:
+    """Contributions to wall pressure and to moment with lambda, the largest over fills.
+
+    Args: `fills`: x, shape (n,), above zero; may be empty.
+    Returns: Contributions by name, by "pressures" and "moments".
+    Source: stands with each.
+    """
+    rows = [_at(scene, float(x)) for x in fills]
+    return {part: _terms(scene, [row[part] for row in rows], part) for part in ("pressures", "moments")}
+
+
+def _at(scene: Scene, fill: float) -> Mapping[str, Mapping[str, float]]:
+    base, more = by_closed_form(scene, fill), second_order(scene=scene, fill_ratio=fill)
+    a = float(surface_radius(disc=scene.disc, fill_ratio=fill))
+    alpha = float(half_angle(disc=scene.disc, radius=a))
+    tilt = scene.environment.gravity / (scene.rotor.speed**2 * a)
+    if scene.environment.shaft == "vertical":
+        tilt *= scene.disc.axial_width / (2 * a)
+    radial = scene.disc.plate_thickness / (a * alpha)
+
+    factor = amplification(scene, fill)
+
+    def gravity(ripple: float, mean: float, swing: float) -> dict[str, float]:
+        higher = mean * (tilt + radial) + ripple * tilt**2
+        return {RIPPLE: ripple, SLOSHING: ripple * swing, MEAN: mean, HIGHER: higher + tilt**4}
+
+    return {
+        "pressures": gravity(
+            more.wall_pressure_ripple / base.wall_pressure,
+            abs(more.wall_pressure) / base.wall_pressure,
+            _CORIOLIS * max(1.0, factor),
+        ),
+        "moments": gravity(
+            more.moment_ripple / base.moment,
+            _moment_share(base, more.moment, more.moment_per_mass),
+            abs(factor - 1) + _SWING_FLOOR,
+        ),
+    }
+
+
+def _moment_share(base: ChamberValues, moment: float, per_mass: float) -> float:
+    return max(abs(moment) / base.moment, abs(per_mass) / base.moment_per_mass)
+
+
+def _terms(scene: Scene, rows: list[Mapping[str, float]], part: str) -> Terms:
+    largest = {
+        name: max((row[name] for row in rows), default=0.0) for name in (RIPPLE, SLOSHING, MEAN, HIGHER)
+    }
+    disc, cells = scene.disc, default_cells(disc=scene.disc)[1]
+    bare = paper.sector_area(disc=disc) * disc.axial_width
+    strips = 1 - chamber_volume(disc=disc) / bare
+    pressures = part == "pressures"
+    first = "rho omega^2 G |R2 s_2 - a s|/P" if pressures else "rho B a^2 G |shape|/U"
+    swing = "2 max(1, |1/(1 - 1/s^2)|)" if pressures else "(|1/(1 - 1/s^2)| - 1)"
+    force = "and the Coriolis force on its flux" if pressures else "without Coriolis force"
+    found = (
+        (PLATES, strips, "1 - V/(B theta (R2^2 - R1^2)/2)", "Eqs. 3, 7 and 12 against the exact geometry"),
+        (RIPPLE, largest[RIPPLE], f"{first}, G = g/omega^2", "first order of |r + g/omega^2| = b"),
+        (
+            SLOSHING,
+            largest[SLOSHING],
+            f"ripple times {swing}, s^2 = k tanh(k ln(R2/a)), k = pi/theta",
+            f"lowest mode of a chamber {force}, driven at 1x",
+        ),
+        (MEAN, largest[MEAN], "order (G/a)^2", "second order of the same surface, mean over a turn"),
+        (HIGHER, largest[HIGHER], "second order times (G/a + t/(a alpha)), and (G/a)^4", "remainder"),
+        (
+            COARSE_MESH,
+            mesh_error(scene, max(4, cells // 2)),
+            "(h/2)^4/32 R2/depth",
+            "a circle's interpolation",
+        ),
+        (FINE_MESH, mesh_error(scene, cells), "(h/2)^4/32 R2/depth", "a circle's interpolation"),
+    )
+    return {
+        term: Contribution(term=term, value=float(value), formula=formula, source=source)
+        for term, value, formula, source in found
+    }

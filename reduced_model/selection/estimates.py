@@ -1,0 +1,253 @@
+"""Estimated contribution of every physical term of a scene, before anything is solved.
+
+Every command takes its estimates from here, so that they agree.  Each is taken at the worst fill of the
+range, and what belongs to an injection for the one that matters most, the shortest (`deciding_gas_time`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from ringbalance.mesh.geometry import chamber_volume
+from ringbalance.reduced_model.chamber.values import by_closed_form
+from ringbalance.reduced_model.selection.chamber_models import (
+    chamber_fills,
+    mean_gravity,
+    range_contributions,
+    range_fills,
+)
+from ringbalance.reduced_model.selection.chamber_terms import (
+    PLATES,
+    RIPPLE,
+    SLOSHING,
+    amplification,
+    capillary_share,
+    wall_layers,
+)
+from ringbalance.reduced_model.selection.tube_terms import (
+    HUMP,
+    LOSS,
+    ROTATION,
+    RangeFlow,
+    flow_contributions,
+    flow_estimate,
+    range_flow,
+)
+from ringbalance.reduced_model.time_scales import (
+    deciding_gas_time,
+    filling_time,
+    long_start_up_loss,
+    start_up_loss,
+    start_up_time,
+    venting_time,
+)
+from ringbalance.scene.accuracy import FINEST
+from ringbalance.scene.models import Scene
+
+GRAVITY: Final = "gravity, mean over a turn"
+RIPPLE_AND_SLOSHING: Final = "gravity ripple at 1x and sloshing"
+SURFACE_TENSION: Final = "surface tension"
+WALL_FRICTION: Final = "friction at the walls of a chamber"
+CREST: Final = "priming over the siphon crest"
+TUBE_LOSS: Final = "loss of the tube"
+INERTIA: Final = "tube inertia"
+FILLING: Final = "gas filling"
+LAG: Final = "valve lag"
+HELD: Final = "liquid held in the tube"
+Row = tuple[str, float | None, str, float | None]
+"""Term, contribution, formula and time."""
+NO_BASIS: Final = "the scene gives no basis for an estimate"
+
+
+@dataclass(frozen=True, kw_only=True)
+class TermEstimate:
+    """Estimated contribution of one term."""
+
+    term: str
+    contribution: float | None
+    """Relative to the quantity it changes; None where the scene gives no basis for an estimate."""
+    formula: str
+    """How it is estimated, with its numbers."""
+    tolerance: float
+    """Of the scene."""
+    time: float | None = None
+    """Valve-open time that it costs of a long injection, s; None for a term that is no time."""
+
+    @property
+    def above(self) -> bool:
+        """Whether the contribution exceeds the tolerance."""
+        return self.contribution is not None and self.contribution > self.tolerance
+
+    @property
+    def comparison(self) -> str:
+        """The contribution compared with the tolerance."""
+        if self.contribution is None:
+            return NO_BASIS
+        if self.tolerance == FINEST:
+            return f"{percent(self.contribution)}; every term is modelled that has a model"
+        side = "above" if self.above else "below"
+        return f"{percent(self.contribution)} is {side} the tolerance of {percent(self.tolerance)}"
+
+    @property
+    def reason(self) -> str:
+        """Formula and comparison; the same text in every command."""
+        return f"{self.formula}; {self.comparison}"
+
+
+def percent(fraction: float) -> str:
+    """A fraction in per cent, to two digits.
+
+    Args: `fraction`: any number.
+    Returns: Text.
+    """
+    value = 100 * fraction
+    return f"{value:.0f} %" if 99.5 <= abs(value) < 1e6 else f"{value:.2g} %"
+
+
+@lru_cache(maxsize=8)
+def term_estimates(scene: Scene) -> Mapping[str, TermEstimate]:
+    """Estimates of all terms of a scene, by term.
+
+    Returns: Chamber, tube and injection, in this order.
+    Source: the formula stands with each.
+    """
+    return MappingProxyType({**_chamber(scene), **_tube(scene), **injection_estimates(scene)})
+
+
+def _by_term(scene: Scene, *rows: Row) -> dict[str, TermEstimate]:
+    return {
+        term: TermEstimate(
+            term=term, contribution=value, formula=formula, tolerance=scene.tolerance, time=time
+        )
+        for term, value, formula, time in rows
+    }
+
+
+def _chamber(scene: Scene) -> dict[str, TermEstimate]:
+    closed, found = chamber_fills(scene), range_contributions(scene)
+    fills = closed if closed.size else range_fills(scene)
+    pressure, moment = ({t: c.value or 0.0 for t, c in found[p].items()} for p in ("pressures", "moments"))
+    capillary = capillary_share(scene, fills)["pressures"]
+    layers, ekman = wall_layers(scene, float(fills[-1]))
+    return _by_term(
+        scene,
+        (PLATES, pressure[PLATES], "1 - V/(B theta (R2^2 - R1^2)/2)", None),
+        (
+            GRAVITY,
+            mean_gravity(scene),
+            "second order in g/(omega^2 a) at the worst fill of the range",
+            None,
+        ),
+        (
+            RIPPLE_AND_SLOSHING,
+            max(part[RIPPLE] + part[SLOSHING] for part in (pressure, moment)),
+            _sloshing_formula(scene, fills),
+            None,
+        ),
+        (SURFACE_TENSION, capillary, "sigma (2/B + 1/(a alpha) + 1/a)/P, an inverse Bond number", None),
+        (
+            WALL_FRICTION,
+            layers,
+            f"g/(omega^2 a) sqrt(Ek), Ek = nu/(omega R2^2) = {ekman:.1e}",
+            None,
+        ),
+    )
+
+
+def _sloshing_formula(scene: Scene, fills: np.ndarray) -> str:
+    if scene.environment.shaft == "vertical":
+        return "on a vertical shaft gravity does not turn in the disc's frame"
+    largest = max(amplification(scene, float(x)) for x in fills)
+    return (
+        "first order in g/(omega^2 a), times 1 + 2 max(1, n) in the wall pressure, where the liquid's swing "
+        f"at 1x makes n = |1/(1 - 1/s^2)| up to {largest:.2g} over the range of fills, at every speed"
+    )
+
+
+def _tube(scene: Scene) -> dict[str, TermEstimate]:
+    found, blocked = flow_contributions(scene), not np.any(range_flow(scene).velocity > 0)
+    rotation, reason = found[ROTATION].value, found[ROTATION].formula
+    if scene.tube.drag_coefficient is not None or blocked:
+        rotation, reason = None, "nothing flows" if blocked else "the scene prescribes k"
+    straight = scene.tube.hump_radius is None
+    return _by_term(
+        scene,
+        (
+            CREST,
+            None if straight else found[HUMP].value,
+            "the scene gives no hump_radius" if straight else found[HUMP].formula,
+            None,
+        ),
+        (TUBE_LOSS, None if blocked else found[LOSS].value, found[LOSS].formula, None),
+        (ROTATION, rotation, reason, None),
+    )
+
+
+def injection_estimates(scene: Scene) -> Mapping[str, TermEstimate]:
+    """Estimates of what goes beyond the quasi-steady flow law in an injection.
+
+    Returns: Tube inertia, gas filling, valve lag and liquid held in the tube, by term; relative to the liquid
+        that the deciding injection moves, at most 1.
+    Source: `time_scales`.
+    """
+    flow, deciding = range_flow(scene), injection_time(scene)
+    within = f"in the shortest injection that matters, {1e3 * deciding:.3g} ms"
+    lag = scene.gas.valve_lag
+    share = None if lag is None else min(lag / deciding, 1.0)
+    slowest = float(np.min(flow.velocity[flow.starts], initial=np.inf))
+    held = None if not np.isfinite(slowest) else min(scene.tube.length / max(slowest * deciding, 1e-300), 1.0)
+    return _by_term(
+        scene,
+        _inertia(scene, flow, deciding, within),
+        _gas_filling(scene, deciding, within),
+        (LAG, share, "no valve lag" if lag is None else f"{1e3 * lag:.3g} ms {within}", lag),
+        (HELD, held, f"at most S L over the liquid moved {within}, at the worst fill, L/(u T)", None),
+    )
+
+
+def injection_time(scene: Scene) -> float:
+    """Valve-open time of the injection that decides on a scene's estimates, s.
+
+    Returns: s, of `deciding_gas_time` with the flow at equal fills.
+    """
+    equal = by_closed_form(scene, scene.disc.max_fill_ratio / 2)
+    area = np.pi / 4 * scene.tube.bore**2
+    flow = scene.liquid.density * area * flow_estimate(scene).velocity
+    return deciding_gas_time(scene, rate=scene.rotor.influence_coefficient * equal.moment_per_mass * flow)
+
+
+def _inertia(scene: Scene, flow: RangeFlow, deciding: float, within: str) -> Row:
+    if not np.any(flow.starts):
+        return INERTIA, None, "nothing flows", None
+    laminar = flow_estimate(scene).laminar_share
+    times = [
+        start_up_time(
+            density=scene.liquid.density,
+            length=scene.tube.length,
+            velocity=float(u),
+            driving_pressure=float(p),
+        )
+        for u, p in zip(flow.velocity[flow.starts], flow.driving_pressure[flow.starts], strict=True)
+    ]
+    # A column that never moves costs nothing to start.
+    slowest = max(max(times), 1e-12)
+    lost = start_up_loss(start_up=slowest, gas_time=deciding, laminar=laminar)
+    formula = f"start-up time 2 L/((k + 1) u) up to {1e3 * slowest:.3g} ms over the range of fills, {within}"
+    return INERTIA, lost, formula, long_start_up_loss(slowest, laminar=laminar)
+
+
+def _gas_filling(scene: Scene, deciding: float, within: str) -> Row:
+    volume = chamber_volume(disc=scene.disc) + (scene.gas.dead_volume or 0.0)
+    filling, venting = filling_time(scene.gas, volume=volume), venting_time(scene.gas, volume=volume)
+    if filling is None:
+        return FILLING, None, "no sonic conductance", None
+    longest = max(filling, venting or 0.0)
+    also = "" if venting is None else f" and vents in {1e3 * venting:.3g} ms"
+    formula = f"an empty chamber fills in {1e3 * filling:.3g} ms{also}, {within}"
+    return FILLING, min(longest / deciding, 1.0), formula, longest

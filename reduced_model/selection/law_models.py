@@ -1,0 +1,189 @@
+"""Flow laws by models: any level of the chambers, any loss of the tube, with the crest's regimes or
+without."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.chamber.gravity import closed_ring
+from ringbalance.reduced_model.chamber.values import by_closed_form, by_paper, by_quadrature, by_series
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.law.paper_law import paper_law
+from ringbalance.reduced_model.paper import formulas as paper
+from ringbalance.reduced_model.selection.loss_models import FORMULAS, loss_at
+from ringbalance.reduced_model.selection.models import Work
+from ringbalance.reduced_model.tables.fit import refined_table, table_from_samples
+from ringbalance.reduced_model.tables.hermite import HermiteTable
+from ringbalance.reduced_model.tube.heads import TABLE_ERROR, TABLE_VELOCITIES, TubeHeads
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Scene, Tube
+
+EQ_12: Final = "Eq. 12"
+CLOSED: Final = "closed form"
+SERIES: Final = "closed form, gravity to second order"
+QUADRATURE: Final = "quadrature, gravity to all orders"
+LEVELS: Final = (EQ_12, CLOSED, SERIES, QUADRATURE)
+"""In order of increasing cost."""
+SIPHON: Final = "always a full siphon"
+REGIMES: Final = "four regimes over the siphon crest"
+LEVEL_NODES: Final = 21
+_AT: Final = {EQ_12: by_paper, CLOSED: by_closed_form, SERIES: by_series, QUADRATURE: by_quadrature}
+_LEVEL_FORMULAS: Final = {EQ_12: 4, CLOSED: 30, SERIES: 60, QUADRATURE: 200}
+
+
+@dataclass(frozen=True, kw_only=True)
+class LawModels:
+    """Which models a flow law is made of."""
+
+    level: str
+    """One of `LEVELS`."""
+    loss: str
+    """One of `LOSSES`."""
+    regimes: str
+    """`SIPHON` or `REGIMES`."""
+
+    def named(self) -> Mapping[str, str]:
+        """Model of each part, for people."""
+        return {
+            "level of a chamber": self.level,
+            "loss of the tube": self.loss,
+            "flow over the siphon crest": self.regimes,
+        }
+
+
+def base_law(scene: Scene) -> CalibratedLaw:
+    """The scene's calibrated law without gravity, whose parts the models exchange.
+
+    Args: `scene`: the scene; a ring must exist.
+    """
+    still = replace(scene, environment=replace(scene.environment, gravity=0.0))
+    return calibrate(still).flow_law
+
+
+def levels_available(scene: Scene) -> tuple[str, ...]:
+    """Models of the level that a scene has.
+
+    Returns: Without gravity, or where it leaves some fill without a closed ring, those without gravity alone.
+    """
+    gravity = scene.environment.gravity
+    if gravity == 0:
+        return LEVELS[:2]
+    fills = scene.disc.max_fill_ratio * np.linspace(0, 1, LEVEL_NODES)[1:]
+    closed = closed_ring(
+        disc=scene.disc,
+        angular_velocity=scene.rotor.speed,
+        gravity=gravity,
+        vertical=scene.environment.shaft == "vertical",
+        fill_ratio=fills,
+    )
+    # The thinnest film is open under any gravity; what counts is where the chamber works.
+    return LEVELS if bool(np.all(closed[2:])) else LEVELS[:2]
+
+
+def law_of(scene: Scene, models: LawModels, *, base: CalibratedLaw) -> CalibratedLaw:
+    """The base law with its level, moment, loss and regimes exchanged.
+
+    Returns: CalibratedLaw; its half-widths are the base law's.
+    Source: Eqs. 13 to 18 of the liquid-ring paper, each part by its model.
+    """
+    pressure, moment = level_tables(scene, models.level)
+    path, heads = base.path, loss_heads(scene, models.loss, base=base.heads)
+    if models.regimes == SIPHON:
+        path = replace(path, hump_pressure=None)
+        heads = replace(heads, hump_head=None, return_hump_head=None)
+    volume = base.chamber_volume
+    if models.level == EQ_12:
+        volume = paper.chamber_volume_paper(disc=scene.disc)
+    return replace(
+        base,
+        name=f"{models.level}; {models.loss}; {models.regimes}",
+        wall_pressure=pressure,
+        moment=replace(base.moment, chamber_moment=moment),
+        path=path,
+        heads=heads,
+        chamber_volume=volume,
+    )
+
+
+def law_work(scene: Scene, models: LawModels) -> Work:
+    """Counted work of making a law: formulas at the nodes of its tables. Returns: Counts by kind."""
+    tables = 3 if scene.tube.hump_radius is not None and models.regimes == REGIMES else 1
+    level = LEVEL_NODES * _LEVEL_FORMULAS[models.level]
+    return {"formula": float(level), "table": float(tables * FORMULAS[models.loss])}
+
+
+def level_tables(scene: Scene, level: str) -> tuple[HermiteTable, HermiteTable]:
+    """Wall pressure and moment over the fill by one model; an empty chamber has neither.
+
+    Returns: P, Pa, and U, kg m, over x from 0 to max_fill_ratio. The paper's moment is lambda times half its
+        mass: only differences of two chambers count.
+    Source: the formulas stand with `chamber_values`.
+    """
+    largest = scene.disc.max_fill_ratio
+    fills = np.linspace(0.0, largest, LEVEL_NODES)
+    values = [_AT[level](scene, float(x)) for x in fills[1:]]
+    pressure = np.array([0.0, *(v.wall_pressure for v in values)])
+    moment = np.array([0.0, *(v.moment for v in values)])
+    if level == EQ_12:
+        law = paper_law(scene).moment
+        half = law.density * law.chamber_volume / 2
+        moment = law.moment_per_transferred_mass * half * fills
+    if level in (SERIES, QUADRATURE):
+        pressure, moment = _thin_film(scene, fills, pressure), _thin_film(scene, fills, moment, moment=True)
+    return (
+        table_from_samples(start=0.0, stop=largest, value=pressure),
+        table_from_samples(start=0.0, stop=largest, value=moment),
+    )
+
+
+def _thin_film(scene: Scene, fills: FloatArray, values: FloatArray, *, moment: bool = False) -> FloatArray:
+    """Below the thinnest closed ring gravity's change fades in proportion to the fill."""
+    closed = closed_ring(
+        disc=scene.disc,
+        angular_velocity=scene.rotor.speed,
+        gravity=scene.environment.gravity,
+        vertical=scene.environment.shaft == "vertical",
+        fill_ratio=fills,
+    )
+    if np.all(closed):
+        return values
+    first = int(np.max(np.flatnonzero(~closed))) + 1
+    plain = [by_closed_form(scene, float(x)) for x in fills[1 : first + 1]]
+    without = np.array([0.0, *(v.moment if moment else v.wall_pressure for v in plain)])
+    change = values[first] - without[first]
+    held = values.copy()
+    held[:first] = without[:first] + change * fills[:first] / fills[first]
+    return held
+
+
+def loss_heads(scene: Scene, loss: str, *, base: TubeHeads) -> TubeHeads:
+    """Heads of the tube by one model of the loss.
+
+    Args: `loss`: one of `LOSSES`. `base`: heads whose half-widths are kept.
+    Source: definition of k; the crest's energy balance.
+    """
+    returning = replace(scene.tube, hump_position=1 - scene.tube.hump_position, bends=scene.tube.bends[::-1])
+    head = _table(scene, scene.tube, loss, hump=False)
+    if base.hump_head is None:
+        return replace(base, head=head)
+    return replace(
+        base,
+        head=head,
+        hump_head=_table(scene, scene.tube, loss, hump=True),
+        return_hump_head=_table(scene, returning, loss, hump=True),
+    )
+
+
+def _table(scene: Scene, tube: Tube, loss: str, *, hump: bool) -> HermiteTable:
+    def log_head(log_velocity: FloatArray) -> FloatArray:
+        found = loss_at(scene, loss=loss, velocity=np.exp(log_velocity), tube=tube)
+        factor = found.kinetic_factor + found.upstream_k if hump else found.k + 1
+        return np.asarray(np.log(factor / 2) + 2 * log_velocity, dtype=np.float64)
+
+    start, stop = (float(v) for v in np.log(TABLE_VELOCITIES))
+    return refined_table(function=log_head, start=start, stop=stop, tolerance=TABLE_ERROR)[0]

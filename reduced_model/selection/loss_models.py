@@ -1,0 +1,165 @@
+"""The tube's loss by models: the paper's k = 50, `fluids`, `fluids` with rotation, finite-element tables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.physics.tube.bends import straight_length, turbulent_bend_loss
+from ringbalance.physics.tube.ends import turbulent_entrance_loss
+from ringbalance.physics.tube.friction import friction_factor
+from ringbalance.physics.tube.numbers import reynolds_number, rotation_reynolds_number
+from ringbalance.physics.tube.rotation import (
+    STRAIGHT_CRITICAL_REYNOLDS,
+    critical_reynolds,
+    turbulent_friction_ratio,
+)
+from ringbalance.physics.tube.rotation_table import ito_nanbu_laminar
+from ringbalance.physics.tube.state import tube_state, upstream_loss
+from ringbalance.reduced_model.paper.formulas import PAPER_DRAG_COEFFICIENT
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Scene, Tube
+
+CONSTANT: Final = "k = 50"
+CORRELATIONS: Final = "fluids"
+ROTATING: Final = "fluids with rotation"
+TABLES: Final = "finite-element tables"
+LOSSES: Final = (CONSTANT, CORRELATIONS, ROTATING, TABLES)
+"""In order of increasing cost."""
+FORMULAS: Final = {CONSTANT: 1, CORRELATIONS: 20, ROTATING: 60, TABLES: 260}
+"""Formulas per call, as counted work; the tables' look-ups among them."""
+_TURBULENT_PROFILE: Final = 1.06
+_LEAST_KL: Final = 220.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Loss:
+    """Loss of the tube at velocities; arrays of one shape."""
+
+    k: FloatArray
+    upstream_k: FloatArray
+    """Between the giving chamber and the crest."""
+    kinetic_factor: FloatArray
+    """alpha."""
+
+
+LossFunction = Callable[[Scene, Tube, FloatArray], Loss]
+
+
+def loss_at(scene: Scene, *, loss: str, velocity: npt.ArrayLike, tube: Tube | None = None) -> Loss:
+    """Loss of a scene's tube by one model.
+
+    Args: `loss`: one of `LOSSES`. `velocity`: u, m/s, any shape, positive. `tube`: in place of the scene's,
+        such as the same one from its other end.
+    Returns: Loss; a scene that prescribes k has that k on every model but `CONSTANT`, which then has it
+        too.
+    Raises: ValueError: a model that does not exist.
+    Source: the sources stand with the formulas.
+    """
+    if loss not in _FUNCTIONS:
+        raise ValueError(f"loss must be one of {', '.join(LOSSES)}, not {loss!r}")
+    used, u = tube or scene.tube, np.asarray(velocity, dtype=np.float64)
+    if scene.tube.drag_coefficient is not None:
+        return _constant(scene, used, u)
+    return _FUNCTIONS[loss](scene, used, u)
+
+
+def _constant(scene: Scene, tube: Tube, velocity: FloatArray) -> Loss:
+    fixed = scene.tube.drag_coefficient
+    k = np.full(velocity.shape, PAPER_DRAG_COEFFICIENT if fixed is None else fixed)
+    return Loss(k=k, upstream_k=tube.hump_position * k, kinetic_factor=np.ones(velocity.shape))
+
+
+def _correlations(scene: Scene, tube: Tube, velocity: FloatArray) -> Loss:
+    re = _reynolds(scene, tube, velocity)
+    f = friction_factor(reynolds=re, relative_roughness=tube.roughness / tube.bore)
+    return _summed(tube, f, straight_length(tube=tube) / tube.bore * f)
+
+
+def _rotating(scene: Scene, tube: Tube, velocity: FloatArray) -> Loss:
+    re, rough = _reynolds(scene, tube, velocity), tube.roughness / tube.bore
+    rotation = _rotation(scene, tube)
+    # At the lower end of its range, Kl = 220, the recalled formula is one; below, it would rise again.
+    kl = np.maximum(rotation * re, _LEAST_KL)
+    laminar = np.maximum(ito_nanbu_laminar(kl=kl), 1.0)
+    f = friction_factor(reynolds=re, relative_roughness=rough)
+    turning = friction_factor(
+        reynolds=re,
+        relative_roughness=rough,
+        laminar_ratio=laminar,
+        turbulent_ratio=turbulent_friction_ratio(reynolds=re, rotation_reynolds=rotation).value,
+        critical_ratio=float(critical_reynolds(rotation_reynolds=rotation) / STRAIGHT_CRITICAL_REYNOLDS),
+    )
+    along = straight_length(tube=tube) / tube.bore * f + tube.length / tube.bore * (turning - f)
+    return _summed(tube, f, along)
+
+
+def _summed(tube: Tube, friction: FloatArray, along: FloatArray) -> Loss:
+    """Entrance as in turbulent flow, bends, friction with or without rotation, extra; a turbulent profile."""
+    bends = [turbulent_bend_loss(bend=b, bore=tube.bore, friction_factor=friction) for b in tube.bends]
+    entrance = turbulent_entrance_loss(tube=tube)[0]
+    share = tube.hump_position
+    before = [k for i, k in enumerate(bends) if (i + 0.5) / len(bends) < share]
+    spread = along + tube.extra_loss
+    return Loss(
+        k=np.asarray(entrance + spread + sum(bends)),
+        upstream_k=np.asarray(entrance + share * spread + sum(before)),
+        kinetic_factor=np.full(along.shape, _TURBULENT_PROFILE),
+    )
+
+
+def _tables(scene: Scene, tube: Tube, velocity: FloatArray) -> Loss:
+    state = tube_state(tube=tube, liquid=scene.liquid, angular_velocity=scene.rotor.speed, velocity=velocity)
+    return Loss(
+        k=state.k,
+        upstream_k=upstream_loss(tube=tube, state=state),
+        kinetic_factor=np.asarray(state.kinetic_factor),
+    )
+
+
+def _reynolds(scene: Scene, tube: Tube, velocity: FloatArray) -> FloatArray:
+    return reynolds_number(
+        velocity=velocity, bore=tube.bore, kinematic_viscosity=scene.liquid.kinematic_viscosity
+    )
+
+
+def _rotation(scene: Scene, tube: Tube) -> float:
+    return rotation_reynolds_number(
+        angular_velocity=scene.rotor.speed,
+        bore=tube.bore,
+        kinematic_viscosity=scene.liquid.kinematic_viscosity,
+    )
+
+
+_FUNCTIONS: Final[dict[str, LossFunction]] = {
+    CONSTANT: _constant,
+    CORRELATIONS: _correlations,
+    ROTATING: _rotating,
+    TABLES: _tables,
+}
+
+
+def velocity_under_head(
+    scene: Scene, *, loss: str, head: npt.ArrayLike, to_crest: bool = False
+) -> FloatArray:
+    """Velocity of a full tube under a head, (k(u) + 1) u^2/2 = H, by 60 bisections in ln u.
+
+    Args: `loss`: one of `LOSSES`. `head`: H, m^2/s^2, above zero, any shape. `to_crest`: whether the head
+        acts up to the siphon crest alone: (alpha + k_up) u^2/2 = H.
+    Returns: u, m/s, of the head's shape.
+    Source: definition of k; the head grows with u, so there is one root.
+    """
+    target = np.asarray(head, dtype=np.float64)
+    low, high = np.full(target.shape, np.log(1e-8)), np.log(np.sqrt(2 * target) * 1.001 + 1e-6)
+    for _ in range(60):
+        middle = (low + high) / 2
+        u = np.exp(middle)
+        at = loss_at(scene, loss=loss, velocity=u)
+        factor = at.kinetic_factor + at.upstream_k if to_crest else at.k + 1
+        below = factor * u**2 / 2 < target
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    return np.asarray(np.exp((low + high) / 2))

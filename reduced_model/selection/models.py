@@ -1,0 +1,107 @@
+"""Fidelity levels: what each quantity may be computed with, in order of increasing cost, and what each model
+leaves out.
+
+A model hierarchy belongs to one quantity that users ask for.  Its models are sets of models; each says by
+name what it leaves out and how much work it counts, so that a tolerance can pick the cheapest that will do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from ringbalance.physics.results import Status
+from ringbalance.scene.arrays import FloatArray
+
+Work = Mapping[str, float]
+"""Counted work by its kind, such as {"solve": 3, "unknown_2d": 1000}; never a time."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contribution:
+    """What leaving one thing out is worth, judged before anything is solved."""
+
+    term: str
+    """Name, as in `Fidelity.leaves_out`."""
+    value: float | None
+    """Relative to the quantity; None where the scene gives no basis for an estimate."""
+    formula: str
+    source: str
+    rough: bool = False
+    """Whether it may be far too large, so that no model is ruled out by it alone."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fidelity:
+    """One set of models for one quantity."""
+
+    name: str
+    """Short and unique within its model hierarchy."""
+    models: Mapping[str, str]
+    """Model of each part, for people."""
+    leaves_out: frozenset[str]
+    """Names of the contributions that this set lacks."""
+    work: Work
+    """For one point of the hierarchy."""
+    fixed_work: Work = field(default_factory=dict)
+    """Once, however many points: tables that are built first."""
+    solve: Callable[[int], FloatArray]
+    """From the number of a point to the quantity's values there, shape (m,); SI."""
+    fresh: Callable[[int], object] | None = None
+    """The same work repeated, where `solve` remembers; for timing."""
+    prepare: Callable[[], object] | None = None
+    """The fixed work repeated; for timing."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelHierarchy:
+    """All models of one quantity for one scene; the last one is the finest."""
+
+    quantity: str
+    """Identifier, such as "wall_pressure"."""
+    title: str
+    values: tuple[str, ...]
+    """What stands at each place of a point's values, with its unit."""
+    points: tuple[str, ...]
+    """Where the quantity is asked for, in words."""
+    check: tuple[int, ...]
+    """Numbers of the points at which a choice is checked."""
+    relative_to: Literal["each", "largest"]
+    """Whether an error is relative to each value or to the largest of its kind over the points."""
+    contributions: Mapping[str, Contribution]
+    fidelities: tuple[Fidelity, ...]
+    top_uncertainty: float
+    """Of the finest model itself, relative, expanded uncertainty (95 %)."""
+    top_uncertainty_from: str
+    """What that consists of."""
+    status: Status = field(default_factory=Status)
+    """What the scene cannot be asked, and what to do."""
+
+    @property
+    def top(self) -> Fidelity:
+        """The finest model."""
+        return self.fidelities[-1]
+
+
+def relative_error(
+    *, found: FloatArray, reference: FloatArray, relative_to: Literal["each", "largest"]
+) -> float:
+    """Largest error of one model against another over points.
+
+    Args: `found`: values, shape (points, m). `reference`: values, shape (points, m). `relative_to`: "each":
+        relative to the reference at each place; "largest": to its largest magnitude over the points, column
+        by column.
+    Returns: Largest relative error; a difference from zero counts as 1.
+    Source: definition.
+    """
+    size = np.abs(reference)
+    if relative_to == "largest":
+        size = np.broadcast_to(size.max(axis=0, keepdims=True), reference.shape)
+    difference = np.abs(found - reference)
+    share = np.where(
+        difference == 0, 0.0, difference / np.where(size > 0, size, np.where(difference > 0, difference, 1))
+    )
+    return float(np.max(share, initial=0.0))

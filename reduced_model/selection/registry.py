@@ -1,0 +1,267 @@
+"""The registry of physical terms: the models of each in order of cost, and the one that a tolerance selects.
+
+Every command takes `models_used` from here, so that all of them report the same list for the same scene.  A
+new term is entered in `TERMS`, its estimate in `estimates`; its model lives with the part that it changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final, Literal
+
+from ringbalance.mesh.geometry import chamber_volume
+from ringbalance.reduced_model.chamber.gravity_choice import gravity_choice
+from ringbalance.reduced_model.chamber.values import by_closed_form
+from ringbalance.reduced_model.paper import formulas as paper
+from ringbalance.reduced_model.selection.chamber_models import mean_gravity
+from ringbalance.reduced_model.selection.chamber_terms import PLATES
+from ringbalance.reduced_model.selection.estimates import (
+    CREST,
+    FILLING,
+    GRAVITY,
+    HELD,
+    INERTIA,
+    LAG,
+    RIPPLE_AND_SLOSHING,
+    SURFACE_TENSION,
+    TUBE_LOSS,
+    WALL_FRICTION,
+    TermEstimate,
+    percent,
+    term_estimates,
+)
+from ringbalance.reduced_model.selection.tube_terms import ROTATION
+from ringbalance.reduced_model.time_scales import HEAT_CAPACITY_RATIO
+from ringbalance.scene.models import Scene
+
+Part = Literal["chamber", "tube", "injection"]
+LEFT_OUT: Final = "left out"
+NOT_MODELLED: Final = "not modelled in this version"
+CALIBRATED: Final = "calibrated"
+"""Name of the law that is made of the models selected here."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelUsed:
+    """The model that serves one term of a scene, as `models_used` lists it."""
+
+    term: str
+    model: str
+    """The model used, "left out", or "not modelled in this version"."""
+    why: str
+    """Formula of the estimate, comparison with the tolerance, and further reasons."""
+    estimated_contribution: float | None
+    """Relative, before solving; None where the scene gives no basis for an estimate."""
+
+    @property
+    def modelled(self) -> bool:
+        """Whether a model holds the term."""
+        return self.model not in (LEFT_OUT, NOT_MODELLED)
+
+
+Selection = tuple[str, str]
+"""Model and further reason."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Term:
+    """One physical term."""
+
+    name: str
+    """As in `term_estimates`."""
+    part: Part
+    """Those of chamber and tube are part of a flow law; those of an injection go beyond it."""
+    models: tuple[str, ...]
+    """In order of cost; the first neglects the term, and is the only one where none holds it."""
+    select: Callable[[Term, Scene, TermEstimate], Selection]
+
+    @property
+    def has_model(self) -> bool:
+        """Whether any model holds the term."""
+        return len(self.models) > 1
+
+
+def models_used(
+    scene: Scene,
+    *,
+    law: str = CALIBRATED,
+    obstacles: Mapping[str, str] = MappingProxyType({}),
+    asked: Collection[str] | None = None,
+) -> tuple[ModelUsed, ...]:
+    """Model of every term of a scene, with the reason: chamber, tube, injection.
+
+    Args:
+        law: name of the flow law; any but the calibrated one has its own models of chamber and tube.
+        obstacles: why the flow law cannot carry a term of an injection, by term.
+        asked: the terms of an injection to model, whatever the tolerance; None: as the tolerance selects.
+    """
+    estimates = term_estimates(scene)
+    rows = []
+    for term in TERMS:
+        estimate = estimates[term.name]
+        model, more = _selected(term, scene, estimate, law=law, obstacles=obstacles, asked=asked)
+        rows.append(
+            ModelUsed(
+                term=term.name,
+                model=model,
+                why=f"{estimate.reason}; {more}" if more else estimate.reason,
+                estimated_contribution=estimate.contribution,
+            )
+        )
+    return tuple(rows)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Neglected:
+    """Terms of an injection that a run does not model, and a bound on them."""
+
+    terms: tuple[str, ...]
+    bound: float
+    """Sum of their contributions, relative to the liquid that the shortest injection that matters moves."""
+    unknown: tuple[str, ...]
+    """Those that the scene gives no basis for an estimate of; not part of the bound."""
+    text: str
+
+
+def neglected_in_injections(used: Sequence[ModelUsed]) -> Neglected:
+    """What a run neglects beyond its flow law.
+
+    Source: errors of one sign at worst; each estimate is an upper bound.
+    """
+    injection = {term.name for term in TERMS if term.part == "injection"}
+    rows = [row for row in used if row.term in injection and not row.modelled]
+    known = {r.term: r.estimated_contribution for r in rows if r.estimated_contribution is not None}
+    unknown = tuple(row.term for row in rows if row.estimated_contribution is None)
+    bound = float(sum(known.values()))
+    names = f" ({', '.join(known)})" if known else ""
+    more = f"; not estimated, for lack of numbers in the scene: {', '.join(unknown)}" if unknown else ""
+    return Neglected(
+        terms=tuple(known),
+        bound=bound,
+        unknown=unknown,
+        text=(
+            f"neglected terms{names} change the liquid moved by the shortest injection that matters by at "
+            f"most {percent(bound)}{more}"
+        ),
+    )
+
+
+def _selected(
+    term: Term,
+    scene: Scene,
+    estimate: TermEstimate,
+    *,
+    law: str,
+    obstacles: Mapping[str, str],
+    asked: Collection[str] | None,
+) -> Selection:
+    if term.part != "injection":
+        return term.select(term, scene, estimate) if law == CALIBRATED else (f"as in the law “{law}”", "")
+    if asked is not None and term.has_model:
+        return (term.models[-1] if term.name in asked else LEFT_OUT), "the caller's choice"
+    model, more = term.select(term, scene, estimate)
+    if model != LEFT_OUT and term.name in obstacles:
+        return NOT_MODELLED, obstacles[term.name]
+    return model, more
+
+
+def _by_tolerance(term: Term, _: Scene, estimate: TermEstimate) -> Selection:
+    """The cheapest model where the contribution is within the tolerance, else the one that holds it."""
+    if not estimate.above:
+        return LEFT_OUT, ""
+    return (term.models[-1] if term.has_model else NOT_MODELLED), ""
+
+
+def _plates(term: Term, scene: Scene, _: TermEstimate) -> Selection:
+    strips, exact = paper.chamber_volume_paper(disc=scene.disc), chamber_volume(disc=scene.disc)
+    off = f"costs nothing; flat strips would be {percent(abs(strips / exact - 1))} off in volume"
+    return term.models[-1], off
+
+
+def _gravity(term: Term, scene: Scene, _: TermEstimate) -> Selection:
+    choice = gravity_choice(scene=scene, share=mean_gravity(scene))
+    return term.models[choice.modelled], choice.told
+
+
+def _sloshing(term: Term, scene: Scene, estimate: TermEstimate) -> Selection:
+    return _by_tolerance(term, scene, estimate)[0], "it vanishes in the mean over a turn"
+
+
+def _crest(term: Term, scene: Scene, _: TermEstimate) -> Selection:
+    if scene.tube.hump_radius is None:
+        return term.models[0], "Eq. 18 as it stands"
+    moved = by_closed_form(scene, scene.disc.max_fill_ratio / 2).wall_pressure / 1e6
+    threshold = f"vented or trapped moves the threshold by up to {moved:.3g} MPa"
+    return f"{term.models[-1]}, crest gas {scene.tube.hump_gas}", threshold
+
+
+def _tube_loss(term: Term, scene: Scene, _: TermEstimate) -> Selection:
+    if scene.tube.drag_coefficient is not None:
+        return term.models[0], "the scene fixes drag_coefficient"
+    return term.models[-1], "against the liquid-ring paper's constant k = 50"
+
+
+def _rotation(term: Term, _: Scene, estimate: TermEstimate) -> Selection:
+    return (LEFT_OUT if estimate.contribution is None else term.models[-1]), ""
+
+
+def _filling(term: Term, scene: Scene, estimate: TermEstimate) -> Selection:
+    """With how far heat from the walls of a chamber moves the estimate."""
+    model, _ = _by_tolerance(term, scene, estimate)
+    if model == LEFT_OUT or estimate.time is None:
+        return model, ""
+    if scene.gas.process == "adiabatic":
+        return model, "estimated isothermal, modelled without heat from the walls, which takes less"
+    sooner = 1e3 * estimate.time * (1 - 1 / HEAT_CAPACITY_RATIO)
+    return model, f"isothermal: without heat from the walls it would take up to {sooner:.3g} ms less"
+
+
+TERMS: Final = (
+    Term(name=PLATES, part="chamber", models=("flat strips", "exact geometry"), select=_plates),
+    Term(
+        name=GRAVITY,
+        part="chamber",
+        models=(LEFT_OUT, "quasi-static, free surface found, mean over a turn"),
+        select=_gravity,
+    ),
+    Term(
+        name=RIPPLE_AND_SLOSHING,
+        part="chamber",
+        models=(LEFT_OUT, "apart, by `ringbalance trade`; means over a turn do not hold it"),
+        select=_sloshing,
+    ),
+    Term(name=SURFACE_TENSION, part="chamber", models=(LEFT_OUT,), select=_by_tolerance),
+    Term(name=WALL_FRICTION, part="chamber", models=(LEFT_OUT,), select=_by_tolerance),
+    Term(
+        name=CREST,
+        part="tube",
+        models=("always a full siphon", "four regimes"),
+        select=_crest,
+    ),
+    Term(
+        name=TUBE_LOSS,
+        part="tube",
+        models=("k prescribed", "k(u): finite elements laminar, correlations turbulent"),
+        select=_tube_loss,
+    ),
+    Term(
+        name=ROTATION,
+        part="tube",
+        models=(LEFT_OUT, "finite-element table laminar, correlation turbulent"),
+        select=_rotation,
+    ),
+    Term(
+        name=INERTIA,
+        part="injection",
+        models=(LEFT_OUT, "rho L du/dt of the liquid in the tube, in injections"),
+        select=_by_tolerance,
+    ),
+    Term(name=FILLING, part="injection", models=(LEFT_OUT, "ISO 6358, in injections"), select=_filling),
+    Term(name=LAG, part="injection", models=(LEFT_OUT, "pure delay, in injections"), select=_by_tolerance),
+    Term(name=HELD, part="injection", models=(LEFT_OUT,), select=_by_tolerance),
+)
+"""All physical terms, in the order of every `models_used`."""
+IN_INJECTIONS: Final = tuple(term.name for term in TERMS if term.part == "injection" and term.has_model)
+"""Terms that a closed-loop run can model beyond its flow law."""

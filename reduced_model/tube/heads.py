@@ -1,0 +1,126 @@
+"""The tube's loss as tables of head against velocity, which a flow law can invert in microseconds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.physics.tube.loss import TubeLoss, tube_loss
+from ringbalance.physics.tube.state import TubeState, tube_state, upstream_loss
+from ringbalance.reduced_model.tables.fit import level_table, refined_table
+from ringbalance.reduced_model.tables.hermite import HermiteTable
+from ringbalance.reduced_model.tube.path import reversed_tube
+from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.scene.models import Scene, Tube
+
+TABLE_VELOCITIES: Final = (1e-5, 1e3)
+"""m/s; below, the flow creeps and the head is proportional to u; above, to a power of u."""
+TABLE_ERROR: Final = 1e-9
+"""Aimed at, relative, between the nodes."""
+_UNCERTAINTY_NODES: Final = 2049
+
+LogHead = Callable[[FloatArray], FloatArray]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TubeHeads:
+    """Heads of the full tube over ln u (u in m/s), natural logarithms of m^2/s^2."""
+
+    head: HermiteTable
+    """ln((k + 1) u^2/2): between the chambers."""
+    hump_head: HermiteTable | None
+    """ln((alpha + k_up) u^2/2): from the driven chamber to the crest; None without a crest."""
+    return_hump_head: HermiteTable | None
+    """The same from the opposite chamber, for reverse flow."""
+    uncertainty: HermiteTable
+    """Expanded uncertainty (95 %) of k over k + 1."""
+    hump_uncertainty: HermiteTable
+    """Expanded uncertainty (95 %) of k_up over alpha + k_up."""
+    interpolation_error: float
+    """Largest relative error of the head tables found between their nodes."""
+
+
+def velocity_of(*, table: HermiteTable, head: npt.ArrayLike, where: BoolArray) -> FloatArray:
+    """Velocity that belongs to a head.
+
+    Args: `table`: ln u to ln head. `head`: m^2/s^2, any shape. `where`: of that shape; elsewhere the velocity
+        is zero and the head may be anything.
+    Returns: u, m/s, the shape of `head`.
+    """
+    safe = np.where(where, head, 1.0)
+    return np.where(where, np.exp(table.inverse(np.log(safe))), 0.0)
+
+
+def tube_heads(scene: Scene) -> TubeHeads:
+    """Tabulate the heads of a scene's tube.
+
+    Raises: ValueError: arcs of bends longer than the tube.
+    Source: definition of k; the crest's energy balance with the profile's kinetic-energy factor alpha.
+    """
+    start, stop = (float(v) for v in np.log(TABLE_VELOCITIES))
+    heads = _log_heads(scene)
+    tables, errors = zip(*(_head_table(head, start, stop) for head in heads), strict=True)
+    loss = _loss(scene, np.exp(np.linspace(start, stop, _UNCERTAINTY_NODES)))
+    share = np.where(loss.k.value > 0, loss.upstream_k / np.where(loss.k.value > 0, loss.k.value, 1.0), 1.0)
+    uncertainty = loss.k.uncertainty / (loss.k.value + 1)
+    hump_uncertainty = loss.k.uncertainty * share / (loss.kinetic_factor + loss.upstream_k)
+    return TubeHeads(
+        head=tables[0],
+        hump_head=tables[1] if len(tables) > 1 else None,
+        return_hump_head=tables[2] if len(tables) > 1 else None,
+        uncertainty=level_table(start=start, stop=stop, value=uncertainty),
+        hump_uncertainty=level_table(start=start, stop=stop, value=hump_uncertainty),
+        interpolation_error=max(errors),
+    )
+
+
+def _loss(scene: Scene, velocity: FloatArray) -> TubeLoss:
+    return tube_loss(
+        tube=scene.tube,
+        liquid=scene.liquid,
+        angular_velocity=scene.rotor.speed,
+        velocity=velocity,
+        inputs=scene.uncertainty,
+    )
+
+
+def _log_heads(scene: Scene) -> list[LogHead]:
+    """Heads between the chambers and, with a crest, from either chamber to it, from shared states."""
+    tube = scene.tube
+
+    @lru_cache(maxsize=32)
+    def state(log_velocity: bytes) -> TubeState:
+        return tube_state(
+            tube=tube,
+            liquid=scene.liquid,
+            angular_velocity=scene.rotor.speed,
+            velocity=np.exp(np.frombuffer(log_velocity)),
+        )
+
+    def between(log_velocity: FloatArray) -> FloatArray:
+        return np.asarray(np.log((state(log_velocity.tobytes()).k + 1) / 2) + 2 * log_velocity)
+
+    def to_hump(seen: Tube, order: int) -> LogHead:
+        def head(log_velocity: FloatArray) -> FloatArray:
+            there = state(log_velocity.tobytes())
+            there = replace(there, bends=there.bends[::order])
+            factor = there.kinetic_factor + upstream_loss(tube=seen, state=there)
+            return np.asarray(np.log(factor / 2) + 2 * log_velocity)
+
+        return head
+
+    if tube.hump_radius is None:
+        return [between]
+    return [between, to_hump(tube, 1), to_hump(reversed_tube(tube), -1)]
+
+
+def _head_table(log_head: LogHead, start: float, stop: float) -> tuple[HermiteTable, float]:
+    table, error = refined_table(function=log_head, start=start, stop=stop, tolerance=TABLE_ERROR)
+    if np.any(np.diff(table.value) <= 0):
+        raise ValueError("the tube's head does not grow with the velocity: its loss terms are inconsistent")
+    return table, error

@@ -1,0 +1,103 @@
+"""How the tube flows at equal fills under the scene's gas pressure, and what pressures frame that."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from ringbalance.physics.tube.loss import tube_loss
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.paper import formulas as paper
+from ringbalance.reduced_model.tube.pressure_profile import hump_profile
+from ringbalance.reduced_model.tube.thresholds import priming_pressure, siphon_stall_pressure
+from ringbalance.scene.models import Scene
+
+
+@dataclass(frozen=True, kw_only=True)
+class OperatingPoint:
+    """Equal fills, the scene's gas pressure, an empty tube beforehand."""
+
+    fill_ratio: float
+    """x of both chambers."""
+    gas_pressure: float
+    """Gauge, Pa."""
+    regime: Regime
+    """Of the flow."""
+    velocity: float
+    """u, m/s; zero when blocked."""
+    velocity_uncertainty: float
+    """Expanded uncertainty (95 %), m/s."""
+    loss_velocity: float
+    """Velocity at which k is given: u or, when blocked, that of a primed tube, m/s; zero if none."""
+    k: float | None
+    """Loss coefficient there; None without any velocity."""
+    k_uncertainty: float | None
+    """Expanded uncertainty (95 %)."""
+    k_parts: Mapping[str, float]
+    """Terms of k, by name."""
+    priming_vented: float | None
+    """Gauge pressure that starts a flow, crest gas vented, driven chamber empty, Pa; None: no crest."""
+    priming_trapped: float | None
+    """The same with that gas trapped, at equal fills."""
+    stall: float
+    """Gauge pressure at which a full siphon stalls with the driven chamber empty, Pa."""
+    stall_paper: float
+    """The same by Eq. 19."""
+    hump_pressure: float | None
+    """Pressure over the crest, gauge, Pa; None: no crest."""
+    cavity_pressure: float | None
+    """At which the column separates there, gauge, Pa."""
+    cavitation_margin: float | None
+    """Pressure over the crest of a full siphon, of a primed tube when blocked, less `cavity_pressure`, Pa."""
+    cavitation_margin_uncertainty: float | None
+    """Expanded uncertainty (95 %), Pa."""
+
+
+def operating_point(*, scene: Scene, law: CalibratedLaw) -> OperatingPoint:
+    """Evaluate the law at equal fills under the scene's gas pressure.
+
+    Source: the law itself; thresholds by hydrostatics.
+    """
+    x, pressure = law.max_fill_ratio / 2, scene.gas.pressure
+    flow = law.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=pressure)
+    full = law.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=pressure, primed=True)
+    u = abs(float(flow.velocity)) or abs(float(full.velocity))
+    loss = None
+    if u > 0:
+        loss = tube_loss(
+            tube=scene.tube,
+            liquid=scene.liquid,
+            angular_velocity=scene.rotor.speed,
+            velocity=u,
+            inputs=scene.uncertainty,
+        )
+    hump = hump_profile(scene=scene, law=law, fill_ratio=x, opposite_fill_ratio=x, points=2)
+    vented = priming_pressure(law=law, fill_ratio=0.0, hump_gas="vented")
+    trapped = priming_pressure(law=law, fill_ratio=x, opposite_fill_ratio=x, hump_gas="trapped")
+    return OperatingPoint(
+        fill_ratio=x,
+        gas_pressure=pressure,
+        regime=Regime(int(flow.regime)),
+        velocity=float(flow.velocity),
+        velocity_uncertainty=float(flow.uncertainty),
+        loss_velocity=u,
+        k=None if loss is None else float(loss.k.value),
+        k_uncertainty=None if loss is None else float(loss.k.uncertainty),
+        k_parts=MappingProxyType({} if loss is None else {n: float(k) for n, k in loss.terms.items()}),
+        priming_vented=None if vented is None else float(vented),
+        priming_trapped=None if trapped is None else float(trapped),
+        stall=float(np.maximum(siphon_stall_pressure(law=law, fill_ratio=0.0), 0.0)),
+        stall_paper=float(
+            paper.stall_pressure(
+                disc=scene.disc, density=scene.liquid.density, angular_velocity=scene.rotor.speed
+            )
+        ),
+        hump_pressure=hump.hump_pressure,
+        cavity_pressure=hump.cavity_pressure,
+        cavitation_margin=hump.cavitation_margin,
+        cavitation_margin_uncertainty=hump.cavitation_margin_uncertainty,
+    )

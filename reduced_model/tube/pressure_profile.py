@@ -1,0 +1,250 @@
+"""The pressure along the tube's path, from the driven chamber over the crest to the opposite one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ringbalance.physics.roots import bracketed_root
+from ringbalance.physics.tube.state import TubeState, tube_state
+from ringbalance.reduced_model.law.building import column_pressure
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.law.flow_law import Flow, Regime
+from ringbalance.reduced_model.tube.crest_margin import DirectedState, directed_state, siphon_margin
+from ringbalance.reduced_model.tube.path import (
+    Places,
+    loss_before,
+    path_radius,
+    places,
+    reversed_tube,
+)
+from ringbalance.reduced_model.tube.regime import TubeEnds
+from ringbalance.reduced_model.tube.rest import rest
+from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.scene.models import Scene, Tube
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HumpProfile:
+    """State of the tube along its path; arrays of one shape, from the driven to the opposite chamber.
+
+    A path coordinate stands twice where the pressure steps (ends, bends) or the tube stops being full.
+    """
+
+    path: FloatArray
+    """s, m, from 0 to the tube's length, never falling."""
+    radius: FloatArray
+    """r, m."""
+    pressure: FloatArray
+    """Gauge, Pa; of the gas or the cavity where the tube is not full.  First and last: in the chamber."""
+    full: BoolArray
+    """Whether liquid fills the bore."""
+    regime: Regime
+    """Of the flow."""
+    velocity: float
+    """u, m/s, negative in reverse; zero when blocked."""
+    hump_path: float | None
+    """s of the crest, m; None without one."""
+    hump_pressure: float | None
+    """Pressure over the crest, gauge, Pa; None without one."""
+    cavity_pressure: float | None
+    """At which a column separates at the crest: vapour, or the downstream chamber's gas; gauge, Pa."""
+    cavitation_margin: float | None
+    """Pressure over the crest of a full siphon under these conditions, less the cavity pressure, Pa.
+    Negative: no such siphon exists, so the flow is separated or a resting column separates.  When blocked,
+    it is that of a primed tube."""
+    cavitation_margin_uncertainty: float | None
+    """Expanded uncertainty (95 %), Pa."""
+    lowest_pressure: float | None
+    """Of the liquid inside the tube, gauge, Pa; None when there is none."""
+
+
+def hump_profile(
+    *,
+    scene: Scene,
+    law: CalibratedLaw,
+    fill_ratio: float,
+    opposite_fill_ratio: float | None = None,
+    gas_pressure: float | None = None,
+    primed: bool = False,
+    points: int = 401,
+) -> HumpProfile:
+    """Follow the pressure along the path at one operating state.
+
+    p(s) = p_A + P_A - rho omega^2 (R2^2 - r^2)/2 - K(s) rho u^2/2, with K the loss up to there and alpha
+
+    Where the column is separated the cavity reaches from the crest to the column that the opposite chamber
+    supports; the momentum of what falls onto it is left out.
+    Args:
+        fill_ratio: x of the driven chamber.
+        opposite_fill_ratio: default max_fill_ratio - fill_ratio.
+        gas_pressure: gauge, Pa, in the driven chamber; default the scene's.
+        primed: whether the tube holds a continuous column beforehand.
+        points: number of even places along the path; more stand where something changes.
+    Raises: ValueError: a fill ratio outside the range, a NaN, a negative absolute pressure, or under 2
+        points.
+    Range: the scene does not give the shape of the legs nor where the bends lie: straight in r, and evenly.
+    Source: Eqs. 13 to 18 of the liquid-ring paper, taken along the path.
+    """
+    if points < 2:
+        raise ValueError("points must be at least 2")
+    gas = scene.gas.pressure if gas_pressure is None else gas_pressure
+    other = law.max_fill_ratio - fill_ratio if opposite_fill_ratio is None else opposite_fill_ratio
+    flow = law.evaluate(fill_ratio=fill_ratio, opposite_fill_ratio=other, gas_pressure=gas, primed=primed)
+    forward, backward = (
+        directed_state(law=law, fills=(fill_ratio, other), gas_pressure=gas, reverse=r) for r in (False, True)
+    )
+    state = backward if forward.ends.driving_pressure() < 0 else forward
+    tube = reversed_tube(scene.tube) if state.reverse else scene.tube
+    margin = siphon_margin(scene=scene, tube=tube, law=law, state=state)
+    if Regime(int(flow.regime)) is Regime.BLOCKED and not bool(flow.primed):
+        line = _blocked(scene, law, forward, primed, points)
+    else:
+        separated = margin[0] is not None and margin[0] < 0
+        cavity = _cavity_pressure(law, state) if separated else None
+        line = _flowing(scene, tube, abs(float(flow.velocity)), state.ends, cavity, points)
+        if state.reverse:
+            line = _Line(share=1 - line.share[::-1], pressure=line.pressure[::-1], full=line.full[::-1])
+    return _profile(scene, law, flow, state, margin, line)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Line:
+    """State along s/L; arrays of one shape."""
+
+    share: FloatArray
+    pressure: FloatArray
+    full: BoolArray
+
+
+def _profile(
+    scene: Scene,
+    law: CalibratedLaw,
+    flow: Flow,
+    state: DirectedState,
+    margin: tuple[float, float] | tuple[None, None],
+    line: _Line,
+) -> HumpProfile:
+    tube, humped = scene.tube, scene.tube.hump_radius is not None
+    place = int(np.argmin(np.abs(line.share - tube.hump_position)))
+    inside = line.pressure[1:-1][line.full[1:-1]]
+    return HumpProfile(
+        path=line.share * tube.length,
+        radius=path_radius(tube=tube, share=line.share),
+        pressure=line.pressure,
+        full=line.full,
+        regime=Regime(int(flow.regime)),
+        velocity=float(flow.velocity),
+        hump_path=tube.hump_position * tube.length if humped else None,
+        hump_pressure=float(line.pressure[place]) if humped else None,
+        cavity_pressure=_cavity_pressure(law, state),
+        cavitation_margin=margin[0],
+        cavitation_margin_uncertainty=margin[1],
+        lowest_pressure=float(np.min(inside)) if inside.size else None,
+    )
+
+
+def _cavity_pressure(law: CalibratedLaw, state: DirectedState) -> float | None:
+    crest = law.path.crest
+    return None if crest is None else crest.cavity_pressure(state.ends)
+
+
+def _flowing(
+    scene: Scene, tube: Tube, velocity: float, ends: TubeEnds[float], cavity: float | None, points: int
+) -> _Line:
+    """Along a tube in which liquid flows or a column rests, from its upstream end."""
+    terms = _terms(scene, tube, velocity)
+    head = scene.liquid.density * velocity**2 / 2
+    if cavity is not None and terms is not None:
+        return _separated(scene, tube, terms, ends, cavity, head, points)
+    at = places(tube=tube, points=points)
+    lost = 0.0 if terms is None else head * loss_before(tube=tube, state=terms, at=at)
+    hydrostatic = column_pressure(scene=scene, radius=path_radius(tube=tube, share=at.share))
+    return _Line(
+        share=at.share,
+        pressure=np.asarray(ends.upstream_pressure() - hydrostatic - lost),
+        full=np.ones(at.share.shape, dtype=np.bool_),
+    )
+
+
+def _terms(scene: Scene, tube: Tube, velocity: float) -> TubeState | None:
+    if velocity == 0:
+        return None
+    return tube_state(
+        tube=tube, liquid=scene.liquid, angular_velocity=scene.rotor.speed, velocity=np.asarray(velocity)
+    )
+
+
+def _separated(
+    scene: Scene,
+    tube: Tube,
+    terms: TubeState,
+    ends: TubeEnds[float],
+    cavity: float,
+    head: float,
+    points: int,
+) -> _Line:
+    """Full up to the crest, then a cavity, then the column that the downstream chamber supports."""
+    top = ends.downstream_gas + ends.back_pressure()
+
+    def behind(at: Places) -> FloatArray:
+        """Pressure of a full tube seen from its downstream end."""
+        lost = float(terms.k) + 1 - loss_before(tube=tube, state=terms, at=at)
+        return np.asarray(
+            top - column_pressure(scene=scene, radius=path_radius(tube=tube, share=at.share)) + head * lost
+        )
+
+    first = places(tube=tube, points=points)
+    again = 1.0 if ends.downstream_open() else _full_again(first, behind, cavity, tube.hump_position)
+    at = places(tube=tube, points=points, doubled=(tube.hump_position, again))
+    from_top = ends.upstream_pressure() - column_pressure(
+        scene=scene, radius=path_radius(tube=tube, share=at.share)
+    )
+    ahead = from_top - head * loss_before(tube=tube, state=terms, at=at)
+    near = (at.share < tube.hump_position) | ((at.share == tube.hump_position) & ~at.after)
+    far = (at.share > again) | ((at.share == again) & at.after)
+    pressure = np.where(near, ahead, np.where(far, behind(at), cavity))
+    return _Line(share=at.share, pressure=pressure, full=near | far)
+
+
+def _full_again(at: Places, behind: Callable[[Places], FloatArray], cavity: float, hump: float) -> float:
+    """Share of the path from which on the column seen from its downstream end is above the cavity."""
+    low = np.flatnonzero((behind(at) < cavity) & (at.share >= hump))
+    if low.size == 0:
+        return hump
+    last = int(low[-1])
+    if last + 1 >= at.share.size:
+        return 1.0
+    start, stop = float(at.share[last]), float(at.share[last + 1])
+    if start == stop:
+        return start
+
+    def above(share: float) -> float:
+        inside = Places(share=np.array([share]), after=np.array([share < stop]))
+        return float(behind(inside)[0] - cavity)
+
+    return bracketed_root(above, start, stop)
+
+
+def _blocked(scene: Scene, law: CalibratedLaw, state: DirectedState, primed: bool, points: int) -> _Line:
+    """Two columns at rest and what lies between; without a crest, each chamber's pressure up to the
+    middle."""
+    ends, crest = state.ends, law.path.crest
+    near, far = ends.upstream_pressure(), ends.downstream_pressure()
+    if crest is None:
+        at = places(tube=scene.tube, points=points, doubled=(0.5,))
+        first = (at.share < 0.5) | ((at.share == 0.5) & ~at.after)
+        pressure = np.where(first, near, far) - ends.port_pressure
+        return _Line(share=at.share, pressure=pressure, full=np.ones(first.shape, dtype=np.bool_))
+    cavity = crest.cavity_pressure(ends) if primed and ends.upstream_covered() else None
+    stop = rest(scene=scene, ends=ends, cavity=cavity, crest_pressure=crest.column_pressure)
+    at = places(tube=scene.tube, points=points, doubled=(stop.near, stop.far))
+    hydrostatic = column_pressure(scene=scene, radius=path_radius(tube=scene.tube, share=at.share))
+    in_near = ((at.share < stop.near) | ((at.share == stop.near) & ~at.after)) & ends.upstream_covered()
+    in_far = ((at.share > stop.far) | ((at.share == stop.far) & at.after)) & (not ends.downstream_open())
+    pressure = np.where(in_near, near - hydrostatic, np.where(in_far, far - hydrostatic, stop.between))
+    # A chamber that leaves its port open shows its own gas there.
+    pressure[0] = pressure[0] if ends.upstream_covered() else max(pressure[0], ends.upstream_gas)
+    return _Line(share=at.share, pressure=pressure, full=in_near | in_far)

@@ -1,0 +1,255 @@
+"""Pressures at the tube's ends and at its siphon crest, and the flow regime that follows from them.
+
+The one place for the conditions under which the tube is blocked, runs as a full siphon or as a separated
+column.  Everything is written for one direction of flow: upstream is the chamber that gives liquid,
+downstream the one that receives it; `TubeEnds.reversed` changes the direction.  Pressures are gauge, Pa; a
+hydrostatic pressure is that of a chamber's liquid at the outer wall, rho omega^2 (R2^2 - a^2)/2, without its
+gas.  The functions accept plain numbers and arrays of one shape.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Generic, TypeAlias, TypeVar
+
+import numpy as np
+
+from ringbalance.scene.arrays import BoolArray, FloatArray
+
+Truth: TypeAlias = bool | BoolArray
+Pressure = TypeVar("Pressure", float, FloatArray)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class TubeEnds(Generic[Pressure]):
+    """What acts on the two ends of the tube."""
+
+    upstream_gas: Pressure
+    """p_A, Pa."""
+    downstream_gas: Pressure
+    """p_C, Pa."""
+    upstream_hydrostatic: Pressure
+    """P_A, Pa."""
+    downstream_hydrostatic: Pressure
+    """P_C, Pa."""
+    port_pressure: Pressure | float
+    """D_p = rho omega^2 (R2^2 - r_p^2)/2, of a column from the port to the outer wall, Pa."""
+
+    def reversed(self) -> TubeEnds[Pressure]:
+        """The same ends for flow in the other direction."""
+        return TubeEnds(
+            upstream_gas=self.downstream_gas,
+            downstream_gas=self.upstream_gas,
+            upstream_hydrostatic=self.downstream_hydrostatic,
+            downstream_hydrostatic=self.upstream_hydrostatic,
+            port_pressure=self.port_pressure,
+        )
+
+    def upstream_covered(self) -> Truth:
+        """Whether the upstream liquid covers the port; otherwise only gas can leave."""
+        return self.upstream_hydrostatic >= self.port_pressure
+
+    def downstream_open(self) -> Truth:
+        """Whether the downstream liquid leaves the port open to the gas."""
+        return self.downstream_hydrostatic < self.port_pressure
+
+    def upstream_pressure(self) -> Pressure:
+        """At the upstream outer wall, gas and liquid, p_A + P_A, Pa."""
+        return self.upstream_gas + self.upstream_hydrostatic
+
+    def downstream_pressure(self) -> Pressure:
+        """At the downstream outer wall, gas and liquid, p_C + P_C, Pa."""
+        return self.downstream_gas + self.downstream_hydrostatic
+
+    def back_pressure(self) -> Pressure:
+        """Hydrostatic pressure that the tube discharges against, max(P_C, D_p), Pa."""
+        return _larger(self.downstream_hydrostatic, self.port_pressure)
+
+    def driving_pressure(self) -> Pressure:
+        """Pressure that drives a full siphon, p_A - p_C + P_A - max(P_C, D_p), Pa.
+
+        Source: Eqs. 13 to 16 of the liquid-ring paper.
+        """
+        return self.upstream_gas - self.downstream_gas + self.upstream_hydrostatic - self.back_pressure()
+
+    def stall_pressure(self) -> Pressure:
+        """Difference of the gas pressures at which a full siphon stalls, max(P_C, D_p) - P_A, Pa."""
+        return self.back_pressure() - self.upstream_hydrostatic
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class SiphonCrest(Generic[Pressure]):
+    """The innermost point of the tube's path, where the column must be primed and may separate."""
+
+    column_pressure: Pressure | float
+    """D_m = rho omega^2 (R2^2 - r_m^2)/2, of a column from the crest to the outer wall, Pa."""
+    vapour_pressure: Pressure | float
+    """Pa, gauge."""
+    trapped: bool
+    """Whether the gas over the crest must be displaced through the downstream port."""
+
+    def cavity_pressure(self, ends: TubeEnds[Pressure]) -> Pressure:
+        """Pressure of a cavity over the crest, Pa.
+
+        Args: `ends`: pressures at the tube's ends.
+        Returns: The vapour pressure, or the downstream gas pressure where the port there is open.
+        """
+        return _choose(ends.downstream_open(), ends.downstream_gas, self.vapour_pressure)
+
+    def separation_margin(self, ends: TubeEnds[Pressure]) -> Pressure:
+        """Crest pressure of a column at rest less the cavity pressure, p_A - p_c + P_A - D_m, Pa.
+
+        Args: `ends`: pressures at the tube's ends.
+        Returns: What drives a separated column; where it is not positive, no column holds.
+        """
+        cavity = self.cavity_pressure(ends)
+        return ends.upstream_gas - cavity + ends.upstream_hydrostatic - self.column_pressure
+
+    def priming_pressure(self, ends: TubeEnds[Pressure]) -> Pressure:
+        """Difference of the gas pressures that lifts liquid over the crest of an unprimed tube, Pa.
+
+        Args: `ends`: pressures at the tube's ends.
+        Returns: D_m - P_A, and P_C - D_p more where trapped gas is displaced through a covered port.
+        """
+        lift = self.column_pressure - ends.upstream_hydrostatic
+        if not self.trapped:
+            return lift
+        return lift + _larger(ends.downstream_hydrostatic - ends.port_pressure, 0.0)
+
+    def primes(self, ends: TubeEnds[Pressure]) -> Truth:
+        """Whether the gas starts a flow in an unprimed tube.
+
+        Args: `ends`: pressures at the tube's ends.
+        Returns: True above the priming pressure.
+        """
+        return ends.upstream_gas - ends.downstream_gas > self.priming_pressure(ends)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TubePath:
+    """The tube's fixed radii, as pressures of a column that reaches from there to the outer wall."""
+
+    density: float
+    """rho, kg/m^3."""
+    port_pressure: float
+    """rho omega^2 (R2^2 - r_p^2)/2, Pa."""
+    hump_pressure: float | None
+    """rho omega^2 (R2^2 - r_m^2)/2, Pa; None: always a full siphon while the gas is on."""
+    trapped: bool
+    """Whether the gas over the siphon crest must be displaced through the downstream port."""
+    vapour_pressure: float
+    """Gauge, Pa."""
+
+    @property
+    def crest(self) -> SiphonCrest[Any] | None:
+        """The siphon crest, None without one."""
+        if self.hump_pressure is None:
+            return None
+        return SiphonCrest(
+            column_pressure=self.hump_pressure, vapour_pressure=self.vapour_pressure, trapped=self.trapped
+        )
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class ColumnFlow(Generic[Pressure]):
+    """Quasi-steady flow in one direction."""
+
+    velocity: Pressure
+    """m/s, the smaller of the two below; zero where nothing flows."""
+    siphon_velocity: Pressure
+    """Of a full siphon, m/s."""
+    separation_velocity: Pressure
+    """Of a column that is separated at the crest, m/s; without a crest that of the siphon."""
+    separated: Truth
+    """Whether the column is separated."""
+    primed: Truth
+    """Whether the tube holds a continuous column afterwards."""
+
+
+def can_flow(*, ends: TubeEnds[Pressure], crest: SiphonCrest[Pressure] | None, primed: Truth) -> Truth:
+    """Whether liquid flows: port covered, driving pressure positive, crest passed.
+
+    Args: `ends`: pressures at the tube's ends. `crest`: None without one. `primed`: whether the tube holds a
+        continuous column beforehand.
+    Returns: Of the ends' shape.
+    """
+    return _flows(ends, ends.driving_pressure(), crest, primed)[0]
+
+
+def _flows(
+    ends: TubeEnds[Pressure], driving: Pressure, crest: SiphonCrest[Pressure] | None, primed: Truth
+) -> tuple[Truth, Pressure]:
+    """Whether liquid flows, and the separation margin; without a crest the driving pressure in its place."""
+    flows = ends.upstream_covered() & (driving > 0)
+    if crest is None:
+        return flows, driving
+    margin = crest.separation_margin(ends)
+    return flows & (primed | crest.primes(ends)) & (margin > 0), margin
+
+
+def column_flow(
+    *,
+    ends: TubeEnds[Pressure],
+    crest: SiphonCrest[Pressure] | None,
+    primed: Truth,
+    allowed: Truth,
+    siphon: Callable[[Pressure, Truth], Pressure],
+    separation: Callable[[Pressure, Truth], Pressure],
+) -> ColumnFlow[Pressure]:
+    """Regime and velocity of the quasi-steady column, the smaller of siphon and separation velocity.
+
+    siphon: (k + 1) rho u^2/2 = driving pressure; separated: (alpha + k_up) rho u^2/2 = separation margin.
+    Where the siphon's velocity is the smaller one its crest pressure is above the cavity pressure, so the
+    smaller of the two is continuous across the change.
+    Args:
+        ends: pressures at the tube's ends.
+        crest: None without one.
+        primed: whether the tube holds a continuous column beforehand.
+        allowed: False where flow in this direction is ruled out from the start.
+        siphon: velocity of the full siphon under a pressure, zero where the second argument is false.
+        separation: velocity of the separated column under a pressure, likewise; not called without a crest.
+    Returns: ColumnFlow, of the ends' shape.
+    Source: Eqs. 13 to 18 of the liquid-ring paper, extended to the siphon crest.
+    """
+    driving = ends.driving_pressure()
+    can, margin = _flows(ends, driving, crest, primed)
+    flows = allowed & can
+    full = siphon(driving, flows)
+    if crest is None:
+        return ColumnFlow(
+            velocity=full,
+            siphon_velocity=full,
+            separation_velocity=full,
+            separated=full < full,
+            primed=flows | (primed & allowed),
+        )
+    broken = separation(margin, flows)
+    separated = broken < full
+    # At exact balance nothing flows, yet a column that holds is still there.
+    rests = primed & (driving == 0) & (margin > 0) & ends.upstream_covered()
+    keeps = (broken >= full) | (ends.downstream_hydrostatic >= ends.port_pressure)
+    return ColumnFlow(
+        velocity=_choose(separated, broken, full),
+        siphon_velocity=full,
+        separation_velocity=broken,
+        separated=separated,
+        primed=(flows & keeps) | rests,
+    )
+
+
+def _larger(first: Pressure, second: Pressure | float) -> Pressure:
+    """The larger of two, without the cost of an array for plain numbers."""
+    if isinstance(first, float):
+        return max(first, second)
+    return np.asarray(np.maximum(first, second), dtype=np.float64)
+
+
+def _choose(condition: Truth, first: Pressure | float, second: Pressure | float) -> Pressure:
+    either: Any
+    if isinstance(condition, np.ndarray):
+        either = np.where(condition, first, second)
+    else:
+        either = first if condition else second
+    chosen: Pressure = either
+    return chosen

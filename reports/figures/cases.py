@@ -1,0 +1,131 @@
+"""Figures of the verification cases: order plots, and whatever series a case hands over."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ringbalance.reports.figures.style import (
+    FIFTH,
+    FOUND,
+    FOURTH,
+    INK,
+    MUTED,
+    PAPER,
+    THIRD,
+    Drawing,
+    draw,
+    legend_above,
+    logarithmic,
+)
+from ringbalance.reports.numbers import number
+from ringbalance.reports.prose import typeset
+from ringbalance.reports.units import DisplayUnit, display_unit
+from ringbalance.scene.arrays import FloatArray
+
+Record = dict[str, Any]
+
+_COLOURS: Final = (FOUND, THIRD, FOURTH, FIFTH, MUTED, INK)
+_LONGEST_LABEL: Final = 36
+_MARKERS: Final = ("o", "s", "^", "D", "v", "P")
+
+
+def _positive(values: list[float | None]) -> bool:
+    return all(value is not None and value > 0 for value in values)
+
+
+def order_plot(case: Record) -> Drawing | None:
+    """Error against mesh size, a line per sequence, with the formal order as a slope to compare.
+
+    Args: `case`: a verification result with `convergence`.
+    Returns: The figure; None when no sequence has errors.
+    """
+    sequences = [s for s in case.get("convergence") or [] if s.get("error") and _positive(s["error"])]
+    if not sequences:
+        return None
+
+    def paint(figure: Figure, axes: Axes) -> None:
+        for index, sequence in enumerate(sequences):
+            size, error = np.asarray(sequence["h"]), np.asarray(sequence["error"])
+            colour = _COLOURS[index % len(_COLOURS)]
+            axes.plot(
+                size,
+                error,
+                color=colour,
+                marker=_MARKERS[index % len(_MARKERS)],
+                markersize=4,
+                label=sequence["label"],
+            )
+            if sequence.get("formal_order"):
+                slope = 0.6 * error[-1] * (size / size[-1]) ** sequence["formal_order"]
+                axes.plot(size, slope, color=colour, linewidth=0.8, linestyle=":")
+        logarithmic(axes, "x", ticks=sorted({float(f"{size:.3g}") for size in sequences[0]["h"]}))
+        logarithmic(axes, "y")
+        axes.set_xlabel("relative mesh or step size")
+        axes.set_ylabel("error")
+        legend_above(figure, axes, columns=1)
+
+    last = [number(s["observed_order"][-1], digits=3) for s in sequences if s["observed_order"]]
+    told = f"Observed at the finest pair: {', '.join(last)}" if last else "No order was observed"
+    return draw(
+        name=f"order-{case['id'].replace('_', '-')}",
+        paint=paint,
+        alt=f"Error against mesh size, double logarithmic. {told}.",
+        height=2.7 + 0.175 * len(sequences),
+        caption=f"{case['title']}: error against size. Dotted: the formal order. {told}.",
+    )
+
+
+_STYLES: Final = {"paper": (PAPER, (0, (5, 2))), "found": (FOUND, "-"), "reference": (THIRD, (0, (1, 1.5)))}
+
+
+def series_plots(case: Record) -> list[Drawing]:
+    """The figures that a case hands over as plain series.
+
+    Args: `case`: a verification result with `series`.
+    """
+    stem = f"case-{case['id'].replace('_', '-')}"
+    return [_series_plot(f"{stem}-{index}", series) for index, series in enumerate(case.get("series") or [])]
+
+
+def _with_gaps(values: list[float | None], unit: DisplayUnit) -> FloatArray:
+    """Values in a display unit; None leaves a gap in the line."""
+    return np.array([np.nan if value is None else value * unit.factor for value in values])
+
+
+def _label(name: str, unit: str) -> str:
+    return f"{name} in {unit}" if name and unit not in {"", "1"} else name or unit
+
+
+def _series_plot(name: str, series: Record) -> Drawing:
+    x_unit = display_unit(series["x"]["unit"], *series["x"]["values"])
+    x = _with_gaps(series["x"]["values"], x_unit)
+    curves, told = series["y"], typeset(series["name"][:1].upper() + series["name"][1:])
+    unit = display_unit(curves[0]["unit"], *(value for curve in curves for value in curve["values"]))
+    spare = iter((FOURTH, FIFTH, MUTED, INK) * len(curves))
+    used: set[str] = set()
+
+    def paint(figure: Figure, axes: Axes) -> None:
+        for curve in curves:
+            colour, dashes = _STYLES[curve.get("style") or "found"]
+            colour = next(spare) if colour in used else colour
+            used.add(colour)
+            y = _with_gaps(curve["values"], unit)
+            axes.plot(x, y, color=colour, linestyle=dashes, label=typeset(curve["name"]))
+            if curve.get("uncertainty"):
+                band = _with_gaps(curve["uncertainty"], unit)
+                axes.fill_between(x, y - band, y + band, color=colour, alpha=0.2, linewidth=0)
+        if series.get("log"):
+            logarithmic(axes, "x")
+            logarithmic(axes, "y")
+        axes.set_xlabel(_label(typeset(series["x"]["name"]), x_unit.symbol))
+        axes.set_ylabel(_label(told if len(told) < _LONGEST_LABEL else "", unit.symbol))
+        legend_above(figure, axes, columns=2)
+
+    names = typeset(", ".join(curve["name"] for curve in curves))
+    return draw(
+        name=name, paint=paint, alt=f"{told}: {names} against {series['x']['name']}.", caption=f"{told}."
+    )

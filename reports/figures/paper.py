@@ -1,0 +1,239 @@
+"""Figs. 4, 6, 7 and 8 of the liquid-ring paper as this program has them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ringbalance.reports.figures.style import (
+    FIFTH,
+    FOUND,
+    FOURTH,
+    INK,
+    MUTED,
+    PAPER,
+    THIRD,
+    Drawing,
+    draw,
+    legend_above,
+    logarithmic,
+)
+from ringbalance.reports.numbers import percent, short
+from ringbalance.reports.units import given, shown
+
+Record = dict[str, Any]
+
+_COLOURS: Final = (FOUND, THIRD, FOURTH, PAPER, FIFTH)
+_MARKERS: Final = ("o", "s", "^", "D", "v")
+_TICKS: Final = [step * 10.0**power for power in range(-3, 3) for step in (1, 2, 5)]
+_FLOOR: Final = 5e-9
+"""m: smaller amplitudes are drawn here."""
+
+
+_LINES: Final = {
+    "paper_m_s": (PAPER, (0, (5, 2)), "Eq. 19, as Fig. 4 has it"),
+    "levels_m_s": (FOUND, "-", "k = 50, levels by finite elements"),
+    "calibrated_m_s": (THIRD, "-", "calibrated law"),
+}
+
+
+def figure_4(velocity: list[Record]) -> list[Drawing]:
+    """Velocity over the fill at both gas pressures: Eq. 19 against finite elements, and against the law.
+
+    Args: `velocity`: the evidence's `paper_again.velocity`.
+    Returns: Two figures: with the paper's k and the finite elements' wall pressures, and with the calibrated
+        law.
+    """
+    falls = "; ".join(_fall(told) for told in velocity)
+    return [
+        _velocities(
+            velocity,
+            "levels_m_s",
+            name="paper-figure-4",
+            caption=f"Fig. 4 again, with the paper’s k. From full to empty the velocity falls {falls}.",
+        ),
+        _velocities(
+            velocity,
+            "calibrated_m_s",
+            name="paper-figure-4-law",
+            caption="The same beside the calibrated law of the tube that had to be assumed, with its 95 % "
+            "band: the levels change how far the velocity falls, k how large it is.",
+        ),
+    ]
+
+
+def _velocities(velocity: list[Record], other: str, *, name: str, caption: str) -> Drawing:
+    def paint(figure: Figure, axes: Axes) -> None:
+        for index, told in enumerate(velocity):
+            fill = np.asarray(told["fill_ratio"])
+            for key in ("paper_m_s", other):
+                colour, dashes, label = _LINES[key]
+                axes.plot(fill, told[key], color=colour, linestyle=dashes, label=None if index else label)
+            if other == "calibrated_m_s":
+                found, width = (np.asarray(told[k]) for k in (other, "calibrated_uncertainty"))
+                axes.fill_between(fill, found - width, found + width, color=THIRD, alpha=0.18, linewidth=0)
+            middle = len(fill) // 2
+            axes.annotate(
+                given(told["gas_pressure_Pa"], "Pa"),
+                (fill[middle], told[other][middle]),
+                xytext=(0, 7),
+                textcoords="offset points",
+                ha="center",
+                fontsize=7.5,
+                color=MUTED,
+            )
+        axes.set_xlim(0, fill[-1])
+        axes.set_ylim(bottom=0)
+        axes.set_xlabel("fill ratio of the driven chamber")
+        axes.set_ylabel("velocity in the tube in m/s")
+        legend_above(figure, axes, columns=2)
+
+    return draw(
+        name=name,
+        paint=paint,
+        alt=f"Velocity over the fill ratio at both gas pressures of Fig. 4: Eq. 19 and {_LINES[other][2]}.",
+        caption=caption,
+        height=3.4,
+    )
+
+
+def _fall(told: Record) -> str:
+    paper, printed, levels, calibrated = (
+        percent(told[f"departure_{name}"], digits=3) for name in ("paper", "printed", "levels", "calibrated")
+    )
+    return (
+        f"at {given(told['gas_pressure_Pa'], 'Pa')} by {paper} under Eq. 19 (printed {printed}), "
+        f"{levels} with the finite elements’ levels, {calibrated} under the calibrated law"
+    )
+
+
+def _amplitudes(axes: Axes, runs: list[Record], labels: list[str], limit: float) -> None:
+    top, bottom = limit, limit
+    for index, (run, label) in enumerate(zip(runs, labels, strict=True)):
+        values = np.maximum(np.asarray(run["amplitude_m"]), _FLOOR) * 1e6
+        top, bottom = max(top, values.max() * 1e-6), min(bottom, values.min() * 1e-6)
+        axes.plot(
+            run["time_s"],
+            values,
+            color=_COLOURS[index],
+            marker=_MARKERS[index],
+            markersize=2.6,
+            linewidth=1.2,
+            label=label,
+        )
+    axes.axhline(limit * 1e6, color=MUTED, linewidth=1, linestyle=":", label="limit")
+    low, high = bottom * 0.7e6, top * 1.5e6
+    logarithmic(axes, "y", ticks=[tick for tick in _TICKS if low <= tick <= high])
+    axes.set_ylim(low, high)
+    axes.set_xlim(left=0)
+    axes.set_xlabel("time in s")
+    axes.set_ylabel("amplitude in µm, zero to peak")
+
+
+def _settled(run: Record) -> str:
+    return shown(run["settling_time_s"], "s", digits=2) if run["settled"] else "not at all"
+
+
+def figure_6(runs: list[Record], limit: float) -> Drawing:
+    """The trial algorithm from four phases. Args: `runs`: the evidence's `paper_again.trial`. `limit`: m."""
+    names = [f"{math.degrees(run['of']):.0f}°" for run in runs]
+
+    def paint(figure: Figure, axes: Axes) -> None:
+        _amplitudes(axes, runs, names, limit)
+        legend_above(figure, axes, columns=5)
+
+    told = ", ".join(f"{_settled(run)} from {name}" for run, name in zip(runs, names, strict=True))
+    rises = ", ".join(str(run["misadjustments"]) for run in runs)
+    return draw(
+        name="paper-figure-6",
+        paint=paint,
+        wide=True,
+        height=3.4,
+        alt=f"Amplitude over time under the trial algorithm from four phases; settled after {told}.",
+        caption="Fig. 6 again: the trial algorithm at four phases of the initial vibration. "
+        f"Settled after {told}; misadjustments {rises}.",
+    )
+
+
+def figure_7(runs: list[Record], limit: float) -> Drawing:
+    """The target-vector algorithm with five gains: amplitude.
+
+    Args: `runs`: the evidence's `paper_again.gains`. `limit`: m.
+    """
+    names = [f"Kp = {run['of'] * 1e-6:.2f}" for run in runs]
+
+    def paint(figure: Figure, axes: Axes) -> None:
+        _amplitudes(axes, runs, names, limit)
+        legend_above(figure, axes, columns=3)
+
+    told = ", ".join(f"{run['overshoots']} at {run['of'] * 1e-6:.2f}" for run in runs)
+    return draw(
+        name="paper-figure-7",
+        paint=paint,
+        height=3.5,
+        alt=f"Amplitude at each sample for five gains; overshoots: {told}.",
+        caption=f"Fig. 7 again: the target-vector algorithm, proportional part alone, five gains Kp in s/µm. "
+        f"Overshoots: {told}.",
+    )
+
+
+def figure_7_phase(runs: list[Record]) -> Drawing:
+    """The same runs: phase. Args: `runs`: the evidence's `paper_again.gains`."""
+
+    def paint(figure: Figure, axes: Axes) -> None:
+        for index, run in enumerate(runs):
+            axes.plot(
+                run["time_s"],
+                np.degrees(run["phase_rad"]),
+                color=_COLOURS[index],
+                marker=_MARKERS[index],
+                markersize=2.6,
+                linewidth=1.2,
+                label=f"Kp = {run['of'] * 1e-6:.2f}",
+            )
+        axes.set_ylim(-190, 190)
+        axes.set_yticks([-180, -90, 0, 90, 180])
+        axes.set_xlim(left=0)
+        axes.set_xlabel("time in s")
+        axes.set_ylabel("phase in °")
+        axes.spines["bottom"].set_color(INK)
+        legend_above(figure, axes, columns=3)
+
+    loud = [short(run["of"] * 1e-6) for run in runs if run["overshoots"]]
+    return draw(
+        name="paper-figure-7-phase",
+        paint=paint,
+        height=3.5,
+        alt=f"Phase at each sample for five gains; it flips to the opposite side at Kp of {', '.join(loud)}.",
+        caption="Fig. 7 again: phase of the same runs. It drifts while both axes fall together, and flips to "
+        f"the opposite side where an operation takes away too much: at Kp of {' and '.join(loud)}.",
+    )
+
+
+def figure_8(runs: list[Record], limit: float) -> Drawing:
+    """The target-vector algorithm with the paper's parameters from five amplitudes.
+
+    Args: `runs`: the evidence's `paper_again.amplitudes`. `limit`: m.
+    """
+    names = [given(run["of"], "m") for run in runs]
+
+    def paint(figure: Figure, axes: Axes) -> None:
+        _amplitudes(axes, runs, names, limit)
+        axes.axvline(5.0, color=INK, linewidth=0.8, linestyle=(0, (5, 2)), label="the paper’s bound, 5 s")
+        axes.set_xlim(0, max(5.4, *(run["time_s"][-1] for run in runs)))
+        legend_above(figure, axes, columns=4)
+
+    told = ", ".join(f"{_settled(run)} from {name}" for run, name in zip(runs, names, strict=True))
+    return draw(
+        name="paper-figure-8",
+        paint=paint,
+        wide=True,
+        height=3.4,
+        alt=f"Amplitude over time from five initial amplitudes; settled after {told}.",
+        caption="Fig. 8 again: the target-vector algorithm with all three of the paper’s parameters. "
+        f"Settled after {told}.",
+    )

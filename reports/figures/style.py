@@ -1,0 +1,268 @@
+"""How every figure looks: one axis, few colours, and colours that follow the page between light and dark.
+
+Figures are drawn in sentinel colours, which the SVG text then exchanges for CSS variables.  Nothing random,
+no date and no fixed colour remains, so the same data gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from html import escape
+from typing import Any, Final
+
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap, to_hex
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullLocator
+
+from ringbalance.reports.numbers import MINUS, number, power_of_ten
+
+INK: Final = "#010101"
+MUTED: Final = "#020202"
+GRID: Final = "#030303"
+PAPER: Final = "#040404"
+"""The paper's formulas, in every figure."""
+FOUND: Final = "#050505"
+"""What this program found, in every figure."""
+THIRD: Final = "#060606"
+FOURTH: Final = "#070707"
+FIFTH: Final = "#080808"
+SURFACE: Final = "#090909"
+"""The page behind the figure."""
+
+MAP: Final = tuple(f"#0a0a{step:02x}" for step in range(1, 13))
+"""Twelve shades from low to high, for a field in colour."""
+
+_VARIABLES: Final = {
+    INK: "--fig-ink",
+    MUTED: "--fig-muted",
+    GRID: "--fig-grid",
+    PAPER: "--fig-paper",
+    FOUND: "--fig-found",
+    THIRD: "--fig-third",
+    FOURTH: "--fig-fourth",
+    FIFTH: "--fig-fifth",
+    SURFACE: "--fig-surface",
+    **{shade: f"--fig-map-{step}" for step, shade in enumerate(MAP)},
+}
+
+
+def _shades(low: str, middle: str, high: str) -> tuple[str, ...]:
+    """From one colour over another to a third; lines in the text's colour stand out on each."""
+    ramp = LinearSegmentedColormap.from_list("ramp", [low, middle, high])
+    return tuple(to_hex(ramp(step / (len(MAP) - 1))) for step in range(len(MAP)))
+
+
+_MAP_LIGHT: Final = _shades("#f1f5fa", "#a9c9ec", "#5597d6")
+_MAP_DARK: Final = _shades("#18202a", "#1d4a7c", "#3f83c9")
+LIGHT: Final = {
+    "--fig-ink": "#1d2530",
+    "--fig-muted": "#5b6675",
+    "--fig-grid": "#dfe3e8",
+    "--fig-paper": "#b4500b",
+    "--fig-found": "#1059b0",
+    "--fig-third": "#1b7a55",
+    "--fig-fourth": "#7a3fa3",
+    "--fig-fifth": "#8a6d00",
+    "--fig-surface": "#ffffff",
+    **{f"--fig-map-{step}": shade for step, shade in enumerate(_MAP_LIGHT)},
+}
+DARK: Final = {
+    "--fig-ink": "#e4e8ee",
+    "--fig-muted": "#9aa6b5",
+    "--fig-grid": "#2c3540",
+    "--fig-paper": "#ffa35c",
+    "--fig-found": "#72b1ff",
+    "--fig-third": "#5fd0a0",
+    "--fig-fourth": "#cf9dfa",
+    "--fig-fifth": "#e3c55a",
+    "--fig-surface": "#12171e",
+    **{f"--fig-map-{step}": shade for step, shade in enumerate(_MAP_DARK)},
+}
+
+_RC: Final = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "ringbalance",
+    "font.family": ["DejaVu Sans"],
+    "font.size": 8.5,
+    "axes.edgecolor": MUTED,
+    "axes.facecolor": "none",
+    "axes.labelcolor": INK,
+    "axes.labelsize": 8.5,
+    "axes.linewidth": 0.7,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.axisbelow": True,
+    "axes.grid": True,
+    "axes.unicode_minus": True,
+    "grid.color": GRID,
+    "grid.linewidth": 0.6,
+    "figure.facecolor": "none",
+    "savefig.facecolor": "none",
+    "legend.frameon": False,
+    "legend.fontsize": 8,
+    "legend.labelcolor": INK,
+    "legend.handlelength": 1.8,
+    "lines.linewidth": 1.6,
+    "lines.solid_capstyle": "round",
+    "text.color": INK,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "xtick.major.width": 0.7,
+    "ytick.major.width": 0.7,
+    "xtick.minor.visible": False,
+    "text.parse_math": False,
+}
+
+Draw = Callable[[Figure, Axes], None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drawing:
+    """A finished figure."""
+
+    name: str
+    """Of the file, and the prefix of every id in it."""
+    svg: str
+    """For an HTML page that defines the colour variables."""
+    alt: str
+    """What the figure shows, in a sentence, for those who cannot see it."""
+    caption: str
+    wide: bool = False
+    """Whether it takes the page's whole width."""
+
+
+WIDE: Final = 9.3
+"""Width, in, of a figure that takes the page's whole width: its text then has the size of a narrow one's."""
+NARROW: Final = 4.5
+_LEFT: Final = 0.62
+_RIGHT: Final = 0.08
+_BOTTOM: Final = 0.42
+_TOP: Final = 0.1
+_LEGEND_ROW: Final = 0.175
+_TOP_AXIS: Final = 0.42
+
+
+def plain_number(value: float, _position: object = None) -> str:
+    """Tick label in plain text, because matplotlib's own would be mathtext.
+
+    Returns: Text, such as 0.05, 250 or 10⁻³.
+    """
+    if value == 0:
+        return "0"
+    text = f"{value:.6g}"
+    return text.replace("-", MINUS) if "e" not in text else number(value, digits=1)
+
+
+def decade(value: float, _position: object = None) -> str:
+    """Tick label of a logarithmic axis that spans many decades.
+
+    Args: `value`: the tick, positive.
+    Returns: Power of ten, or nothing between decades.
+    """
+    exponent = f"{value:.0e}".split("e")
+    return power_of_ten(int(exponent[1])) if exponent[0] == "1" else ""
+
+
+def logarithmic(axes: Axes, axis: str, *, ticks: list[float] | None = None) -> None:
+    """Makes one axis logarithmic, with labels in plain text.
+
+    Args: `axis`: "x" or "y". `ticks`: where to label; None: the decades.
+    """
+    getattr(axes, f"set_{axis}scale")("log")
+    target = getattr(axes, f"{axis}axis")
+    if ticks is not None:
+        target.set_ticks(ticks)
+    target.set_major_formatter(FuncFormatter(decade if ticks is None else plain_number))
+    target.set_minor_locator(NullLocator())
+
+
+def _to_page(text: str, name: str, alt: str) -> str:
+    """Bare svg element: variables for colours and font, ids of its own, no fixed size."""
+    body = text[text.index("<svg") :]
+    body = re.sub(r"<metadata>.*?</metadata>\s*", "", body, flags=re.DOTALL)
+    body = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", body, count=1)
+    body = re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", body, count=1)
+    body = re.sub(r'\bid="', f'id="{name}-', body)
+    body = re.sub(r'(href="|url\()#', rf"\1#{name}-", body)
+    # Matplotlib before 3.11 writes the font in one property.
+    body = re.sub(r"font: ((?:\w+ )?[\d.]+px) [^;\"]*", r"font: \1 var(--fig-font)", body)
+    body = re.sub(r"font-family: [^;\"]*", "font-family: var(--fig-font)", body)
+    for sentinel, variable in _VARIABLES.items():
+        body = body.replace(sentinel, f"var({variable})")
+    body = body.replace("<svg ", f'<svg role="img" aria-label="{escape(alt, quote=True)}" ', 1)
+    # A hundredth of a point is finer than any screen, and a third of the bytes.
+    body = re.sub(r' (?:d|x|y|transform)="[^"]*"', lambda m: re.sub(r"(\.\d\d)\d+", r"\1", m[0]), body)
+    return "\n".join(line.rstrip() for line in body.splitlines())
+
+
+def draw(
+    *, name: str, paint: Draw, alt: str, caption: str, wide: bool = False, height: float = 3.0
+) -> Drawing:
+    """Draws one figure with one axis.
+
+    Args: `name`: of the figure; a file name without its ending. `paint`: draws into the figure and its axes.
+        `alt`: one sentence on what is to be seen. `caption`: as printed below. `wide`: whether it takes the
+        page's whole width. `height`: inches of 72 units.
+    Returns: The figure as SVG.
+    """
+    settings: Any = dict(_RC)
+    with matplotlib.rc_context(settings):
+        width = WIDE if wide else NARROW
+        figure = Figure(figsize=(width, height))
+        # Margins in inches, the same in every figure, so that neighbours line up.
+        axes = figure.add_axes((_LEFT / width, _BOTTOM / height, 1 - (_LEFT + _RIGHT) / width, 0.5))
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_formatter(FuncFormatter(plain_number))
+        paint(figure, axes)
+        buffer = io.StringIO()
+        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    return Drawing(name=name, svg=_to_page(buffer.getvalue(), name, alt), alt=alt, caption=caption, wide=wide)
+
+
+def legend_above(figure: Figure, axes: Axes, *, columns: int = 2) -> None:
+    """Puts the legend above the axes and gives the axes the height that is left; call it last.
+
+    Args: `axes`: whose labelled artists are listed.
+    """
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(
+        handles,
+        labels,
+        loc="upper left",
+        bbox_to_anchor=(0, 1),
+        ncols=columns,
+        columnspacing=1.4,
+        borderaxespad=0.0,
+        borderpad=0.1,
+        labelspacing=0.35,
+    )
+    rows = -(-len(labels) // columns)
+    top = _TOP + _LEGEND_ROW * rows + (_TOP_AXIS if axes.child_axes else 0.0)
+    box, height = axes.get_position(), figure.get_figheight()
+    axes.set_position((box.x0, box.y0, box.width, 1 - (_BOTTOM + top) / height))
+
+
+def standalone(drawing: Drawing) -> str:
+    """The figure as a file of its own, which follows the viewer's light or dark scheme.
+
+    Returns: An SVG document.
+    """
+
+    def block(colours: dict[str, str]) -> str:
+        return "".join(f"{key}:{value};" for key, value in colours.items())
+
+    font = "--fig-font:system-ui,'Segoe UI',Roboto,'Helvetica Neue',Arial,sans-serif;"
+    style = (
+        f"<style>svg{{{font}{block(LIGHT)}}}@media(prefers-color-scheme:dark){{svg{{{block(DARK)}}}}}</style>"
+    )
+    start = drawing.svg.index(">") + 1
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{drawing.svg[:start]}{style}{drawing.svg[start:]}\n'

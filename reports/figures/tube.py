@@ -1,0 +1,212 @@
+"""Figures of the connecting tube: k over velocity, what k is made of, and the flow law against Fig. 4."""
+
+from __future__ import annotations
+
+from itertools import groupby
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullLocator
+
+from ringbalance.reports.figures.style import (
+    FIFTH,
+    FOUND,
+    FOURTH,
+    INK,
+    MUTED,
+    PAPER,
+    THIRD,
+    Drawing,
+    decade,
+    draw,
+    legend_above,
+    logarithmic,
+)
+from ringbalance.reports.numbers import measured, short
+from ringbalance.reports.units import given
+from ringbalance.scene.arrays import FloatArray
+
+Record = dict[str, Any]
+
+_VELOCITY_TICKS: Final = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0]
+_TERM_COLOURS: Final = (FOUND, THIRD, FOURTH, FIFTH, PAPER, MUTED)
+
+
+def _nice_ticks(low: float, high: float) -> list[float]:
+    """1-2-5 ticks of a logarithmic axis of a few decades, decades alone beyond three."""
+    steps = (1, 2, 5) if high / low < 1e3 else (1,)
+    decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
+    ticks = [step * 10.0**exponent for exponent in decades for step in steps]
+    return [tick for tick in ticks if low <= tick <= high]
+
+
+def _shade_transition(axes: Axes, velocity: FloatArray, states: list[str]) -> None:
+    """Grey where the flow is neither laminar nor turbulent."""
+    start = 0
+    for state, members in groupby(states):
+        count = len(list(members))
+        if state == "transitional":
+            last = min(start + count, velocity.size - 1)
+            axes.axvspan(velocity[start], velocity[last], color=MUTED, alpha=0.13, linewidth=0, label=state)
+        start += count
+
+
+def _reynolds_axis(axes: Axes, reynolds_per_velocity: float) -> None:
+    def to_reynolds(velocity: npt.ArrayLike) -> FloatArray:
+        return np.asarray(velocity, dtype=np.float64) * reynolds_per_velocity
+
+    def to_velocity(reynolds: npt.ArrayLike) -> FloatArray:
+        return np.asarray(reynolds, dtype=np.float64) / reynolds_per_velocity
+
+    top = axes.secondary_xaxis("top", functions=(to_reynolds, to_velocity))
+    top.set_xlabel("Reynolds number", color=MUTED)
+    top.xaxis.set_major_formatter(FuncFormatter(decade))
+    top.xaxis.set_minor_locator(NullLocator())
+
+
+def drag(tube: Record, point: Record, paper: Record) -> Drawing:
+    """k against velocity and Reynolds number, with its 95 % band and the paper's one number.
+
+    Args: `tube`: the calibration's `tube`, SI. `point`: the evidence's `operating_point`. `paper`: the
+        evidence's `paper`.
+    Returns: The figure.
+    """
+    velocity, k = np.asarray(tube["velocity_m_s"]), np.asarray(tube["k"])
+    band = np.asarray(tube["k_uncertainty"])
+    low, high = np.maximum(k - band, k.min() * 0.2), k + band
+    printed = paper["drag_coefficient"]
+
+    def paint(figure: Figure, axes: Axes) -> None:
+        logarithmic(axes, "x", ticks=_VELOCITY_TICKS)
+        axes.set_xlim(velocity[0], velocity[-1])
+        _shade_transition(axes, velocity, tube["flow_state"])
+        axes.axhline(printed, color=PAPER, linestyle=(0, (5, 2)), label="the paper")
+        axes.fill_between(velocity, low, high, color=FOUND, alpha=0.2, linewidth=0)
+        axes.plot(velocity, k, color=FOUND, label="found, 95 % band")
+        if point["k"] is not None:
+            place = [point["k_at_velocity_m_s"]], [point["k"]]
+            axes.plot(*place, "o", color=INK, markersize=4.5, label="operating point")
+        bottom, ceiling = min(low.min(), printed) * 0.8, max(high.max(), printed) * 1.3
+        logarithmic(axes, "y", ticks=_nice_ticks(bottom, ceiling))
+        axes.set_ylim(bottom, ceiling)
+        axes.set_xlabel("mean velocity in the tube in m/s")
+        axes.set_ylabel("drag coefficient k")
+        _reynolds_axis(axes, tube["reynolds"][-1] / tube["velocity_m_s"][-1])
+        legend_above(figure, axes, columns=4)
+
+    ends = [measured(tube["k"][i], tube["k_uncertainty"][i]) for i in (0, -1)]
+    speeds = [given(tube["velocity_m_s"][i], "m/s") for i in (0, -1)]
+    shaded = " Grey: transition." if "transitional" in tube["flow_state"] else ""
+    return draw(
+        name="drag",
+        paint=paint,
+        wide=True,
+        height=3.9,
+        alt=f"The drag coefficient is {ends[0]} at {speeds[0]} and {ends[1]} at {speeds[1]}; the paper has "
+        f"{short(printed)} throughout.",
+        caption=f"Drag coefficient over velocity and Reynolds number: {ends[0]} at {speeds[0]}, {ends[1]} at "
+        f"{speeds[1]}. The paper has one number, {short(printed)}.{shaded}",
+    )
+
+
+def drag_terms(tube: Record) -> Drawing:
+    """What k is made of, term by term, over velocity.
+
+    Args: `tube`: the calibration's `tube`, SI.
+    Returns: The figure.
+    """
+    velocity = np.asarray(tube["velocity_m_s"])
+    terms = {name: np.asarray(values) for name, values in tube["terms"].items() if np.any(values)}
+    largest = max(np.abs(values).max() for values in terms.values())
+    shown_terms = {name: v for name, v in terms.items() if np.abs(v).max() > 1e-3 * largest}
+
+    def paint(figure: Figure, axes: Axes) -> None:
+        logarithmic(axes, "x", ticks=_VELOCITY_TICKS)
+        for index, (name, values) in enumerate(shown_terms.items()):
+            colour = _TERM_COLOURS[index % len(_TERM_COLOURS)]
+            dashes = "-" if index < len(_TERM_COLOURS) else (0, (5, 2))
+            axes.plot(
+                velocity,
+                np.where(values > 0, values, np.nan),
+                color=colour,
+                linestyle=dashes,
+                label=name.replace("_", " "),
+            )
+        logarithmic(axes, "y")
+        axes.set_xlim(velocity[0], velocity[-1])
+        axes.set_xlabel("mean velocity in the tube in m/s")
+        axes.set_ylabel("contribution to k")
+        legend_above(figure, axes, columns=3)
+
+    names = ", ".join(name.replace("_", " ") for name in shown_terms)
+    return draw(
+        name="drag-terms",
+        paint=paint,
+        alt=f"Contributions to the drag coefficient over velocity: {names}.",
+        caption=f"What k is made of: {names}.",
+    )
+
+
+def _regime_runs(regimes: list[str]) -> list[tuple[str, slice]]:
+    """Stretches of one regime, each reaching to the first point of the next so that the line has no gap."""
+    runs, start = [], 0
+    for regime, members in groupby(regimes):
+        stop = start + len(list(members))
+        runs.append((regime, slice(start, min(stop + 1, len(regimes)))))
+        start = stop
+    return runs
+
+
+_REGIME_LINES: Final[dict[str, Record]] = {
+    "siphon": {"linestyle": "-"},
+    "separated": {"linestyle": "-", "marker": "o", "markersize": 3.2, "markevery": 5},
+    "blocked": {"linestyle": ":"},
+    "reverse": {"linestyle": "-."},
+}
+
+
+def flow_law(law: Record, row: int) -> Drawing:
+    """Velocity over fill ratio at one gas pressure: the calibrated law with its regimes against Eq. 19.
+
+    Args: `law`: the evidence's `flow_law`, SI. `row`: index of the gas pressure.
+    Returns: The figure.
+    """
+    fill = np.asarray(law["fill_ratio"])
+    velocity, paper = np.asarray(law["velocity_m_s"][row]), np.asarray(law["velocity_paper_m_s"][row])
+    band, regimes = np.asarray(law["velocity_uncertainty"][row]), list(law["regime"][row])
+
+    def paint(figure: Figure, axes: Axes) -> None:
+        axes.plot(fill, paper, color=PAPER, linestyle=(0, (5, 2)), label="Eq. 19")
+        axes.fill_between(
+            fill, np.maximum(velocity - band, 0), velocity + band, color=FOUND, alpha=0.2, linewidth=0
+        )
+        named: set[str] = set()
+        for regime, part in _regime_runs(regimes):
+            label = None if regime in named else f"calibrated, {regime}"
+            axes.plot(fill[part], velocity[part], color=FOUND, label=label, **_REGIME_LINES[regime])
+            named.add(regime)
+        axes.set_xlabel("fill ratio of the driven chamber")
+        axes.set_ylabel("velocity in the tube in m/s")
+        axes.set_ylim(bottom=0)
+        legend_above(figure, axes, columns=3)
+
+    pressure = given(law["gas_pressure_Pa"][row], "Pa")
+    names = " and ".join(dict.fromkeys(regimes))
+    return draw(
+        name=f"flow-law-{row}",
+        paint=paint,
+        alt=f"Velocity over fill ratio at {pressure}: calibrated ({names}), and by Eq. 19.",
+        caption=f"Flow law at {pressure} gas pressure, drawn as in Fig. 4 of the paper. Calibrated: {names}.",
+    )
+
+
+def flow_laws(law: Record) -> list[Drawing]:
+    """The flow law at every gas pressure of the evidence.
+
+    Args: `law`: the evidence's `flow_law`, SI.
+    Returns: One figure for each pressure.
+    """
+    return [flow_law(law, row) for row in range(len(law["gas_pressure_Pa"]))]

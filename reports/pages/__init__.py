@@ -1,0 +1,5 @@
+"""Sections of the report's page: from evidence to texts, tables and figures.
+
+A new section is a module with a `SECTION`, a template of its name, and one line in
+`ringbalance.reports.sections`.
+"""

@@ -1,0 +1,256 @@
+"""Is k = 50 right?  The map over bore and viscosity, and the verdict for each liquid in the scene's tube."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.physics.tube.range import VELOCITIES
+from ringbalance.reduced_model.calibration import Calibration
+from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.paper import formulas as paper
+from ringbalance.reports.figures.drag_coefficient import apparent_figure, map_figure
+from ringbalance.reports.numbers import MISSING, measured, percent
+from ringbalance.reports.prose import typeset
+from ringbalance.reports.section import Record, Section, Work
+from ringbalance.reports.studies.apparent_drag import apparent_drag
+from ringbalance.reports.studies.drag_map import (
+    BORES,
+    DragMap,
+    LiquidVerdicts,
+    drag_contour,
+    drag_map,
+    liquid_verdicts,
+    velocity_errors,
+)
+from ringbalance.reports.studies.drag_point import DragPoint
+from ringbalance.reports.units import given, shown
+
+_DIGITS: Final = 5
+_READINGS: Final = 60
+
+
+def collect(work: Work) -> Record:
+    """The map, its contours, the liquids, and Eq. 18's reading of a separated column, as plain numbers.
+
+    Args: `work`: scene, calibration and level.
+    """
+    found = drag_map(calibration=work.calibration)
+    verdicts = liquid_verdicts(calibration=work.calibration)
+    return {
+        "bore_m": work.scene.tube.bore,
+        "decreed_k": work.scene.tube.drag_coefficient,
+        "map": _map_record(found),
+        "contours": {
+            name: _contour(found, apparent=apparent) for name, apparent in (("k", False), ("apparent", True))
+        },
+        "liquids": liquid_records(verdicts),
+        "apparent": _apparent(work.calibration),
+    }
+
+
+def _rounded(values: npt.ArrayLike) -> Any:
+    """Nested lists to five significant digits: a map is read off a figure."""
+    array = np.asarray(values, dtype=np.float64)
+    if array.ndim > 1:
+        return [_rounded(row) for row in array]
+    return [float(f"{value:.{_DIGITS - 1}e}") for value in array]
+
+
+def _map_record(found: DragMap) -> Record:
+    point = found.point
+    return {
+        "bore_m": _rounded(found.bore),
+        "kinematic_viscosity_m2_s": _rounded(found.kinematic_viscosity),
+        "density_kg_m3": found.density,
+        "gas_pressure_Pa": found.gas_pressure,
+        "velocity_paper_m_s": found.velocity_paper,
+        "k": _rounded(point.k),
+        "k_uncertainty": _rounded(point.k_point_uncertainty),
+        "apparent_k": _rounded(point.apparent_k),
+        "tearing": _rounded(point.separation_excess),
+        "in_range": point.in_range.astype(int).tolist(),
+        "runs": bool(np.all(point.runs)),
+        "starts": bool(np.all(point.regime != Regime.BLOCKED)),
+    }
+
+
+def _contour(found: DragMap, *, apparent: bool) -> Record:
+    viscosity, bore = drag_contour(drag_map=found, apparent=apparent)
+    return {"kinematic_viscosity_m2_s": _rounded(viscosity), "bore_m": _rounded(bore)}
+
+
+def liquid_records(verdicts: LiquidVerdicts) -> list[Record]:
+    """The verdict on k = 50 for each liquid.
+
+    Returns: One record a liquid: under the scene's gas where that starts the flow, else at equal heads.
+    """
+    errors = velocity_errors(verdicts=verdicts)
+    found = []
+    for i, liquid in enumerate(verdicts.liquids):
+        starts = bool(verdicts.at_scene.regime[i] != Regime.BLOCKED)
+        point = verdicts.at_scene if starts else verdicts.at_equal_head
+        own, equal = verdicts.velocity_paper_at_scene[i], verdicts.velocity_paper_at_equal_head[i]
+        scene_pressure = verdicts.equal_head_pressure[0]
+        found.append(
+            {
+                "name": liquid.name,
+                "temperature_K": liquid.temperature,
+                "density_kg_m3": liquid.density,
+                "kinematic_viscosity_m2_s": liquid.kinematic_viscosity,
+                "starts_at_scene_pressure": starts,
+                "starting_pressure_Pa": float(verdicts.starting_pressure[i]),
+                "gas_pressure_Pa": float(scene_pressure if starts else verdicts.equal_head_pressure[i]),
+                **_point_record(point, i),
+                "velocity_paper_m_s": float(own if starts else equal),
+                "velocity_error": float(errors[0][i] if starts else errors[1][i]),
+                "bore_for_paper_m": float(verdicts.bore_for_paper[i]) or None,
+            }
+        )
+    return found
+
+
+def _point_record(point: DragPoint, i: int) -> Record:
+    regime = Regime(int(point.regime[i]))
+    return {
+        "regime": regime.label,
+        "runs": bool(point.runs[i]),
+        "velocity_m_s": float(point.velocity[i]),
+        "velocity_uncertainty": float(point.velocity_uncertainty[i]),
+        "k": float(point.k[i]),
+        "k_uncertainty": float(point.k_point_uncertainty[i]),
+        "apparent_k": float(point.apparent_k[i]),
+        "reynolds": float(point.reynolds[i]),
+        "flow_state": str(point.flow_state[i]),
+        "in_range": bool(point.in_range[i]),
+    }
+
+
+def _apparent(calibration: Calibration) -> Record | None:
+    law, point = calibration.flow_law, calibration.operating_point
+    if law.path.hump_pressure is None or not point.loss_velocity:
+        return None
+    speed = np.geomspace(
+        max(VELOCITIES[0], point.loss_velocity / 15), max(VELOCITIES[1], 2 * point.loss_velocity), _READINGS
+    )
+    read = apparent_drag(law=law, velocity=speed, opposite_fill_ratio=law.max_fill_ratio / 2)
+    fifty = float(np.interp(-paper.PAPER_DRAG_COEFFICIENT, -read.separated, speed))
+    return {
+        "velocity_m_s": _rounded(speed),
+        "velocity_of_50_m_s": fifty,
+        "pressure_of_50_Pa": (paper.PAPER_DRAG_COEFFICIENT + 1) * law.density * fifty**2 / 2,
+        "siphon": _rounded(read.siphon),
+        "separated": _rounded(read.separated),
+        "read": _rounded(read.read),
+        "floor": _rounded(read.lower_bound),
+        "excess_head_m2_s2": read.excess_head,
+        "operating_velocity_m_s": point.loss_velocity,
+        "operating_k": 2 * point.gas_pressure / (law.density * point.loss_velocity**2) - 1,
+    }
+
+
+def verdict_on_fifty(record: Record) -> str:
+    """What a liquid says of k = 50, judged by the velocity that Eq. 19 gives with it.
+
+    Returns: "right", "too high", "too low", or "nothing flows".
+    """
+    if not record["runs"]:
+        return "nothing flows"
+    gap = record["velocity_paper_m_s"] - record["velocity_m_s"]
+    if abs(gap) <= record["velocity_uncertainty"]:
+        return "right"
+    return "too low" if gap > 0 else "too high"
+
+
+def liquid_row(record: Record) -> Record:
+    """One liquid as the tables show it. Returns: Texts."""
+    runs, bore = record["runs"], record["bore_for_paper_m"]
+    pressure = given(record["gas_pressure_Pa"], "Pa", digits=3)
+    start = shown(record["starting_pressure_Pa"], "Pa", digits=2)
+    error = percent(record["velocity_error"], signed=True, digits=2) if runs else MISSING
+    return {
+        "name": typeset(record["name"]),
+        "viscosity": shown(record["kinematic_viscosity_m2_s"], "m^2/s", digits=3),
+        "density": f"{record['density_kg_m3']:.0f}",
+        "pressure": pressure,
+        "needs": "" if record["starts_at_scene_pressure"] else start,
+        "runs": f"{record['regime']}, {record['flow_state']}" if runs else "nothing flows",
+        "velocity": shown(record["velocity_m_s"], "m/s", record["velocity_uncertainty"]) if runs else MISSING,
+        "k": measured(record["k"], record["k_uncertainty"]) if runs else MISSING,
+        "apparent": measured(record["apparent_k"], None, digits=3) if runs else MISSING,
+        "error": error,
+        "verdict": verdict_on_fifty(record),
+        "bore": shown(bore, "m", digits=3) if bore else _outside(record),
+        "stretched": runs and not record["in_range"],
+    }
+
+
+def _outside(record: Record) -> str:
+    """No bore of the map gives k = 50: this says on which side it lies."""
+    if not record["runs"]:
+        return MISSING
+    low, high = (given(bore, "m") for bore in BORES)
+    return f"below {low}" if record["k"] < paper.PAPER_DRAG_COEFFICIENT else f"none up to {high}"
+
+
+def view(evidence: Record) -> Record | None:
+    """The section's texts, table and figures.
+
+    Args: `evidence`: the whole document.
+    Returns: Record; None where the evidence has none of it.
+    """
+    found = evidence.get("fifty")
+    if not found:
+        return None
+    rows = [liquid_row(record) for record in found["liquids"]]
+    apparent = found["apparent"]
+    return {
+        "paper_k": given(evidence["paper"]["drag_coefficient"], "1"),
+        "lead": _lead(found["liquids"]),
+        "rows": rows,
+        "any_needs": any(row["needs"] for row in rows),
+        "any_stretched": any(row["stretched"] for row in rows),
+        "decreed": given(found["decreed_k"], "1") if found["decreed_k"] is not None else "",
+        "gas": given(found["map"]["gas_pressure_Pa"], "Pa"),
+        "bore": given(found["bore_m"], "m"),
+        "map": map_figure(found) if found["map"]["runs"] else None,
+        "apparent": apparent_figure(apparent) if apparent else None,
+        "hidden": _hidden(apparent) if apparent else "",
+    }
+
+
+def _hidden(apparent: Record) -> str:
+    """Where a separated column would be taken for the paper's number."""
+    readings = apparent["separated"]
+    if not min(readings) < paper.PAPER_DRAG_COEFFICIENT < max(readings):
+        return ""
+    speed = shown(apparent["velocity_of_50_m_s"], "m/s", digits=2)
+    pressure = shown(apparent["pressure_of_50_Pa"], "Pa", digits=2)
+    return (
+        f"In this tube a column separated at {speed}, under {pressure}, would read as 50 whatever its own k."
+    )
+
+
+def _lead(liquids: list[Record]) -> str:
+    groups: dict[str, list[str]] = {}
+    for record in liquids:
+        groups.setdefault(verdict_on_fifty(record), []).append(typeset(record["name"]))
+    told = {
+        "right": "it is right, within what can be told, for {}",
+        "too high": "too high for {}, whose velocity Eq. 19 then makes too small",
+        "too low": "too low for {}, whose velocity it makes too large",
+        "nothing flows": "without meaning for {}, which do not flow here",
+    }
+    if set(groups) == {"nothing flows"}:
+        return "Under the scene’s gas pressure nothing flows in this tube, so no k can be given for it."
+    parts = [text.format(_series(groups[name])) for name, text in told.items() if name in groups]
+    return f"In this tube, with k = 50: {'; '.join(parts)}."
+
+
+def _series(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+SECTION: Final = Section(name="fifty", title="Is k = 50 right?", collect=collect, view=view)

@@ -1,0 +1,175 @@
+"""The tables of docs/is-k-50-right.md as Markdown, straight from the map; as a program, rewrites the page.
+
+python -m ringbalance.reports.pages.drag_coefficient_doc docs/is-k-50-right.md
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from ringbalance.reduced_model.calibration import Calibration, calibrate
+from ringbalance.reduced_model.paper import formulas as paper
+from ringbalance.reports.numbers import number, percent
+from ringbalance.reports.pages.drag_coefficient import collect, liquid_row
+from ringbalance.reports.section import Record, Work
+from ringbalance.reports.studies.drag_map import DragMap, drag_contour, drag_map
+from ringbalance.reports.units import shown
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.platform.files import write_whole
+from ringbalance.verification.runner import paper_scene
+
+_VISCOSITIES: Final = (0.7e-6, 1e-6, 2e-6, 5e-6, 1e-5, 2e-5, 5e-5, 1e-4, 2e-4)
+_BORES: Final = np.geomspace(0.2e-3, 5e-3, 61)
+
+
+def document_tables() -> dict[str, str]:
+    """The generated parts of the page, for the liquid-ring paper's disc with its assumed tube.
+
+    Returns: Markdown by the names that mark their places in the page.
+    """
+    scene = paper_scene()
+    calibration = calibrate(scene)
+    found = collect(Work(scene=scene, calibration=calibration, level="light"))
+    return {
+        "liquids": liquids_table(found["liquids"]),
+        "bores": bores_table(calibration),
+        "rule": rule(calibration),
+        "hidden": hidden_table(found["apparent"], calibration),
+    }
+
+
+def _table(heads: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
+    lines = [heads, tuple("---" for _ in heads), *rows]
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
+
+
+def liquids_table(liquids: list[Record]) -> str:
+    """One row a liquid.
+
+    Args: `liquids`: of the section's evidence.
+    Returns: Markdown.
+    """
+    heads = ("liquid", "viscosity", "kg/m³", "gas", "tube runs", "velocity", "k")
+    more = ("Eq. 18 reads", "Eq. 19 is off by", "50 is")
+    rows = []
+    for row in (liquid_row(record) for record in liquids):
+        gas = f"{row['pressure']}*" if row["needs"] else row["pressure"]
+        cells = (row["name"], row["viscosity"], row["density"], gas, row["runs"], row["velocity"], row["k"])
+        rows.append((*cells, row["apparent"], row["error"], row["verdict"]))
+    return _table((*heads, *more), rows)
+
+
+def bores_table(calibration: Calibration) -> str:
+    """The bore at which k is the paper's, and the bores at which it may be, over the viscosity.
+
+    Args: `calibration`: of the paper's disc.
+    Returns: Markdown.
+    """
+    found = drag_map(calibration=calibration, bore=_BORES, kinematic_viscosity=list(_VISCOSITIES))
+    point = found.point
+    columns = [
+        _crossings(replace(found, point=replace(point, k=point.k + side * point.k_point_uncertainty)))
+        for side in (0.0, -1.0, 1.0)
+    ]
+    rows = []
+    for i, viscosity in enumerate(_VISCOSITIES):
+        middle, low, high = (column[i] for column in columns)
+        rows.append((shown(viscosity, "m^2/s", digits=2), _bore(middle), f"{_bore(low)} to {_bore(high)}"))
+    return _table(("viscosity", "k = 50 at a bore of", "within its uncertainty from"), rows)
+
+
+def rule(calibration: Calibration) -> str:
+    """Where k = 50 lies, as one number for laminar flow in this tube.
+
+    Args: `calibration`: of the paper's disc.
+    Returns: A sentence.
+    """
+    laminar = [nu for nu in _VISCOSITIES if 5e-6 <= nu <= 1e-4]
+    viscosity, bore = drag_contour(
+        drag_map=drag_map(calibration=calibration, bore=_BORES, kinematic_viscosity=laminar)
+    )
+    ratio = viscosity / bore**2
+    low, high = (number(float(value), digits=2) for value in (ratio.min(), ratio.max()))
+    speed = number(float(_velocity_at_fifty(calibration)), digits=2)
+    return (
+        f"From 5 to 100 mm²/s the line k = 50 follows ν/d² = {low} to {high} mm²/s per mm² of bore squared, "
+        f"for this length of 120 mm and the {speed} m/s that 0.7 MPa gives water’s density at k = 50."
+    )
+
+
+def _velocity_at_fifty(calibration: Calibration) -> FloatArray:
+    return paper.velocity_from_pressures(
+        density=calibration.scene.liquid.density,
+        drag_coefficient=paper.PAPER_DRAG_COEFFICIENT,
+        pressure_difference=calibration.scene.gas.pressure,
+    )
+
+
+def _crossings(found: DragMap) -> list[float | None]:
+    viscosity, bore = drag_contour(drag_map=found)
+    at = {float(nu): float(d) for nu, d in zip(viscosity, bore, strict=True)}
+    return [at.get(float(nu)) for nu in found.kinematic_viscosity]
+
+
+def _bore(value: float | None) -> str:
+    return "beyond the map" if value is None else shown(value, "m", digits=3)
+
+
+def hidden_table(apparent: Record, calibration: Calibration) -> str:
+    """What Eq. 18 reads off a column separated at the crest, over the velocity.
+
+    Args: `apparent`: `apparent` of the section's evidence. `calibration`: of the paper's disc.
+    Returns: Markdown.
+    """
+    speed, siphon, separated = (np.asarray(apparent[key]) for key in ("velocity_m_s", "siphon", "separated"))
+    density = calibration.flow_law.density
+    rows = []
+    for wanted in (2.0, apparent["velocity_of_50_m_s"], 5.0, 10.0):
+        at: Any = np.log(wanted)
+        own, read = (float(np.exp(np.interp(at, np.log(speed), np.log(k)))) for k in (siphon, separated))
+        pressure = (read + 1) * density * wanted**2 / 2
+        error = np.sqrt((read + 1) / (paper.PAPER_DRAG_COEFFICIENT + 1)) - 1
+        rows.append(
+            (
+                shown(wanted, "m/s", digits=2),
+                shown(pressure, "Pa", digits=2),
+                number(own, digits=2),
+                number(read, digits=2),
+                percent(float(error), signed=True, digits=2),
+            )
+        )
+    return _table(("velocity", "gas", "k of the tube", "Eq. 18 reads", "Eq. 19 is off by"), rows)
+
+
+def filled(page: str) -> str:
+    """The page with its generated parts renewed.
+
+    Args: `page`: Markdown with the marks `<!-- name -->` and `<!-- /name -->`.
+    Returns: Markdown.
+    """
+    for name, text in document_tables().items():
+        start, end = f"<!-- {name} -->\n", f"\n<!-- /{name} -->"
+        before, _, rest = page.partition(start)
+        page = before + start + text + end + rest.partition(end)[2]
+    return page
+
+
+def main(arguments: list[str]) -> int:
+    """Rewrite the page in place.
+
+    Args: `arguments`: path of docs/is-k-50-right.md.
+    Returns: 0.
+    """
+    path = Path(arguments[0])
+    write_whole(path, filled(path.read_text(encoding="utf-8")))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

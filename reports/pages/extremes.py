@@ -1,0 +1,174 @@
+"""The scene at its extremes: where answers end, and what is said beyond, from the heavy case `extremes`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from textwrap import fill
+from typing import Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from ringbalance.reports.figures.style import FOUND, MUTED, PAPER, THIRD, Drawing, draw, logarithmic
+from ringbalance.reports.numbers import number
+from ringbalance.reports.prose import typeset
+from ringbalance.reports.section import Record, Section
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.verification.extremes.axes import Axis, axis_of
+from ringbalance.verification.extremes.point import Ending
+from ringbalance.verification.extremes.study import MAP_PREFIX
+
+CASE: Final = "extremes"
+_COLOURS: Final = {
+    Ending.SOLVED: (FOUND, 0.55),
+    Ending.WIDE: (FOUND, 0.22),
+    Ending.STATUS: (THIRD, 0.5),
+    Ending.REFUSED: (MUTED, 0.18),
+    Ending.BROKEN: (PAPER, 1.0),
+}
+_MARKS: Final = (
+    ("loop settles", ("settled",), "o", 3.0),
+    ("loop diverges or drifts", ("diverging", "drifting"), "x", 3.5),
+)
+"""Outcomes of the closed loop that a map shows by marks."""
+_LABEL: Final = 34
+"""Characters of an axis' label on one line."""
+_LEGEND: Final = 0.62
+"""Inches above a map for its legend."""
+
+
+def view(evidence: Record) -> Record:
+    """Sentences, the table of axes and the maps.
+
+    Args: `evidence`: the whole evidence.
+    Returns: `ran`, and where it is true `text`, `stamp`, `rows` and `maps`.
+    """
+    case = next((c for c in evidence.get("verification", []) if c["id"] == CASE), None)
+    if case is None or not case.get("tables"):
+        return {"ran": False}
+    tables = {table["name"]: table["columns"] for table in case["tables"]}
+    return {
+        "ran": True,
+        "text": typeset(case.get("explanation", "")),
+        "date": case.get("date", ""),
+        "rows": [{**row, "said": typeset(row["said"])} for row in axis_rows(tables["axes"])],
+        "maps": map_drawings(tables),
+    }
+
+
+def map_drawings(tables: Mapping[str, Record]) -> list[Drawing]:
+    """The stability maps. Args: `tables`: columns of the case's tables, by name."""
+    return [_map(name, columns) for name, columns in tables.items() if name.startswith(MAP_PREFIX)]
+
+
+def axis_rows(columns: Record) -> list[Record]:
+    """The stretches of every axis as texts.
+
+    Args: `columns`: of the table "axes" of `extremes_tables`.
+    Returns: `title` (empty but for an axis' first), `span`, `ending`, `loop` and `said` of each.
+    """
+    before = ["", *columns["axis"]]
+    return [
+        {
+            "title": "" if title == before[index] else title,
+            "span": _span(columns["from"][index], columns["to"][index], columns["unit"][index]),
+            "ending": str(columns["ending"][index]).removesuffix(" with a message"),
+            "loop": str(columns["loop"][index]).replace("_", " "),
+            "said": _shortened(str(columns["said"][index])),
+        }
+        for index, title in enumerate(columns["axis"])
+    ]
+
+
+def _span(low: float, high: float, unit: str) -> str:
+    """First and last value of a stretch, or the one where both are the same."""
+    first, last = (number(float(end), digits=3) for end in (low, high))
+    told = first if first == last else f"{first} to {last}"
+    return told if unit == "1" else f"{told} {_shown(unit)}"
+
+
+def _shown(unit: str) -> str:
+    return unit.replace("^2", "²")
+
+
+def _shortened(message: str) -> str:
+    """The first line of a message, without the name of a file that nobody has."""
+    return message.split("\n")[0].split(".toml: ", 1)[-1]
+
+
+def _map(name: str, columns: Record) -> Drawing:
+    x, y = (axis_of(part) for part in name.removeprefix(MAP_PREFIX).split(" and "))
+    xs, ys = (np.unique(np.asarray(columns[axis.name], dtype=np.float64)) for axis in (x, y))
+    shape = (ys.size, xs.size)
+    endings = np.asarray(columns["ending"], dtype=object).reshape(shape)
+    loops = np.asarray(columns["loop"], dtype=object).reshape(shape)
+
+    def paint(figure: Figure, axes: Axes) -> None:
+        edges_x, edges_y = _edges(x, xs), _edges(y, ys)
+        present = [ending for ending in Ending if np.any(endings == str(ending))]
+        for ending in present:
+            colour, strength = _COLOURS[ending]
+            for row, column in zip(*np.nonzero(endings == str(ending)), strict=True):
+                axes.fill_between(
+                    edges_x[column : column + 2],
+                    *edges_y[row : row + 2],
+                    color=colour,
+                    alpha=strength,
+                    linewidth=0,
+                )
+        for label, outcomes, marker, size in _MARKS:
+            rows, cols = np.nonzero(np.isin(loops, outcomes))
+            if rows.size:
+                axes.plot(
+                    xs[cols],
+                    ys[rows],
+                    marker,
+                    color=FOUND,
+                    markersize=size,
+                    markeredgewidth=0.9,
+                    label=label,
+                )
+        for axis, target, edges in (("x", x, edges_x), ("y", y, edges_y)):
+            if target.spacing == "log":
+                logarithmic(axes, axis)
+            getattr(axes, f"set_{axis}lim")(edges[0], edges[-1])
+        axes.grid(visible=False)
+        axes.set_xlabel(_label(x))
+        axes.set_ylabel(_label(y))
+        _legend(figure, axes, present)
+
+    return draw(
+        name=f"extremes-{x.name}-{y.name}",
+        paint=paint,
+        height=3.4,
+        alt=f"Where the program answers over {x.title} and {y.title}, and where it refuses with a message.",
+        caption=f"{x.title[0].upper()}{x.title[1:]} and {y.title}, all else as in the scene. "
+        "Unmarked: the loop ends in another way, most often because its time is up.",
+    )
+
+
+def _edges(axis: Axis, values: FloatArray) -> FloatArray:
+    """Edges of cells around the values, in the axis' own spacing."""
+    place = np.log(values) if axis.spacing == "log" else values
+    middle = (place[1:] + place[:-1]) / 2
+    ends = np.concatenate([[2 * place[0] - middle[0]], middle, [2 * place[-1] - middle[-1]]])
+    return np.exp(ends) if axis.spacing == "log" else ends
+
+
+def _label(axis: Axis) -> str:
+    told = axis.title if axis.unit == "1" else f"{axis.title} in {_shown(axis.unit)}"
+    return fill(told, _LABEL)
+
+
+def _legend(figure: Figure, axes: Axes, present: list[Ending]) -> None:
+    cells = [Patch(color=_COLOURS[e][0], alpha=_COLOURS[e][1], linewidth=0, label=str(e)) for e in present]
+    handles = [*cells, *axes.get_legend_handles_labels()[0]]
+    figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0, 1), ncols=2, borderaxespad=0.0)
+    box, height = axes.get_position(), figure.get_figheight()
+    axes.set_position((box.x0, box.y0, box.width, 1 - box.y0 - _LEGEND / height))
+
+
+SECTION: Final = Section(name="extremes", title="At the extremes", view=view)
+"""Shown also where it was not run, to say how it is."""

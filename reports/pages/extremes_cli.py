@@ -1,0 +1,107 @@
+"""The command `ringbalance extremes`."""
+
+from __future__ import annotations
+
+import json as json_format
+import os
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Final
+
+from rich.markup import escape
+from rich.padding import Padding
+from rich.table import Table
+
+from ringbalance.reports.figures.style import standalone
+from ringbalance.reports.numbers import number
+from ringbalance.reports.pages.extremes import axis_rows, map_drawings
+from ringbalance.scene.platform.files import staged, write_whole
+from ringbalance.scene.platform.progress import activity
+from ringbalance.scene.platform.terminal import messages_console, results_console
+from ringbalance.verification.evidence import Level
+from ringbalance.verification.extremes.study import (
+    SIZES,
+    Record,
+    broken,
+    extremes_document,
+    extremes_tables,
+    find_extremes,
+    scene_base,
+)
+
+DONE: Final = 0
+BROKEN: Final = 1
+FILE: Final = "extremes.json"
+KEPT: Final = "extremes-points.json"
+
+
+def extremes(
+    scene: Path,
+    *,
+    json: bool = False,
+    out: Path | None = None,
+    level: Level = "light",
+    workers: int | None = None,
+) -> int:
+    """Find the limits of validity of a scene: where results stop, what is reported beyond, and whether the
+    invariants hold inside.
+
+    Args:
+        scene: the scene file.
+        json: print one JSON document instead of tables.
+        out: also write extremes.json and the stability maps to this folder; after an interrupted run with
+            the same folder the designed set resumes where it stopped.
+        level: "heavy" judges thousands of points, for an hour or more.
+        workers: processes; default one for each core, at most two.
+
+    Returns:
+        Exit code: 0; 1 when an invariant was violated at some point.
+
+    Raises:
+        SceneError: a scene that cannot be used; nothing is written.
+        OSError: the folder cannot be written.
+    """
+    base = scene_base(scene)
+    console = messages_console()
+    with nullcontext() if out is None else staged(out, files=(KEPT, FILE)) as stage:
+        with activity("extremes", "axes") as shown:
+            found = find_extremes(
+                base,
+                size=SIZES[level],
+                workers=workers or min(2, os.cpu_count() or 1),
+                progress=lambda what, done, number: shown.show(
+                    f"{what}: {done} of {number} points", done=done, total=number
+                ),
+                kept=None if out is None else out / KEPT,
+            )
+        told, tables = extremes_document(found), extremes_tables(found)
+        if stage is not None:
+            write_whole(stage / FILE, json_format.dumps(told, allow_nan=False) + "\n")
+            for drawing in map_drawings(tables):
+                write_whole(stage / f"{drawing.name}.svg", standalone(drawing))
+    if out is not None:
+        console.print(f"written to {out}", highlight=False)
+    if json:
+        print(json_format.dumps(told, allow_nan=False))
+    else:
+        _show(told, axis_rows(tables["axes"]))
+    return BROKEN if broken(found) else DONE
+
+
+def _show(told: Record, rows: list[Record]) -> None:
+    console = results_console()
+    endings = ", ".join(f"{count} {ending}" for ending, count in told["endings"].items() if count)
+    console.print(f"{told['judged']} points: {endings}", highlight=False)
+    console.print(
+        f"largest residual {number(told['worst_residual'], digits=2)}; largest error "
+        f"{number(told['worst_error_over_half_width'], digits=2)} of its half-width",
+        highlight=False,
+    )
+    table = Table(box=None, header_style="dim", padding=(0, 1))
+    for title in ("input", "stretch", "answer", "loop", "said"):
+        table.add_column(title, overflow="fold")
+    for row in rows:
+        table.add_row(*(escape(text) for text in row.values()))
+    console.print(table, highlight=False)
+    for fault in told["violations"]:
+        console.print(Padding(f"{fault['violations']} at {fault['point']}", (0, 0, 0, 2)), style="red")

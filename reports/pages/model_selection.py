@@ -1,0 +1,165 @@
+"""Speed against accuracy: every model hierarchy with its front, and the models that a tolerance needs."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ringbalance.reports.figures.style import (
+    FOUND,
+    INK,
+    MUTED,
+    PAPER,
+    Drawing,
+    draw,
+    legend_above,
+    logarithmic,
+)
+from ringbalance.reports.numbers import MISSING, number, percent
+from ringbalance.reports.prose import typeset
+from ringbalance.reports.section import Record, Section, Work
+from ringbalance.scene.models import Scene
+from ringbalance.verification.selection_studies.study import (
+    TradeStudy,
+    tolerance_text,
+    trade_document,
+    trade_study,
+)
+
+_LEAST: Final = 1e-9
+"""Error at which a model that equals the finest is drawn."""
+_MOST_ROWS: Final = 8
+
+
+def collect(work: Work) -> Record | None:
+    """The trade of the scene, light: without the settling time.
+
+    Args: `work`: scene, calibration and level.
+    Returns: Record; its `times` differ from run to run and are kept apart.
+    """
+    return trade_document(_study(work.scene))
+
+
+@lru_cache(maxsize=4)
+def _study(scene: Scene) -> TradeStudy:
+    """One measurement serves every report of a scene within a process."""
+    return trade_study(scene, level="light")
+
+
+def view(evidence: Record) -> Record | None:
+    """The section on models against tolerances, every number already text.
+
+    Args: `evidence`: the whole document.
+    Returns: `quantities`, `numbers` and `tolerance`; None where nothing was measured.
+    """
+    found = evidence.get("trade")
+    if not found:
+        return None
+    times = (evidence["times"].get("trade") or {}).get("rungs", {})
+    return {
+        "tolerance": typeset(tolerance_text(found["tolerance"], _error)),
+        "numbers": [
+            {
+                "name": typeset(n["name"]),
+                "value": MISSING if n["value"] is None else number(n["value"], digits=3),
+                "formula": typeset(n["formula"]),
+                "tells": typeset(n["tells"]),
+            }
+            for n in found["numbers"]
+        ],
+        "quantities": [_quantity(q, times.get(q["quantity"], [])) for q in found["quantities"] if q["rungs"]],
+    }
+
+
+def _quantity(found: Record, times: list[Record]) -> Record:
+    seconds = {entry["name"]: entry["seconds"] for entry in times}
+    front = sorted((r for r in found["rungs"] if r["on_front"]), key=lambda r: r["cost_s"])
+    own = found["choices"][-1]
+    return {
+        "title": typeset(_headed(found["title"])),
+        "status": "" if found["status"]["code"] == "ok" else typeset(found["status"]["text"]),
+        "knee": typeset(found["knee"]),
+        "top": typeset(found["top"]),
+        "known": _error(found["top_uncertainty"]),
+        "front": [
+            {
+                "name": typeset(fidelity["name"]),
+                "error": MISSING if fidelity["name"] == found["top"] else _error(fidelity["error"]),
+                "cost": _time(fidelity["cost_s"]),
+                "time": MISSING
+                if seconds.get(fidelity["name"]) is None
+                else _time(seconds[fidelity["name"]]),
+            }
+            for fidelity in front[:_MOST_ROWS]
+        ],
+        "choices": [
+            {
+                "tolerance": _error(choice["tolerance"]),
+                "model": typeset(choice["rung"]),
+                "check": MISSING if choice["measured"] is None else _error(choice["measured"]),
+                "cost": _time(choice["cost_s"]),
+            }
+            for choice in found["choices"][:-1]
+        ],
+        "own": {"model": typeset(own["rung"]), "reasons": [typeset(text) for text in own["reasons"]]},
+        "figure": front_figure(found),
+    }
+
+
+def _headed(title: str) -> str:
+    """With a capital, unless it is a symbol."""
+    return title if len(title) == 1 else title[0].upper() + title[1:]
+
+
+def _error(value: float) -> str:
+    return percent(value, digits=2) if value >= 1e-3 else number(value, digits=2)
+
+
+def _time(value: float) -> str:
+    unit, scale = ("µs", 1e-6) if value < 1e-3 else ("ms", 1e-3) if value < 1 else ("s", 1.0)
+    return f"{number(value / scale, digits=2)} {unit}"
+
+
+def front_figure(found: Record) -> Drawing:
+    """Error against counted cost of every model, with the front and its trade-off point.
+
+    Args: `found`: one entry of `quantities`.
+    """
+    fidelities = sorted(found["rungs"], key=lambda r: r["cost_s"])
+    cost = np.array([r["cost_s"] for r in fidelities])
+    error = np.array([max(r["error"], _LEAST) for r in fidelities])
+    front = np.array([r["on_front"] for r in fidelities])
+    at_knee = np.array([r["name"] == found["knee"] for r in fidelities])
+
+    def paint(figure: Figure, axes: Axes) -> None:
+        known = found["top_uncertainty"]
+        axes.plot(cost[~front], error[~front], "o", color=MUTED, markersize=3.5, label="beaten by another")
+        axes.plot(cost[front], error[front], "o-", color=FOUND, markersize=5, label="the front")
+        axes.plot(cost[at_knee], error[at_knee], "D", color=INK, markersize=8, fillstyle="none", label="knee")
+        axes.axhline(known, color=PAPER, linewidth=1, linestyle=":", label="known to")
+        logarithmic(axes, "x")
+        logarithmic(axes, "y")
+        axes.set_xlim(cost.min() / 2, cost.max() * 2)
+        low = min(error.min(), found["top_uncertainty"])
+        axes.set_ylim(low / 3, max(error.max() * 3, 1.0))
+        axes.set_xlabel("counted cost in s")
+        axes.set_ylabel("error against the top")
+        legend_above(figure, axes, columns=4)
+
+    return draw(
+        name=f"trade-{found['quantity'].replace('_', '-')}",
+        paint=paint,
+        height=2.9,
+        alt=f"Error of {len(fidelities)} models for {found['title']} against their cost, falling along the "
+        "front "
+        f"to the finest model; the trade-off point is {found['knee']}.",
+        caption=f"{_headed(found['title'])}. The finest model is drawn at 10⁻⁹; dotted: what it "
+        "is itself known to.",
+    )
+
+
+SECTION: Final = Section(name="trade", title="Speed against accuracy", collect=collect, view=view)

@@ -1,0 +1,132 @@
+"""Shapes of the disc for the pictures, in millimetres; the liquid itself comes from the finite elements."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+import pyvista as pv
+
+from ringbalance.scene.arrays import FloatArray
+
+_STEPS: Final = 481
+_LATTICE: Final = (
+    *((0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2)),
+    *((1, 0, 0), (2, 1, 0), (1, 2, 0), (0, 1, 0), (1, 0, 2), (2, 1, 2), (1, 2, 2), (0, 1, 2)),
+    *((0, 0, 1), (2, 0, 1), (2, 2, 1), (0, 2, 1), (0, 1, 1), (2, 1, 1), (1, 0, 1), (1, 2, 1)),
+    *((1, 1, 0), (1, 1, 2), (1, 1, 1)),
+)
+"""Places of VTK's 27 nodes in a triquadratic hexahedron, in half edges."""
+
+
+def split_hexahedra(grid: Any) -> Any:
+    """Eight linear hexahedra for each triquadratic one, on the same nodes: VTK cuts only linear cells well.
+
+    Args: `grid`: pyvista grid of triquadratic hexahedra.
+    Returns: pyvista grid with the same points and point data.
+    """
+    index = {place: number for number, place in enumerate(_LATTICE)}
+    starts = [(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)]
+    local = [[index[(i + a // 2, j + b // 2, k + c // 2)] for a, b, c in _LATTICE[:8]] for i, j, k in starts]
+    nodes = grid.cells_dict[int(pv.CellType.TRIQUADRATIC_HEXAHEDRON)]
+    cells = nodes[:, np.array(local)].reshape(-1, 8)
+    fine = pv.UnstructuredGrid({pv.CellType.HEXAHEDRON: cells}, np.asarray(grid.points))
+    for name in grid.point_data:
+        fine.point_data[name] = grid.point_data[name]
+    return fine
+
+
+def ring(*, inner: float, outer: float, bottom: float, top: float) -> Any:
+    """A closed ring of rectangular section about the shaft.
+
+    Args: `inner`: radius, mm. `outer`: radius, mm. `bottom`: lower axial coordinate, mm. `top`: upper axial
+        coordinate, mm.
+    Returns: pyvista surface.
+    """
+    angle = np.linspace(0, 2 * np.pi, _STEPS)
+    section = np.array([(inner, bottom), (outer, bottom), (outer, top), (inner, top), (inner, bottom)])
+    radius, height = section[:, 0], section[:, 1]
+    x, y = np.outer(np.cos(angle), radius), np.outer(np.sin(angle), radius)
+    grid = pv.StructuredGrid(x[..., None], y[..., None], np.broadcast_to(height, x.shape)[..., None])
+    return grid.extract_surface(algorithm="dataset_surface")
+
+
+def web(
+    *, start: float, end: float, half_angle: FloatArray, radius: FloatArray, bottom: float, top: float
+) -> Any:
+    """The solid between two chambers, its middle along the x axis; turn it into place.
+
+    Args: `start`: radius within the hub, mm. `end`: radius within the wall, mm. `half_angle`: of the solid at
+        each radius, rad, shape (n,). `radius`: mm, shape (n,), rising. `bottom`: lower axial coordinate, mm.
+        `top`: upper axial coordinate, mm.
+    Returns: pyvista surface.
+    """
+    reach = np.linspace(start, end, 41)
+    across = np.linspace(-1, 1, 17)
+    angle = np.interp(reach, radius, half_angle)[:, None] * across
+    x, y = (
+        np.repeat((reach[:, None] * part)[..., None], 2, axis=2) for part in (np.cos(angle), np.sin(angle))
+    )
+    z = np.array(np.broadcast_to([bottom, top], x.shape))
+    return pv.StructuredGrid(x, y, z).extract_surface(algorithm="dataset_surface")
+
+
+def chamber_outline(
+    *, inner: float, outer: float, half_thickness: float, half_angle: float, width: float
+) -> list[Any]:
+    """Edges of a whole chamber, its gas space included.
+
+    Args: `inner`: radius, mm. `outer`: radius, mm. `half_thickness`: strip that a plate takes of each
+        chamber, mm. `half_angle`: half of the central angle, rad. `width`: axial, mm.
+    Returns: pyvista lines.
+    """
+    ends = (-width / 2, width / 2)
+    edges, corners = [], {}
+    for radius in (inner, outer):
+        reach = half_angle - math.asin(half_thickness / radius)
+        angle = np.linspace(-reach, reach, 61)
+        circle = np.c_[radius * np.cos(angle), radius * np.sin(angle)]
+        corners[radius] = circle[[0, -1]]
+        edges += [pv.lines_from_points(np.c_[circle, np.full(61, z)]) for z in ends]
+        edges += [pv.Line((*corner, ends[0]), (*corner, ends[1])) for corner in corners[radius]]
+    for inward, outward in zip(corners[inner], corners[outer], strict=True):
+        edges += [pv.Line((*inward, z), (*outward, z)) for z in ends]
+    return edges
+
+
+def tube_path(*, port: float, hump: float | None, height: float, bend: float) -> FloatArray:
+    """Schematic centre line from the first chamber's port over the crest to the opposite one's.
+
+    Out of the chamber, inward to the crest's radius, along that radius half-way round, outward and in again;
+    without a crest straight across.
+    Args: `port`: radius of both ports, mm. `hump`: smallest radius on the path, mm; None: a straight tube.
+        `height`: of the tube above the cut, mm. `bend`: radius of its corners, mm.
+    Returns: Points, mm, shape (n, 3).
+    """
+    low = -height
+    if hump is None:
+        return np.array(
+            [[port, 0, low], [port, 0, height], [-port, 0, height], [-port, 0, low]], dtype=np.float64
+        )
+    angle = np.linspace(0, np.pi, 121)
+    arc = np.c_[hump * np.cos(angle), hump * np.sin(angle), np.full(angle.size, height)]
+    return np.vstack(
+        [
+            [[port, 0, low]],
+            _corner(np.array([port, 0, low]), np.array([port, 0, height]), arc[0], bend),
+            _corner(np.array([port, 0, height]), arc[0], arc[5], bend),
+            arc[6:-6],
+            _corner(arc[-6], arc[-1], np.array([-port, 0, height]), bend),
+            _corner(arc[-1], np.array([-port, 0, height]), np.array([-port, 0, low]), bend),
+            [[-port, 0, low]],
+        ]
+    )
+
+
+def _corner(before: FloatArray, corner: FloatArray, after: FloatArray, bend: float) -> FloatArray:
+    """A corner rounded by a parabola, at most half-way into its legs."""
+    legs = [point - corner for point in (before, after)]
+    start, end = (corner + leg * min(bend / float(np.linalg.norm(leg)), 0.5) for leg in legs)
+    share = np.linspace(0, 1, 13)[:, None]
+    return np.asarray((1 - share) ** 2 * start + 2 * share * (1 - share) * corner + share**2 * end)

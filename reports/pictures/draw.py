@@ -1,0 +1,286 @@
+"""Draws the 3-D pictures off-screen; run in a process of its own, because a driver may take it down.
+
+    python -m ringbalance.reports.pictures.draw JOB.json
+
+The job names the VTU files of the fields, the disc's dimensions in metres and the folder for the PNG files.
+VTK must find VTK_DEFAULT_OPENGL_WINDOW in the environment.  Standard input is a pipe that
+stays open: when it closes, whoever wanted the pictures is gone, and the drawing ends.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import sys
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import pyvista as pv
+from matplotlib import colormaps
+from matplotlib.colors import Colormap, ListedColormap
+from matplotlib.ticker import MaxNLocator
+from PIL import Image
+
+from ringbalance.reports.pictures.disc_shapes import chamber_outline, ring, split_hexahedra, tube_path, web
+from ringbalance.reports.pictures.draw_tube import draw_tube
+from ringbalance.reports.pictures.draw_view import label_at, look
+from ringbalance.reports.pictures.text import (
+    BAR_SHADES,
+    Bar,
+    Label,
+    letter,
+    shade_bar,
+    with_palette,
+)
+from ringbalance.reports.pictures.theme import PICTURE, THEMES, Theme
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.platform.processes import end_with
+
+Record = dict[str, Any]
+
+SCALE: Final = 2
+"""Drawn this much larger and then reduced, so that lines and letters are smooth."""
+_MILLIMETRES: Final = 1e3
+_COLOURS: Final = 256
+_VIRIDIS: Final = colormaps["viridis"]
+_WATER: Final = ListedColormap(colormaps["Blues"](np.linspace(0.28, 1.0, 256)))
+
+
+def main(arguments: list[str]) -> int:
+    """Draw every picture of a job in every theme.
+
+    Args: `arguments`: path of the job file.
+    Returns: 0.
+    """
+    # Not through sys.stdin, whose lock would be held when the interpreter ends.
+    end_with(partial(os.read, 0, 1))
+    job = json.loads(Path(arguments[0]).read_text(encoding="utf-8"))
+    lengths = {key: None if value is None else value * _MILLIMETRES for key, value in job["lengths"].items()}
+    paints = {"pressure": _draw_pressure, "disc": _draw_disc} | ({"tube": draw_tube} if job["tube"] else {})
+    for name, paint in paints.items():
+        field = job["fields"].get(name)
+        liquid = None if field is None else _in_millimetres(pv.read(field))
+        for theme in THEMES:
+            plotter: Any = pv.Plotter(
+                off_screen=True, window_size=[SCALE * side for side in PICTURE], lighting="light kit"
+            )
+            plotter.set_background(theme.background)
+            labels, bar = paint(plotter, job | {"lengths": lengths}, liquid, theme)
+            _save(plotter, labels, bar, theme, Path(job["folder"]) / f"{name}-{theme.name}.png")
+    return 0
+
+
+def _in_millimetres(grid: Any) -> Any:
+    """Linear cells in millimetres and MPa, eight for each quadratic one of the file, on its very nodes."""
+    fine = split_hexahedra(grid)
+    fine.points = np.asarray(fine.points) * _MILLIMETRES
+    fine.point_data["pressure"] = np.asarray(fine.point_data["pressure_Pa"]) * 1e-6
+    fine.point_data["depth"] = np.asarray(fine.point_data["depth_m"]) * _MILLIMETRES
+    return fine
+
+
+def _pixel(plotter: Any, place: FloatArray) -> tuple[float, float]:
+    """Where a place of the scene stands in the picture."""
+    camera, (width, height) = plotter.camera, (SCALE * side for side in PICTURE)
+    matrix = camera.GetCompositeProjectionTransformMatrix(width / height, -1, 1)
+    rows = np.array([[matrix.GetElement(i, j) for j in range(4)] for i in range(4)])
+    x, y, _, w = rows @ np.array([*place, 1.0])
+    return (x / w + 1) / 2 * width, (1 - y / w) / 2 * height
+
+
+def _save(plotter: Any, labels: list[tuple[FloatArray, Label]], bar: Bar, theme: Theme, path: Path) -> None:
+    """Letters, reduces and writes the picture."""
+    image = Image.fromarray(plotter.screenshot(return_img=True))
+    placed = [
+        replace(label, place=_pixel(plotter, place), shift=(SCALE * label.shift[0], SCALE * label.shift[1]))
+        for place, label in labels
+    ]
+    plotter.close()
+    lettered = letter(image, labels=placed, bar=bar, ink=theme.ink, ground=theme.background, scale=SCALE)
+    small = lettered.resize(PICTURE, Image.Resampling.LANCZOS)
+    few = small.quantize(
+        colors=_COLOURS - BAR_SHADES, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE
+    )
+    with_palette(shade_bar(few.convert("RGB"), bar)).save(path, optimize=True)
+
+
+def _bar(title: str, colours: Colormap, high: float) -> Bar:
+    ticks = [
+        float(tick)
+        for tick in MaxNLocator(5, steps=[1, 2, 5, 10]).tick_values(0.0, high)
+        if 0 <= tick <= high
+    ]
+    return Bar(
+        title=title,
+        colours=colours,
+        low=0.0,
+        high=high,
+        ticks=tuple(ticks),
+        labels=tuple(f"{tick:g}" for tick in ticks),
+    )
+
+
+def _draw_pressure(
+    plotter: Any, job: Record, liquid: Any, theme: Theme
+) -> tuple[list[tuple[FloatArray, Label]], Bar]:
+    """The liquid of one chamber, a corner cut away, coloured by pressure, in the outline of its chamber."""
+    disc, half = job["lengths"], job["central_angle"] / 2
+    outer, inner, width = disc["outer_radius"], disc["inner_radius"], disc["axial_width"]
+    high = float(liquid.point_data["pressure"].max())
+    for part in _without_corner(liquid):
+        _add_field(plotter, part, high)
+    for edge in chamber_outline(
+        inner=inner, outer=outer, half_thickness=disc["plate_thickness"], half_angle=half, width=width
+    ):
+        plotter.add_mesh(edge, color=theme.edge, line_width=3)
+    reach = outer * math.sin(min(half, math.pi / 2))
+    low = min(inner * math.cos(half), outer * math.cos(half))
+    bounds = (low, outer, -reach, reach, -width / 2, width / 2)
+    look(plotter, direction=(75, -80, 150), up=(1, 0, 0), zoom=1.35, bounds=bounds, lift=0.11)
+    shallow = float(np.hypot(liquid.points[:, 0], liquid.points[:, 1]).min())
+    return [
+        label_at("outer wall", _polar(outer, 0.45 * half, 0.1 * width), shift=(60, -110)),
+        label_at("free surface", _polar(shallow, 0.55 * half, width / 2), shift=(-125, 150)),
+        label_at("gas", _polar(0.75 * inner + 0.25 * outer, 0.0, width / 2)),
+    ], _bar("pressure in MPa", _VIRIDIS, high)
+
+
+def _without_corner(liquid: Any) -> tuple[Any, Any]:
+    """The back half, and the left half of the front."""
+    front = liquid.clip(normal="z", origin=(0, 0, 0), invert=False)
+    return (
+        liquid.clip(normal="z", origin=(0, 0, 0), invert=True),
+        front.clip(normal="y", origin=(0, 0, 0), invert=False),
+    )
+
+
+def _add_field(plotter: Any, part: Any, high: float) -> None:
+    surface = part.extract_surface(algorithm="dataset_surface")
+    plotter.add_mesh(
+        surface,
+        scalars="pressure",
+        cmap=_VIRIDIS,
+        clim=[0, high],
+        n_colors=256,
+        ambient=0.65,
+        diffuse=0.4,
+        show_scalar_bar=False,
+    )
+    lines = surface.contour(np.linspace(0, high, 9)[1:-1], scalars="pressure")
+    plotter.add_mesh(lines, color="white", line_width=3, opacity=0.6)
+
+
+def _polar(radius: float, angle: float, height: float) -> FloatArray:
+    return np.array([radius * math.cos(angle), radius * math.sin(angle), height])
+
+
+def _draw_disc(
+    plotter: Any, job: Record, liquid: Any, theme: Theme
+) -> tuple[list[tuple[FloatArray, Label]], Bar]:
+    """All chambers with their liquid, the front half of the width cut off, and one tube over its crest."""
+    disc, count = job["lengths"], job["chambers"]
+    _add_metal(plotter, job, theme)
+    high = float(liquid.point_data["depth"].max())
+    body = liquid.clip(normal="z", origin=(0, 0, -0.004 * disc["axial_width"]))
+    surface = body.extract_surface(algorithm="dataset_surface")
+    for index in range(count):
+        plotter.add_mesh(
+            surface.rotate_z(360.0 * index / count),
+            scalars="depth",
+            cmap=_WATER,
+            clim=[0, high],
+            ambient=0.65,
+            diffuse=0.4,
+            specular=0.05,
+            show_scalar_bar=False,
+        )
+    labels = _add_tube(plotter, disc, theme)
+    outer, inner = disc["outer_radius"], disc["inner_radius"]
+    labels.append(_add_arrow(plotter, 1.17 * outer, theme))
+    rim = 1.2 * outer
+    look(
+        plotter,
+        direction=(35, -95, 150),
+        up=(0, 1, 0),
+        zoom=1.3,
+        bounds=(-rim, rim, -rim, rim, -disc["axial_width"] / 2, 0.0),
+        lift=0.02,
+    )
+    for index, name in enumerate(job["letters"]):
+        angle = 2 * math.pi * (index / count) - 0.22 * job["central_angle"]
+        # Beside the middle of the chamber, where the tube does not run.
+        labels.append(label_at(name, _polar(0.62 * inner + 0.38 * outer, angle, 0.0), size=54))
+    return labels, _bar("depth in mm", _WATER, high)
+
+
+def _add_metal(plotter: Any, job: Record, theme: Theme) -> None:
+    """Hub, wall, back plate and the webs between the chambers."""
+    disc, count = job["lengths"], job["chambers"]
+    outer, inner, back = disc["outer_radius"], disc["inner_radius"], -disc["axial_width"] / 2
+    wall = 0.07 * outer
+    hub = max(inner - wall, 0.5 * inner)
+    shapes = [
+        ring(inner=outer, outer=outer + wall, bottom=back, top=0.0),
+        ring(inner=hub, outer=inner, bottom=back, top=0.0),
+        ring(inner=hub, outer=outer + wall, bottom=back - wall, top=back),
+    ]
+    radius = np.linspace(inner, outer, 41)
+    strip = np.arcsin(disc["plate_thickness"] / radius)
+    between = math.pi / count - (job["central_angle"] / 2 - strip)
+    solid = web(
+        start=(hub + inner) / 2, end=outer + wall / 2, half_angle=between, radius=radius, bottom=back, top=0.0
+    )
+    shapes += [solid.rotate_z(360.0 * (index + 0.5) / count) for index in range(count)]
+    for shape in shapes:
+        plotter.add_mesh(
+            shape, color=theme.metal, smooth_shading=True, split_sharp_edges=True, ambient=0.2, diffuse=0.8
+        )
+
+
+def _add_arrow(plotter: Any, radius: float, theme: Theme) -> tuple[FloatArray, Label]:
+    """An arrow along the rim that shows which way the disc turns."""
+    angle = np.radians(np.linspace(287, 325, 40))
+    points = np.c_[radius * np.cos(angle), radius * np.sin(angle), np.zeros(angle.size)]
+    way = points[-1] - points[-2]
+    thick = 0.014 * radius
+    plotter.add_mesh(
+        pv.lines_from_points(points).strip().tube(radius=thick, n_sides=24), color=theme.mark, ambient=0.4
+    )
+    tip = pv.Cone(
+        center=points[-1] + 2.6 * thick * way / np.linalg.norm(way),
+        direction=way,
+        height=7 * thick,
+        radius=2.6 * thick,
+        resolution=36,
+    )
+    plotter.add_mesh(tip, color=theme.mark, ambient=0.4)
+    return label_at("rotation", _polar(1.16 * radius, math.radians(300), -0.1 * radius))
+
+
+def _add_tube(plotter: Any, disc: Record, theme: Theme) -> list[tuple[FloatArray, Label]]:
+    outer, hump = disc["outer_radius"], disc["hump_radius"]
+    height = 0.09 * outer
+    reach = disc["port_radius"] - 0.04 * outer
+    path = tube_path(port=reach, hump=hump, height=height, bend=0.06 * outer)
+    radius = max(disc["bore"], 0.045 * outer) / 2
+    tube = pv.lines_from_points(path).strip().tube(radius=radius, n_sides=32, capping=True)
+    plotter.add_mesh(tube, color=theme.tube, smooth_shading=True, ambient=0.25, specular=0.3)
+    if hump is None:
+        return [label_at("connecting tube", np.array([0.0, 0.0, height]), shift=(150, 120))]
+    top = np.array([0.0, hump, height])
+    plotter.add_mesh(
+        pv.Sphere(radius=1.7 * radius, center=top), color=theme.mark, smooth_shading=True, ambient=0.3
+    )
+    side = path[len(path) // 4]
+    return [
+        label_at(f"siphon crest at {hump:.4g} mm", top, shift=(-10, -110)),
+        label_at("connecting tube", side, shift=(250, -100)),
+    ]
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

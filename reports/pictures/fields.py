@@ -1,0 +1,113 @@
+"""Pressure fields for the report: solved here, written as VTU, drawn elsewhere."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ringbalance.mesh.chamber import chamber_mesh, default_cells
+from ringbalance.mesh.export import write_vtu
+from ringbalance.mesh.geometry import chamber_volume, surface_radius
+from ringbalance.mesh.quality import mesh_quality
+from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, places, solve_pressure
+from ringbalance.reduced_model.paper import formulas as paper
+from ringbalance.scene.models import Scene
+
+Record = dict[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChamberField:
+    """The liquid's pressure in one chamber, gravity left out."""
+
+    fill_ratio: float
+    surface_radius: float
+    """m."""
+    solution: PressureSolution
+    """On the three-dimensional mesh."""
+
+
+def shown_fill(scene: Scene) -> float:
+    """Fill ratio at which fields are shown: that of the start, or of equal chambers when that is none.
+
+    Returns: Fill ratio, positive.
+    """
+    return scene.disc.initial_fill or scene.disc.max_fill_ratio / 2
+
+
+def chamber_field(scene: Scene, *, fill_ratio: float) -> ChamberField:
+    """Solve the pressure of the liquid in one chamber in three dimensions, gravity left out.
+
+    Args: `fill_ratio`: x, within (0, 1).
+    Returns: The field; its solution carries the status.
+    Source: Eqs. 9 to 11 of the liquid-ring paper as a boundary-value problem.
+    """
+    disc = scene.disc
+    radius = float(surface_radius(disc=disc, fill_ratio=fill_ratio))
+    chamber = chamber_mesh(disc=disc, surface_radius=radius, cells=default_cells(disc=disc, dimension=3))
+    liquid = RotatingLiquid(density=scene.liquid.density, angular_velocity=scene.rotor.speed)
+    solution = solve_pressure(chamber=chamber, problem=liquid.problem())
+    return ChamberField(fill_ratio=fill_ratio, surface_radius=radius, solution=solution)
+
+
+def write_field(*, field: ChamberField, path: Path) -> Path:
+    """Write a field to a VTU file: gauge pressure in Pa and depth below the free surface in m.
+
+    Args: `path`: of the file, ending in .vtu.
+    Raises: OSError: the file cannot be written.
+    """
+    chamber = field.solution.chamber
+    radius = np.hypot(*places(chamber)[:2])
+    fields = {
+        "pressure_Pa": field.solution.pressure,
+        "depth_m": np.maximum(radius - field.surface_radius, 0.0),
+    }
+    return write_vtu(path, mesh=chamber.mesh, length_scale=chamber.length_scale, fields=fields)
+
+
+def pressure_profile(*, scene: Scene, field: ChamberField) -> Record:
+    """Nodal pressure along the middle of the chamber, and the profile that Eq. 12 implies.
+
+    Eq. 12's wall pressure is that of a ring whose surface lies at sqrt(R2^2 - 2 V'/(B theta)).
+    Args: `field`: the solved field.
+    Returns: JSON-able record, SI.
+    Source: Eq. 12 of the liquid-ring paper.
+    """
+    disc, chamber = scene.disc, field.solution.chamber
+    line = chamber.grid[:, chamber.grid.shape[1] // 2, chamber.grid.shape[2] // 2]
+    volume = field.fill_ratio * chamber_volume(disc=disc)
+    implied = math.sqrt(disc.outer_radius**2 - 2 * volume / (disc.axial_width * disc.central_angle))
+    drawn = np.linspace(implied, disc.outer_radius, line.size)
+    factor = scene.liquid.density * scene.rotor.speed**2 / 2
+    wall = paper.wall_pressure_paper(
+        disc=disc, density=scene.liquid.density, angular_velocity=scene.rotor.speed, liquid_volume=volume
+    )
+    return {
+        "fill_ratio": field.fill_ratio,
+        "radius_m": np.hypot(*places(chamber)[:2, line]).tolist(),
+        "pressure_Pa": field.solution.pressure[line].tolist(),
+        "paper_radius_m": drawn.tolist(),
+        "paper_pressure_Pa": [*(factor * (drawn[:-1] ** 2 - implied**2)).tolist(), float(wall)],
+    }
+
+
+def mesh_record(field: ChamberField) -> Record:
+    """Sizes and quality of the mesh, and how the solve ended.
+
+    Args: `field`: the solved field.
+    Returns: JSON-able record.
+    """
+    chamber, solution = field.solution.chamber, field.solution
+    quality = mesh_quality(chamber.mesh)
+    return {
+        "cells": list(chamber.cells),
+        "unknowns": quality.nodes,
+        "minimum_scaled_jacobian": quality.minimum_scaled_jacobian,
+        "largest_aspect": quality.maximum_aspect,
+        "relative_residual": solution.statistics.relative_residual,
+        "status": solution.status.text,
+    }

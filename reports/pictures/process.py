@@ -1,0 +1,189 @@
+"""The 3-D pictures: asked of a process of its own, so that a report outlives a driver that does not."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from ringbalance.controller.rotor import chamber_letters
+from ringbalance.reports.pictures.fields import chamber_field, shown_fill, write_field
+from ringbalance.reports.pictures.opengl import OpenGL, find_opengl
+from ringbalance.reports.pictures.theme import PICTURE
+from ringbalance.reports.pictures.tube import tube_field
+from ringbalance.reports.units import given, shown
+from ringbalance.scene import Scene
+
+Record = dict[str, Any]
+
+_PATIENCE: Final = 300.0
+_FIGURES: Final = "figures"
+_FIELDS: Final = "fields"
+FOLDERS: Final = (_FIGURES, _FIELDS)
+"""Of the files, in an output folder."""
+_JOB: Final = "drawing.json"
+_LOG: Final = "drawing.txt"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drawing3D:
+    """Pictures that are being drawn, or the reason why they are not."""
+
+    process: subprocess.Popen[bytes] | None
+    text: str
+    folder: Path
+    captions: Mapping[str, tuple[str, str]]
+    """Alternative text and caption by picture."""
+
+
+def write_fields(*, scene: Scene, folder: Path) -> dict[str, Path]:
+    """Solve and write the pressure fields that the pictures show.
+
+    Args: `folder`: of the report; the files go into its `fields`.
+    Returns: VTU files: "pressure" at the largest fill, "disc" at the fill of the start.
+    Raises: OSError: a file cannot be written.
+    """
+    fills = {"pressure": scene.disc.max_fill_ratio, "disc": shown_fill(scene)}
+    names = {"pressure": "chamber_largest_fill.vtu", "disc": "chamber_at_start.vtu"}
+    return {
+        key: write_field(field=chamber_field(scene, fill_ratio=fill), path=folder / _FIELDS / names[key])
+        for key, fill in fills.items()
+    }
+
+
+def start_drawing(
+    *, scene: Scene, fields: Mapping[str, Path], folder: Path, opengl: OpenGL | None = None
+) -> Drawing3D:
+    """Begin to draw in a process of its own, or say why nothing can be drawn.
+
+    Args: `fields`: VTU files of `write_fields`. `folder`: of the report; the pictures go into its `figures`.
+        `opengl`: what this machine can draw with; None: it is asked.
+    Returns: The drawing under way, for `finish_drawing`.
+    Raises: OSError: the folder cannot be written.
+    """
+    found = find_opengl() if opengl is None else opengl
+    figures = folder / _FIGURES
+    figures.mkdir(parents=True, exist_ok=True)
+    tube = tube_field(scene)
+    captions = _captions(scene, tube)
+    if not found.available:
+        return Drawing3D(process=None, text=found.text, folder=figures, captions=captions)
+    job = folder / _JOB
+    job.write_text(json.dumps({**_job(scene, fields, figures), "tube": tube}), encoding="utf-8")
+    with open(folder / _LOG, "wb") as log:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "ringbalance.reports.pictures.draw", str(job)],
+            env={**os.environ, "VTK_DEFAULT_OPENGL_WINDOW": found.window, "OMP_NUM_THREADS": "1"},
+            # Never written to: it closes when this process ends, however it ends, and then the other ends.
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=log,
+        )
+    return Drawing3D(process=process, text=found.text, folder=figures, captions=captions)
+
+
+def finish_drawing(drawing: Drawing3D) -> Record:
+    """Wait for the pictures and list them for the evidence.
+
+    Args: `drawing`: of `start_drawing`.
+    Returns: `drawn`, `text` and `files`: each with name, light and dark file, size, alternative text and
+        caption.
+    """
+    log = drawing.folder.parent / _LOG
+    fault = "" if drawing.process is None else _fault(drawing.process, log)
+    stop_drawing(drawing)
+    for path in (log, log.with_name(_JOB)):
+        path.unlink(missing_ok=True)
+    if drawing.process is None or fault:
+        return {"drawn": False, "text": fault or drawing.text, "files": []}
+    files = [
+        {
+            "name": name,
+            "light": f"{name}-light.png",
+            "dark": f"{name}-dark.png",
+            "width": PICTURE[0],
+            "height": PICTURE[1],
+            "alt": alt,
+            "caption": caption,
+        }
+        for name, (alt, caption) in drawing.captions.items()
+    ]
+    return {"drawn": True, "text": drawing.text, "files": files}
+
+
+def stop_drawing(drawing: Drawing3D) -> None:
+    """End a drawing that nobody waits for any more. Args: `drawing`: of `start_drawing`."""
+    if drawing.process is not None:
+        # All that is left of it: the pipe is closed, and the process waited for.
+        drawing.process.kill()
+        drawing.process.communicate()
+
+
+def _fault(process: subprocess.Popen[bytes], log: Path) -> str:
+    """Empty when the process drew everything, else a sentence."""
+    try:
+        process.wait(_PATIENCE)
+    except subprocess.TimeoutExpired:
+        return f"The 3-D pictures were left out: drawing took longer than {_PATIENCE:.0f} s."
+    if process.returncode == 0:
+        return ""
+    told = log.read_text(encoding="utf-8", errors="replace").strip()
+    last = told.splitlines()[-1] if told else "it said nothing"
+    return f"The 3-D pictures were left out: drawing ended with code {process.returncode} ({last})."
+
+
+def _job(scene: Scene, fields: Mapping[str, Path], folder: Path) -> Record:
+    disc, tube = scene.disc, scene.tube
+    return {
+        "fields": {name: str(path) for name, path in fields.items()},
+        "folder": str(folder),
+        "chambers": disc.chambers,
+        "central_angle": disc.central_angle,
+        "letters": list(chamber_letters(disc.chambers)),
+        "lengths": {
+            "outer_radius": disc.outer_radius,
+            "inner_radius": disc.inner_radius,
+            "axial_width": disc.axial_width,
+            "plate_thickness": disc.plate_thickness,
+            "bore": tube.bore,
+            "port_radius": tube.port_radius,
+            "hump_radius": tube.hump_radius,
+        },
+    }
+
+
+def _captions(scene: Scene, tube: Record | None) -> dict[str, tuple[str, str]]:
+    letters = chamber_letters(scene.disc.chambers)
+    fill, most = given(shown_fill(scene), "1"), given(scene.disc.max_fill_ratio, "1")
+    speed = shown(scene.rotor.speed, "rad/s", digits=5)
+    hump = scene.tube.hump_radius
+    path = "straight across" if hump is None else f"over its siphon crest at a radius of {given(hump, 'm')}"
+    of_tube = {} if tube is None else {"tube": _tube_caption(tube)}
+    return of_tube | {
+        "disc": (
+            f"The disc cut open across its shaft: chambers {letters[0]} to {letters[-1]}, each with a ring "
+            f"of liquid on its outer wall; a tube leads from one chamber {path} to the opposite one.",
+            f"The disc at a fill ratio of {fill} in every chamber, front half cut away. Colour: depth below "
+            f"the free surface. The connecting tube of the first pair is drawn schematically, {path}.",
+        ),
+        "pressure": (
+            "The liquid in one chamber with a corner cut out: pressure rises from nothing on the free "
+            "surface to its largest value on the outer wall.",
+            f"Gauge pressure of the liquid in one chamber by finite elements in three dimensions, at the "
+            f"largest fill ratio of {most} and {speed}, gravity left out. White lines join equal pressures.",
+        ),
+    }
+
+
+def _tube_caption(tube: Record) -> tuple[str, str]:
+    return (
+        "The connecting tube on its disc, half a turn over the siphon crest, coloured by pressure: "
+        f"{tube['text']}.",
+        f"The tube at equal fills under {tube['gas']}, coloured by gauge pressure: {tube['text']}. Its "
+        "radius is that of the calculation, straight along each leg; its turn about the shaft is schematic.",
+    )

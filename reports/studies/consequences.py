@@ -1,0 +1,269 @@
+"""What a wrong k and lambda do to a machine: one controller under the paper's law and the calibrated one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+
+from ringbalance.controller.algorithms.algorithm import Controller
+from ringbalance.controller.algorithms.by_name import law_based_of, target_vector_of
+from ringbalance.controller.ensemble.monte_carlo import (
+    Ensemble,
+    ensemble_document,
+    ensemble_transfer,
+    simulate_ensemble,
+)
+from ringbalance.controller.ensemble.transfer import PairTransfer
+from ringbalance.controller.loop import simulate
+from ringbalance.controller.simulation import Simulation
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.paper_law import paper_model
+from ringbalance.reports.studies.consequences_gain import GainCurve, LoopGain, loop_gain
+from ringbalance.scene.models import Scene
+
+MEMBERS: Final = 2000
+"""Of each ensemble at the light level."""
+POINTS: Final = 50
+"""Most entries of any array in the document."""
+FIRST_GAIN: Final = 0.5
+"""Gain per operation aimed at where the paper's law gives none, or one that overshoots."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """One closed-loop run and what it stands for."""
+
+    name: str
+    """Short and unique: "paper", "calibrated", "calibrated_retuned", "law_based", "law_based_wrong_law"."""
+    title: str
+    """For readers."""
+    controller: str
+    """Algorithm and what it assumes."""
+    proportional: float | None
+    """Kc, s/m; None for an algorithm without a gain."""
+    simulation: Simulation
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Consequences:
+    """The loop of one scene under two laws."""
+
+    scene: str
+    runs: tuple[Run, ...]
+    gains: tuple[LoopGain, ...]
+    """The paper's law, then the calibrated one; a law that does not flow at equal fills is missing."""
+    retuned_proportional: float | None
+    """Kc for the calibrated law with the gain per operation that was meant, s/m; None when nothing flows."""
+    ensembles: tuple[Ensemble, ...]
+    """The paper's law, the calibrated one, and the calibrated one with the re-tuned gain."""
+    notes: tuple[str, ...]
+    """What could not be found, and why."""
+    findings: tuple[str, ...]
+    """One sentence each."""
+
+
+def find_consequences(
+    scene: Scene, calibrated: BalancerModel, *, paper: BalancerModel | None = None, members: int = MEMBERS
+) -> Consequences:
+    """Run a scene's target-vector controller under both laws, with its margins, re-tuned, and law-based.
+
+    The re-tuned gain gives the calibrated loop the gain per operation that the scene's gain has under the
+    paper's law, Kc' = Kc (dA/dt)_paper/(dA/dt)_calibrated, or 0.5 where that is none or would overshoot.
+    Args: `scene`: the scene; its controller's `kind` is not looked at. `calibrated`: the balancer by the
+        calibrated law, such as `calibrate(scene).model`. `paper`: by the paper's law; default
+        `paper_model(scene)`. `members`: of each ensemble.
+    Raises: SceneError: a rotor too slow to form a ring, or a model made for another disc.
+    Source: sections 5 and 6 of the liquid-ring paper; the comparison is this program's.
+    """
+    nominal = paper_model(scene) if paper is None else paper
+    notes: list[str] = []
+    transfers = {m.name: _transfer(scene, m, notes) for m in (nominal, calibrated)}
+    gains = {m.name: _gain(scene, m, transfers[m.name], notes) for m in (nominal, calibrated)}
+    retuned = _retuned(gains[nominal.name], gains[calibrated.name])
+    tuned = scene if retuned is None else _with_gain(scene, retuned)
+    asked = [(scene, nominal), (scene, calibrated)] + ([(tuned, calibrated)] if retuned else [])
+    ensembles = [
+        simulate_ensemble(own, model, members, scene.run.seed, transfer=transfer)
+        for own, model in asked
+        if (transfer := transfers[model.name]) is not None
+    ]
+    runs = _runs(scene, tuned if retuned else None, nominal, calibrated)
+    return Consequences(
+        scene=scene.name,
+        runs=runs,
+        gains=tuple(gain for gain in gains.values() if gain is not None),
+        retuned_proportional=retuned,
+        ensembles=tuple(ensembles),
+        notes=tuple(notes),
+        findings=_findings(gains[nominal.name], gains[calibrated.name], retuned, runs, tuple(ensembles)),
+    )
+
+
+def _with_gain(scene: Scene, proportional: float) -> Scene:
+    return replace(scene, controller=replace(scene.controller, proportional=proportional))
+
+
+def _transfer(scene: Scene, model: BalancerModel, notes: list[str]) -> PairTransfer | None:
+    try:
+        return ensemble_transfer(scene, model)
+    except ValueError as cause:
+        notes.append(f"{model.name}: no margins and no ensemble; {cause}")
+        return None
+
+
+def _gain(
+    scene: Scene, model: BalancerModel, transfer: PairTransfer | None, notes: list[str]
+) -> LoopGain | None:
+    found = None if transfer is None else loop_gain(scene, model, transfer=transfer)
+    if found is None and transfer is not None:
+        notes.append(f"{model.name}: the gas drives no flow at equal fills, so the loop has no gain")
+    return found
+
+
+def _retuned(nominal: LoopGain | None, calibrated: LoopGain | None) -> float | None:
+    if calibrated is None:
+        return None
+    meant = FIRST_GAIN if nominal is None or nominal.per_operation >= 1 else nominal.per_operation
+    return meant / calibrated.slope
+
+
+def _runs(
+    scene: Scene, tuned: Scene | None, nominal: BalancerModel, calibrated: BalancerModel
+) -> tuple[Run, ...]:
+    def run(
+        name: str, title: str, words: str, own: Scene, model: BalancerModel, controller: Controller[Any]
+    ) -> Run:
+        gain = own.controller.proportional if words.startswith("target") else None
+        found = simulate(own, model, controller=controller)
+        return Run(name=name, title=title, controller=words, proportional=gain, simulation=found)
+
+    same, vector = target_vector_of(scene), "target vector"
+    law = "law-based, assumes the calibrated law"
+    wrong = "law-based, assumes the paper's law"
+    runs = [
+        run("paper", "the paper's law", vector, scene, nominal, same),
+        run("calibrated", "the calibrated law, same controller", vector, scene, calibrated, same),
+    ]
+    if tuned is not None:
+        title = "the calibrated law, gain re-tuned"
+        runs.append(run("calibrated_retuned", title, vector, tuned, calibrated, target_vector_of(tuned)))
+    title = "the calibrated law, no gain to tune"
+    runs.append(run("law_based", title, law, scene, calibrated, law_based_of(scene, calibrated)))
+    title = "the calibrated law, a controller with the paper's law"
+    runs.append(run("law_based_wrong_law", title, wrong, scene, calibrated, law_based_of(scene, nominal)))
+    return tuple(runs)
+
+
+def _findings(
+    nominal: LoopGain | None,
+    calibrated: LoopGain | None,
+    retuned: float | None,
+    runs: tuple[Run, ...],
+    ensembles: tuple[Ensemble, ...],
+) -> tuple[str, ...]:
+    told = []
+    if nominal is not None and calibrated is not None:
+        told += [
+            f"A second of gas takes {calibrated.slope * 1e6:.3g} um away, not {nominal.slope * 1e6:.3g} um: "
+            f"k is {calibrated.drag_coefficient:.3g} at equal fills, not {nominal.drag_coefficient:.3g}.",
+            f"The same gain of {nominal.gain * 1e-6:.3g} s/um takes {calibrated.per_operation:.0%} of the "
+            f"residual away in one operation, not {nominal.per_operation:.0%}: {_stability(calibrated)}.",
+        ]
+    if retuned is not None:
+        told.append(f"Re-tuned for the calibrated law the gain is {retuned * 1e-6:.3g} s/um.")
+    told += [f"Run under {run.title}: {_ending(run.simulation)}." for run in runs]
+    for ensemble, of in zip(ensembles, ("", "", " with the re-tuned gain"), strict=False):
+        told.append(
+            f"Of {ensemble.members} runs under the {ensemble.law} law{of}, {ensemble.overshoot.value:.1%} "
+            "overshoot, "
+            f"{ensemble.misadjustment.value:.1%} misadjust and {ensemble.not_settled.value:.1%} do not "
+            "settle."
+        )
+    return tuple(told)
+
+
+def _stability(gain: LoopGain) -> str:
+    h = gain.per_operation
+    if h >= 2:
+        return "the residual grows"
+    return (
+        f"it turns round each time, {2 / h:.3g} times below instability" if h > 1 else "it does not overshoot"
+    )
+
+
+def _ending(simulation: Simulation) -> str:
+    turns = f"{simulation.overshoots} overshoots, {simulation.misadjustments} misadjustments"
+    if simulation.settling_time is None:
+        return f"not settled ({simulation.outcome.value.replace('_', ' ')}), {turns}"
+    return f"settled after {simulation.settling_time:.3g} s, {turns}"
+
+
+def consequences_document(found: Consequences) -> dict[str, Any]:
+    """Turn the consequences into plain numbers, lists and text, all in SI, arrays of at most 50 entries.
+
+    Returns: Document that `json.dumps(..., allow_nan=False)` accepts; null where an onset was not found.
+    """
+    return {
+        "scene": found.scene,
+        "findings": list(found.findings),
+        "notes": list(found.notes),
+        "retuned_proportional_s_per_m": found.retuned_proportional,
+        "runs": [_run_document(run) for run in found.runs],
+        "gain": [_gain_document(gain) for gain in found.gains],
+        "ensembles": [ensemble_document(ensemble) for ensemble in found.ensembles],
+    }
+
+
+def _run_document(run: Run) -> dict[str, Any]:
+    simulation = run.simulation
+    closed = [i.time + i.operation.duration for i in simulation.injections]
+    end = min(float(simulation.time[-1]), 1.2 * max(closed, default=np.inf))
+    known = np.flatnonzero(simulation.time <= end)
+    shown = known[np.unique(np.linspace(0, known.size - 1, POINTS).round().astype(np.intp))]
+    return {
+        "name": run.name,
+        "title": run.title,
+        "controller": run.controller,
+        "proportional_s_per_m": run.proportional,
+        "law": simulation.law,
+        "settled": simulation.settled,
+        "settling_time_s": simulation.settling_time,
+        "outcome": simulation.outcome.value,
+        "status": simulation.status,
+        "overshoots": simulation.overshoots,
+        "misadjustments": simulation.misadjustments,
+        "operations": len({injection.time for injection in simulation.injections}),
+        "gas_time_s": float(sum(i.operation.duration for i in simulation.injections)),
+        "limit_m": simulation.limit,
+        "time_s": simulation.time[shown].tolist(),
+        "amplitude_m": simulation.amplitude[shown].tolist(),
+    }
+
+
+def _gain_document(gain: LoopGain) -> dict[str, Any]:
+    return {
+        "law": gain.law,
+        "velocity_m_s": gain.velocity,
+        "drag_coefficient": gain.drag_coefficient,
+        "moment_per_transferred_mass_m": gain.moment_per_transferred_mass,
+        "slope_m_per_s": gain.slope,
+        "proportional_s_per_m": gain.gain,
+        "gain_per_operation": gain.per_operation,
+        "overshoot_proportional_s_per_m": gain.overshoot_gain,
+        "instability_proportional_s_per_m": gain.instability_gain,
+        "margin_to_overshoot": 1 / gain.per_operation,
+        "margin_to_instability": 2 / gain.per_operation,
+        "lag_margin_rad": gain.lag_margin,
+        "over_drag_coefficient": _curve_document(gain.over_drag),
+        "over_moment_per_transferred_mass": _curve_document(gain.over_moment),
+    }
+
+
+def _curve_document(curve: GainCurve) -> dict[str, Any]:
+    return {name: [_number(v) for v in values] for name, values in vars(curve).items()}
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

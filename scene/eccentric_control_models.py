@@ -1,0 +1,299 @@
+"""Records of filters, regulator and stages of two eccentric masses; `eccentric_models` has the machine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from ringbalance.scene.keys.declaration import derived, standard
+from ringbalance.scene.keys.derivations import (
+    a_tenth,
+    amplitude_limit,
+    assumed_position_noise,
+    assumed_rate_noise,
+    assumed_velocity_noise,
+    capacity,
+    capacity_travel,
+    critical_velocity,
+    same,
+    settling,
+    two_turns,
+)
+from ringbalance.scene.keys.fields import NOT_NEGATIVE, POSITIVE, angle_of_turn, each_of, quantity
+from ringbalance.scene.keys.quantities import (
+    Damping,
+    Gate,
+    Length,
+    PositiveAngle,
+    PositiveLength,
+    PositiveMass,
+    PositiveRate,
+    PositiveTime,
+    PositiveUnbalance,
+    PositiveVelocity,
+    Rate,
+    Stiffness,
+    Time,
+    Unbalance,
+    Velocity,
+    Weight,
+)
+
+Discretisation = Literal["exact", "euler"]
+FrictionCompensation = Literal["break_away", "printed", "none"]
+Strategy = Literal["whole", "locked"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImbalanceFilter:
+    """The Kalman filter of rotor and unbalance."""
+
+    step: Annotated[
+        PositiveTime, derived("step of [sensor]", "time between two updates", same, "sensor.step")
+    ]
+    discretisation: Annotated[
+        Discretisation,
+        standard(
+            "exact",
+            "of the rotor's equations: by the matrix exponential, or by one Euler step as the paper has it",
+        ),
+    ]
+    position_noise: Annotated[
+        PositiveLength,
+        derived(
+            "position_noise of [sensor], at least 1 um",
+            "standard deviation that the filter assumes",
+            assumed_position_noise,
+            "sensor.position_noise",
+        ),
+    ]
+    velocity_noise: Annotated[
+        PositiveVelocity,
+        derived(
+            "velocity_noise of [sensor], at least 10 um/s",
+            "standard deviation that the filter assumes",
+            assumed_velocity_noise,
+            "sensor.velocity_noise",
+        ),
+    ]
+    velocity_walk: Annotated[
+        Velocity,
+        standard(
+            "0.1 mm/s",
+            "random walk of the rotor's velocity, from forces that are not in the model, within 1 s",
+        ),
+    ]
+    unbalance_walk: Annotated[Unbalance, standard("1 g*mm", "random walk of the unbalance within 1 s")]
+    initial_position: Annotated[
+        PositiveLength,
+        derived(
+            "2 m_b r_b / M, the balancing capacity over the whole mass",
+            "standard deviation of each coordinate before the first update",
+            capacity_travel,
+            "masses.mass",
+            "masses.guide_radius",
+            "rotor.mass",
+        ),
+    ]
+    initial_velocity: Annotated[
+        PositiveVelocity,
+        derived(
+            "initial_position times the critical speed",
+            "standard deviation of each velocity before the first update",
+            critical_velocity,
+            "imbalance_filter.initial_position",
+            "rotor.stiffness",
+            "rotor.mass",
+            "masses.mass",
+        ),
+    ]
+    initial_unbalance: Annotated[
+        PositiveUnbalance,
+        derived(
+            "2 m_b r_b, the balancing capacity",
+            "standard deviation of each component of the unbalance before the first update",
+            capacity,
+            "masses.mass",
+            "masses.guide_radius",
+        ),
+    ]
+    gate: Annotated[
+        Gate,
+        standard(
+            "1 %", "the estimate is taken when its standard deviation is below this share of its magnitude"
+        ),
+    ]
+    assumed_mass: Annotated[
+        PositiveMass,
+        derived("mass of [rotor]", "value used by the filter and the controller", same, "rotor.mass"),
+    ]
+    assumed_stiffness: Annotated[
+        Stiffness,
+        derived(
+            "stiffness of [rotor]", "value used by the filter and the controller", same, "rotor.stiffness"
+        ),
+    ]
+    assumed_damping: Annotated[
+        Damping,
+        derived("damping of [rotor]", "value used by the filter and the controller", same, "rotor.damping"),
+    ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrictionFilter:
+    """The extended Kalman filter of the friction arms, and the drive meanwhile."""
+
+    step: Annotated[
+        PositiveTime, derived("step of [sensor]", "time between two updates", same, "sensor.step")
+    ]
+    discretisation: Annotated[
+        Discretisation, standard("exact", "of the drive's equations, as in [imbalance_filter]")
+    ]
+    rate_noise: Annotated[
+        PositiveRate,
+        derived(
+            "encoder_rate_noise of [sensor], at least 0.001 rad/s",
+            "standard deviation that the filter assumes",
+            assumed_rate_noise,
+            "sensor.encoder_rate_noise",
+        ),
+    ]
+    rate_walk: Annotated[Rate, standard("0.01 rad/s", "random walk of the speed of a mass within 1 s")]
+    friction_walk: Annotated[Length, standard("0.01 mm", "random walk of the friction arm within 1 s")]
+    initial_rate: Annotated[
+        PositiveRate,
+        derived(
+            "drive_speed",
+            "standard deviation of the speed of a mass before the first update",
+            same,
+            "friction_filter.drive_speed",
+        ),
+    ]
+    initial_friction: Annotated[
+        PositiveLength,
+        derived(
+            "a tenth of guide_radius",
+            "standard deviation of the friction arm before the first update",
+            a_tenth,
+            "masses.guide_radius",
+        ),
+    ]
+    drive_speed: Annotated[
+        PositiveRate, standard("5 rpm", "speed of both masses along the track while friction is found")
+    ]
+    speed_gain: Annotated[
+        float,
+        quantity("voltage_per_speed", POSITIVE),
+        standard("2 V*s/rad", "gamma, motor voltage per error of the speed of a mass"),
+    ]
+    pair_gain: Annotated[
+        float,
+        quantity("voltage_per_angle", NOT_NEGATIVE),
+        standard(
+            "2 V/rad",
+            "motor voltage per error of the 180 degrees between the masses; zero for the paper's law",
+        ),
+    ]
+    stall_share: Annotated[
+        Gate, standard("20 %", "a warning is given when a mass is slower than this share of drive_speed")
+    ]
+    gate: Annotated[
+        Gate,
+        standard(
+            "2 %", "the estimate is taken when its standard deviation is below this share of its magnitude"
+        ),
+    ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lqr:
+    """The regulator that moves the masses to their targets."""
+
+    state_weight: Annotated[
+        Weight, standard(3.5, "q in Q = q diag(0.1, 0.1, 0.01, 0.01), of angles and speeds in SI")
+    ]
+    input_weight: Annotated[Weight, standard(1.0, "r in R = r diag(0.1, 0.1), of torques in SI")]
+    step: Annotated[
+        PositiveTime,
+        derived("step of [sensor]", "time for which the motors' voltages are held", same, "sensor.step"),
+    ]
+    friction_compensation: Annotated[
+        FrictionCompensation,
+        standard(
+            "break_away",
+            "of the estimated friction: so that a mass at rest breaks away; as the paper prints it; or none",
+        ),
+    ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FineTuning:
+    """The search by trial."""
+
+    step: Annotated[
+        PositiveAngle, standard("4 deg", "first trial move of the masses; it is halved when no move helps")
+    ]
+    stop: Annotated[
+        PositiveAngle, standard("0.1 deg", "tuning ends when the trial move is shorter than this")
+    ]
+    wait: Annotated[
+        Time,
+        derived(
+            "8 / decay rate C_B / (2 M) of the rotor, at most 30 s",
+            "after a move, for the rotor to settle",
+            settling,
+            "rotor.damping",
+            "rotor.mass",
+            "masses.mass",
+        ),
+    ]
+    average: Annotated[
+        PositiveTime,
+        derived(
+            "two turns of the rotor at the start",
+            "time over which the amplitude is averaged",
+            two_turns,
+            "rotor.speed_profile",
+        ),
+    ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Supervisor:
+    """Order, gates and limits of the stages."""
+
+    strategy: Annotated[
+        Strategy, standard("whole", "all stages in turn; or none, with the masses locked where they are")
+    ]
+    start: Annotated[Time, standard("0 s", "beginning of the first stage")]
+    limit: Annotated[
+        PositiveLength,
+        derived(
+            "2 % of 2 m_b r_b / M, at least three times position_noise",
+            "amplitude (zero-to-peak) below which no fine tuning is needed",
+            amplitude_limit,
+            "masses.mass",
+            "masses.guide_radius",
+            "rotor.mass",
+            "sensor.position_noise",
+        ),
+    ]
+    lowest_speed: Annotated[
+        PositiveRate,
+        standard("1 rpm", "the imbalance cannot be seen below this speed, and its estimation is refused"),
+    ]
+    arrival_angle: Annotated[
+        PositiveAngle, standard("0.5 deg", "a mass has arrived when it is closer to its target")
+    ]
+    arrival_rate: Annotated[
+        PositiveRate, standard("0.5 deg/s", "a mass has arrived when it is also slower than this")
+    ]
+    imbalance_time: Annotated[PositiveTime, standard("60 s", "longest estimation of the imbalance")]
+    friction_time: Annotated[PositiveTime, standard("60 s", "longest estimation of the friction")]
+    positioning_time: Annotated[PositiveTime, standard("60 s", "longest move to the targets")]
+    fine_tuning_time: Annotated[PositiveTime, standard("600 s", "longest fine tuning")]
+    target_error: Annotated[
+        tuple[float, float],
+        each_of(angle_of_turn(), count=2, example='["10 deg", "-10 deg"]'),
+        standard(["0 deg", "0 deg"], "added to each target, to show what fine tuning mends"),
+    ]

@@ -1,0 +1,189 @@
+"""Keys of a scene file as the fields of records declare them: each key once, in its field's annotation.
+
+    bore: Annotated[PositiveLength, needed("inner diameter d"), UNCERTAIN, shown("bore d", "mm")]
+
+A field is a key when its annotation holds a `Presence`. What may be written there is the `Reader` of the
+annotation, or follows from the type: a `Literal`, a record, or a tuple of records. Reading, defaults,
+uncertainties, descriptions and the reference in the documentation derive from these declarations.  Values are
+SI: in the first unit that `DIMENSIONS` has for the reader's dimension.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, is_dataclass
+from functools import cache
+from types import MappingProxyType
+from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
+
+from ringbalance.scene.keys.fields import Reader, choice
+
+Part = TypeVar("Part")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Presence:
+    """What a key means and how it may be absent."""
+
+    kind: Literal["needed", "standard", "derived", "unused"]
+    """Always needed; with a default value; following from other keys; or leaving out a term."""
+    meaning: str
+    default: object = None
+    """As a user would write it."""
+    otherwise: str = ""
+    """What holds when it is left out, in words."""
+    rule: Callable[..., Any] | None = None
+    """Value that follows from those of `needs`; None when there is none in this case."""
+    needs: tuple[str, ...] = ()
+    """Paths of the rule's arguments, "table.key"."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Entries:
+    """A key whose value is one table, or a list of tables, of which records are made."""
+
+    record: Callable[..., Any]
+    keys: Mapping[str, Key]
+    example: str
+    """The list as one would write it; empty for one table."""
+
+    @property
+    def allowed(self) -> str:
+        """What is accepted, for messages."""
+        return self.example or f"a table with {', '.join(self.keys)}"
+
+    @property
+    def summary(self) -> str:
+        """What is written there, for the reference of the scene file."""
+        return "a list of tables" if self.example else "a table"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Key:
+    """One key of a scene file."""
+
+    takes: Reader | Entries
+    presence: Presence
+    uncertain: bool = False
+    """Whether [uncertainty] may have its half-width."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shown:
+    """How a field is described to people."""
+
+    name: str
+    """Such as "outer radius R2"."""
+    unit: str
+    note: str
+    absent: str
+    """What is written when the scene has no such value; empty: no line."""
+    only_for: str
+    """Control algorithm for which it is described; empty for all."""
+    dimension: str | None
+    """A key of `DIMENSIONS`; None for that of the field's reader."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Listed:
+    """Marks a list of tables."""
+
+    example: str
+
+
+@dataclass(frozen=True)
+class Uncertain:
+    """Marks a quantity whose uncertainty may be given."""
+
+
+UNCERTAIN = Uncertain()
+
+
+def needed(meaning: str) -> Presence:
+    """Declare a key that every scene must have."""
+    return Presence(kind="needed", meaning=meaning, otherwise="needed")
+
+
+def standard(default: object, meaning: str) -> Presence:
+    """Declare a key with a default. Args: `default`: as a user would write it."""
+    return Presence(kind="standard", meaning=meaning, default=default)
+
+
+def derived(otherwise: str, meaning: str, rule: Callable[..., Any] | None = None, *needs: str) -> Presence:
+    """Declare a key whose default follows from other keys.
+
+    Args: `otherwise`: how it follows, in words. `rule`: from the values at the paths `needs`; None when other
+        code fills it in.
+    """
+    return Presence(kind="derived", meaning=meaning, otherwise=otherwise, rule=rule, needs=needs)
+
+
+def unused(otherwise: str, meaning: str) -> Presence:
+    """Declare a key without which a term is left out. Args: `otherwise`: what holds without it, in words."""
+    return Presence(kind="unused", meaning=meaning, otherwise=otherwise)
+
+
+def listed(example: str) -> Listed:
+    """Declare that a key takes a list of tables. Args: `example`: the list as one would write it."""
+    return Listed(example=example)
+
+
+def shown(
+    name: str,
+    unit: str = "",
+    *,
+    note: str = "",
+    absent: str = "",
+    only_for: str = "",
+    dimension: str | None = None,
+) -> Shown:
+    """Let a field be described, see `Shown`."""
+    return Shown(name=name, unit=unit, note=note, absent=absent, only_for=only_for, dimension=dimension)
+
+
+@cache
+def keys_of(record: type) -> Mapping[str, Key]:
+    """Keys that the fields of a record declare, in order."""
+    hints = get_type_hints(record, include_extras=True)
+    return MappingProxyType(
+        {
+            name: Key(
+                takes=_takes(hint),
+                presence=presence,
+                uncertain=_part(hint, Uncertain) is not None,
+            )
+            for name, hint in hints.items()
+            if (presence := _part(hint, Presence)) is not None
+        }
+    )
+
+
+@cache
+def descriptions_of(record: type) -> Mapping[str, Shown]:
+    """Descriptions that the fields of a record have, in order."""
+    hints = get_type_hints(record, include_extras=True)
+    found = {name: _part(hint, Shown) for name, hint in hints.items()}
+    return MappingProxyType({name: entry for name, entry in found.items() if entry is not None})
+
+
+def _part(hint: Any, kind: type[Part]) -> Part | None:
+    return next((each for each in _parts(hint) if isinstance(each, kind)), None)
+
+
+def _parts(hint: Any) -> Iterator[Any]:
+    """Everything inside an annotation: its types, and what was put beside them."""
+    yield hint
+    for inner in get_args(hint):
+        yield from _parts(inner)
+
+
+def _takes(hint: Any) -> Reader | Entries:
+    for part in _parts(hint):
+        if isinstance(part, Reader):
+            return part
+        if get_origin(part) is Literal:
+            return choice(part)
+        if isinstance(part, type) and is_dataclass(part):
+            listed = _part(hint, Listed)
+            return Entries(record=part, keys=keys_of(part), example=listed.example if listed else "")
+    raise TypeError(f"{hint} does not declare what its key takes")

@@ -1,0 +1,301 @@
+"""What a key of a scene file can take: readers that turn a TOML value into SI or say what is allowed.
+
+A reader stands in the annotation of a record's field, see `declaration`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any, get_args
+
+from ringbalance.scene.dimensions import DIMENSIONS
+from ringbalance.scene.faults import did_you_mean
+from ringbalance.scene.units import FieldError, parse_quantity, unit_names
+
+_LARGEST_NUMBER = 1e9
+_LONGEST_NAME = 200
+LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reader:
+    """How the values of one key are read."""
+
+    read: Callable[[object], Any]
+    """TOML value to SI; raises FieldError."""
+    allowed: str
+    """What is accepted, for messages."""
+    summary: str
+    """What is written there, for the reference of the scene file."""
+    dimension: str | None = None
+    """A key of `DIMENSIONS`; None without unit."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bounds:
+    """The interval that a value must lie in, as numbers and as people write it."""
+
+    above: float | None = None
+    """Exclusive."""
+    at_least: float | None = None
+    at_most: float | None = None
+    below: float | None = None
+    """Exclusive."""
+
+    def holds(self, value: float) -> bool:
+        """Tell whether a value lies inside.
+
+        Args: `value`: in the same unit as the bounds.
+        Returns: True inside.
+        """
+        return (
+            (self.above is None or value > self.above)
+            and (self.at_least is None or value >= self.at_least)
+            and (self.at_most is None or value <= self.at_most)
+            and (self.below is None or value < self.below)
+        )
+
+    def __str__(self) -> str:
+        """Such as "above 0 and at most 1"."""
+        named = {
+            "above": self.above,
+            "at least": self.at_least,
+            "at most": self.at_most,
+            "below": self.below,
+        }
+        return " and ".join(f"{words} {bound:g}" for words, bound in named.items() if bound is not None)
+
+
+POSITIVE = Bounds(above=0)
+NOT_NEGATIVE = Bounds(at_least=0)
+
+
+def quantity(dimension: str, bounds: Bounds | None = None) -> Reader:
+    """Read a number with a unit.
+
+    Args: `dimension`: a key of `DIMENSIONS`. `bounds`: in SI; None for any sign.
+    Returns: A reader of text such as "44.5 mm"; its values are SI.
+    """
+    kind = DIMENSIONS[dimension]
+    limits = bounds or Bounds()
+    interval = f" {limits}".replace(" at least", " of at least") if bounds else ""
+    allowed = f'{kind.name}{interval}, such as "{kind.example}", in {unit_names(dimension)}'
+
+    def read(value: object) -> float:
+        number = parse_quantity(value, dimension)
+        if not limits.holds(number):
+            raise FieldError(f"it must be {limits}", allowed)
+        if limits.above == 0 and number < kind.smallest:
+            si_unit = next(iter(kind.units))
+            raise FieldError(f"it must be at least {kind.smallest:g} {si_unit} to mean anything", allowed)
+        return number
+
+    return Reader(read=read, allowed=allowed, summary=f"{kind.name}{interval}", dimension=dimension)
+
+
+def angle_of_turn() -> Reader:
+    """Read a phase or lag; beyond a full turn either way it is wrapped to within half a turn.
+
+    Returns: A reader of text such as "17 deg"; its values are rad.
+    """
+
+    allowed = f'an angle such as "{DIMENSIONS["angle"].example}", in {unit_names("angle")}'
+
+    def read(value: object) -> float:
+        angle = parse_quantity(value, "angle")
+        # 360 deg is the full turn itself, however it was rounded.
+        return angle if abs(angle) <= 2 * math.pi * (1 + 1e-12) else math.remainder(angle, 2 * math.pi)
+
+    return Reader(read=read, allowed=allowed, summary="an angle", dimension="angle")
+
+
+def share(bounds: Bounds, *, example: float) -> Reader:
+    """Read a share of one: a bare number or a percentage.
+
+    Args: `bounds`: dimensionless. `example`: a value that one might write.
+    Returns: A reader of 0.01 and of "1 %".
+    """
+    allowed = f'a share {bounds}, such as {example:g} or "{100 * example:g} %"'
+
+    def read(value: object) -> float:
+        number = parse_quantity(value, "share") if isinstance(value, str) else _number(value, allowed)
+        if not bounds.holds(number):
+            raise FieldError(f"it must be {bounds}", allowed)
+        return number
+
+    return Reader(read=read, allowed=allowed, summary=f"a share {bounds}, bare or in %")
+
+
+def number(bounds: Bounds) -> Reader:
+    """Read a number that has no unit.
+
+    Args: `bounds`: dimensionless.
+    Returns: A reader of bare numbers.
+    """
+    allowed = f"a bare number {bounds}".replace("number at", "number of at")
+
+    def read(value: object) -> float:
+        plain = _number(value, allowed)
+        if not bounds.holds(plain):
+            raise FieldError(f"it must be {bounds}", allowed)
+        return plain
+
+    return Reader(read=read, allowed=allowed, summary=allowed)
+
+
+def _number(value: object, allowed: str) -> float:
+    if isinstance(value, str):
+        raise FieldError("it is text, where a bare number stands", allowed)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise FieldError("it is not a number", allowed)
+    if isinstance(value, float) and not math.isfinite(value):
+        raise FieldError("it is not a finite number", allowed)
+    if abs(value) > _LARGEST_NUMBER:
+        raise FieldError(f"its magnitude is above {_LARGEST_NUMBER:g}", allowed)
+    return float(value)
+
+
+def _whole(value: object, allowed: str) -> int:
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise FieldError("it is not a whole number", allowed)
+    return value
+
+
+def chamber_count() -> Reader:
+    """Read the number of chambers: even, and no more than there are letters for.
+
+    Returns: A reader of whole numbers.
+    """
+    allowed = f"an even whole number from 2 to {len(LETTERS)}"
+
+    def read(value: object) -> int:
+        count = _whole(value, allowed)
+        if count % 2:
+            raise FieldError("it must be even: each chamber needs its opposite", allowed)
+        if not 2 <= count <= len(LETTERS):
+            raise FieldError(f"it must lie from 2 to {len(LETTERS)}", allowed)
+        return count
+
+    return Reader(read=read, allowed=allowed, summary=allowed)
+
+
+def whole(lowest: int, highest: int, *, highest_text: str = "") -> Reader:
+    """Read a whole number. Args: `highest_text`: the highest as people write it; else its digits."""
+    interval = f"from {lowest} to {highest_text or highest}"
+    allowed = f"a whole number {interval}"
+
+    def read(value: object) -> int:
+        count = _whole(value, allowed)
+        if not lowest <= count <= highest:
+            raise FieldError(f"it must lie {interval}", allowed)
+        return count
+
+    return Reader(read=read, allowed=allowed, summary=allowed)
+
+
+def each_of(reader: Reader, *, count: int, example: str) -> Reader:
+    """Read a list of a fixed number of values of one sort.
+
+    Args: `count`: how many there must be. `example`: the list as one would write it.
+    Returns: A reader of lists; its values are tuples.
+    """
+    allowed = f"a list of {count} such as {example}; each {reader.allowed}"
+
+    def read(value: object) -> tuple[Any, ...]:
+        if not isinstance(value, list) or len(value) != count:
+            raise FieldError(f"it is not a list of {count}", allowed)
+        return tuple(_entry(item, place) for place, item in enumerate(value, start=1))
+
+    def _entry(item: object, place: int) -> Any:
+        try:
+            return reader.read(item)
+        except FieldError as error:
+            raise FieldError(f"entry {place}: {error.problem}", error.allowed) from error
+
+    return Reader(read=read, allowed=allowed, summary=f"a list of {count}, each {reader.summary}")
+
+
+def choice(words: Any) -> Reader:
+    """Read one of a few words. Args: `words`: a `Literal` of them."""
+    options: tuple[str, ...] = get_args(words)
+    allowed = " or ".join(f'"{option}"' for option in options)
+
+    def read(value: object) -> str:
+        if not isinstance(value, str):
+            raise FieldError("it is not text", allowed)
+        if value not in options:
+            raise FieldError(f"it is not one of the known words{did_you_mean(value, options)}", allowed)
+        return value
+
+    return Reader(read=read, allowed=allowed, summary=allowed)
+
+
+def text() -> Reader:
+    """Read a name. Returns: A reader of text on one line."""
+    allowed = f"text on one line, up to {_LONGEST_NAME} characters"
+
+    def read(value: object) -> str:
+        if not isinstance(value, str):
+            raise FieldError("it is not text", allowed)
+        if not value.strip() or not value.isprintable() or len(value) > _LONGEST_NAME:
+            raise FieldError("it is empty, too long or not printable", allowed)
+        return value
+
+    return Reader(read=read, allowed=allowed, summary=allowed)
+
+
+def chamber_letters() -> Reader:
+    """Read the order in which chambers are tried. Returns: A reader of lists of different capital letters."""
+    allowed = 'a list of chamber letters, each once, such as ["A", "C", "B", "D"]'
+
+    def read(value: object) -> tuple[str, ...]:
+        if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
+            raise FieldError("it is not a list of letters", allowed)
+        letters: Iterable[str] = value
+        if any(len(letter) != 1 or letter not in LETTERS for letter in letters):
+            raise FieldError("a chamber is named by one capital letter", allowed)
+        if len(set(letters)) != len(value):
+            raise FieldError("a chamber stands in it more than once", allowed)
+        return tuple(letters)
+
+    return Reader(read=read, allowed=allowed, summary=allowed)
+
+
+def half_width(dimension: str | None) -> Reader:
+    """Read the expanded uncertainty (95 %) of a quantity: a percentage of it, or in its own unit.
+
+    Args: `dimension`: a key of `DIMENSIONS`, or None for a quantity without unit.
+    Returns: A reader whose values are (half-width, whether it is relative); SI when it is not.
+    """
+    allowed = _half_width_allowed(dimension)
+
+    def read(value: object) -> tuple[float, bool]:
+        relative = isinstance(value, str) and value.rstrip().endswith("%")
+        if dimension is None and not relative:
+            width = _number(value, allowed)
+        else:
+            width = _absolute(value, "share" if relative or dimension is None else dimension, allowed)
+        if width < 0 or (relative and width >= 1):
+            raise FieldError("an uncertainty must be at least 0 and below 100 %", allowed)
+        return width, relative
+
+    own = DIMENSIONS[dimension].name if dimension else "a bare number"
+    return Reader(read=read, allowed=allowed, summary=f"a percentage, or {own}")
+
+
+def _absolute(value: object, dimension: str, allowed: str) -> float:
+    try:
+        return parse_quantity(value, dimension)
+    except FieldError as error:
+        raise FieldError(error.problem, allowed) from error
+
+
+def _half_width_allowed(dimension: str | None) -> str:
+    own = "a bare number"
+    if dimension is not None:
+        own = f"{DIMENSIONS[dimension].name} in {unit_names(dimension)}"
+    return f'a percentage of the quantity such as "5 %", or {own}'

@@ -1,0 +1,270 @@
+"""A TOML document against the declared keys: what could be read, and an error for all that could not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+from ringbalance.scene.faults import MISSING, Fault, closest, did_you_mean, toml_key, toml_text
+from ringbalance.scene.keys.declaration import Entries, Key
+from ringbalance.scene.keys.schema import Place, Schema
+from ringbalance.scene.units import FieldError
+
+_MOST_GUESSED = 100
+"""Unknown keys of a file for which the key that was meant is looked for: a third of a millisecond each."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Rejected:
+    """A value, key or table that could not be read."""
+
+    place: Place
+    content: object
+    """What stands there."""
+    kind: Literal["value", "missing", "unknown"] = "value"
+    problem: str = ""
+    allowed: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """What is known of a scene file so far; paths are "table.key", or "key" at the top level."""
+
+    file: str
+    """As it was named."""
+    document: Mapping[str, Any]
+    """As TOML has it."""
+    values: Mapping[str, Any]
+    """SI values by path, defaults included; absent are keys that do not apply or could not be read."""
+    broken: frozenset[str]
+    """Paths, and names of whole tables, that stand in the file but could not be read."""
+    schema: Schema
+    """What such a file can hold."""
+
+    def adding(self, values: Mapping[str, Any]) -> Reading:
+        """Copy with more values. Args: `values`: SI, by path."""
+        return replace(self, values={**self.values, **values})
+
+    def given(self, path: str) -> bool:
+        """Tell whether the file itself has a value at a path.
+
+        Args: `path`: "table.key" or "key".
+        Returns: True when it stands in the file, readable or not.
+        """
+        table, _, key = path.rpartition(".")
+        return key in self._table(table)
+
+    def known(self, *paths: str) -> bool:
+        """Tell whether there are values for some paths.
+
+        Args: `paths`: "table.key" or "key".
+        Returns: True when each was read or has a default.
+        """
+        return all(path in self.values for path in paths)
+
+    def lacks(self, path: str) -> bool:
+        """Tell whether a value is missing, rather than present but unreadable.
+
+        Args: `path`: "table.key".
+        Returns: True when a fault about its absence is due.
+        """
+        table, _, _ = path.rpartition(".")
+        return not self.known(path) and not {path, table} & self.broken
+
+    def allowed(self, path: str) -> str:
+        """What a key takes, for messages. Args: `path`: "table.key"."""
+        return self.schema.key_at(tuple(path.split("."))).takes.allowed
+
+    def fault(self, path: str, *, problem: str, allowed: str) -> Fault:
+        """Make an error about a value of this file.
+
+        Args: `path`: "table.key" or "key". `problem`: what is wrong. `allowed`: what would be accepted.
+        Returns: the error, with what the file has there or the default that is used.
+        """
+        table, _, key = path.rpartition(".")
+        value = toml_text(self._table(table)[key]) if self.given(path) else self._default_text(path)
+        return Fault(file=self.file, table=table, key=key, value=value, problem=problem, allowed=allowed)
+
+    def _table(self, table: str) -> Mapping[str, Any]:
+        content = self.document.get(table, {}) if table else self.document
+        return content if isinstance(content, Mapping) else {}
+
+    def _default_text(self, path: str) -> str:
+        return f"{toml_text(self.values[path])} (SI, by default)" if self.known(path) else MISSING
+
+
+def read_document(
+    document: Mapping[str, Any], *, file: str, schema: Schema
+) -> tuple[Reading, tuple[Fault, ...]]:
+    """Compare a document with a schema.
+
+    Args: `document`: as TOML has it. `file`: its name, for the errors.
+    Returns: What could be read, and an error for each value, key or table that could not.
+    """
+    values, every = _read_tables(document, schema)
+    rejected, uninspected = _split(every)
+    broken = frozenset(_paths(rejected, document, schema))
+    known = {path: value for path, value in values.items() if not {path, path.split(".")[0]} & broken}
+    reading = Reading(file=file, document=document, values=known, broken=broken, schema=schema)
+    named = (_fault(each, file, schema, said=_said(each, schema)) for each in _reported(rejected, schema))
+    return reading, (*named, *(_fault(each, file, schema, said=("unknown", "")) for each in uninspected))
+
+
+def _read_tables(document: Mapping[str, Any], schema: Schema) -> tuple[dict[str, Any], list[_Rejected]]:
+    """Values by path, and all that could not be read."""
+    values, rejected = _read_keys(document, schema.top, ())
+    for name, table in schema.tables.items():
+        inside, wrong = _read_table(document.get(name, {}), table.keys, (name,))
+        values |= {f"{name}.{key}": value for key, value in inside.items()}
+        rejected += wrong
+    return values, rejected + _unknown_keys(document, (*schema.top, *schema.tables), ())
+
+
+def _read_table(
+    content: object, keys: Mapping[str, Key], place: Place
+) -> tuple[dict[str, Any], list[_Rejected]]:
+    if not isinstance(content, Mapping):
+        allowed = f"a table with {', '.join(keys)}"
+        return {}, [_Rejected(place=place, content=content, problem="it is not a table", allowed=allowed)]
+    values, rejected = _read_keys(content, keys, place)
+    return values, rejected + _unknown_keys(content, keys, place)
+
+
+def _read_keys(
+    content: Mapping[str, Any], keys: Mapping[str, Key], place: Place
+) -> tuple[dict[str, Any], list[_Rejected]]:
+    """Values of keys, defaults included; a key that an entry of another key lacks is rejected at once."""
+    values: dict[str, Any] = {}
+    rejected: list[_Rejected] = []
+    for name, key in keys.items():
+        at = (*place, name)
+        if name not in content and key.presence.default is None:
+            if len(place) > 1:
+                rejected.append(_Rejected(place=at, content=content, kind="missing"))
+            continue
+        value, wrong = _read_value(content.get(name, key.presence.default), key, at)
+        rejected += wrong
+        if not wrong:
+            values[name] = value
+    return values, rejected
+
+
+def _unknown_keys(content: Mapping[str, Any], known: Iterable[str], place: Place) -> list[_Rejected]:
+    names = set(known)
+    return [
+        _Rejected(place=(*place, name), content=value, kind="unknown")
+        for name, value in content.items()
+        if name not in names
+    ]
+
+
+def _read_value(content: object, key: Key, place: Place) -> tuple[Any, list[_Rejected]]:
+    if isinstance(key.takes, Entries):
+        return _read_entries(content, key.takes, place)
+    try:
+        return key.takes.read(content), []
+    except FieldError as error:
+        return None, [_Rejected(place=place, content=content, problem=error.problem, allowed=error.allowed)]
+
+
+def _read_entries(content: object, takes: Entries, place: Place) -> tuple[Any, list[_Rejected]]:
+    if not takes.example:
+        values, rejected = _read_table(content, takes.keys, place)
+        return (None if rejected else takes.record(**values)), rejected
+    if not isinstance(content, list):
+        problem = "it is not a list"
+        return None, [_Rejected(place=place, content=content, problem=problem, allowed=takes.example)]
+    read = [_read_table(entry, takes.keys, (*place, count)) for count, entry in enumerate(content)]
+    rejected = [each for _, wrong in read for each in wrong]
+    return (None if rejected else tuple(takes.record(**values) for values, _ in read)), rejected
+
+
+def _split(rejected: list[_Rejected]) -> tuple[list[_Rejected], list[_Rejected]]:
+    """What is to be inspected, and the unknown keys and tables that are too many for it."""
+    many = [each for each in rejected if each.kind == "unknown"][_MOST_GUESSED:]
+    skipped = {id(each) for each in many}
+    return [each for each in rejected if id(each) not in skipped], many
+
+
+def _reported(rejected: list[_Rejected], schema: Schema) -> list[_Rejected]:
+    """All but the missing keys that a misspelt one was meant for."""
+    meant = {_meant(each, schema) for each in rejected if each.kind == "unknown"}
+    return [
+        each for each in rejected if each.kind != "missing" or ".".join(map(str, each.place)) not in meant
+    ]
+
+
+def _paths(rejected: list[_Rejected], document: Mapping[str, Any], schema: Schema) -> Iterator[str]:
+    """Paths of what was rejected, and those meant by a misspelt or misplaced key: neither is missing."""
+    for each in rejected:
+        yield ".".join(map(str, each.place[:2]))
+        if each.kind == "unknown" and len(each.place) <= 2:
+            meant = _meant(each, schema)
+            table, _, key = meant.rpartition(".")
+            content = document.get(table, {}) if table else document
+            if meant and not (isinstance(content, Mapping) and key in content):
+                yield meant
+
+
+def _fault(rejected: _Rejected, file: str, schema: Schema, *, said: tuple[str, str]) -> Fault:
+    place, tables = rejected.place, schema.tables
+    is_table = str(place[0]) in tables or (len(place) == 1 and isinstance(rejected.content, Mapping))
+    table, keys = (str(place[0]), place[1:]) if is_table else ("", place)
+    problem, allowed = said
+    value = MISSING if rejected.kind == "missing" else toml_text(rejected.content)
+    unknown_table = not keys and rejected.kind == "unknown"
+    return Fault(
+        file=file,
+        table=table if table in tables else toml_key(table) if table else "",
+        key=_key_text(keys),
+        value="" if unknown_table else value,
+        problem=problem,
+        allowed=allowed,
+    )
+
+
+def _key_text(keys: Place) -> str:
+    """Name a key as in "bends[2].radius"; entries of a list are counted from one."""
+    text = ""
+    for key in keys:
+        text += f"[{key + 1}]" if isinstance(key, int) else ("." if text else "") + toml_key(key)
+    return text
+
+
+def _said(rejected: _Rejected, schema: Schema) -> tuple[str, str]:
+    if rejected.kind == "unknown":
+        return _unknown(rejected, schema)
+    if rejected.kind == "missing":
+        return "it is needed here", schema.key_at(rejected.place).takes.allowed
+    return rejected.problem, rejected.allowed
+
+
+def _unknown(rejected: _Rejected, schema: Schema) -> tuple[str, str]:
+    place = rejected.place
+    whole = len(place) == 1 and isinstance(rejected.content, Mapping)
+    kind, known = ("table", list(schema.tables)) if whole else ("key", schema.names_at(place[:-1]))
+    meant = _meant(rejected, schema)
+    table, _, key = meant.rpartition(".")
+    hint = ""
+    if meant and key == place[-1]:
+        hint = f" (it belongs in [{table}])" if table else " (it belongs at the top, before the first table)"
+    elif meant:
+        hint = did_you_mean(str(place[-1]), [key])
+    return f"unknown {kind}{hint}", ", ".join(known)
+
+
+def _meant(rejected: _Rejected, schema: Schema) -> str:
+    """Path that an unknown key or table was probably meant for; empty when there is none."""
+    place = rejected.place
+    word = str(place[-1])
+    if len(place) == 1 and isinstance(rejected.content, Mapping):
+        return closest(word, schema.tables)
+    if place[0] != "uncertainty" and len(place) <= 2:
+        if word in schema.top:
+            return word
+        home = next((name for name, table in schema.tables.items() if word in table.keys), "")
+        if home:
+            return f"{home}.{word}"
+    near = closest(word, schema.names_at(place[:-1]))
+    return ".".join([*map(str, place[:-1]), near]) if near else ""

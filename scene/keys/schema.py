@@ -1,0 +1,154 @@
+"""The tables of a scene file of each kind, with the keys that the records declare."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Literal, get_args
+
+from ringbalance.scene import eccentric_control_models, eccentric_models, loop_models, models
+from ringbalance.scene.keys.declaration import (
+    Entries,
+    Key,
+    Presence,
+    derived,
+    keys_of,
+    needed,
+    standard,
+    unused,
+)
+from ringbalance.scene.keys.fields import Bounds, Reader, choice, half_width, share, text
+
+Balancer = Literal["liquid_ring", "eccentric_mass"]
+BALANCERS: tuple[str, ...] = get_args(Balancer)
+Place = tuple[int | str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """One table of a scene file."""
+
+    text: str
+    keys: Mapping[str, Key]
+    record: type | None = None
+    """What is made of it; None when the scene has its values elsewhere."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Schema:
+    """All that a kind of scene file can hold."""
+
+    top: Mapping[str, Key]
+    """Keys before the first table."""
+    tables: Mapping[str, Table]
+
+    def key_at(self, place: Place) -> Key:
+        """The key at a place: table, key and so on; entries of lists are passed over."""
+        *tables, name = (step for step in place if isinstance(step, str))
+        return self._keys(tables)[name] if tables else self.top[name]
+
+    def names_at(self, place: Place) -> list[str]:
+        """Names that can stand in the table at a place; at the top those of keys and tables."""
+        steps = [step for step in place if isinstance(step, str)]
+        return list(self._keys(steps)) if steps else [*self.top, *self.tables]
+
+    def _keys(self, steps: list[str]) -> Mapping[str, Key]:
+        keys = self.tables[steps[0]].keys
+        for step in steps[1:]:
+            takes = keys[step].takes
+            keys = takes.keys if isinstance(takes, Entries) else {}
+        return keys
+
+
+def _of(record: type, text: str) -> Table:
+    return Table(text=text, keys=keys_of(record), record=record)
+
+
+def _rotor() -> Table:
+    """Amplitude and phase are entries of one key, and two fields of the record."""
+    vibration = Key(
+        takes=Entries(record=loop_models.Vibration, keys=keys_of(loop_models.Vibration), example=""),
+        presence=standard(
+            {"amplitude": "10 um", "phase": "90 deg"},
+            "{ amplitude, phase } before balancing, zero-to-peak",
+        ),
+    )
+    return Table(
+        text="the rotor as the balancer sees it",
+        keys={**keys_of(loop_models.Rotor), "initial_vibration": vibration},
+        record=loop_models.Rotor,
+    )
+
+
+def _top(balancer: Presence) -> dict[str, Key]:
+    return {
+        "name": Key(takes=text(), presence=derived("the file's name", "title of the scene")),
+        "balancer": Key(takes=choice(Balancer), presence=balancer),
+    }
+
+
+def _half_width_of(table: str, key: Key) -> Key:
+    rule = "that of the known liquid" if table == "liquid" else "exact"
+    dimension = key.takes.dimension if isinstance(key.takes, Reader) else None
+    return Key(
+        takes=half_width(dimension),
+        presence=unused(rule, f"expanded uncertainty of the quantity in [{table}]"),
+    )
+
+
+def _uncertainty(tables: Mapping[str, Table]) -> Table:
+    keys = {
+        name: _half_width_of(table, key)
+        for table, content in tables.items()
+        for name, key in content.keys.items()
+        if key.uncertain
+    }
+    return Table(text="Expanded uncertainties (95 %) of the inputs", keys=keys)
+
+
+_TOLERANCE = Key(
+    takes=share(Bounds(above=0, below=1), example=0.01),
+    presence=standard("1 %", "relative bound on discretisation and left-out terms, against the top model"),
+)
+_RUN = {
+    "run": _of(loop_models.RunSettings, "a simulation's seed and end"),
+    "accuracy": Table(text="what is asked of the result", keys={"tolerance": _TOLERANCE}),
+}
+_LIQUID_RING = {
+    "disc": _of(models.Disc, "the balancing disc"),
+    "liquid": _of(models.Liquid, "the balancing liquid"),
+    "tube": _of(models.Tube, "the tube that connects two opposite chambers"),
+    "gas": _of(models.Gas, "the gas that drives the liquid"),
+    "environment": _of(models.Environment, "gravity and how the shaft lies in it"),
+    "rotor": _rotor(),
+    "sensor": _of(loop_models.Sensor, "the vibration sensor; exact when left out"),
+    "controller": _of(loop_models.ControllerSettings, "the control algorithm"),
+}
+_ECCENTRIC = {
+    "rotor": _of(eccentric_models.EccentricRotor, "the rotor on its bearing, and its speed"),
+    "imbalance": _of(eccentric_models.Imbalance, "the imbalance to be balanced"),
+    "masses": _of(eccentric_models.EccentricMasses, "the two eccentric masses on their track"),
+    "motor": _of(eccentric_models.Motor, "motor and gears of each mass"),
+    "sensor": _of(eccentric_models.EccentricSensor, "the sensors; exact when left out"),
+    "imbalance_filter": _of(
+        eccentric_control_models.ImbalanceFilter, "the Kalman filter that finds the imbalance"
+    ),
+    "friction_filter": _of(
+        eccentric_control_models.FrictionFilter, "the extended Kalman filter that finds the friction"
+    ),
+    "lqr": _of(eccentric_control_models.Lqr, "the regulator that moves the masses"),
+    "fine_tuning": _of(eccentric_control_models.FineTuning, "the search by trial for a smaller vibration"),
+    "supervisor": _of(eccentric_control_models.Supervisor, "the order of the stages, and when each ends"),
+}
+
+LIQUID_RING = Schema(
+    top=MappingProxyType(_top(standard("liquid_ring", "kind of balancer"))),
+    tables=MappingProxyType({**_LIQUID_RING, "uncertainty": _uncertainty(_LIQUID_RING), **_RUN}),
+)
+"""A scene whose balancer is a liquid ring."""
+ECCENTRIC_MASS = Schema(
+    top=MappingProxyType(_top(needed('"eccentric_mass" for eccentric masses'))),
+    tables=MappingProxyType({**_ECCENTRIC, **_RUN}),
+)
+"""A scene whose balancer is two eccentric masses."""

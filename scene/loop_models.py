@@ -1,0 +1,179 @@
+"""Records of the rotor, its sensor, the controller and the run, as `models` has those of the balancer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from ringbalance.scene.keys.declaration import UNCERTAIN, derived, needed, shown, standard, unused
+from ringbalance.scene.keys.derivations import same, trial_sequence
+from ringbalance.scene.keys.fields import POSITIVE, chamber_letters, quantity, whole
+from ringbalance.scene.keys.quantities import (
+    Angle,
+    Influence,
+    Length,
+    PositiveLength,
+    PositiveTime,
+    Time,
+    Turn,
+)
+
+ControllerKind = Literal["target_vector", "trial", "law_based"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Vibration:
+    """The vibration before balancing."""
+
+    amplitude: Annotated[Length, needed("zero-to-peak")]
+    phase: Annotated[Turn, needed("of the vibration, with the rotation")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rotor:
+    """The rotor as the balancer sees it: V1 = V0 + K U with K = influence_coefficient at minus lag_angle."""
+
+    speed: Annotated[
+        float, quantity("speed", POSITIVE), needed("speed of the rotor"), UNCERTAIN, shown("speed", "rpm")
+    ]
+    influence_coefficient: Annotated[
+        Influence,
+        standard(
+            "0.0108 um/(g*mm)",
+            "zero-to-peak vibration per unbalance; the default is inferred for the paper's rotor",
+        ),
+        UNCERTAIN,
+        shown("influence coefficient", "um/(g*mm)"),
+    ]
+    lag_angle: Annotated[
+        Turn,
+        standard(
+            "17 deg",
+            "by which the vibration lags behind the unbalance; the default is assumed for the paper's rotor",
+        ),
+        UNCERTAIN,
+        shown("lag angle", "deg"),
+    ]
+    initial_amplitude: Annotated[
+        float, shown("vibration at the start", "um", note="zero-to-peak", dimension="length")
+    ]
+    """m, zero-to-peak."""
+    initial_phase: Annotated[float, shown("its phase", "deg", dimension="angle")]
+    """rad, of the vibration."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sensor:
+    """Standard deviations of the vibration measurement; zero: exact."""
+
+    amplitude_noise: Annotated[
+        Length,
+        standard("0 um", "standard deviation of the measured amplitude"),
+        shown("amplitude noise", "um"),
+    ]
+    phase_noise: Annotated[
+        Angle, standard("0 deg", "standard deviation of the measured phase"), shown("phase noise", "deg")
+    ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ControllerSettings:
+    """What the scene says of the control algorithm."""
+
+    kind: Annotated[
+        ControllerKind,
+        standard(
+            "target_vector", "algorithm; law_based takes the valve-open time straight from the flow law"
+        ),
+        shown("algorithm"),
+    ]
+    limit: Annotated[
+        PositiveLength,
+        standard("0.05 um", "amplitude below which the controller rests"),
+        shown("limit", "um"),
+    ]
+    period: Annotated[
+        PositiveTime,
+        standard(
+            "0.5 s", "wait after the gas closes, before the next sample; a run takes at most 10 000 samples"
+        ),
+        shown("period", "s"),
+    ]
+    proportional: Annotated[
+        float,
+        quantity("gain", POSITIVE),
+        standard("0.08 s/um", "Kc, valve-open time per vibration amplitude"),
+        shown("proportional gain Kc", "s/um"),
+    ]
+    integral_time: Annotated[
+        PositiveTime | None,
+        unused("no integral part", "Ti"),
+        shown("integral time Ti", "min", absent="no integral part"),
+    ]
+    derivative_time: Annotated[
+        Time, standard("0 s", "Td; zero for no derivative part"), shown("derivative time Td", "min")
+    ]
+    minimum_gas_time: Annotated[
+        Time, standard("1 ms", "a shorter command is not executed"), shown("shortest valve-open time", "ms")
+    ]
+    maximum_gas_time: Annotated[
+        PositiveTime,
+        standard("5 s", "a longer command is cut to this"),
+        shown("longest valve-open time", "s"),
+    ]
+    assumed_influence_coefficient: Annotated[
+        Influence,
+        derived(
+            "influence_coefficient of [rotor]",
+            "value used by the controller",
+            same,
+            "rotor.influence_coefficient",
+        ),
+        shown("influence coefficient assumed", "um/(g*mm)"),
+    ]
+    assumed_lag_angle: Annotated[
+        Turn,
+        derived("lag_angle of [rotor]", "value used by the controller", same, "rotor.lag_angle"),
+        shown("lag angle assumed", "deg"),
+    ]
+    sequence: Annotated[
+        tuple[str, ...],
+        chamber_letters(),
+        derived(
+            "each chamber followed by its opposite: A, C, B, D for four",
+            "trial algorithm: order of the chambers",
+            trial_sequence,
+            "disc.chambers",
+        ),
+        shown("order of trials", only_for="trial"),
+    ]
+    first_trial: Annotated[
+        PositiveTime,
+        standard("50 ms", "trial algorithm: valve-open time of a chamber's first trial"),
+        shown("first trial", "ms", only_for="trial"),
+    ]
+    long_step: Annotated[
+        PositiveTime,
+        standard("100 ms", "trial algorithm: valve-open time while the amplitude is large"),
+        shown("long step", "ms", only_for="trial"),
+    ]
+    short_step: Annotated[
+        PositiveTime,
+        standard("5 ms", "trial algorithm: valve-open time below fine_below"),
+        shown("short step", "ms", only_for="trial"),
+    ]
+    fine_below: Annotated[
+        PositiveLength,
+        standard("0.8 um", "trial algorithm: amplitude below which short steps are used"),
+        shown("short steps below", "um", only_for="trial"),
+    ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunSettings:
+    """Seed and end of a simulation."""
+
+    seed: Annotated[
+        int, whole(0, 2**63 - 1, highest_text="2^63 - 1"), standard(0, "of all random numbers"), shown("seed")
+    ]
+    time_limit: Annotated[PositiveTime, standard("120 s", "end of a simulation"), shown("time limit", "s")]

@@ -1,0 +1,128 @@
+"""Processes that work for this one: they leave reporting to it, and end when it does, however it ends."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from multiprocessing import get_context, parent_process
+from threading import Thread
+from types import TracebackType
+from typing import Final, ParamSpec, TypeVar
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+
+_THREADS: Final = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+_LOG: Final = logging.getLogger("ringbalance")
+_WORKER_ENDED: Final = (
+    "ringbalance: a worker process was ended by the system, probably for lack of memory; its work is done "
+    "again in this process. Should that be ended too, close other programs and run again"
+)
+
+
+class Workers(ProcessPoolExecutor):
+    """A pool of fresh processes, one thread each, that are ended at once when its `with` block is left.
+
+    Args: `count`: of processes, started when there is work for them.
+    """
+
+    def __init__(self, count: int) -> None:
+        # When this process is killed, multiprocessing removes its semaphores, and need not say so.
+        with _environment({"PYTHONWARNINGS": "ignore::UserWarning:multiprocessing.resource_tracker"}):
+            super().__init__(count, mp_context=get_context("spawn"), initializer=_begin)
+        self._ended = False
+
+    def submit(self, fn: Callable[_P, _R], /, *args: _P.args, **kwargs: _P.kwargs) -> Future[_R]:
+        """Have a function called by a worker.
+
+        Args: `fn`: of an importable module.
+        Returns: The call under way; without a worker left it holds BrokenProcessPool.
+        """
+        with _quiet_start():
+            try:
+                return super().submit(fn, *args, **kwargs)
+            except BrokenProcessPool as error:
+                lost: Future[_R] = Future()
+                lost.set_exception(error)
+                return lost
+
+    def result(self, future: Future[_R], again: Callable[[], _R]) -> _R:
+        """What a worker returned, or, when the system ended it, what this process finds itself.
+
+        A worker that was killed for memory leaves this process more of it, and one process at a time needs
+        less than several side by side; a report is not lost for it.
+        Args: `future`: of `submit`. `again`: does the same work here.
+        Returns: The result; with a note on standard error where the work was done again.
+        """
+        try:
+            return future.result()
+        except BrokenProcessPool:
+            if not self._ended:
+                self._ended = True
+                _LOG.warning(_WORKER_ENDED)
+        return again()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End the workers: nobody wants what is still under way."""
+        # From Python 3.14 on this is `kill_workers`.
+        for process in list((self._processes or {}).values()):
+            process.kill()
+        self.shutdown(cancel_futures=True)
+
+
+def end_with(gone: Callable[[], object]) -> None:
+    """End this process as soon as another is gone. Args: `gone`: returns when the other process is gone."""
+
+    def watch() -> None:
+        gone()
+        os._exit(1)
+
+    Thread(target=watch, daemon=True).start()
+
+
+def _begin() -> None:
+    """What a worker does first."""
+    parent = parent_process()
+    if parent is not None:
+        end_with(parent.join)
+    # Blocked while it started, see `_quiet_start`; without this the pool could not end it.
+    _mask("SIG_UNBLOCK", signal.SIGTERM)
+
+
+@contextmanager
+def _quiet_start() -> Iterator[None]:
+    """Processes started here use one thread, and leave an interrupt from the terminal to this one."""
+    with _environment(dict.fromkeys(_THREADS, "1")):
+        _mask("SIG_BLOCK", signal.SIGINT, signal.SIGTERM)
+        try:
+            yield
+        finally:
+            _mask("SIG_UNBLOCK", signal.SIGINT, signal.SIGTERM)
+
+
+@contextmanager
+def _environment(changes: Mapping[str, str]) -> Iterator[None]:
+    """Environment variables for what is started meanwhile."""
+    before = {name: os.environ.get(name) for name in changes}
+    os.environ.update(changes)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def _mask(how: str, *signals: signal.Signals) -> None:
+    """Change the signals that this thread, and what it starts, holds back; nothing on Windows."""
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(getattr(signal, how), signals)

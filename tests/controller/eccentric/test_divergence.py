@@ -1,0 +1,69 @@
+"""Runs whose sampled loops are unstable end with a status, and runs that would take for ever are refused."""
+
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from ringbalance.controller.eccentric_mass.document import eccentric_document
+from ringbalance.controller.eccentric_mass.run import simulate_eccentric
+from ringbalance.controller.eccentric_mass.sampled_loops import regulator_loop, speed_loop
+from ringbalance.controller.eccentric_mass.show import show_eccentric
+from ringbalance.scene import EccentricScene, SceneError, bundled_scene, load_scene
+
+
+@pytest.fixture(scope="module")
+def unlimited() -> EccentricScene:
+    """The small scene without its own weight, gain and voltage limit."""
+    scene = load_scene(bundled_scene("driven_masses_small"))
+    assert isinstance(scene, EccentricScene)
+    return replace(
+        scene,
+        lqr=replace(scene.lqr, state_weight=3.5),
+        motor=replace(scene.motor, maximum_voltage=None),
+        run=replace(scene.run, time_limit=4.0),
+    )
+
+
+def test_a_diverging_run_is_a_status_with_finite_numbers(unlimited: EccentricScene) -> None:
+    run = simulate_eccentric(unlimited)
+    assert run.outcome == "diverged"
+    assert not run.settled
+    assert run.time[-1] < 4.0
+    assert "lqr.state_weight = 3.5 to " in run.status
+    json.dumps(eccentric_document(run), allow_nan=False)
+    text = io.StringIO()
+    show_eccentric(run, console=Console(file=text))
+    assert np.all(np.isfinite(run.amplitude))
+
+
+def test_the_remedy_of_a_diverging_run_is_true(unlimited: EccentricScene) -> None:
+    weight = regulator_loop(unlimited).recommended
+    cured = replace(unlimited, lqr=replace(unlimited.lqr, state_weight=weight))
+    assert regulator_loop(cured).stable
+    assert simulate_eccentric(cured).outcome != "diverged"
+
+
+def test_sampled_poles_of_the_small_scene(unlimited: EccentricScene) -> None:
+    assert speed_loop(unlimited).radius == pytest.approx(1.34, abs=0.01)
+    gain = speed_loop(unlimited).recommended
+    half = replace(unlimited, friction_filter=replace(unlimited.friction_filter, speed_gain=2 * gain))
+    assert speed_loop(half).radius == pytest.approx(1.0)
+
+
+def test_a_plant_too_stiff_is_refused_with_key_and_limit(unlimited: EccentricScene) -> None:
+    stiff = replace(unlimited, rotor=replace(unlimited.rotor, stiffness=1.26e12))
+    long = replace(stiff, run=replace(stiff.run, time_limit=30.0))
+    with pytest.raises(SceneError, match=r"\[rotor\] stiffness = .* allowed: at most .* N/m"):
+        simulate_eccentric(long)
+
+
+def test_a_run_of_too_many_samples_is_refused(unlimited: EccentricScene) -> None:
+    long = replace(unlimited, run=replace(unlimited.run, time_limit=1e6))
+    with pytest.raises(SceneError, match="time_limit"):
+        simulate_eccentric(long)

@@ -1,0 +1,198 @@
+"""Damaged caches of compiled code, full and read-only disks, and signals during compiled calls."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from ringbalance.controller.compilation.compiled import code_root
+from ringbalance.scene import bundled_scene
+
+pytestmark = pytest.mark.faults
+
+PROGRAM = """
+import sys
+from typing import NamedTuple
+from ringbalance.controller.compilation.compiled import compiled
+
+class Pair(NamedTuple):
+    one: float
+    two: float
+
+def doubled(x):
+    return 2 * x
+
+def paired(x):
+    return Pair(x, 2 * x)
+
+fast, pairs = compiled(doubled), compiled(paired)
+assert fast(2.0) == 4.0 and fast(3) == 6
+assert pairs(2.0).two == 4.0
+print(sum(f.stats.cache_misses[s] for f in (fast, pairs) for s in f.stats.cache_misses))
+"""
+LOOP = (
+    PROGRAM
+    + """
+print("ready", flush=True)
+while True:
+    pairs(1.0)
+"""
+)
+
+
+def _kept(path: Path) -> list[Path]:
+    return sorted(p for p in path.rglob("*") if p.suffix in {".nbi", ".nbc"})
+
+
+def _program(tmp_path: Path, text: str = PROGRAM) -> list[str]:
+    script = tmp_path / "program.py"
+    script.write_text(text)
+    return [sys.executable, str(script)]
+
+
+def _misses(tmp_path: Path, cache: Path) -> int:
+    """Signatures that had to be compiled."""
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
+    done = subprocess.run(
+        _program(tmp_path), env=environment, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+    return int(done.stdout.split()[-1])
+
+
+DAMAGE = (
+    PROGRAM
+    + """
+import random, shutil
+from pathlib import Path
+from ringbalance.controller.compilation.compiled import code_root
+
+def flip(path):
+    content = bytearray(path.read_bytes())
+    content[number.randrange(len(content))] ^= 1 << number.randrange(8)
+    path.write_bytes(content)
+
+def folder(path):
+    path.unlink()
+    path.mkdir()
+    (path / "inside").write_text("something")
+
+def misses():
+    one, two = compiled(doubled), compiled(paired)
+    assert one(2.0) == 4.0 and one(3) == 6 and two(2.0).two == 4.0
+    return sum(sum(f.stats.cache_misses.values()) for f in (one, two))
+
+damages = {
+    "empty": lambda path: path.write_bytes(b""),
+    "half": lambda path: path.write_bytes(path.read_bytes()[: path.stat().st_size // 2]),
+    "garbage": lambda path: path.write_bytes(number.randbytes(5000)),
+    "flipped": flip,
+    "folder": folder,
+    "pickled number": lambda path: path.write_bytes(b"\\x80\\x04K\\x01."),
+    "gone": lambda path: path.unlink(),
+    "not to be read": lambda path: path.chmod(0),
+    "longer": lambda path: path.write_bytes(path.read_bytes() + b"x"),
+    "text": lambda path: path.write_text("not a cache"),
+    "link to nothing": lambda path: (path.unlink(), path.symlink_to("nothing")),
+    "no checksum": lambda path: path.write_bytes(path.read_bytes()[32:]),
+}
+number = random.Random(12)
+assert misses() == 0
+for name, damage in damages.items():
+    for suffix in ("nbi", "nbc"):
+        damage(number.choice(sorted(p for p in code_root().rglob(f"*.{suffix}") if p.is_file())))
+        misses()
+        assert misses() == 0, (name, suffix)
+shutil.rmtree(code_root())
+assert misses() == 3 and misses() == 0
+"""
+)
+
+
+def test_whatever_is_damaged_is_compiled_again_once(tmp_path: Path) -> None:
+    done = subprocess.run(
+        _program(tmp_path, DAMAGE),
+        env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_two_programs_share_a_damaged_cache(tmp_path: Path) -> None:
+    cache = tmp_path / "cache"
+    _misses(tmp_path, cache)
+    for path in _kept(cache):
+        path.write_bytes(b"")
+    command, environment = _program(tmp_path), {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
+    both = [subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL) for _ in range(2)]
+    assert [one.wait(timeout=120) for one in both] == [0, 0]
+    _misses(tmp_path, cache)
+    assert _misses(tmp_path, cache) == 0
+
+
+def test_a_full_disk_is_no_obstacle(tmp_path: Path) -> None:
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=8k", "none", str(disk)]
+    if shutil.which("mount") is None or subprocess.run(mount, capture_output=True, check=False).returncode:
+        pytest.skip("mounting is not permitted here")
+    try:
+        assert _misses(tmp_path, disk) == 3
+    finally:
+        subprocess.run(["umount", str(disk)], check=True)
+
+
+def test_ctrl_c_between_compiled_calls_is_an_interruption(tmp_path: Path) -> None:
+    for attempt in range(3):
+        with subprocess.Popen(
+            _program(tmp_path, LOOP),
+            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        ) as running:
+            assert running.stdout is not None
+            while running.stdout.readline() not in {"ready\n", ""}:
+                pass
+            time.sleep(0.05 * attempt)
+            running.send_signal(signal.SIGINT)
+            # Python's own end after a KeyboardInterrupt; a segmentation fault would be SIGSEGV.
+            assert running.wait(timeout=60) == -signal.SIGINT
+
+
+def test_a_real_run_survives_a_damaged_cache_and_ctrl_c(tmp_path: Path) -> None:
+    text = bundled_scene("driven_masses_small").read_text()
+    scene = tmp_path / "scene.toml"
+    scene.write_text(text.replace('time_limit = "30 s"', 'time_limit = "3 s"'))
+    command = [sys.executable, "-c", "import ringbalance.cli as c; raise SystemExit(c.main())", "simulate"]
+    done = subprocess.run([*command, str(scene), "--json"], capture_output=True, timeout=900, check=False)
+    assert done.returncode == 1
+    assert json.loads(done.stdout)["outcome"] == "time_limit"
+    # A copy of what that run found or left: to compile everything once more would take a minute.
+    folder = tmp_path / "cache"
+    shutil.copytree(code_root(), folder / "ringbalance")
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder)}
+    for path in folder.rglob("run_loop.measure*.nbi"):
+        path.write_bytes(b"")
+    again = subprocess.run(
+        [*command, str(scene), "--json"], env=environment, capture_output=True, timeout=900, check=False
+    )
+    assert again.returncode == 1
+    assert again.stdout == done.stdout
+    scene.write_text(text.replace('time_limit = "30 s"', 'time_limit = "200 s"'))
+    running = subprocess.Popen([*command, str(scene)], env=environment, stderr=subprocess.DEVNULL)
+    time.sleep(8)
+    running.send_signal(signal.SIGINT)
+    assert running.wait(timeout=60) == 130

@@ -1,0 +1,65 @@
+"""The source distribution holds what git holds, and its tests run from it."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import tarfile
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.faults
+
+ROOT = Path(__file__).resolve().parents[2]
+BUILD = "import sys; from setuptools import build_meta; build_meta.build_sdist(sys.argv[1])"
+ADDED = {"PKG-INFO", "setup.cfg"}
+"""What setuptools writes itself, beside the egg-info folder."""
+
+
+@pytest.fixture(scope="module")
+def files() -> list[Path]:
+    """Files that git tracks or would track, relative to the root; links to folders are left out."""
+    command = [
+        "git",
+        "-c",
+        "safe.directory=*",
+        "ls-files",
+        "--cached",
+        "--others",
+        "--exclude-standard",
+        "-z",
+    ]
+    listing = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    if listing.returncode != 0:
+        pytest.skip(f"not a git checkout: {listing.stderr.strip()}")
+    return sorted(Path(name) for name in set(listing.stdout.split("\0")) if name and (ROOT / name).is_file())
+
+
+@pytest.fixture(scope="module")
+def unpacked(files: list[Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The source distribution of a copy of the checkout, which no earlier build has touched."""
+    folder = tmp_path_factory.mktemp("sdist")
+    checkout = folder / "checkout"
+    for path in files:
+        (checkout / path).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / path, checkout / path)
+    subprocess.run([sys.executable, "-c", BUILD, folder], cwd=checkout, check=True, capture_output=True)
+    (archive,) = folder.glob("*.tar.gz")
+    with tarfile.open(archive) as tar:
+        tar.extractall(folder, filter="data")
+    return folder / archive.name.removesuffix(".tar.gz")
+
+
+def test_it_holds_what_git_holds(files: list[Path], unpacked: Path) -> None:
+    held = {path.relative_to(unpacked) for path in unpacked.rglob("*") if path.is_file()}
+    own = {path for path in held if path.parts[0] in ADDED or path.parts[0].endswith(".egg-info")}
+    assert sorted(held - own) == files
+
+
+def test_its_tests_run(unpacked: Path) -> None:
+    tests = ("test_packaging.py", "test_sizes.py")
+    command = [sys.executable, "-m", "pytest", "-q", *(f"tests/architecture/{name}" for name in tests)]
+    result = subprocess.run(command, cwd=unpacked, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stdout

@@ -1,0 +1,61 @@
+"""Terms are chosen by their estimate against the tolerance, and what is missing says so."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+from ringbalance.reduced_model.calibration import Calibration
+from ringbalance.reduced_model.selection.registry import LEFT_OUT, ModelUsed, models_used
+from ringbalance.reduced_model.time_scales import first_gas_time
+from ringbalance.scene.models import Scene
+
+INERTIA = "rho L du/dt of the liquid in the tube, in injections"
+
+
+def chosen(scene: Scene) -> dict[str, ModelUsed]:
+    return {used.term: used for used in models_used(scene)}
+
+
+def test_every_term_says_model_and_reason(table_1_calibration: Calibration) -> None:
+    assert (
+        len({t.term for t in table_1_calibration.models_used}) == len(table_1_calibration.models_used) >= 10
+    )
+    assert all(t.model and t.why for t in table_1_calibration.models_used)
+
+
+@pytest.mark.parametrize(("tolerance", "model"), [(0.9, LEFT_OUT), (0.01, INERTIA)])
+def test_tolerance_decides_on_the_tubes_inertia(table_1_scene: Scene, tolerance: float, model: str) -> None:
+    scene = dataclasses.replace(table_1_scene, tolerance=tolerance)
+    assert chosen(scene)["tube inertia"].model == model
+
+
+def test_valve_and_filling_are_unknown_until_the_scene_asks(table_1_scene: Scene) -> None:
+    silent = chosen(table_1_scene)
+    assert silent["valve lag"].estimated_contribution is None
+    assert silent["gas filling"].estimated_contribution is None
+    gas = dataclasses.replace(
+        table_1_scene.gas, valve_lag=0.1, conductance=1e-8, critical_ratio=0.3, dead_volume=1e-5
+    )
+    asked = chosen(dataclasses.replace(table_1_scene, gas=gas))
+    assert asked["valve lag"].estimated_contribution == 1.0
+    assert asked["valve lag"].model == "pure delay, in injections"
+    assert asked["gas filling"].estimated_contribution is not None
+
+
+def test_first_gas_time_follows_the_controller(table_1_scene: Scene) -> None:
+    assert first_gas_time(table_1_scene) == pytest.approx(0.8)
+    short = dataclasses.replace(table_1_scene.controller, maximum_gas_time=0.3)
+    assert first_gas_time(dataclasses.replace(table_1_scene, controller=short)) == 0.3
+    trial = dataclasses.replace(table_1_scene.controller, kind="trial")
+    assert first_gas_time(dataclasses.replace(table_1_scene, controller=trial)) == 0.1
+
+
+def test_prescribed_k_and_blocked_tubes_have_no_rotation_fraction(table_1_scene: Scene) -> None:
+    tube = dataclasses.replace(table_1_scene.tube, drag_coefficient=50.0)
+    fixed = chosen(dataclasses.replace(table_1_scene, tube=tube))
+    assert fixed["friction by rotation"].model == LEFT_OUT
+    weak = dataclasses.replace(table_1_scene, gas=dataclasses.replace(table_1_scene.gas, pressure=1e3))
+    blocked = chosen(weak)
+    assert blocked["friction by rotation"].estimated_contribution is None

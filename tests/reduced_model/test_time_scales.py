@@ -1,0 +1,120 @@
+"""Each time scale against the differential equation that it comes from, solved by scipy."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Literal
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from ringbalance.reduced_model.time_scales import (
+    deciding_gas_time,
+    filling_time,
+    long_start_up_loss,
+    start_up_loss,
+    start_up_time,
+    venting_time,
+)
+from ringbalance.scene.models import Gas, Scene
+
+GAS = Gas(
+    pressure=0.7e6,
+    ambient_pressure=101325.0,
+    temperature=313.15,
+    conductance=1e-8,
+    critical_ratio=0.3,
+    dead_volume=0.0,
+    valve_lag=None,
+    process="isothermal",
+)
+VOLUME = 51e-6
+
+
+def moved(gas_time: float, *, power: int) -> float:
+    """Fraction of u0 T that a column loses whose drag grows with a power of the velocity, tau = 3 ms."""
+    tau = 3e-3
+    path = solve_ivp(
+        lambda _, y: [(1 - y[0] ** power) / tau, y[0]], (0, gas_time), [0.0, 0.0], rtol=1e-10, atol=1e-12
+    )
+    return 1 - float(path.y[1, -1]) / gas_time
+
+
+@pytest.mark.parametrize("gas_time", [1e-4, 2e-3, 4e-3, 0.8])
+@pytest.mark.parametrize(("power", "laminar"), [(2, 0.0), (1, 1.0)])
+def test_start_up_loss_is_that_of_the_column(gas_time: float, power: int, laminar: float) -> None:
+    lost = start_up_loss(start_up=3e-3, gas_time=gas_time, laminar=laminar)
+    assert lost == pytest.approx(moved(gas_time, power=power), rel=1e-6)
+    assert 0 < lost < 1
+
+
+def test_a_long_injection_loses_tau_ln_2() -> None:
+    tau, long = 3e-3, 30.0
+    assert start_up_loss(start_up=tau, gas_time=long) * long == pytest.approx(tau * math.log(2), rel=1e-9)
+    assert long_start_up_loss(tau) == pytest.approx(tau * math.log(2))
+    assert long_start_up_loss(tau, laminar=1.0) == tau
+
+
+def test_both_forms_of_the_start_up_time_agree() -> None:
+    """2 L/((k + 1) u) is rho L u/p, because p = (k + 1) rho u^2/2."""
+    rho, length, k, pressure = 1000.0, 0.12, 3.53, 0.7e6
+    u = math.sqrt(2 * pressure / rho / (k + 1))
+    tau = start_up_time(density=rho, length=length, velocity=u, driving_pressure=pressure)
+    assert tau == pytest.approx(2 * length / ((k + 1) * u))
+
+
+def rate(upstream: float, downstream: float) -> float:
+    """dp/dt of isothermal gas behind an ISO 6358 line, by hand."""
+    b, ratio = 0.3, downstream / upstream
+    choked = 1.0 if ratio <= b else math.sqrt(max(1 - ((ratio - b) / (1 - b)) ** 2, 0.0))
+    mass_flow = 1e-8 * upstream * 1e5 / (287.0 * 293.15) * math.sqrt(293.15 / 313.15) * choked
+    return mass_flow * 287.0 * 313.15 / VOLUME
+
+
+def test_filling_time_is_that_of_the_choked_line() -> None:
+    time = filling_time(GAS, volume=VOLUME)
+    assert time is not None
+    supply = GAS.pressure + GAS.ambient_pressure
+    assert GAS.pressure / rate(supply, GAS.ambient_pressure) == pytest.approx(time)
+
+
+@pytest.mark.parametrize("pressure", [0.7e6, 0.05e6])
+def test_venting_time_is_that_of_the_line(pressure: float) -> None:
+    gas = dataclasses.replace(GAS, pressure=pressure)
+    time = venting_time(gas, volume=VOLUME)
+    assert time is not None
+    ambient = gas.ambient_pressure
+    path = solve_ivp(
+        lambda _, p: [-rate(max(p[0], ambient), ambient)],
+        (0, 2 * time),
+        [ambient + pressure],
+        rtol=1e-9,
+        atol=1.0,
+        max_step=time / 200,
+    )
+    reached = path.t[int(np.argmax(path.y[0] <= ambient * (1 + 1e-5)))]
+    assert reached == pytest.approx(time, rel=1e-2)
+
+
+def test_without_a_line_there_is_no_time() -> None:
+    without = dataclasses.replace(GAS, conductance=None, critical_ratio=None)
+    assert filling_time(without, volume=VOLUME) is None
+    assert venting_time(without, volume=VOLUME) is None
+
+
+def test_the_deciding_injection_is_the_one_at_the_limit(table_1_scene: Scene) -> None:
+    """0.08 s/um times 0.05 um; the trial's short step; the limit over the rate."""
+    control = table_1_scene.controller
+    kinds: dict[Literal["target_vector", "law_based"], float] = {
+        "target_vector": 4e-3,
+        "law_based": 0.05 / 7.2,
+    }
+    for kind, expected in kinds.items():
+        scene = dataclasses.replace(table_1_scene, controller=dataclasses.replace(control, kind=kind))
+        assert deciding_gas_time(scene, rate=7.2e-6) == pytest.approx(expected)
+    trial = dataclasses.replace(table_1_scene, controller=dataclasses.replace(control, kind="trial"))
+    assert deciding_gas_time(trial, rate=7.2e-6) == control.short_step
+    slow = dataclasses.replace(control, minimum_gas_time=0.02)
+    assert deciding_gas_time(dataclasses.replace(table_1_scene, controller=slow), rate=0.0) == 0.02

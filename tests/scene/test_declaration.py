@@ -1,0 +1,134 @@
+"""One declaration in a record's field is enough: reading, defaults, errors and reference follow from it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Annotated, Any, Literal
+
+import pytest
+import scene_reference
+
+from ringbalance.scene import Fault, bundled_scene, liquid_ring_scene, load_scene, scene_table
+from ringbalance.scene.keys.declaration import (
+    UNCERTAIN,
+    derived,
+    descriptions_of,
+    keys_of,
+    listed,
+    needed,
+    shown,
+    standard,
+    unused,
+)
+from ringbalance.scene.keys.defaults import completed
+from ringbalance.scene.keys.quantities import Length, PositiveLength
+from ringbalance.scene.keys.reading import Reading, read_document
+from ringbalance.scene.keys.requirements import missing_faults
+from ringbalance.scene.keys.schema import LIQUID_RING, Schema, Table
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hole:
+    """A hole in a plate."""
+
+    radius: Annotated[PositiveLength, needed("of the hole")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plate:
+    """A plate."""
+
+    width: Annotated[PositiveLength, needed("along the shaft"), UNCERTAIN, shown("width w", "mm")]
+    kind: Annotated[Literal["flat", "bent"], standard("flat", "shape")]
+    rim: Annotated[Length | None, unused("no rim", "height of the rim"), shown("rim", "mm", absent="none")]
+    depth: Annotated[Length, derived("twice the width", "depth", lambda width: 2 * width, "plate.width")]
+    holes: Annotated[tuple[Hole, ...], standard([], "list of { radius }"), listed('[{ radius = "1 mm" }]')]
+    mass: float
+    """No key, kg."""
+
+
+SCHEMA = Schema(top={}, tables={"plate": Table(text="a plate", keys=keys_of(Plate), record=Plate)})
+
+
+def _read(**plate: Any) -> tuple[Reading, tuple[Fault, ...]]:
+    reading, faults = read_document({"plate": plate}, file="plate.toml", schema=SCHEMA)
+    reading = completed(reading)
+    return reading, (*faults, *missing_faults(reading))
+
+
+def _plate(reading: Reading) -> Mapping[str, Any]:
+    return {field.name: reading.values.get(f"plate.{field.name}") for field in fields(Plate)}
+
+
+def test_values_and_defaults() -> None:
+    reading, faults = _read(width="2 mm", holes=[{"radius": "1 mm"}])
+    assert faults == ()
+    assert _plate(reading) == {
+        "width": 2e-3,
+        "kind": "flat",
+        "rim": None,
+        "depth": 4e-3,
+        "holes": (Hole(radius=1e-3),),
+        "mass": None,
+    }
+
+
+@pytest.mark.parametrize(
+    ("plate", "message"),
+    [
+        ({}, "[plate] width is missing: every scene needs it; allowed: a length above 0"),
+        ({"width": "0 mm"}, '[plate] width = "0 mm": it must be above 0; allowed: a length above 0'),
+        ({"width": "1 mm", "kind": "flatt"}, '(did you mean "flat"?); allowed: "flat" or "bent"'),
+        (
+            {"widht": "1 mm"},
+            '[plate] widht = "1 mm": unknown key (did you mean "width"?); allowed: width, kind',
+        ),
+        ({"width": "1 mm", "holes": 3}, "[plate] holes = 3: it is not a list"),
+        ({"width": "1 mm", "holes": [{}]}, "[plate] holes[1].radius is missing: it is needed here"),
+        ({"width": "1 mm", "mass": 2}, "[plate] mass = 2: unknown key"),
+    ],
+)
+def test_errors(plate: dict[str, Any], message: str) -> None:
+    (fault,) = _read(**plate)[1]
+    assert message in str(fault)
+
+
+def test_reference() -> None:
+    assert scene_reference.rows(keys_of(Plate))[1:] == [
+        "| `width` | a length above 0 | **needed** | along the shaft |",
+        '| `kind` | "flat" or "bent" | `"flat"` | shape |',
+        "| `rim` | a length of at least 0 | no rim | height of the rim |",
+        "| `depth` | a length of at least 0 | twice the width | depth |",
+        "| `holes` | a list of tables | `[]` | list of { radius } |",
+    ]
+
+
+def test_what_else_follows() -> None:
+    assert [name for name, key in keys_of(Plate).items() if key.uncertain] == ["width"]
+    assert list(descriptions_of(Plate)) == ["width", "rim"]
+
+
+def test_a_field_that_declares_no_values_is_refused() -> None:
+    @dataclass(frozen=True, kw_only=True)
+    class Unread:
+        size: Annotated[complex, needed("of no reader")]
+
+    with pytest.raises(TypeError, match="does not declare what its key takes"):
+        keys_of(Unread)
+
+
+def test_every_description_of_a_scene_reaches_its_table() -> None:
+    """Each described field gives one row, unless it is absent or belongs to another algorithm."""
+    scene = liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper")))
+    trial = replace(scene, controller=replace(scene.controller, kind="trial"))
+    names = {
+        entry.name
+        for table in LIQUID_RING.tables.values()
+        if table.record is not None
+        for entry in descriptions_of(table.record).values()
+    }
+    described = {row.quantity for row in scene_table(trial)}
+    optional = {"critical pressure ratio b", "dead volume", "valve lag"}
+    assert names - described <= optional
+    assert described - names == {"tolerance"}

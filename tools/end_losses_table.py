@@ -1,0 +1,178 @@
+"""Table of the laminar end losses: `python tools/end_losses_table.py`.
+
+Each end is one path in Re, followed on every mesh.  A finished path is one file, so a stopped run resumes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import sys
+from concurrent.futures import Executor, as_completed
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.progress import Progress
+
+from ringbalance.physics.convergence.grid import gci
+from ringbalance.physics.navier_stokes.continuation import StepRule, follow
+from ringbalance.physics.navier_stokes.end_losses import (
+    End,
+    EndMesh,
+    end_loss_times_reynolds,
+    end_system,
+    solve_end,
+)
+from ringbalance.physics.navier_stokes.newton import FlowSolution, FlowSystem, NewtonSettings
+from ringbalance.scene.platform.files import write_whole
+from ringbalance.scene.platform.processes import Workers
+
+ENDS: tuple[End, End] = ("entrance", "exit")
+REYNOLDS_SCALE, REYNOLDS_LIMIT = 5.0, 2000.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class EndSettings:
+    """All that the table of end losses depends on."""
+
+    nodes: int = 30
+    """Reynolds numbers from 0 to the limit, evenly spaced in ln(1 + Re/5)."""
+    checks: tuple[int, ...] = (0, 4, 8, 12, 16, 20, 24, 28)
+    """Intervals between nodes with a further point half-way."""
+    cells_per_fold: tuple[float, ...] = (1.8, 2.4, 3.2)
+    edge_cell: float = 1e-4
+    reservoir: float = 40.0
+    entrance_tube: float = 300.0
+    exit_tube: float = 6.0
+    exit_jet_cell: float = 2.0
+    formal_order: float = 4.0
+
+    def points(self) -> list[tuple[str, float]]:
+        """Kind, "node" or "check", and ln(1 + Re/5) of all points, in rising order."""
+        nodes = np.round(np.linspace(0.0, np.log1p(REYNOLDS_LIMIT / REYNOLDS_SCALE), self.nodes), 12)
+        found = [("node", float(a)) for a in nodes]
+        found += [("check", float((nodes[i] + nodes[i + 1]) / 2)) for i in self.checks]
+        return sorted(found, key=lambda point: point[1])
+
+    def mesh(self, end: End, level: int) -> EndMesh:
+        """Mesh of an end.
+
+        Args: `end`: "entrance" or "exit". `level`: 0 is the coarsest.
+        Returns: Its domain and grading.
+        """
+        return EndMesh(
+            cells_per_fold=self.cells_per_fold[level],
+            edge_cell=self.edge_cell,
+            reservoir=self.reservoir,
+            tube=self.entrance_tube if end == "entrance" else self.exit_tube,
+            jet_cell=6.0 if end == "entrance" else self.exit_jet_cell,
+        )
+
+
+def _solve(system: FlowSystem, a: float, start: FlowSolution | None) -> FlowSolution:
+    reynolds = REYNOLDS_SCALE * float(np.expm1(a))
+    newton = NewtonSettings(max_iterations=12, tolerance=1e-8)
+    return solve_end(system=system, reynolds=reynolds, start=start, settings=newton)
+
+
+def run_path(*, end: End, level: int, settings: EndSettings, points: list[float]) -> list[float]:
+    """K Re of one end on one mesh.
+
+    Args: `end`: "entrance" or "exit". `level`: of the mesh, 0 is the coarsest. `settings`: of the table.
+        `points`: ln(1 + Re/5), rising, the first 0.
+    Returns: K Re at the points.
+    Raises: ArithmeticError: a point could not be reached; the text says which.
+    """
+    cells = settings.mesh(end, level)
+    system = end_system(cells=cells, end=end)
+    flow = _solve(system, 0.0, None)
+    path = follow(
+        solve=partial(_solve, system),
+        start=flow,
+        start_at=0.0,
+        targets=points[1:],
+        rule=StepRule(first=1.0, smallest=0.01),
+    )
+    if not path.status.ok:
+        raise ArithmeticError(f"{end}, level {level}: {path.status.text}")
+    flows = [flow, *path.solutions]
+    return [end_loss_times_reynolds(system=system, solution=f, end=end, cells=cells) for f in flows]
+
+
+def _run_to_file(end: End, level: int, settings: EndSettings, folder: Path) -> None:
+    points = [a for _, a in settings.points()]
+    values = run_path(end=end, level=level, settings=settings, points=points)
+    write_whole(folder / f"{end}_{level}.json", json.dumps(values))
+
+
+def table_text(*, folder: Path, settings: EndSettings) -> str:
+    """The table as CSV with its header, from the files of the paths."""
+    levels = range(len(settings.cells_per_fold))
+    sizes = [1 / c for c in reversed(settings.cells_per_fold)]
+    rows = ["end,kind,a,coarse,medium,fine,uncertainty"]
+    for end in ENDS:
+        runs = [json.loads((folder / f"{end}_{level}.json").read_text(encoding="utf-8")) for level in levels]
+        for (kind, a), values in zip(settings.points(), zip(*runs, strict=True), strict=True):
+            found = gci(
+                values=list(values)[::-1], sizes=sizes, formal_order=settings.formal_order, round_off=1e-6
+            )
+            rows.append(f"{end},{kind},{a!r},{','.join(f'{v:.7f}' for v in values)},{found.uncertainty:.3e}")
+    body = "\n".join(rows) + "\n"
+    plain = json.dumps(asdict(settings), sort_keys=True)
+    head = [
+        "K Re of a tube's sharp-edged ends in laminar flow, a = ln(1 + Re/5), by finite elements",
+        "(axisymmetric) on three meshes; uncertainty: 95 % half-width of the fine value (GCI).",
+        "K_ent and K_exit are static pressure differences over rho U^2/2, beyond developed friction.",
+        "Computed by: python tools/end_losses_table.py",
+        f"settings: {plain}",
+        f"settings_sha256: {hashlib.sha256(plain.encode()).hexdigest()}",
+        f"data_sha256: {hashlib.sha256(body.encode()).hexdigest()}",
+    ]
+    return "".join(f"# {line}\n" for line in head) + body
+
+
+def generate(*, folder: Path, settings: EndSettings, executor: Executor) -> None:
+    """Follow all paths that have no file yet, with progress on standard error.
+
+    Args: `settings`: of the table. `executor`: of any kind, such as a process pool.
+    """
+    levels = reversed(range(len(settings.cells_per_fold)))
+    jobs = [(end, level) for level in levels for end in ENDS]
+    missing = [job for job in jobs if not (folder / f"{job[0]}_{job[1]}.json").exists()]
+    with Progress(console=Console(file=sys.stderr)) as progress:
+        bar = progress.add_task("end losses", total=len(jobs), completed=len(jobs) - len(missing))
+        futures = [executor.submit(_run_to_file, end, level, settings, folder) for end, level in missing]
+        for future in as_completed(futures):
+            future.result()
+            progress.advance(bar)
+
+
+def main() -> int:
+    """Compute the table and write it. Returns: Exit code 0."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument(
+        "--points", type=Path, default=Path("out/end_losses"), help="folder of finished paths"
+    )
+    parser.add_argument(
+        "--table",
+        type=Path,
+        default=Path(__file__).resolve().parents[1] / "physics" / "data" / "end_losses.csv",
+    )
+    parser.add_argument("--workers", type=int, default=2)
+    arguments = parser.parse_args()
+    settings = EndSettings()
+    digest = hashlib.sha256(json.dumps(asdict(settings), sort_keys=True).encode()).hexdigest()
+    folder = arguments.points / digest[:12]
+    folder.mkdir(parents=True, exist_ok=True)
+    with Workers(arguments.workers) as executor:
+        generate(folder=folder, settings=settings, executor=executor)
+    write_whole(arguments.table, table_text(folder=folder, settings=settings))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,77 @@
+"""Runs `make test-short` under every further supported Python of this machine.
+
+    .venv/bin/python tools/other_pythons.py
+
+Supported is what pyproject.toml's requires-python says.  Python is looked for as `python3.X` on the search
+path and among the versions of pyenv; one that does not start, or has no venv, does not count.  The Python
+that runs this is left out, since `make test` has used it.  Each gets an environment of its own, `.venv-3.X`.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from packaging.specifiers import SpecifierSet
+
+ROOT = Path(__file__).resolve().parents[1]
+_ASK = "import sys, ensurepip, venv; print('%d.%d' % sys.version_info[:2])"
+
+
+def supported(requires_python: str) -> list[str]:
+    """Minor versions that a specifier allows, such as "3.11"."""
+    allowed = SpecifierSet(requires_python)
+    return [f"3.{minor}" for minor in range(100) if f"3.{minor}.0" in allowed]
+
+
+def starts(python: Path, version: str) -> bool:
+    """Whether this is an interpreter of that minor version which runs and can make environments."""
+    try:
+        answer = subprocess.run([python, "-c", _ASK], capture_output=True, text=True, timeout=60, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+    return answer.returncode == 0 and answer.stdout.strip() == version
+
+
+def candidates(version: str) -> Iterator[Path]:
+    """Where an interpreter of a minor version may be."""
+    for folder in filter(None, os.environ.get("PATH", "").split(os.pathsep)):
+        yield Path(folder) / f"python{version}"
+    pyenv = Path(os.environ.get("PYENV_ROOT") or Path.home() / ".pyenv")
+    yield from sorted((pyenv / "versions").glob(f"{version}.*/bin/python"), reverse=True)
+
+
+def interpreters(versions: Sequence[str]) -> dict[str, Path | None]:
+    """The first interpreter of each minor version that starts; None where there is none."""
+    return {
+        version: next(
+            (path for path in candidates(version) if path.is_file() and starts(path, version)), None
+        )
+        for version in versions
+    }
+
+
+def main() -> int:
+    """Test under each further interpreter; the first that fails ends it."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    running = f"3.{sys.version_info.minor}"
+    versions = supported(project["requires-python"])
+    others = interpreters([version for version in versions if version != running])
+    for version, python in others.items():
+        print(f"Python {version}: {python or 'not on this machine, not tested'}", flush=True)
+    for version, python in others.items():
+        if python is not None:
+            command = ["make", "test-short", f"VENV=.venv-{version}", f"PYTHON={python}"]
+            code = subprocess.run(command, cwd=ROOT, stdin=subprocess.DEVNULL, check=False).returncode
+            if code != 0:
+                print(f"The tests fail under Python {version} ({python}).", file=sys.stderr)
+                return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,254 @@
+"""Friction table of the rotating tube: `python tools/rotating_friction_table.py`.
+
+Each column of a rectangle is one path, followed on the medium mesh from slow rotation upwards; every point of
+it is then solved on the other meshes, starting from that flow.  A finished point is one file: a stopped run
+resumes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import sys
+from collections.abc import Sequence
+from concurrent.futures import Executor, Future, wait
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import MofNCompleteColumn, Progress, TimeElapsedColumn
+
+from ringbalance.physics.convergence.grid import gci
+from ringbalance.physics.navier_stokes.continuation import StepRule, follow
+from ringbalance.physics.navier_stokes.newton import FlowSolution, FlowSystem, NewtonSettings
+from ringbalance.physics.navier_stokes.rotating_section import (
+    SectionMesh,
+    friction_ratio,
+    section_system,
+    solve_section,
+    solve_section_without_inertia,
+)
+from ringbalance.physics.navier_stokes.transfer import transfer
+from ringbalance.physics.tube.rotation_grid import TableSettings, fast_pair, slow_pair, table_settings
+from ringbalance.scene.platform.files import write_whole
+from ringbalance.scene.platform.processes import Workers
+
+COLUMNS = ("table", "a", "b", "coarse", "medium", "fine", "uncertainty")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Column:
+    """One path: a rectangle's column b with its points a."""
+
+    table: str
+    """Name of the rectangle, "slow" or "fast", with "_check" for points between nodes."""
+    b: float
+    points: tuple[float, ...]
+
+
+def columns(settings: TableSettings) -> tuple[Column, ...]:
+    """All paths of the table and of its checks between nodes, the longest first."""
+    slow = [Column(table="slow", b=b, points=settings.slow_a[1:]) for b in settings.slow_b]
+    fast = [Column(table="fast", b=b, points=settings.fast_a[1:]) for b in settings.fast_b]
+    checks = [_between("slow_check", settings.slow_a, settings.slow_b, j) for j in (0, 2, 5, 9)]
+    checks += [_between("fast_check", settings.fast_a, settings.fast_b, j) for j in (0, 3)]
+    return (*slow, *fast, *checks)
+
+
+def _between(table: str, first: Sequence[float], second: Sequence[float], index: int) -> Column:
+    """Points half-way between nodes, every second one, on a path half-way between columns."""
+    middles = [(low + high) / 2 for low, high in pairwise(first)]
+    return Column(
+        table=table, b=(second[index] + second[index + 1]) / 2, points=tuple(middles[index % 2 :: 2])
+    )
+
+
+def solve_point(
+    *,
+    table: str,
+    a: float,
+    b: float,
+    system: FlowSystem,
+    start: FlowSolution | None,
+    settings: NewtonSettings,
+) -> FlowSolution:
+    """Flow at one point of a rectangle.
+
+    Args: `table`: name of the rectangle. `a`: first coordinate. `b`: second coordinate. `system`: of the
+        section. `start`: a neighbouring flow on the same mesh. `settings`: of Newton's method.
+    """
+    if table.startswith("slow"):
+        kl, s = slow_pair(a, b)
+        return solve_section(system=system, kl=kl, s=s, start=start, settings=settings)
+    rotation, inverse_s = fast_pair(a, b)
+    if inverse_s == 0.0:
+        return solve_section_without_inertia(system=system, rotation_reynolds=rotation)
+    kl = rotation**2 * inverse_s
+    return solve_section(system=system, kl=kl, s=1 / inverse_s, start=start, settings=settings)
+
+
+def systems(settings: TableSettings) -> list[FlowSystem]:
+    """Discrete sections of all meshes, coarse to fine."""
+    meshes = [
+        SectionMesh(around=n, across=3 * n // 2, wall_ratio=settings.wall_ratio) for n in settings.around
+    ]
+    return [section_system(cells=mesh) for mesh in meshes]
+
+
+def _all_values(
+    column: Column, a: float, flow: FlowSolution, meshes: list[FlowSystem], settings: TableSettings
+) -> list[float]:
+    """Friction ratios on all meshes, coarse to fine, from the flow on the path's mesh."""
+    newton = NewtonSettings(tolerance=settings.newton_tolerance, max_iterations=30)
+    values = []
+    for level, mesh in enumerate(meshes):
+        found = flow
+        if level != settings.path_level:
+            moved = transfer(source=meshes[settings.path_level], solution=flow, target=mesh)
+            start = replace(flow, vector=moved)
+            found = solve_point(
+                table=column.table, a=a, b=column.b, system=mesh, start=start, settings=newton
+            )
+        if not found.status.ok:
+            raise ArithmeticError(f"{column.table} a = {a}, b = {column.b}: {found.status.text}")
+        values.append(friction_ratio(found))
+    return values
+
+
+def _point_file(folder: Path, column: Column, a: float) -> Path:
+    return folder / f"{column.table}_{column.b:.12f}_{a:.12f}.json"
+
+
+def run_column(*, column: Column, folder: Path, settings: TableSettings) -> int:
+    """Solve the points of one path that have no file yet.
+
+    Returns: Number of points solved on all meshes.
+    Raises: ArithmeticError: a point could not be reached; the text says which.
+    """
+    if all(_point_file(folder, column, a).exists() for a in column.points):
+        return 0
+    meshes, done = systems(settings), 0
+    for a, flow in zip(column.points, _path(column, meshes[settings.path_level], settings), strict=True):
+        if not _point_file(folder, column, a).exists():
+            values = _all_values(column, a, flow, meshes, settings)
+            write_whole(_point_file(folder, column, a), json.dumps(values))
+            done += 1
+    return done
+
+
+def _path(column: Column, system: FlowSystem, settings: TableSettings) -> list[FlowSolution]:
+    """Flows at the column's points on one mesh, in short steps where further branches exist."""
+    newton = NewtonSettings(max_iterations=12)
+    solve = partial(_solve_at, column, system, newton)
+    easy = [a for a in column.points if _kl(column, a) <= settings.branch_kl]
+    hard = [a for a in column.points if _kl(column, a) > settings.branch_kl]
+    short = StepRule(first=settings.branch_step, largest=settings.branch_step, smallest=0.002)
+    flows: list[FlowSolution] = []
+    at, flow = 0.01, solve(0.01, None)
+    for targets, rule in ((easy, StepRule(first=0.5, smallest=0.01)), (hard, short)):
+        path = follow(solve=solve, start=flow, start_at=at, targets=targets, rule=rule)
+        if not path.status.ok:
+            raise ArithmeticError(f"{column.table} b = {column.b}: {path.status.text}")
+        flows += path.solutions
+        at, flow = (targets[-1], flows[-1]) if targets else (at, flow)
+    return flows
+
+
+def _kl(column: Column, a: float) -> float:
+    if column.table.startswith("slow"):
+        return slow_pair(a, column.b)[0]
+    rotation, inverse_s = fast_pair(a, column.b)
+    return rotation**2 * inverse_s
+
+
+def _solve_at(
+    column: Column, system: FlowSystem, settings: NewtonSettings, a: float, start: FlowSolution | None
+) -> FlowSolution:
+    return solve_point(table=column.table, a=a, b=column.b, system=system, start=start, settings=settings)
+
+
+def settings_hash(settings: TableSettings) -> str:
+    """SHA-256 of the settings as sorted JSON. Returns: Hexadecimal digits."""
+    return hashlib.sha256(json.dumps(settings.plain(), sort_keys=True).encode()).hexdigest()
+
+
+def _row(column: Column, a: float, values: list[float], settings: TableSettings) -> str:
+    sizes = [1 / n for n in reversed(settings.around)]
+    # Newton's tolerance bounds the noise that the difference of two meshes carries.
+    noise = settings.newton_tolerance * values[-1]
+    found = gci(values=values[::-1], sizes=sizes, formal_order=settings.formal_order, round_off=noise)
+    numbers = ",".join(f"{v:.9f}" for v in values)
+    return f"{column.table},{a!r},{column.b!r},{numbers},{found.uncertainty:.3e}"
+
+
+def table_text(*, folder: Path, settings: TableSettings) -> str:
+    """The table as CSV with its header, from the point files."""
+    rows = []
+    for column in columns(settings):
+        for a in column.points:
+            values = json.loads(_point_file(folder, column, a).read_text(encoding="utf-8"))
+            rows.append(_row(column, a, values, settings))
+    body = "\n".join([",".join(COLUMNS), *rows]) + "\n"
+    head = [
+        "Friction ratio F = f/f0 of laminar developed flow in a tube rotating about an axis across it,",
+        "by finite elements on three meshes; uncertainty: 95 % half-width of the fine value (GCI).",
+        "slow: a = ln(1 + Kl/300), b = S/(1 + S); fast: a = ln(1 + R/20), b = S_min(R)/S; F = 1 at a = 0.",
+        "Computed by: python tools/rotating_friction_table.py",
+        f"settings: {json.dumps(settings.plain(), sort_keys=True)}",
+        f"settings_sha256: {settings_hash(settings)}",
+        f"data_sha256: {hashlib.sha256(body.encode()).hexdigest()}",
+    ]
+    return "".join(f"# {line}\n" for line in head) + body
+
+
+def generate(*, folder: Path, settings: TableSettings, executor: Executor) -> None:
+    """Solve all points that have no file yet, with progress on standard error.
+
+    Args: `executor`: of any kind, such as a process pool.
+    """
+    paths = columns(settings)
+    total = sum(len(column.points) for column in paths)
+    with Progress(
+        *Progress.get_default_columns(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        console=Console(file=sys.stderr),
+    ) as progress:
+        bar = progress.add_task("rotating section", total=total)
+        pending: set[Future[int]] = {
+            executor.submit(run_column, column=column, folder=folder, settings=settings) for column in paths
+        }
+        while pending:
+            done, pending = wait(pending, timeout=2.0)
+            for future in done:
+                future.result()
+            progress.update(bar, completed=sum(1 for _ in folder.glob("*.json")))
+
+
+def main() -> int:
+    """Compute the table and write it. Returns: Exit code 0."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument(
+        "--points", type=Path, default=Path("out/rotating_friction"), help="folder of finished points"
+    )
+    parser.add_argument(
+        "--table",
+        type=Path,
+        default=Path(__file__).resolve().parents[1] / "physics" / "data" / "rotating_friction.csv",
+    )
+    parser.add_argument("--workers", type=int, default=2)
+    arguments = parser.parse_args()
+    settings = table_settings()
+    folder = arguments.points / settings_hash(settings)[:12]
+    folder.mkdir(parents=True, exist_ok=True)
+    with Workers(arguments.workers) as executor:
+        generate(folder=folder, settings=settings, executor=executor)
+    write_whole(arguments.table, table_text(folder=folder, settings=settings))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

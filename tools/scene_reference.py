@@ -1,0 +1,103 @@
+"""Write the tables of docs/scene-file.md from the declarations of the keys, the liquids and the units.
+
+python tools/scene_reference.py            prints the page with fresh tables
+python tools/scene_reference.py --write    puts them into docs/scene-file.md
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+from ringbalance.scene import known_liquids, write_whole
+from ringbalance.scene.dimensions import DIMENSIONS
+from ringbalance.scene.faults import toml_text
+from ringbalance.scene.keys.declaration import Entries, Key
+from ringbalance.scene.keys.schema import ECCENTRIC_MASS, LIQUID_RING, Schema
+from ringbalance.scene.units import unit_names
+
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "scene-file.md"
+BLOCK = re.compile(r"<!-- table: (\w+) -->\n.*?<!-- end -->", re.DOTALL)
+HEAD = "| key | takes | when left out | meaning |\n|---|---|---|---|"
+
+
+def key_reference(schema: Schema, title: str) -> str:
+    """One Markdown table of keys for each table of a kind of scene. Args: `title`: of the first table."""
+    parts = [f"### {title}", *rows(schema.top)]
+    for name, table in schema.tables.items():
+        parts += [f"\n### [{name}]", f"{table.text[0].upper()}{table.text[1:]}.\n", *rows(table.keys)]
+    for name, table in schema.tables.items():
+        for key, declared in table.keys.items():
+            if isinstance(declared.takes, Entries):
+                each = ", each entry" if declared.takes.example else ""
+                parts += [f"\n### [{name}] {key}{each}", *rows(declared.takes.keys)]
+    return "\n".join(parts)
+
+
+def liquid_reference() -> str:
+    """Write a Markdown table of the known liquids."""
+    head = (
+        "| name | also understood | temperatures | density, 95 % | viscosity, 95 % | source |\n"
+        "|---|---|---|---|---|---|"
+    )
+    rows = (
+        f"| {each.name} | {', '.join(each.aliases)} | {each.held} | {100 * each.density_uncertainty:g} % "
+        f"| {100 * each.viscosity_uncertainty:g} % | {each.source} |"
+        for each in known_liquids()
+    )
+    return "\n".join([head, *rows])
+
+
+def unit_reference() -> str:
+    """Write a Markdown table of the units."""
+    rows = (
+        f"| {kind.noun} | `{kind.example}` | `{unit_names(name).replace(', ', '`, `')}` |"
+        for name, kind in DIMENSIONS.items()
+    )
+    return "\n".join(["| quantity | example | units |\n|---|---|---|", *rows])
+
+
+def rows(keys: Mapping[str, Key]) -> list[str]:
+    """Head and rows of the table of some keys."""
+    return [
+        HEAD,
+        *(
+            f"| `{name}` | {key.takes.summary} | {when_left_out(key)} | {key.presence.meaning} |"
+            for name, key in keys.items()
+        ),
+    ]
+
+
+def when_left_out(key: Key) -> str:
+    """What holds without a key."""
+    if key.presence.kind == "standard":
+        return f"`{toml_text(key.presence.default)}`"
+    return "**needed**" if key.presence.kind == "needed" else key.presence.otherwise
+
+
+def fresh(page: str) -> str:
+    """The page with its tables written again."""
+    tables = {
+        "units": unit_reference(),
+        "liquid_ring_keys": key_reference(LIQUID_RING, "At the top of the file"),
+        "eccentric_mass_keys": key_reference(ECCENTRIC_MASS, "At the top of a file with eccentric masses"),
+        "liquids": liquid_reference(),
+    }
+    return BLOCK.sub(lambda match: f"<!-- table: {match[1]} -->\n{tables[match[1]]}\n<!-- end -->", page)
+
+
+def main() -> None:
+    """Write the page, or print it."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--write", action="store_true", help="put the tables into the page")
+    page = fresh(PAGE.read_text(encoding="utf-8"))
+    if parser.parse_args().write:
+        write_whole(PAGE, page)
+    else:
+        print(page, end="")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,1 +1,0 @@
-"""The bent tube in the rotating frame, in three dimensions."""

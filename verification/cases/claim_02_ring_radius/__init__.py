@@ -1,1 +1,0 @@
-"""Eqs. 5 and 6 of the liquid-ring paper, and R1'min."""

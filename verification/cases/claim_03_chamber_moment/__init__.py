@@ -1,1 +1,0 @@
-"""Eq. 7 of the liquid-ring paper."""

@@ -1,1 +1,0 @@
-"""Eq. 8 of the liquid-ring paper."""

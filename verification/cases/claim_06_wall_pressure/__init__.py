@@ -1,1 +1,0 @@
-"""Eq. 12 of the liquid-ring paper."""

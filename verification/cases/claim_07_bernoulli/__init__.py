@@ -1,1 +1,0 @@
-"""Eqs. 13 to 18 of the liquid-ring paper."""

@@ -1,1 +1,0 @@
-"""Eq. 19 and Fig. 4 of the liquid-ring paper."""

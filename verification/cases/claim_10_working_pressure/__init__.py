@@ -1,1 +1,0 @@
-"""The working range after Eq. 19 of the liquid-ring paper."""

@@ -1,1 +1,0 @@
-"""lambda in section 5.2 of the liquid-ring paper."""

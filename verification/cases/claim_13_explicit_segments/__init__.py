@@ -1,1 +1,0 @@
-"""Eq. 20 of the liquid-ring paper."""

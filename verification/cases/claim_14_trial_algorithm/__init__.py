@@ -1,1 +1,0 @@
-"""Fig. 6 of the liquid-ring paper."""

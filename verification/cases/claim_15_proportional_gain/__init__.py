@@ -1,1 +1,0 @@
-"""Fig. 7 of the liquid-ring paper."""

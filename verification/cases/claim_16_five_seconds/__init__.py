@@ -1,1 +1,0 @@
-"""Fig. 8 of the liquid-ring paper."""

@@ -1,1 +1,0 @@
-"""Section 4.2 and the conclusions of the liquid-ring paper."""

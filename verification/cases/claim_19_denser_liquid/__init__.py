@@ -1,1 +1,0 @@
-"""The conclusion of the liquid-ring paper on changing the balancing liquid."""

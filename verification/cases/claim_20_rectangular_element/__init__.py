@@ -1,1 +1,0 @@
-"""Eqs. 9 to 11 of the liquid-ring paper."""

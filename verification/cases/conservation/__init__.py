@@ -1,1 +1,0 @@
-"""Balances of flux, force, torque, weight and volume."""

@@ -1,1 +1,0 @@
-"""How often half-widths hold, over random discs."""

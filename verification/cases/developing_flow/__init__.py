@@ -1,1 +1,0 @@
-"""The decay of disturbances along the turning tube against exact rates."""

@@ -1,1 +1,0 @@
-"""Appendix B of the driven-mass paper: a bound on the rotor's motion."""

@@ -1,1 +1,0 @@
-"""Fig. 4 of the driven-mass paper: how fast the imbalance becomes known."""

@@ -1,1 +1,0 @@
-"""Fig. 5 of the driven-mass paper: friction estimated while both masses go round."""

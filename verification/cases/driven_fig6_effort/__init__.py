@@ -1,1 +1,0 @@
-"""Fig. 6 of the driven-mass paper: what positioning costs over the speed."""

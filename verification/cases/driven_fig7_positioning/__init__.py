@@ -1,1 +1,0 @@
-"""Fig. 7 of the driven-mass paper: balanced by positioning alone."""

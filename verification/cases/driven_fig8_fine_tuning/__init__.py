@@ -1,1 +1,0 @@
-"""Fig. 8 of the driven-mass paper: errors of ten degrees, and fine tuning."""

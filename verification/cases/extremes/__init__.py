@@ -1,1 +1,0 @@
-"""The whole way from a scene file to a closed loop, at the extremes of every input."""

@@ -1,1 +1,0 @@
-"""Grid convergence on sequences whose limit is known."""

@@ -1,1 +1,0 @@
-"""The worked examples of Celik et al. (2008)."""

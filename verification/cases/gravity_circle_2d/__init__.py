@@ -1,1 +1,0 @@
-"""Gravity across the shaft: the free surface is part of a circle."""

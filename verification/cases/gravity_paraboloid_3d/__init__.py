@@ -1,1 +1,0 @@
-"""Gravity along the shaft: the free surface is a paraboloid."""

@@ -1,1 +1,0 @@
-"""One number by finite elements in two and three dimensions and by quadrature."""

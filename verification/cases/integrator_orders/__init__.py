@@ -1,1 +1,0 @@
-"""The integrators of an operation against the closed form and against each other."""

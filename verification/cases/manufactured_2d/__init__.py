@@ -1,1 +1,0 @@
-"""The pressure problem in 2 dimensions against a manufactured solution."""

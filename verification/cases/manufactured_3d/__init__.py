@@ -1,1 +1,0 @@
-"""The pressure problem in 3 dimensions against a manufactured solution."""

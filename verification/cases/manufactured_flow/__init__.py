@@ -1,1 +1,0 @@
-"""The laminar flow solver against a manufactured solution."""

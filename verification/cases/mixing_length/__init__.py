@@ -1,1 +1,0 @@
-"""The friction formula beside a mixing-length solution: text, computation and data."""

@@ -1,1 +1,0 @@
-"""Only the models that a scene requires."""

@@ -1,1 +1,0 @@
-"""Friction of laminar flow in a turning tube against its exact limits."""

@@ -1,1 +1,0 @@
-"""Waves on the ring in one chamber against exact and spectral ones."""

@@ -1,0 +1,53 @@
+"""What the cases on the eccentric-mass paper share: its scene, and curves thin enough for a figure."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.scene import bundled_scene, load_scene
+from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.eccentric_models import EccentricScene
+
+DRIVEN_SCENE: Final = "eccentric_mass_paper"
+_DRAWN: Final = 240
+"""Points of a curve."""
+
+
+@lru_cache(maxsize=1)
+def driven_scene() -> EccentricScene:
+    """The eccentric-mass paper's own rotor.
+
+    Returns: The bundled scene.
+    Raises: TypeError: the bundled scene is of another balancer.
+    """
+    scene = load_scene(bundled_scene(DRIVEN_SCENE))
+    if not isinstance(scene, EccentricScene):
+        raise TypeError(f"{DRIVEN_SCENE} is no scene of eccentric masses")
+    return scene
+
+
+def thinned(values: npt.ArrayLike, *, count: int = _DRAWN) -> FloatArray:
+    """Evenly chosen values along the last axis, the first and last among them.
+
+    Args: `values`: shape (..., n). `count`: at most so many.
+    Returns: Values, shape (..., at most count).
+    """
+    array = np.asarray(values, dtype=np.float64)
+    return np.asarray(array[..., _places(array.shape[-1], count)], dtype=np.float64)
+
+
+def envelope(values: npt.ArrayLike, *, count: int = _DRAWN) -> FloatArray:
+    """Largest value in each of so many stretches, so that a thinned curve keeps its peaks.
+
+    Args: `values`: shape (n,). `count`: of stretches, at most n.
+    """
+    array = np.asarray(values, dtype=np.float64)
+    return np.asarray(np.maximum.reduceat(array, _places(array.size, count)), dtype=np.float64)
+
+
+def _places(size: int, count: int) -> IntArray:
+    return np.unique(np.linspace(0, size - 1, count).round().astype(np.int64))

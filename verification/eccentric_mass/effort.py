@@ -1,0 +1,148 @@
+"""Fig. 6: what positioning costs over weights and speed, and which friction compensation makes it grow.
+
+The paper's index is the integral of the regulator's torque alone.  Whirl and compensated friction are not in
+it: what the regulator has to do is the move itself and the friction that compensation leaves.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ringbalance.controller.compilation.compiled import compiled
+from ringbalance.controller.eccentric_mass.strategy.lqr_law import (
+    BREAK_AWAY,
+    NO_COMPENSATION,
+    PRINTED,
+    DriveLaw,
+    friction_torque,
+    regulator_torque,
+)
+from ringbalance.controller.eccentric_mass.strategy.settings import drive_law
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.eccentric_models import EccentricScene
+from ringbalance.verification.eccentric_mass.scenes import changed
+
+STEP = 1e-4
+"""s, of the integration, which is of first order."""
+DURATION = 3.0
+"""Of the move, s."""
+MASS_RATIOS = (0.035, 0.023)
+"""m_b/m_r of Fig. 6."""
+WEIGHT_RATIOS = (1.0, 2.0, 3.5, 5.0)
+"""q/r."""
+SPEED_RATIOS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0)
+"""W over sqrt(K_B/M)."""
+TRAVEL = (-1.0, 0.6)
+"""rad, of the two masses."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FigureSix:
+    """The effort J(q, r) of one move, N m s, for several ways of compensating friction."""
+
+    mass_ratios: FloatArray
+    weight_ratios: FloatArray
+    speed_ratios: FloatArray
+    exact: FloatArray
+    """Friction compensated exactly, shape (mass ratios, weight ratios, speed ratios)."""
+    without: FloatArray
+    """Friction not compensated."""
+    printed: FloatArray
+    """With the angle where the rate belongs, as printed."""
+    short: FloatArray
+    """With a friction arm that is assumed 20 % too small."""
+
+    def growth(self, effort: FloatArray) -> FloatArray:
+        """Effort at the highest over that at the lowest speed.
+
+        Args: `effort`: one of the arrays of this record.
+        Returns: Shape (mass ratios, weight ratios).
+        """
+        return np.asarray(effort[..., -1] / effort[..., 0], dtype=np.float64)
+
+
+@compiled
+def positioning_effort(
+    law: DriveLaw,
+    arm: float,
+    believed_arm: float,
+    speed: float,
+    first: float,
+    second: float,
+    step: float,
+    duration: float,
+) -> float:
+    """Integral of the norm of the regulator's torques over a move, the whirl's loads compensated.
+
+    Args: `law`: of the voltages. `arm`: true friction arm, m. `believed_arm`: the one that is compensated, m.
+        `speed`: W, rad/s. `first`: travel of the first mass, rad. `second`: travel of the second mass, rad.
+        `step`: of the integration, s.
+    Returns: J, N m s.
+    Source: Eqs. 40 and 55 of the paper on eccentric masses.
+    """
+    angle, rate, asked = np.array([-first, -second]), np.zeros(2), np.zeros(2)
+    total = 0.0
+    for _ in range(round(duration / step)):
+        for i in range(2):
+            asked[i] = regulator_torque(law, angle[i], rate[i], 0.0)
+            extra = friction_torque(law, believed_arm, speed, angle[i], rate[i], -angle[i])
+            net = asked[i] + extra - law.track.damping * rate[i]
+            rate[i] = _later_rate(law, arm, speed, rate[i], net, step)
+            angle[i] += step * rate[i]
+        total += step * math.hypot(asked[0], asked[1])
+    return total
+
+
+@compiled
+def _later_rate(law: DriveLaw, arm: float, speed: float, rate: float, net: float, step: float) -> float:
+    """Rate one step later under dry friction; a mass that would turn round within the step rests first."""
+    most = arm * law.track.moment * (speed + rate) ** 2
+    if rate == 0:
+        if abs(net) <= most:
+            return 0.0
+        return step * (net - math.copysign(most, net)) / law.track.inertia
+    later = rate + step * (net - math.copysign(most, rate)) / law.track.inertia
+    return 0.0 if later * rate < 0 else later
+
+
+def figure_six(scene: EccentricScene, *, step: float = STEP) -> FigureSix:
+    """Effort over weights and speed for both mass ratios and four compensations.
+
+    Args: `scene`: the scene; its rotor's mass is kept. `step`: of the integration, s.
+    Source: Fig. 6 of the paper on eccentric masses.
+    """
+    share = {"exact": 1.0, "without": 0.0, "printed": 1.0, "short": 0.8}
+    kind = {"exact": BREAK_AWAY, "without": NO_COMPENSATION, "printed": PRINTED, "short": BREAK_AWAY}
+    found = {name: _efforts(scene, kind[name], part, step) for name, part in share.items()}
+    return FigureSix(
+        mass_ratios=np.array(MASS_RATIOS),
+        weight_ratios=np.array(WEIGHT_RATIOS),
+        speed_ratios=np.array(SPEED_RATIOS),
+        **found,
+    )
+
+
+def _efforts(scene: EccentricScene, kind: int, share: float, step: float) -> FloatArray:
+    return np.array(
+        [
+            [_over_speed(scene, mass, weight, kind, share, step) for weight in WEIGHT_RATIOS]
+            for mass in MASS_RATIOS
+        ]
+    )
+
+
+def _over_speed(
+    scene: EccentricScene, mass_ratio: float, weight_ratio: float, kind: int, share: float, step: float
+) -> list[float]:
+    heavier = changed(scene, "masses", mass=mass_ratio * scene.rotor.mass)
+    weighted = changed(heavier, "lqr", state_weight=weight_ratio * scene.lqr.input_weight)
+    law = drive_law(weighted)._replace(compensation=kind, slow=0.0, near=0.0)
+    natural = math.sqrt(scene.rotor.stiffness / (scene.rotor.mass * (1 + 2 * mass_ratio)))
+    arm = scene.masses.friction_arm[0]
+    return [
+        positioning_effort(law, arm, share * arm, ratio * natural, *TRAVEL, step, DURATION)
+        for ratio in SPEED_RATIOS
+    ]

@@ -1,0 +1,163 @@
+"""Fig. 4: how fast the imbalance becomes known, and under which covariances that takes the printed time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import (
+    imbalance_history,
+    start_estimate,
+)
+from ringbalance.controller.eccentric_mass.estimation.imbalance_model import (
+    FilterMatrices,
+    ProcessNoise,
+    filter_matrices,
+)
+from ringbalance.controller.eccentric_mass.plant.open_loop import run_plant
+from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
+from ringbalance.controller.eccentric_mass.strategy.settings import believed_whirl
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.eccentric_models import EccentricScene
+from ringbalance.verification.eccentric_mass.scenes import at_constant_speed, changed
+
+PAPER_PHASES = (30.0, 100.0, 210.0, 300.0)
+"""Of the imbalance in Fig. 4, deg."""
+CONVERGED = 0.02
+"""Relative error of the imbalance within which its estimate has converged."""
+SCALES = (1.0, 10.0, 100.0, 1000.0, 1500.0, 2000.0, 2500.0)
+"""Sensor noise that the filter assumes, over the true one."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImbalanceRecord:
+    """A locked rotor at constant speed, measured in its own frame."""
+
+    time: FloatArray
+    """s, shape (n,)."""
+    samples: FloatArray
+    """x, y, x', y' with noise, shape (n, 4)."""
+    imbalance: complex
+    """True, kg m."""
+    speed: float
+    """rad/s."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FigureFour:
+    """Estimates of four imbalances, and how their convergence hangs on the covariances."""
+
+    time: FloatArray
+    """s, shape (n,)."""
+    phases: tuple[float, ...]
+    """deg."""
+    true: FloatArray
+    """Along the rotor's axes, kg m, shape (phases, 2)."""
+    estimate: FloatArray
+    """With honest covariances, kg m, shape (phases, n, 2)."""
+    covariance_norm: FloatArray
+    """Largest singular value of P, shape (phases, n)."""
+    honest_time: tuple[float, ...]
+    """From when on the estimate keeps within 2 % of the imbalance, for each phase, s."""
+    scales: FloatArray
+    """Assumed over true sensor noise, shape (scales,)."""
+    scaled_time: FloatArray
+    """The same time for the first phase, s, shape (scales,); infinite where it is never reached."""
+
+
+def imbalance_record(scene: EccentricScene, *, duration: float, seed: int | None = None) -> ImbalanceRecord:
+    """Measure a rotor that starts at its centre, the masses locked at their first angles.
+
+    Args: `scene`: the scene; its first speed is kept. `duration`: s. `seed`: of the noise; default the
+        scene's.
+    Returns: ImbalanceRecord, one sample for each step of the sensor, without the instant of the start.
+    """
+    level = at_constant_speed(scene, time_limit=duration)
+    run = run_plant(level, locked=True)
+    random = np.random.default_rng(scene.run.seed if seed is None else seed)
+    deviations = np.repeat([scene.sensor.position_noise, scene.sensor.velocity_noise], 2)
+    clean = run.state[1:, :4]
+    parameters = plant_parameters(scene)
+    return ImbalanceRecord(
+        time=run.time[1:],
+        samples=clean + deviations * random.standard_normal(clean.shape),
+        imbalance=complex(parameters.unbalance * np.exp(1j * parameters.phase)),
+        speed=float(run.speed[0]),
+    )
+
+
+def scene_matrices(scene: EccentricScene, *, angular_velocity: float) -> FilterMatrices:
+    """Matrices of the scene's imbalance filter for samples in the rotor's frame.
+
+    Args: `angular_velocity`: W, rad/s.
+    """
+    told = scene.imbalance_filter
+    noise = ProcessNoise(told.velocity_walk**2, told.unbalance_walk**2)
+    euler = told.discretisation == "euler"
+    return filter_matrices(believed_whirl(scene), noise, angular_velocity, scene.sensor.step, False, euler)
+
+
+def estimate_imbalance(
+    scene: EccentricScene, record: ImbalanceRecord, *, scale: float = 1.0
+) -> tuple[FloatArray, FloatArray]:
+    """Run the scene's imbalance filter over a record.
+
+    Args: `record`: measured. `scale`: assumed over true sensor noise, above zero.
+    Returns: States, shape (n, 6), and covariances, shape (n, 6, 6).
+    """
+    told = scene.imbalance_filter
+    variance = scale**2 * np.repeat([told.position_noise**2, told.velocity_noise**2], 2)
+    start = start_estimate(told.initial_position, told.initial_velocity, told.initial_unbalance)
+    first, second = scene.masses.initial_angle
+    own = plant_parameters(scene).moment * (np.exp(1j * first) + np.exp(1j * second))
+    return imbalance_history(
+        start,
+        matrices=scene_matrices(scene, angular_velocity=record.speed),
+        samples=record.samples,
+        variance=variance,
+        mass_imbalance=(float(own.real), float(own.imag)),
+    )
+
+
+def convergence_time(time: FloatArray, error: FloatArray, *, limit: float) -> float:
+    """Instant from which on an error stays within a limit.
+
+    Args: `time`: s, shape (n,), ascending. `error`: shape (n,), at least zero. `limit`: of the same unit.
+    Returns: s; infinite when the last error is beyond the limit.
+    """
+    beyond = np.flatnonzero(error > limit)
+    if beyond.size == 0:
+        return float(time[0])
+    last = int(beyond[-1])
+    return math.inf if last == time.size - 1 else float(time[last + 1])
+
+
+def _time_of(scene: EccentricScene, record: ImbalanceRecord, scale: float) -> float:
+    states, _ = estimate_imbalance(scene, record, scale=scale)
+    error = np.abs(states[:, 4] + 1j * states[:, 5] - record.imbalance) / abs(record.imbalance)
+    return convergence_time(record.time, error, limit=CONVERGED)
+
+
+def figure_four(
+    scene: EccentricScene, *, duration: float = 8.0, scales: tuple[float, ...] = SCALES
+) -> FigureFour:
+    """Estimate the four imbalances of Fig. 4, and one of them under covariances ever less honest.
+
+    Args: `duration`: of each estimation, s. `scales`: assumed over true sensor noise.
+    Source: Fig. 4 of the paper on eccentric masses.
+    """
+    turned = [changed(scene, "imbalance", phase=math.radians(phase)) for phase in PAPER_PHASES]
+    records = [imbalance_record(one, duration=duration) for one in turned]
+    found = [estimate_imbalance(one, record) for one, record in zip(turned, records, strict=True)]
+    return FigureFour(
+        time=records[0].time,
+        phases=PAPER_PHASES,
+        true=np.array([[record.imbalance.real, record.imbalance.imag] for record in records]),
+        estimate=np.array([states[:, 4:] for states, _ in found]),
+        covariance_norm=np.array([np.linalg.norm(covariances, 2, (1, 2)) for _, covariances in found]),
+        honest_time=tuple(_time_of(one, r, 1.0) for one, r in zip(turned, records, strict=True)),
+        scales=np.asarray(scales, dtype=np.float64),
+        scaled_time=np.array([_time_of(turned[0], records[0], scale) for scale in scales]),
+    )

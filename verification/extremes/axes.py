@@ -1,0 +1,298 @@
+"""The axes along which a scene is taken to its extremes, and the scene file of a point on them."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from copy import deepcopy
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.mesh.geometry import liquid_first_moment, surface_radius
+from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Scene
+
+Document = dict[str, Any]
+Values = Mapping[str, float]
+"""By axis, in the axis' unit."""
+_TABLES: Final = ("environment", "gas", "sensor", "controller", "run", "accuracy")
+"""That a scene file may leave out."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Axis:
+    """One input, from one end of what anyone might ask for to a step beyond the other."""
+
+    name: str
+    title: str
+    unit: str
+    low: float
+    high: float
+    usual: tuple[float, float]
+    """Ends of the range where most discs are; the rest of the axis lies beyond it on one or both sides."""
+    spacing: Literal["log", "linear"] = "log"
+
+    def share(self, value: float) -> float:
+        """How far along the axis a value stands.
+
+        Args: `value`: in `unit`.
+        Returns: Share within [0, 1].
+        """
+        if self.spacing == "linear":
+            return (value - self.low) / (self.high - self.low)
+        return math.log(value / self.low) / math.log(self.high / self.low)
+
+    def at(self, share: npt.ArrayLike) -> FloatArray:
+        """Values at shares of the way along the axis.
+
+        Args: `share`: within [0, 1], any shape.
+        Returns: Values in `unit`, the shape of `share`.
+        """
+        s = np.asarray(share, dtype=np.float64)
+        if self.spacing == "linear":
+            return np.asarray(self.low + s * (self.high - self.low), dtype=np.float64)
+        return np.asarray(self.low * (self.high / self.low) ** s, dtype=np.float64)
+
+
+AXES: Final = (
+    Axis(name="speed", title="speed", unit="rpm", low=1.0, high=1e5, usual=(300.0, 6e4)),
+    Axis(name="fill", title="largest fill ratio", unit="1", low=1e-6, high=1.0, usual=(0.05, 0.9)),
+    Axis(
+        name="angle",
+        title="central angle",
+        unit="deg",
+        low=5.0,
+        high=175.0,
+        usual=(20.0, 170.0),
+        spacing="linear",
+    ),
+    Axis(
+        name="plate",
+        title="plate thickness over that which closes the chamber",
+        unit="1",
+        low=0.0,
+        high=1.05,
+        usual=(0.0, 0.8),
+        spacing="linear",
+    ),
+    Axis(
+        name="viscosity", title="kinematic viscosity", unit="m^2/s", low=1e-7, high=1e-2, usual=(1e-7, 1e-3)
+    ),
+    Axis(name="bore", title="bore", unit="mm", low=0.1, high=20.0, usual=(0.3, 6.0)),
+    Axis(name="roughness", title="roughness over bore", unit="1", low=1e-7, high=0.06, usual=(1e-6, 0.02)),
+    Axis(
+        name="pressure",
+        title="gas pressure over the column to the siphon crest",
+        unit="1",
+        low=0.0,
+        high=4.0,
+        usual=(0.8, 3.0),
+        spacing="linear",
+    ),
+    Axis(
+        name="unbalance",
+        title="unbalance over what one pair can carry",
+        unit="1",
+        low=0.01,
+        high=1.5,
+        usual=(0.05, 0.9),
+    ),
+    Axis(
+        name="gain",
+        title="controller gain over the scene's",
+        unit="1",
+        low=1e-4,
+        high=1e3,
+        usual=(0.01, 10.0),
+    ),
+    Axis(name="noise", title="sensor noise over the limit", unit="1", low=1e-4, high=10.0, usual=(1e-3, 0.5)),
+    Axis(name="period", title="controller period", unit="s", low=1e-3, high=100.0, usual=(0.05, 5.0)),
+    Axis(name="tolerance", title="tolerance", unit="1", low=1e-10, high=0.1, usual=(1e-4, 0.1)),
+    Axis(
+        name="gravity",
+        title="gravity over standard gravity",
+        unit="1",
+        low=0.0,
+        high=2.0,
+        # Without gravity there is a closed form to hold the half-widths against.
+        usual=(0.0, 0.0),
+        spacing="linear",
+    ),
+)
+"""What a designed set varies together, each after those that it hangs on."""
+
+
+def axis_of(name: str) -> Axis:
+    """An axis by its name. Raises: KeyError: no axis of that name."""
+    return {axis.name: axis for axis in AXES}[name]
+
+
+def varied(document: Mapping[str, Any], *, scene: Scene, values: Mapping[str, float]) -> Document:
+    """The document of a scene file with some axes set.
+
+    Args: `document`: of the scene's own file. `scene`: the scene, for what a value is relative to. `values`:
+        by axis, in the axis' unit.
+    Returns: A new document; what hangs on a value follows it: two chambers for any central angle, bends that
+        the bore can take, and a tube that reaches over the crest.
+    """
+    changed: Document = {table: {} for table in _TABLES} | deepcopy(dict(document))
+    for axis in AXES:
+        if axis.name in values and axis.name in _SETTERS:
+            _SETTERS[axis.name](changed, float(values[axis.name]), scene, values)
+    return changed
+
+
+def fitted(
+    document: Mapping[str, Any], *, scene: Scene, made: Scene, values: Mapping[str, float]
+) -> Document:
+    """The document with a rotor that suits what its disc can balance, and the loop's own axes set.
+
+    A disc that carries less liquid is put on a lighter rotor: its influence coefficient grows so that all
+    liquid of a pair makes the same vibration, and limit, gain and noise mean what they meant before.
+    Args: `document`: of `varied`. `scene`: the scene that was varied. `made`: the scene that the document
+        makes. `values`: by axis.
+    Returns: A new document, in which the loop has as much to do for its disc as in the scene that was varied;
+        the unbalance of a disc with a single pair lies along that pair, the only direction it can balance.
+    """
+    changed = deepcopy(dict(document))
+    lighter = _capacity(scene) / _capacity(made)
+    rotor, control = changed["rotor"], changed["controller"]
+    rotor["influence_coefficient"] = _influence(lighter * scene.rotor.influence_coefficient)
+    if "assumed_influence_coefficient" in control:
+        believed = lighter * scene.controller.assumed_influence_coefficient
+        control["assumed_influence_coefficient"] = _influence(believed)
+    rotor["initial_vibration"] = _vibration(scene=scene, made=made, values=values)
+    control["proportional"] = f"{values.get('gain', 1.0) * scene.controller.proportional!r} s/m"
+    noise = values.get("noise", scene.sensor.amplitude_noise / scene.controller.limit)
+    changed["sensor"]["amplitude_noise"] = f"{noise * scene.controller.limit!r} m"
+    return changed
+
+
+def _influence(coefficient: float) -> str:
+    return f"{coefficient!r} m/(kg*m)"
+
+
+def _vibration(*, scene: Scene, made: Scene, values: Mapping[str, float]) -> Document:
+    before, phase = scene.rotor.initial_amplitude, scene.rotor.initial_phase
+    amplitude = values["unbalance"] * _capacity(scene) if "unbalance" in values else before
+    if made.disc.chambers == 2:
+        phase = -scene.rotor.lag_angle
+    return {"amplitude": f"{amplitude!r} m", "phase": f"{math.degrees(phase)!r} deg"}
+
+
+def _capacity(scene: Scene) -> float:
+    """Vibration that all liquid of a pair in one chamber balances, m."""
+    a = surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio)
+    moment = (
+        scene.liquid.density * scene.disc.axial_width * liquid_first_moment(disc=scene.disc, surface_radius=a)
+    )
+    return float(scene.rotor.influence_coefficient * moment)
+
+
+def toml_bytes(document: Mapping[str, Any]) -> bytes:
+    """A document as the bytes of a scene file.
+
+    Args: `document`: tables of texts, numbers, truth values, lists and small tables.
+    Returns: TOML, UTF-8.
+    """
+    top = {key: value for key, value in document.items() if not isinstance(value, dict)}
+    lines = [f"{key} = {_toml(value)}" for key, value in top.items()]
+    for name, table in document.items():
+        if isinstance(table, dict):
+            lines += ["", f"[{name}]", *(f"{key} = {_toml(value)}" for key, value in table.items())]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(_toml(item) for item in value) + "]"
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _set_speed(document: Document, value: float, _: Scene, __: Values) -> None:
+    document["rotor"]["speed"] = f"{value!r} rpm"
+
+
+def _set_fill(document: Document, value: float, _: Scene, __: Values) -> None:
+    document["disc"] |= {"max_fill_ratio": value, "initial_fill": value / 2}
+
+
+def _set_plate(document: Document, value: float, scene: Scene, values: Values) -> None:
+    angle = math.radians(values["angle"]) if "angle" in values else scene.disc.central_angle
+    closing = scene.disc.inner_radius * math.sin(min(angle, math.pi) / 2)
+    document["disc"]["plate_thickness"] = f"{value * closing!r} m"
+
+
+def _set_angle(document: Document, value: float, _: Scene, __: Values) -> None:
+    document["disc"] |= {"central_angle": f"{value!r} deg", "chambers": 2}
+    document["controller"].pop("sequence", None)
+
+
+def _set_viscosity(document: Document, value: float, scene: Scene, _: Values) -> None:
+    liquid = scene.liquid
+    document["liquid"] = {
+        "density": f"{liquid.density!r} kg/m^3",
+        "kinematic_viscosity": f"{value!r} m^2/s",
+        "vapour_pressure": f"{liquid.vapour_pressure!r} Pa",
+    }
+
+
+def _set_bore(document: Document, value: float, scene: Scene, _: Values) -> None:
+    tube = document["tube"]
+    tube["bore"] = f"{value!r} mm"
+    bends = [f"{max(1e3 * bend.radius, value)!r} mm" for bend in scene.tube.bends]
+    tube["bends"] = [
+        {"angle": f"{math.degrees(bend.angle)!r} deg", "radius": radius}
+        for bend, radius in zip(scene.tube.bends, bends, strict=True)
+    ]
+    # Two right-angled bends of that radius need no more than this beside the legs.
+    tube["length"] = f"{1e3 * scene.tube.length + 4 * value!r} mm"
+
+
+def _set_roughness(document: Document, value: float, scene: Scene, values: Values) -> None:
+    bore = 1e-3 * values["bore"] if "bore" in values else scene.tube.bore
+    document["tube"]["roughness"] = f"{value * bore!r} m"
+
+
+def _set_pressure(document: Document, value: float, scene: Scene, values: Values) -> None:
+    speed = math.pi / 30 * values["speed"] if "speed" in values else scene.rotor.speed
+    hump = scene.tube.hump_radius or scene.disc.inner_radius
+    column = hydrostatic_pressure(
+        density=scene.liquid.density, angular_velocity=speed, inner=hump, outer=scene.disc.outer_radius
+    )
+    document["gas"]["pressure"] = f"{value * column!r} Pa"
+
+
+def _set_period(document: Document, value: float, _: Scene, __: Values) -> None:
+    document["controller"]["period"] = f"{value!r} s"
+
+
+def _set_tolerance(document: Document, value: float, _: Scene, __: Values) -> None:
+    document["accuracy"] = {"tolerance": f"{100 * value!r} %"}
+
+
+def _set_gravity(document: Document, value: float, _: Scene, __: Values) -> None:
+    document["environment"]["gravity"] = f"{9.80665 * value!r} m/s^2"
+
+
+_SETTERS: Final = {
+    "speed": _set_speed,
+    "fill": _set_fill,
+    "plate": _set_plate,
+    "angle": _set_angle,
+    "viscosity": _set_viscosity,
+    "bore": _set_bore,
+    "roughness": _set_roughness,
+    "pressure": _set_pressure,
+    "period": _set_period,
+    "tolerance": _set_tolerance,
+    "gravity": _set_gravity,
+}
+"""What hangs on the whole scene, such as the unbalance, is set by `fitted` when that is made."""

@@ -1,0 +1,211 @@
+"""One point at the extremes: the whole way from a scene file to a closed loop, and what must hold on it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, Final
+
+import numpy as np
+
+from ringbalance.controller.document import simulation_document
+from ringbalance.controller.loop import simulate
+from ringbalance.controller.simulation import Simulation
+from ringbalance.mesh.geometry import liquid_first_moment, surface_radius
+from ringbalance.reduced_model.calibration import Calibration, calibrate
+from ringbalance.reduced_model.documents import calibration_document
+from ringbalance.scene.faults import SceneError
+from ringbalance.scene.loader import scene_from
+from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.verification.extremes.axes import toml_bytes
+from ringbalance.verification.reference.exact_chamber import exact_wall_pressure
+
+ROUND_OFF: Final = 1e-12
+"""Relative: what floating point may take from a conserved or monotone quantity."""
+WIDE: Final = 1.0
+"""Half-width over value from which on an answer is no more than an order of magnitude."""
+
+
+class Ending(StrEnum):
+    """How a point ended."""
+
+    SOLVED = "solved"
+    WIDE = "solved, with a wide half-width"
+    STATUS = "solved, with a reservation"
+    REFUSED = "refused with a message"
+    BROKEN = "broken"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judgement:
+    """What became of one point."""
+
+    ending: Ending
+    text: str
+    """The program's own message, or its reservation; empty where there is none."""
+    violations: tuple[str, ...] = ()
+    """What should have held and did not."""
+    residual: float = 0.0
+    """Largest relative residual of its linear solves."""
+    unknowns: float = 0.0
+    worst_ratio: float = -1.0
+    """Largest |error| over half-width against the closed form; -1 where gravity is modelled, without one."""
+    loop: str = ""
+    """Outcome of its closed loop."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Defect:
+    """Deliberate errors, to show that the judgement notices; the defaults are none."""
+
+    width_factor: float = 1.0
+    """Multiplies every half-width of the chamber."""
+    leak: float = 0.0
+    """Share of the liquid lost by the end of a run."""
+
+
+SOUND: Final = Defect()
+
+
+def judge_point(
+    document: Mapping[str, Any], *, file: str = "extremes.toml", defect: Defect = SOUND
+) -> Judgement:
+    """Take a scene file through calibration and closed loop, and look for anything that should not be.
+
+    Args: `file`: its name, for messages. `defect`: deliberate errors.
+    Returns: Judgement; an exception other than a scene's fault counts as broken, whatever it is.
+    """
+    try:
+        scene = liquid_ring_scene(scene_from(content=toml_bytes(document), file=file))
+        calibration = calibrate(scene)
+        run = simulate(scene, calibration.model)
+    except SceneError as error:
+        return refusal(error)
+    except Exception as error:
+        # Whatever it is: finding it is what this is for.
+        text = f"{type(error).__name__}: {error}"
+        return Judgement(ending=Ending.BROKEN, text=text, violations=(f"exception {text}",))
+    ratio = _worst_ratio(calibration, defect.width_factor)
+    violations = (*_calibration_faults(calibration, ratio), *_loop_faults(scene, run, defect.leak))
+    return Judgement(
+        ending=Ending.BROKEN if violations else _ending(calibration),
+        text=_reservation(calibration),
+        violations=violations,
+        residual=float(calibration.statistics["relative_residual"]),
+        unknowns=float(calibration.statistics["unknowns"]),
+        worst_ratio=ratio,
+        loop=str(run.outcome),
+    )
+
+
+def refusal(error: SceneError) -> Judgement:
+    """Judge a refusal: it has to name what is wrong. Args: `error`: as a user meets it."""
+    return Judgement(ending=Ending.REFUSED, text=str(error), violations=tuple(_unclear(error)))
+
+
+def _unclear(error: SceneError) -> Iterator[str]:
+    """A refusal has to name what is wrong and what would be accepted."""
+    for fault in error.faults:
+        if not (fault.key and fault.problem):
+            yield f"a refusal that names no key: {fault}"
+
+
+def _ending(calibration: Calibration) -> Ending:
+    if not calibration.chamber.status.ok:
+        return Ending.STATUS
+    chamber = calibration.chamber
+    width = float(chamber.moment_per_mass.uncertainty) / float(chamber.moment_per_mass.value)
+    k, uncertainty_95 = calibration.tube.k.value, calibration.tube.k.uncertainty
+    tube = float(np.median(uncertainty_95 / (np.abs(k) + 1)))
+    return Ending.WIDE if max(width, tube) > WIDE else Ending.SOLVED
+
+
+def _reservation(calibration: Calibration) -> str:
+    status = calibration.chamber.status
+    return "" if status.ok else status.text
+
+
+def _worst_ratio(calibration: Calibration, width_factor: float) -> float:
+    """Of the finite elements against the concentric closed form, which is exact where gravity is left out."""
+    chamber, scene = calibration.chamber, calibration.scene
+    if chamber.gravity_modelled:
+        return -1.0
+    solved = chamber.check.elements
+    x = solved.fill_ratio
+    pressure = exact_wall_pressure(
+        disc=scene.disc, density=scene.liquid.density, angular_velocity=abs(scene.rotor.speed), fill_ratio=x
+    )
+    a = surface_radius(disc=scene.disc, fill_ratio=x)
+    swept = liquid_first_moment(disc=scene.disc, surface_radius=a)
+    moment = scene.liquid.density * scene.disc.axial_width * swept
+    worst = 0.0
+    for estimate, exact in ((solved.wall_pressure, pressure), (solved.moment, moment)):
+        allowed = width_factor * estimate.uncertainty + ROUND_OFF * np.abs(exact)
+        error = np.abs(estimate.value - exact)
+        worst = max(worst, float(np.max(error[allowed > 0] / allowed[allowed > 0], initial=0.0)))
+    return worst
+
+
+def _calibration_faults(calibration: Calibration, ratio: float) -> Iterator[str]:
+    """Finite, monotone where physics is, half-widths that hold."""
+    try:
+        json.dumps(calibration_document(calibration), allow_nan=False)
+    except ValueError:
+        yield "a number in the calibration is not finite"
+    if ratio > 1:
+        yield f"an error is {ratio:.3g} times its half-width"
+    nodes = calibration.chamber.wall_pressure.table.value.size
+    for name, curve in (
+        ("wall pressure", calibration.chamber.wall_pressure),
+        ("moment", calibration.chamber.moment),
+    ):
+        if np.any(curve.uncertainty < 0):
+            yield f"a half-width of the {name} is negative"
+        if not np.all(np.diff(curve.value[:nodes]) > 0):
+            yield f"the {name} does not grow with the fill"
+    tube = calibration.tube
+    head = (tube.k.value + 1) * tube.reynolds**2
+    if np.any(np.diff(head) <= 0):
+        yield "the tube's head does not grow with the velocity"
+    yield from _law_faults(calibration)
+
+
+def _law_faults(calibration: Calibration) -> Iterator[str]:
+    law, scene = calibration.flow_law, calibration.scene
+    fills = np.linspace(0.0, law.max_fill_ratio, 9)[:, None]
+    pressure = np.linspace(0.0, 2.0, 9) * max(scene.gas.pressure, 1.0)
+    for primed in (False, True):
+        velocity = law.evaluate(
+            fill_ratio=fills,
+            opposite_fill_ratio=law.max_fill_ratio - fills,
+            gas_pressure=pressure,
+            primed=primed,
+        ).velocity
+        slack = ROUND_OFF + 1e-9 * np.abs(velocity).max()
+        # A tube without a crest is taken to hold its liquid while there is no gas at all, as in Eq. 18.
+        driven = velocity[:, 1:] if law.path.hump_pressure is None else velocity
+        if not np.all(np.isfinite(velocity)):
+            yield "a velocity of the law is not finite"
+        elif np.any(np.diff(driven, axis=1) < -slack):
+            yield f"the velocity falls as the gas pressure grows ({'primed' if primed else 'empty'} tube)"
+
+
+def _loop_faults(scene: Scene, run: Simulation, leak: float) -> Iterator[str]:
+    """Ends with a text, conserves the liquid, keeps fills within bounds."""
+    try:
+        json.dumps(simulation_document(run), allow_nan=False)
+    except ValueError:
+        yield "a number in the run is not finite"
+    if not run.status:
+        yield "the run ended without a word"
+    fills = np.array(list(run.fill_ratio.values()))
+    fills[:, -1] *= 1 - leak
+    largest = scene.disc.max_fill_ratio
+    half = len(fills) // 2
+    if np.any(np.abs(fills[:half] + fills[half:] - 2 * scene.disc.initial_fill) > ROUND_OFF * largest):
+        yield "liquid is not conserved"
+    if fills.min() < 0 or fills.max() > largest:
+        yield "a fill ratio leaves its bounds"

@@ -1,0 +1,106 @@
+"""An adaptive Runge-Kutta transfer with events: an independent reference for the other integrators."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from ringbalance.controller.liquid_ring.closed_form import boundary_event
+from ringbalance.controller.liquid_ring.transfer import (
+    Drive,
+    Event,
+    Integrator,
+    Transfer,
+    checked_instants,
+    finished,
+    still,
+)
+from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.scene.arrays import FloatArray
+
+
+def adaptive_ode(*, tolerance: float = 1e-10) -> Integrator:
+    """An integrator by Dormand-Prince of order 8 with events at the ends of the range and at a stall.
+
+    Args: `tolerance`: relative and absolute, on the fill ratio; a stall is where less than its square root of
+        the initial velocity is left.
+    Raises: ValueError: a tolerance outside (0, 1).
+    Source: dx/dt = -u S/V; scipy's DOP853.
+    """
+    if not 0 < tolerance < 1:
+        raise ValueError(f"tolerance must lie within (0, 1), not {tolerance}")
+
+    def integrate(drive: Drive, instants: FloatArray) -> Transfer:
+        return _solve(drive, checked_instants(instants), tolerance)
+
+    return integrate
+
+
+def _solve(drive: Drive, t: FloatArray, tolerance: float) -> Transfer:
+    before = drive.flow(drive.fill, primed=drive.primed)
+    u0, regime = float(before.velocity), Regime(int(before.regime))
+    end = drive.lowest if u0 > 0 else drive.highest
+    if u0 == 0:
+        return still(drive, t, flow=before)
+    if t[-1] == 0 or drive.fill == end:
+        event = boundary_event(drive, end) if drive.fill == end else Event.NONE
+        return _unmoved(drive, t, regime, event)
+
+    solved = _march(drive, u0, end, float(t[-1]), tolerance)
+    last = float(solved.t[-1])
+    event = _event(drive, end, [bool(times.size) for times in solved.t_events], finished_=solved.status >= 0)
+    fill = np.asarray(solved.sol(np.minimum(t, last))[0], dtype=np.float64)
+    if event in {Event.EMPTY, Event.FULL}:
+        fill = np.where(t >= last, end, fill)
+    return finished(
+        drive,
+        t,
+        fill,
+        regime_start=regime,
+        event=event,
+        event_time=None if event is Event.NONE else last,
+    )
+
+
+def _march(drive: Drive, u0: float, end: float, duration: float, tolerance: float) -> Any:
+    def slope(_: float, x: FloatArray) -> FloatArray:
+        return np.asarray(-drive.exchange_rate * drive.flow(x).velocity, dtype=np.float64)
+
+    def at_end(_: float, x: FloatArray) -> float:
+        return float(x[0] - end)
+
+    def at_stall(_: float, x: FloatArray) -> float:
+        return float(drive.flow(x[0]).velocity / u0 - tolerance**0.5)
+
+    at_end.terminal = at_stall.terminal = True  # type: ignore[attr-defined]
+    return solve_ivp(
+        slope,
+        (0.0, duration),
+        [drive.fill],
+        method="DOP853",
+        rtol=max(tolerance, 1e-13),
+        atol=tolerance * 1e-2,
+        dense_output=True,
+        events=(at_end, at_stall),
+    )
+
+
+def _unmoved(drive: Drive, t: FloatArray, regime: Regime, event: Event) -> Transfer:
+    return finished(
+        drive,
+        t,
+        np.full(t.shape, drive.fill),
+        regime_start=regime,
+        event=event,
+        event_time=None if event is Event.NONE else 0.0,
+    )
+
+
+def _event(drive: Drive, end: float, hit: list[bool], *, finished_: bool) -> Event:
+    if not finished_:
+        return Event.UNFINISHED
+    if hit[0]:
+        return boundary_event(drive, end)
+    return Event.STALLED if hit[1] else Event.NONE

@@ -1,0 +1,257 @@
+"""Laminar flow through a bent tube in the rotating frame, in three dimensions.
+
+The path lies in the plane across the rotation axis, as a tube between two chambers of a disc does: its legs,
+its bends and the arc over the crest all stay at one place along the shaft.  Coriolis and centrifugal forces
+then lie in that plane too, the flow is its own mirror image in it, and half the tube is enough.  Without that
+symmetry (an axis in the path's plane, say) the whole section would be needed.  With lengths over the bore d,
+velocities over the mean velocity U and reduced pressure over mu U/d:
+
+    Re (u . grad) u + 2 R e_z x u = -grad p + lap u,    div u = 0
+
+Inflow is developed; at the outlet the traction is that of developed flow.  The section's flow comes from the
+same finite elements on the same cells, so a straight tube keeps it to round-off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ringbalance.mesh.bent_tube import Segment, SweptTube, swept_tube
+from ringbalance.physics.navier_stokes.continuation import StepRule, follow
+from ringbalance.physics.navier_stokes.newton import (
+    Coefficients,
+    Dirichlet,
+    FlowSolution,
+    FlowSystem,
+    NewtonSettings,
+    flow_system,
+    solve_flow,
+)
+from ringbalance.physics.navier_stokes.rotating_section import (
+    SectionMesh,
+    section_mesh,
+    section_system,
+    solve_section,
+)
+from ringbalance.physics.navier_stokes.space import FlowSpace, taylor_hood
+from ringbalance.physics.navier_stokes.system import split
+from ringbalance.physics.results import Statistics, Status
+from ringbalance.scene.arrays import FloatArray, IntArray
+
+__all__ = ["BentTubeFlow", "bent_tube_flow", "developed_section", "pressure_loss"]
+
+Progress = Callable[[str], None]
+
+CORIOLIS = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+"""e_z x velocity for components along (x, y, z)."""
+_KL_SCALE = 300.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BentTubeFlow:
+    """Flow in half a bent tube, and the developed flow that enters it."""
+
+    tube: SweptTube
+    system: FlowSystem
+    solution: FlowSolution
+    section: FlowSystem
+    developed: FlowSolution
+    """Of the section; in-plane velocity over nu/d."""
+    reynolds: float
+    rotation_reynolds: float
+    arc_length: FloatArray
+    """Of the stations between slabs, over d."""
+    mean_pressure: FloatArray
+    """Reduced pressure, mean over the section, over mu U/d, at those stations."""
+    energy_flux: FloatArray
+    """Kinetic energy carried through a station over rho U^3/2 and area: alpha, at those stations."""
+
+    @property
+    def gradient(self) -> float:
+        """G = -dp/dx of the developed flow on the same cells, over mu U/d^2."""
+        return self.developed.driving_gradient
+
+
+def developed_section(*, system: FlowSystem, reynolds: float, rotation_reynolds: float) -> FlowSolution:
+    """Developed flow of the straight tube.
+
+    Args: `reynolds`: Re, above zero. `rotation_reynolds`: R, zero or more.
+    Returns: The flow, in-plane velocity over nu/d.
+    Raises: ArithmeticError: the flow was not found.
+    """
+    s = rotation_reynolds / reynolds
+    to = float(np.log1p(reynolds * rotation_reynolds / _KL_SCALE))
+
+    def solve(a: float, start: FlowSolution | None) -> FlowSolution:
+        return solve_section(system=system, kl=_KL_SCALE * float(np.expm1(a)), s=s, start=start)
+
+    first = min(to, 2.0)
+    start = solve(first, None)
+    if to > first and start.status.ok:
+        rule = StepRule(first=2.0, smallest=0.02, largest=3.0)
+        path = follow(solve=solve, start=start, start_at=first, targets=[to], rule=rule)
+        start = path.solutions[0] if path.status.ok else replace(start, status=path.status)
+    if not start.status.ok:
+        raise ArithmeticError(f"developed flow: {start.status.text}")
+    return start
+
+
+def _swept_velocity(tube: SweptTube, developed: FlowSolution, reynolds: float) -> FloatArray:
+    """The section's velocity at every node of the tube, Cartesian components (3, nodes)."""
+    left, up, along = developed.velocity[:, tube.section_node]
+    tangent = tube.direction[:, tube.half_station]
+    normal = np.stack([-tangent[1], tangent[0]])
+    return np.asarray(np.vstack([along * tangent + left / reynolds * normal, up / reynolds]))
+
+
+def _pressure_nodes(tube: SweptTube) -> tuple[IntArray, IntArray]:
+    """Section node and station of every pressure node: the mesh's vertices."""
+    count = tube.mesh.nvertices
+    return tube.section_node[:count], tube.half_station[:count] // 2
+
+
+def _swept_pressure(tube: SweptTube, developed: FlowSolution, reynolds: float) -> FloatArray:
+    """Developed pressure along the tube, zero at the outlet but for the section's own variation."""
+    node, station = _pressure_nodes(tube)
+    s = tube.arc_length[::2]
+    fall = developed.driving_gradient * (s[-1] - s)
+    return np.asarray(fall[station] + developed.pressure[node] / reynolds, dtype=np.float64)
+
+
+def _outlet_load(tube: SweptTube, space: FlowSpace, section: FlowSpace, pressure: FloatArray) -> FloatArray:
+    """Integral over the outlet of minus the section's pressure times normal and shape functions."""
+    values = pressure[section.pressure.element_dofs].T @ section.pressure_shape
+    local = (section.weights * values) @ section.shape.T
+    dofs = section.velocity.element_dofs.T.ravel()
+    normal_force = np.bincount(dofs, weights=local.ravel(), minlength=section.velocity_nodes)
+    at_outlet = np.flatnonzero(tube.half_station == tube.half_station.max())
+    load = np.zeros((3, space.velocity_nodes))
+    load[:2, at_outlet] = -tube.direction[:, -1:] * normal_force[tube.section_node[at_outlet]]
+    return np.concatenate([load.ravel(), np.zeros(space.pressure_nodes)])
+
+
+def _system(tube: SweptTube, section: FlowSystem, developed: FlowSolution, reynolds: float) -> FlowSystem:
+    conditions = [Dirichlet(boundary="symmetry", component=2)]
+    conditions += [Dirichlet(boundary=name, component=c) for name in ("inlet", "wall") for c in range(3)]
+    space = taylor_hood(mesh=tube.mesh)
+    system = flow_system(space=space, conditions=conditions, coriolis=CORIOLIS, slab=tube.slab)
+    velocity = _swept_velocity(tube, developed, reynolds)
+    velocity[:, space.boundary_nodes("wall")] = 0.0
+    fixed = np.concatenate([velocity.ravel(), np.zeros(space.pressure_nodes)])
+    fixed[system.free] = 0.0
+    load = _outlet_load(tube, space, section.space, developed.pressure / reynolds)
+    return replace(system, fixed_values=fixed, load=load)
+
+
+def _guess(tube: SweptTube, system: FlowSystem, developed: FlowSolution, reynolds: float) -> FlowSolution:
+    velocity = _swept_velocity(tube, developed, reynolds)
+    vector = np.concatenate([velocity.ravel(), _swept_pressure(tube, developed, reynolds)])
+    parts = split(system.space, vector)
+    return FlowSolution(
+        vector=vector,
+        velocity=parts[0],
+        pressure=parts[1],
+        reaction=np.zeros_like(velocity),
+        driving_gradient=0.0,
+        status=Status(),
+        statistics=Statistics(),
+    )
+
+
+def bent_tube_flow(
+    *,
+    segments: Sequence[Segment],
+    cells: SectionMesh,
+    reynolds: float,
+    rotation_reynolds: float,
+    coriolis_factor: float = 1.0,
+    first_inertia: float = 1.0,
+    settings: NewtonSettings | None = None,
+    progress: Progress | None = None,
+) -> BentTubeFlow:
+    """Steady laminar flow through a tube along a plane path that turns about the plane's normal.
+
+    Args:
+        segments: of the path, lengths over the bore; a positive turn is to the left, the sense of rotation.
+        cells: of the half section.
+        reynolds: Re = U d/nu, above zero.
+        rotation_reynolds: R = omega d^2/nu, zero or more, counter-clockwise about e_z.
+        coriolis_factor: on the Coriolis force in the tube, not on the inflow; other than 1 only to see that a
+            wrong one is found out.
+        first_inertia: share of the inertia to start with; bends at rest need a path from less, such as 0.2.
+        settings: of Newton's method.
+        progress: called with a short text on what is being done.
+    Returns: The flow; its solution's status says NOT_CONVERGED when Newton's method failed.
+    Raises: ValueError: a Reynolds number out of its bounds, or an impossible path.
+    Raises: ArithmeticError: the developed flow was not found.
+    Range: steady, symmetric laminar flow.
+    """
+    if not (np.isfinite(reynolds + rotation_reynolds) and reynolds > 0.0 and rotation_reynolds >= 0.0):
+        raise ValueError("reynolds must be above zero, rotation_reynolds zero or more, both finite")
+    say = progress or (lambda _: None)
+    section = section_system(cells=cells)
+    developed = developed_section(system=section, reynolds=reynolds, rotation_reynolds=rotation_reynolds)
+    tube = swept_tube(section=section_mesh(cells=cells), segments=segments)
+    system = _system(tube, section, developed, reynolds)
+    say(f"{system.free.size} unknowns in {int(tube.slab.max()) + 1} slabs")
+    rotation = 2 * rotation_reynolds * coriolis_factor
+
+    def solve(share: float, start: FlowSolution) -> FlowSolution:
+        say(f"inertia {share:.3g} of its full value")
+        c = Coefficients(inertia=share * reynolds, viscosity=1.0, rotation=rotation)
+        newton = settings or NewtonSettings(tolerance=1e-7, max_iterations=10)
+        return solve_flow(system=system, coefficients=c, start=start, settings=newton, progress=say)
+
+    solution = solve(first_inertia, _guess(tube, system, developed, reynolds))
+    if first_inertia < 1.0 and solution.status.ok:
+        rule = StepRule(first=first_inertia, smallest=0.02)
+        path = follow(solve=solve, start=solution, start_at=first_inertia, targets=[1.0], rule=rule)
+        solution = path.solutions[0] if path.status.ok else replace(solution, status=path.status)
+    return BentTubeFlow(
+        tube=tube,
+        system=system,
+        solution=solution,
+        section=section,
+        developed=developed,
+        reynolds=reynolds,
+        rotation_reynolds=rotation_reynolds,
+        arc_length=tube.arc_length[::2],
+        mean_pressure=_mean_pressure(tube, section, solution),
+        energy_flux=_energy_flux(tube, section, solution),
+    )
+
+
+def _mean_pressure(tube: SweptTube, section: FlowSystem, solution: FlowSolution) -> FloatArray:
+    node, station = _pressure_nodes(tube)
+    share = section.mean_load / section.mean_load.sum()
+    return np.bincount(station, weights=share[node] * solution.pressure).astype(np.float64)
+
+
+def _energy_flux(tube: SweptTube, section: FlowSystem, solution: FlowSolution) -> FloatArray:
+    """Integral of |u|^2 times the velocity along the path, over the section, at the stations."""
+    space = section.space
+    at = np.flatnonzero(tube.half_station % 2 == 0)
+    speeds = np.zeros((tube.arc_length[::2].size, 4, space.velocity_nodes))
+    tangent = tube.direction[:, tube.half_station[at]]
+    u = solution.velocity[:, at]
+    stations = tube.half_station[at] // 2
+    speeds[stations, :3, tube.section_node[at]] = u.T
+    speeds[stations, 3, tube.section_node[at]] = (u[:2] * tangent).sum(axis=0)
+    fields = speeds[:, :, space.velocity.element_dofs.T] @ space.shape
+    flux = (fields[:, :3] ** 2).sum(axis=1) * fields[:, 3] * space.weights
+    return np.asarray(flux.sum(axis=(1, 2)) / space.weights.sum(), dtype=np.float64)
+
+
+def pressure_loss(*, flow: BentTubeFlow, start: float, end: float) -> float:
+    """Loss coefficient between two places of the path, 2 (H_1 - H_2)/U^2 with H = p/rho + alpha U^2/2.
+
+    Args: `start`: arc length of the first place, over d; between stations the values are interpolated. `end`:
+        of the second.
+    Returns: K; with developed flow at both places it is the fall of reduced pressure over rho U^2/2.
+    """
+    head = 2 / flow.reynolds * flow.mean_pressure + flow.energy_flux
+    first, last = np.interp([start, end], flow.arc_length, head)
+    return float(first - last)

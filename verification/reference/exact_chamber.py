@@ -1,0 +1,75 @@
+"""A chamber's volume, moment and lambda by quadrature of the closed form: a route without any mesh."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from scipy.integrate import quad
+
+from ringbalance.mesh.geometry import chamber_volume, half_angle, surface_radius
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Disc
+
+_RELATIVE = 1e-13
+
+
+def exact_moment(*, disc: Disc, density: float, fill_ratio: npt.ArrayLike) -> FloatArray:
+    """Moment of one chamber's liquid, U = 2 rho B integral of r^2 sin(alpha(r)) dr from a(x) to R2.
+
+    Args: `density`: rho, kg/m^3. `fill_ratio`: x, any shape, within [0, 1].
+    Returns: Moment along the chamber's centre line, kg m, the shape of `fill_ratio`.
+    Source: the integral of rho r cos(phi) over the liquid, its angle done by hand; adaptive quadrature.
+    """
+    inner = surface_radius(disc=disc, fill_ratio=fill_ratio)
+    scale = 2 * density * disc.axial_width
+    values = [scale * _radial_integral(disc, float(a)) for a in inner.ravel()]
+    return np.asarray(values, dtype=np.float64).reshape(inner.shape)
+
+
+def _radial_integral(disc: Disc, inner: float) -> float:
+    def integrand(r: float) -> float:
+        return float(r**2 * np.sin(half_angle(disc=disc, radius=r)))
+
+    return float(quad(integrand, inner, disc.outer_radius, epsabs=0, epsrel=_RELATIVE)[0])
+
+
+def exact_wall_pressure(
+    *, disc: Disc, density: float, angular_velocity: float, fill_ratio: npt.ArrayLike
+) -> FloatArray:
+    """Liquid pressure on the outer wall without gravity, p = rho omega^2 (R2^2 - a(x)^2)/2.
+
+    Args: `density`: rho, kg/m^3. `angular_velocity`: omega, rad/s. `fill_ratio`: x, any shape, within [0, 1].
+    Returns: Pressure above the gas pressure, Pa, the shape of `fill_ratio`.
+    Source: integral of dp = rho omega^2 r dr from the surface to the wall.
+    """
+    a = surface_radius(disc=disc, fill_ratio=fill_ratio)
+    depth = (disc.outer_radius - a) * (disc.outer_radius + a) / 2
+    return np.asarray(density * angular_velocity**2 * depth, dtype=np.float64)
+
+
+def central_lambda(*, disc: Disc) -> float:
+    """Moment per transferred mass with a pair at its centre, 2 a sin(alpha(a))/alpha(a).
+
+    Returns: lambda, m.
+    Source: limit of [U(x) - U(x_max - x)]/(rho V (x - x_max/2)) at x = x_max/2.
+    """
+    a = surface_radius(disc=disc, fill_ratio=disc.max_fill_ratio / 2)
+    alpha = half_angle(disc=disc, radius=a)
+    return float(2 * a * np.sin(alpha) / alpha)
+
+
+def pair_lambda(*, disc: Disc, fill_ratio: npt.ArrayLike) -> FloatArray:
+    """Moment of a pair per transferred mass, lambda(x) = [U(x) - U(x_max - x)]/(rho V (x - x_max/2)).
+
+    Args: `fill_ratio`: x of one chamber, any shape, within [0, x_max], not at the centre x_max/2.
+    Returns: lambda, m, the shape of `fill_ratio`.
+    Raises: ValueError: a fill ratio at the centre, where the quotient is 0/0: use `central_lambda`.
+    """
+    x = np.asarray(fill_ratio, dtype=np.float64)
+    transferred = chamber_volume(disc=disc) * (x - disc.max_fill_ratio / 2)
+    if np.any(transferred == 0):
+        raise ValueError("lambda at the centre is a limit: use central_lambda")
+    difference = exact_moment(disc=disc, density=1.0, fill_ratio=x) - exact_moment(
+        disc=disc, density=1.0, fill_ratio=disc.max_fill_ratio - x
+    )
+    return np.asarray(difference / transferred, dtype=np.float64)

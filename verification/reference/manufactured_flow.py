@@ -1,0 +1,185 @@
+"""A manufactured flow on the curved half section of a turning tube, every term of the equation at work.
+
+In the plane u = d psi/dz, v = -d psi/dy with psi = sin(a y + 0.3) exp(b z)/5, so that div u = 0; along the
+tube w = 1 + cos(c y) sin(d z + 0.4)/2; p = sin(e y) cos(f z + 0.2).  The body force is what
+
+    inertia (u . grad) u + rotation C u - viscosity lap u + grad p = f
+
+asks for, with velocities given all round.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Final
+
+import numpy as np
+
+from ringbalance.physics.navier_stokes.newton import (
+    Coefficients,
+    Dirichlet,
+    FlowSolution,
+    flow_system,
+    solve_flow,
+)
+from ringbalance.physics.navier_stokes.rotating_section import CORIOLIS, SectionMesh, section_mesh
+from ringbalance.physics.navier_stokes.space import FlowSpace, at_points, taylor_hood
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.verification.orders import OrderStudy, order_study
+
+TRUE: Final = Coefficients(inertia=3.0, viscosity=0.7, rotation=5.0)
+"""Chosen so that no term hides behind another."""
+_A, _B, _C, _D, _E, _F = 2.1, 1.2, 2.7, 3.1, 1.7, 1.3
+_ACROSS: Final = 1.5
+"""Cells of the ring between core and wall per cell around."""
+_WALL_RATIO: Final = 3.0
+
+
+def velocity(places: FloatArray) -> FloatArray:
+    """The manufactured velocity.
+
+    Args: `places`: (y, z) over the bore, shape (2, ...).
+    Returns: Components along (y, z, x), shape (3, ...).
+    """
+    y, z = places
+    growth = np.exp(_B * z) / 5
+    return np.stack(
+        [
+            _B * np.sin(_A * y + 0.3) * growth,
+            -_A * np.cos(_A * y + 0.3) * growth,
+            1 + np.cos(_C * y) * np.sin(_D * z + 0.4) / 2,
+        ]
+    )
+
+
+def _gradient(places: FloatArray) -> FloatArray:
+    """d u_c / d x_d, shape (3, 2, ...)."""
+    y, z = places
+    growth, sine, cosine = np.exp(_B * z) / 5, np.sin(_A * y + 0.3), np.cos(_A * y + 0.3)
+    return np.stack(
+        [
+            np.stack([_A * _B * cosine * growth, _B**2 * sine * growth]),
+            np.stack([_A**2 * sine * growth, -_A * _B * cosine * growth]),
+            np.stack(
+                [
+                    -_C * np.sin(_C * y) * np.sin(_D * z + 0.4) / 2,
+                    _D * np.cos(_C * y) * np.cos(_D * z + 0.4) / 2,
+                ]
+            ),
+        ]
+    )
+
+
+def _laplacian(places: FloatArray) -> FloatArray:
+    u, v, w = velocity(places)
+    plane = _B**2 - _A**2
+    return np.stack([plane * u, plane * v, -(_C**2 + _D**2) * (w - 1)])
+
+
+def pressure(places: FloatArray) -> FloatArray:
+    """The manufactured pressure, up to a constant.
+
+    Args: `places`: (y, z) over the bore, shape (2, ...).
+    Returns: Pressure, shape (...).
+    """
+    return np.asarray(np.sin(_E * places[0]) * np.cos(_F * places[1] + 0.2))
+
+
+def body_force(places: FloatArray) -> FloatArray:
+    """The body force that makes this flow the solution.
+
+    Args: `places`: (y, z) over the bore, shape (2, ...).
+    Returns: Components along (y, z, x), shape (3, ...).
+    """
+    y, z = places
+    u = velocity(places)
+    carried = np.einsum("d...,cd...->c...", u[:2], _gradient(places))
+    turning = np.einsum("cd,d...->c...", np.array(CORIOLIS), u)
+    slope = np.stack(
+        [
+            _E * np.cos(_E * y) * np.cos(_F * z + 0.2),
+            -_F * np.sin(_E * y) * np.sin(_F * z + 0.2),
+            np.zeros_like(y),
+        ]
+    )
+    rotation = float(np.asarray(TRUE.rotation))
+    return np.asarray(
+        TRUE.inertia * carried + rotation * turning - TRUE.viscosity * _laplacian(places) + slope
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlowStudy:
+    """Errors over levels, coarse to fine."""
+
+    velocity: OrderStudy
+    """Root mean square over the section, relative."""
+    pressure: OrderStudy
+    """Root mean square over the section, relative, means taken off."""
+    unknowns: tuple[int, ...]
+
+
+def flow_study(*, around: Sequence[int], defect: str | None = None) -> FlowStudy:
+    """Solve the manufactured flow on a sequence of meshes.
+
+    Args: `around`: cells of each level's core, coarse to fine. `defect`: "coriolis_dropped",
+        "inertia_off_by_a_percent" or "viscosity_off_by_a_percent".
+    Raises: ValueError: an unknown defect, or a solve that failed.
+    """
+    used = _spoiled(defect)
+    solved = [_solve(count, used) for count in around]
+    size = [around[0] / count for count in around]
+    return FlowStudy(
+        velocity=order_study(size=size, error=[_velocity_error(*pair) for pair in solved]),
+        pressure=order_study(size=size, error=[_pressure_error(*pair) for pair in solved]),
+        unknowns=tuple(space.unknowns for space, _ in solved),
+    )
+
+
+def _spoiled(defect: str | None) -> Coefficients:
+    changes = {
+        None: TRUE,
+        "coriolis_dropped": replace(TRUE, rotation=0.0),
+        "inertia_off_by_a_percent": replace(TRUE, inertia=1.01 * TRUE.inertia),
+        "viscosity_off_by_a_percent": replace(TRUE, viscosity=1.01 * TRUE.viscosity),
+    }
+    if defect not in changes:
+        raise ValueError(f"unknown defect {defect}")
+    return changes[defect]
+
+
+def _solve(around: int, coefficients: Coefficients) -> tuple[FlowSpace, FlowSolution]:
+    across = max(1, round(_ACROSS * around))
+    cells = SectionMesh(around=around, across=across, wall_ratio=_WALL_RATIO)
+    space = taylor_hood(mesh=section_mesh(cells=cells), components=3)
+    conditions = [
+        Dirichlet(boundary=name, component=c, value=partial(_component, c))
+        for name in ("symmetry", "wall")
+        for c in range(3)
+    ]
+    system = flow_system(
+        space=space, conditions=conditions, enclosed=True, coriolis=CORIOLIS, body_force=body_force
+    )
+    solution = solve_flow(system=system, coefficients=coefficients)
+    if not solution.status.ok:
+        raise ValueError(solution.status.text)
+    return space, solution
+
+
+def _component(component: int, places: FloatArray) -> FloatArray:
+    return np.asarray(velocity(places)[component])
+
+
+def _velocity_error(space: FlowSpace, solution: FlowSolution) -> float:
+    found, _ = at_points(space, solution.velocity)
+    true = velocity(space.points)
+    return float(np.sqrt(np.sum(space.weights * (found - true) ** 2) / np.sum(space.weights * true**2)))
+
+
+def _pressure_error(space: FlowSpace, solution: FlowSolution) -> float:
+    found = solution.pressure[space.pressure.element_dofs.T] @ space.pressure_shape
+    true = pressure(space.points)
+    found, true = (field - np.sum(space.weights * field) / space.weights.sum() for field in (found, true))
+    return float(np.sqrt(np.sum(space.weights * (found - true) ** 2) / np.sum(space.weights * true**2)))

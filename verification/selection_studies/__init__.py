@@ -1,0 +1,4 @@
+"""Studies of the selection of models: error against cost, measured on the scene and on random scenes.
+
+A new quantity to select models for is one more hierarchy in `study`; what it costs is measured in `measure`.
+"""

@@ -1,0 +1,117 @@
+"""The choice of models judged: error against the finest model, cost against the cheapest that would do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+from ringbalance.reduced_model.selection.chamber_models import chamber_hierarchies
+from ringbalance.reduced_model.selection.choice import Values, choose, ranked_fidelities
+from ringbalance.reduced_model.selection.cost import committed_costs
+from ringbalance.reduced_model.selection.law_models import base_law
+from ringbalance.reduced_model.selection.models import Contribution, ModelHierarchy
+from ringbalance.reduced_model.selection.tube_models import LawBook, k_hierarchy, velocity_hierarchy
+from ringbalance.scene.models import Scene
+from ringbalance.verification.selection_studies.operation import mass_hierarchy, settling_hierarchy
+
+CHAMBER: Final = ("wall_pressure", "moment")
+TOLERANCES: Final = (0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judged:
+    """One choice, judged."""
+
+    scene: str
+    quantity: str
+    tolerance: float
+    fidelity: str
+    error: float
+    """Against the finest model over all points of the hierarchy."""
+    cost_ratio: float
+    """Cost over that of the cheapest model that keeps the tolerance; 1 where none does."""
+    climbed: bool
+    said: bool
+    """Whether a tolerance below the finest model's own uncertainty is answered with that."""
+
+    @property
+    def held(self) -> bool:
+        """Whether the tolerance is kept."""
+        return self.error <= self.tolerance
+
+
+def hierarchies_for(scene: Scene, quantities: Sequence[str]) -> Iterator[ModelHierarchy]:
+    """Model hierarchies of some quantities, made one after the other.
+
+    Args: `quantities`: "wall_pressure", "moment", "k", "velocity", "transferred_mass", "settling_time".
+    Yields: Model hierarchies that have points.
+    """
+    chamber = chamber_hierarchies(scene) if set(quantities) & set(CHAMBER) else ()
+    makers = {
+        "velocity": velocity_hierarchy,
+        "transferred_mass": mass_hierarchy,
+        "settling_time": settling_hierarchy,
+    }
+    flow = [quantity for quantity in quantities if quantity in makers]
+    yield from (hierarchy for hierarchy in chamber if hierarchy.quantity in quantities and hierarchy.points)
+    if "k" in quantities:
+        yield k_hierarchy(scene)
+    if flow:
+        book = LawBook(scene, base_law(scene))
+        yield from (makers[quantity](scene, book=book) for quantity in flow)
+
+
+def judge(
+    scene: Scene,
+    *,
+    quantities: Sequence[str],
+    tolerances: Sequence[float] = TOLERANCES,
+    check: bool = True,
+    worth: float = 1.0,
+) -> list[Judged]:
+    """Choose models for a scene at every tolerance, and judge each choice by the finest model.
+
+    Args: `quantities`: names. `tolerances`: relative. `check`: whether choices are checked; without it the
+        estimates alone decide. `worth`: factor on every contribution; anything but 1 is a deliberate error.
+    Returns: One record for each quantity and tolerance.
+    """
+    found = []
+    for hierarchy in hierarchies_for(scene, quantities):
+        spoiled = replace(hierarchy, contributions=_spoiled(hierarchy.contributions, worth))
+        values = Values(spoiled)
+        found += [_judged(scene, spoiled, values, tolerance, check=check) for tolerance in tolerances]
+    return found
+
+
+def _spoiled(contributions: Mapping[str, Contribution], worth: float) -> Mapping[str, Contribution]:
+    return {
+        term: replace(c, value=None if c.value is None else c.value * worth)
+        for term, c in contributions.items()
+    }
+
+
+def _judged(
+    scene: Scene, hierarchy: ModelHierarchy, values: Values, tolerance: float, *, check: bool
+) -> Judged:
+    costs, points = committed_costs(), tuple(range(len(hierarchy.points)))
+    choice = choose(hierarchy, tolerance, check=check, costs=costs, values=values)
+    cheapest = choice.cost
+    for fidelity in ranked_fidelities(hierarchy, costs):
+        cost = costs.of_fidelity(fidelity, points=len(points))
+        if cost >= choice.cost:
+            break
+        if values.error(fidelity, hierarchy.top, points) <= tolerance:
+            cheapest = cost
+            break
+    return Judged(
+        scene=scene.name,
+        quantity=hierarchy.quantity,
+        tolerance=tolerance,
+        fidelity=choice.fidelity.name,
+        error=values.error(choice.fidelity, hierarchy.top, points),
+        cost_ratio=choice.cost / cheapest,
+        climbed=choice.climbed,
+        said=tolerance >= hierarchy.top_uncertainty
+        or any("is below what" in text for text in choice.reasons),
+    )

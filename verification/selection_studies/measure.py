@@ -1,0 +1,200 @@
+"""Every model of a hierarchy measured: its error against the finest, its counted cost, its time and
+memory."""
+
+from __future__ import annotations
+
+import time
+import tracemalloc
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from statistics import median
+from typing import Final
+
+import numpy as np
+
+from ringbalance.reduced_model.selection.choice import Values
+from ringbalance.reduced_model.selection.cost import CostModel
+from ringbalance.reduced_model.selection.models import Fidelity, ModelHierarchy, Work
+
+QUICK: Final = 0.1
+"""s, below which a run is repeated."""
+FLOOR: Final = 3e-8
+"""Relative error below which grid convergence, tables and rounding rule: smaller ones count as equal."""
+
+
+@dataclass(kw_only=True)
+class Clock:
+    """Takes processor times and peaks of memory; remembers what the same counted work took before."""
+
+    repeats: int = 3
+    """Runs of which the median counts, where one is quick."""
+    memory: bool = True
+    """Whether memory is traced, too."""
+    _known: dict[frozenset[tuple[str, float]], float] = field(default_factory=dict)
+
+    def seconds_of(self, fidelity: Fidelity, points: Sequence[int]) -> float:
+        """Processor time of a model over points, with the tables it needs first.
+
+        Args: `points`: numbers of the points.
+        Returns: s; each part the median of several runs, or of the points' single runs where these take long.
+        """
+        before = 0.0
+        if fidelity.prepare is not None:
+            key = frozenset(fidelity.fixed_work.items())
+            if key not in self._known:
+                self._known[key] = self._median(fidelity.prepare)
+            before = self._known[key]
+        work = fidelity.fresh or fidelity.solve
+        each = [_once(partial(work, points[0]))]
+        if self.repeats > 1 or each[0] < QUICK:
+            each += [_once(partial(work, point)) for point in points[1:]]
+        if max(each) < QUICK:
+            each += [_once(partial(work, point)) for _ in range(self.repeats - 1) for point in points]
+        return before + median(each) * len(points)
+
+    def _median(self, work: Callable[[], object]) -> float:
+        times = [_once(work)]
+        while len(times) < self.repeats and times[0] < QUICK:
+            times.append(_once(work))
+        return median(times)
+
+    def memory_of(self, fidelity: Fidelity) -> float | None:
+        """Peak of memory allocated while one point is computed.
+
+        Returns: Bytes, of what Python and NumPy allocate; a factorisation inside a compiled library counts
+            only by its arrays. None where memory is not traced.
+        """
+        if not self.memory:
+            return None
+        work = fidelity.fresh or fidelity.solve
+        tracemalloc.start()
+        try:
+            work(0)
+            return float(tracemalloc.get_traced_memory()[1])
+        finally:
+            tracemalloc.stop()
+
+
+def _once(work: Callable[[], object]) -> float:
+    start = time.process_time()
+    work()
+    return max(time.process_time() - start, 1e-7)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measured:
+    """One model, measured."""
+
+    fidelity: Fidelity
+    error: float
+    """Largest relative error against the finest model over the hierarchy's points."""
+    cost: float
+    """Counted work over all points by the committed cost model, s of its machine."""
+    on_front: bool
+    """Whether no other model is both cheaper and nearer."""
+    seconds: float | None
+    """Processor time over all points and of the tables before, medians of several runs; None: not timed."""
+    memory: float | None
+    """Peak of allocated memory at one point, bytes; None: not measured."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trade:
+    """The measured model hierarchy of one quantity."""
+
+    hierarchy: ModelHierarchy
+    fidelities: tuple[Measured, ...]
+    knee: str | None
+    """Name of the model at the front's trade-off point; None for a model hierarchy without points."""
+
+    @property
+    def front(self) -> tuple[Measured, ...]:
+        """Models on the Pareto front, cheapest first."""
+        return tuple(sorted((m for m in self.fidelities if m.on_front), key=lambda m: m.cost))
+
+
+def measure(hierarchy: ModelHierarchy, *, values: Values, costs: CostModel, clock: Clock | None) -> Trade:
+    """Measure a model hierarchy.
+
+    Args: `costs`: the cost model for the counted cost. `clock`: takes times and
+        memory; None: neither.
+    Returns: Trade; without points no model is measured.
+    Source: Pareto front over counted cost and error; knee by the largest distance from the chord between the
+        front's ends, both axes logarithmic, errors below the finest model's own uncertainty counted as that.
+    """
+    if not hierarchy.points:
+        return Trade(hierarchy=hierarchy, fidelities=(), knee=None)
+    points = tuple(range(len(hierarchy.points)))
+    errors = [values.error(fidelity, hierarchy.top, points) for fidelity in hierarchy.fidelities]
+    spent = [costs.of_fidelity(fidelity, points=len(points)) for fidelity in hierarchy.fidelities]
+    front = pareto_front(spent, [max(error, FLOOR) for error in errors])
+    held = [max(error, hierarchy.top_uncertainty, FLOOR) for error in errors]
+    known = pareto_front(spent, held)
+    return Trade(
+        hierarchy=hierarchy,
+        fidelities=tuple(
+            Measured(
+                fidelity=fidelity,
+                error=error,
+                cost=cost,
+                on_front=i in front,
+                seconds=clock.seconds_of(fidelity, points) if clock else None,
+                memory=clock.memory_of(fidelity) if clock else None,
+            )
+            for i, (fidelity, error, cost) in enumerate(zip(hierarchy.fidelities, errors, spent, strict=True))
+        ),
+        knee=hierarchy.fidelities[knee([spent[i] for i in known], [held[i] for i in known], known)].name,
+    )
+
+
+def pareto_front(costs: Sequence[float], errors: Sequence[float]) -> list[int]:
+    """Entries that no other one beats in both cost and error.
+
+    Returns: Their places, cheapest first; of equals the first.
+    Source: definition.
+    """
+    best, found = float("inf"), []
+    for i in sorted(range(len(costs)), key=lambda i: (costs[i], errors[i])):
+        if errors[i] < best:
+            best = errors[i]
+            found.append(i)
+    return found
+
+
+def knee(costs: Sequence[float], errors: Sequence[float], places: Sequence[int]) -> int:
+    """The place on a front that lies farthest below the chord between its ends, both axes logarithmic.
+
+    Args: `costs`: along the front, ascending. `errors`: along it, descending. `places`: what to return for
+        each.
+    Returns: One of `places`; the last of a front of one or two.
+    Source: maximum-distance rule.
+    """
+    if len(places) < 3:
+        return places[-1]
+    x, y = (np.log(np.maximum(np.asarray(v, dtype=np.float64), 1e-300)) for v in (costs, errors))
+    x, y = (x - x[0]) / (x[-1] - x[0]), (y - y[-1]) / (y[0] - y[-1])
+    return places[int(np.argmax(1 - x - y))]
+
+
+def works_and_seconds(trades: Sequence[Trade]) -> tuple[list[Work], list[float]]:
+    """Counted work and measured times of all timed models, to fit a cost model to.
+
+    Returns: Work over all points, and s, one of each per model.
+    """
+    works: list[Work] = []
+    seconds: list[float] = []
+    for trade in trades:
+        count = len(trade.hierarchy.points)
+        for found in trade.fidelities:
+            if found.seconds is not None:
+                kinds = {*found.fidelity.work, *found.fidelity.fixed_work}
+                works.append(
+                    {
+                        kind: count * found.fidelity.work.get(kind, 0.0)
+                        + found.fidelity.fixed_work.get(kind, 0.0)
+                        for kind in kinds
+                    }
+                )
+                seconds.append(found.seconds)
+    return works, seconds

@@ -1,0 +1,281 @@
+"""Speed against accuracy, measured on a scene: hierarchies, fronts and trade-off points, and the models it
+asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Final, Literal
+
+import numpy as np
+
+from ringbalance.reduced_model.chamber.gravity import check_ring
+from ringbalance.reduced_model.selection.chamber_models import chamber_hierarchies
+from ringbalance.reduced_model.selection.choice import Choice, Values, choose
+from ringbalance.reduced_model.selection.cost import CostModel, committed_costs, fitted_costs
+from ringbalance.reduced_model.selection.estimates import term_estimates
+from ringbalance.reduced_model.selection.law_models import QUADRATURE, SERIES, base_law
+from ringbalance.reduced_model.selection.models import Fidelity, ModelHierarchy
+from ringbalance.reduced_model.selection.registry import models_used
+from ringbalance.reduced_model.selection.scene_numbers import scene_numbers
+from ringbalance.reduced_model.selection.tube_models import LawBook, k_hierarchy, velocity_hierarchy
+from ringbalance.scene.models import Scene
+from ringbalance.verification.selection_studies.measure import (
+    Clock,
+    Measured,
+    Trade,
+    measure,
+    works_and_seconds,
+)
+from ringbalance.verification.selection_studies.operation import (
+    EXPLICIT,
+    MANY,
+    mass_hierarchy,
+    settling_hierarchy,
+)
+
+Record = dict[str, Any]
+Level = Literal["light", "heavy"]
+
+TOLERANCES: Final = (0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+QUICK: Final = ("wall_pressure", "moment", "k", "velocity", "transferred_mass")
+"""Quantities of a light trade; the settling time takes whole runs of the loop."""
+_OWN_ALONE: Final = (("light", "transferred_mass"),)
+"""Where models are chosen for the scene's own tolerance alone."""
+_LAWS: Final = ("velocity", "transferred_mass")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TradeStudy:
+    """All model hierarchies of one scene, measured."""
+
+    scene: Scene
+    trades: tuple[Trade, ...]
+    choices: Mapping[str, tuple[Choice, ...]]
+    """By quantity, for each tolerance and last for the scene's own."""
+    costs: CostModel
+    refit: CostModel | None
+    """Fitted to this run's times; None when nothing was timed."""
+
+
+def hierarchies_of(scene: Scene, *, level: Level = "heavy") -> tuple[ModelHierarchy, ...]:
+    """The model hierarchies of a scene.
+
+    Args: `level`: "light" leaves the settling time out.
+    Returns: Wall pressure, moment, k, velocity, transferred mass and, heavy, settling time.
+    Raises: SceneError: a rotor too slow for the liquid to form a ring.
+    """
+    check_ring(scene)
+    book = LawBook(scene, base_law(scene))
+    quick = (
+        *chamber_hierarchies(scene),
+        k_hierarchy(scene),
+        velocity_hierarchy(scene, book=book),
+        mass_hierarchy(scene, book=book),
+    )
+    return quick if level == "light" else (*quick, settling_hierarchy(scene, book=book))
+
+
+def trade_study(
+    scene: Scene,
+    *,
+    level: Level = "heavy",
+    tolerances: Sequence[float] = TOLERANCES,
+    timed: bool = True,
+    progress: Callable[[str], None] | None = None,
+) -> TradeStudy:
+    """Measure every model hierarchy of a scene and choose its models.
+
+    Args: `level`: "light" leaves the settling time out. `tolerances`: for which models are chosen, beside the
+        scene's own. `timed`: whether times and memory are taken as well. `progress`: called with the name of
+        each quantity; None for silence.
+    Returns: TradeStudy; all but its times is the same on every machine.
+    Raises: SceneError: a rotor too slow for the liquid to form a ring.
+    """
+    costs = committed_costs()
+    trades, chosen = [], {}
+    clock = _clock(level) if timed else None
+    for hierarchy in hierarchies_of(scene, level=level):
+        if progress is not None:
+            progress(hierarchy.title)
+        values = Values(hierarchy)
+        shown = thinned(hierarchy) if level == "light" else hierarchy
+        trades.append(measure(shown, values=values, costs=costs, clock=_no_longer(clock, hierarchy)))
+        wanted = _wanted(scene, () if (level, hierarchy.quantity) in _OWN_ALONE else tolerances)
+        chosen[hierarchy.quantity] = tuple(
+            choose(hierarchy, tolerance, costs=costs, values=values)
+            for tolerance in wanted
+            if hierarchy.points
+        )
+    return TradeStudy(
+        scene=scene, trades=tuple(trades), choices=chosen, costs=costs, refit=refitted(trades, costs=costs)
+    )
+
+
+def thinned(hierarchy: ModelHierarchy) -> ModelHierarchy:
+    """A model hierarchy of laws with every second model left out: levels and ways through time that lie close
+    together.
+
+    Args: `hierarchy`: any model hierarchy.
+    Returns: The model hierarchy; the finest model stays, and choices are made on the whole one.
+    """
+
+    def kept(fidelity: Fidelity) -> bool:
+        close = fidelity.models.get("level of a chamber") in (SERIES, QUADRATURE)
+        return fidelity is hierarchy.top or not (
+            close or fidelity.models.get("operation in time") == EXPLICIT[MANY]
+        )
+
+    return replace(
+        hierarchy, fidelities=tuple(fidelity for fidelity in hierarchy.fidelities if kept(fidelity))
+    )
+
+
+def _clock(level: Level) -> Clock:
+    return Clock(repeats=3) if level == "heavy" else Clock(repeats=1, memory=False)
+
+
+def _no_longer(clock: Clock | None, hierarchy: ModelHierarchy) -> Clock | None:
+    """Runs of the whole loop are timed once each, and not traced; a light study times no laws."""
+    if clock is None or (clock.repeats == 1 and hierarchy.quantity in _LAWS):
+        return None
+    return Clock(repeats=1, memory=False) if hierarchy.quantity == "settling_time" else clock
+
+
+def refitted(trades: Sequence[Trade], *, costs: CostModel) -> CostModel | None:
+    """Fit the cost model again to the times of measured model hierarchies.
+
+    Args: `trades`: measured; may be of several scenes. `costs`: the model that kinds of work without a time
+        of their own keep to.
+    Returns: CostModel; None where nothing was timed.
+    """
+    works, seconds = works_and_seconds(trades)
+    if not seconds:
+        return None
+    told = f"processor times of {len(seconds)} models"
+    return fitted_costs(works=works, seconds=seconds, fitted_on=told, prior=costs)
+
+
+def _wanted(scene: Scene, tolerances: Sequence[float]) -> tuple[float, ...]:
+    """The tolerances and, last, the scene's own held within what choices are made for."""
+    return (*tolerances, held_tolerance(scene.tolerance))
+
+
+def held_tolerance(tolerance: float) -> float:
+    """A scene's tolerance, held within the range that models are chosen for.
+
+    Args: `tolerance`: relative.
+    Returns: The same within 1e-6 and 0.1.
+    """
+    return min(max(tolerance, min(TOLERANCES)), max(TOLERANCES))
+
+
+def tolerance_text(tolerance: float, say: Callable[[float], str]) -> str:
+    """The tolerance that models are chosen for, beside the scene's own where that is out of range.
+
+    Args: `say`: writes a tolerance.
+    Returns: "this scene's tolerance of 1 %", or the nearest to it that models are chosen for.
+    """
+    taken, told = held_tolerance(tolerance), f"this scene's tolerance of {say(tolerance)}"
+    return told if taken == tolerance else f"{say(taken)}, the nearest to {told} that models are chosen for"
+
+
+def trade_document(study: TradeStudy) -> Record:
+    """A study as plain numbers and texts. Returns: Record; all but `times` is the same on every machine."""
+    scene = study.scene
+    return {
+        "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
+        "tolerance": scene.tolerance,
+        "numbers": [
+            {"name": n.name, "value": n.value, "formula": n.formula, "tells": n.tells}
+            for n in scene_numbers(scene)
+        ],
+        "terms": terms_document(scene),
+        "models_used": [asdict(used) for used in models_used(scene)],
+        "cost_model": {"fitted_on": study.costs.fitted_on, "seconds": dict(study.costs.seconds)},
+        "quantities": [_quantity(trade, study.choices[trade.hierarchy.quantity]) for trade in study.trades],
+        "times": _times(study),
+    }
+
+
+def terms_document(scene: Scene) -> list[Record]:
+    """Estimated contribution of every physical term of a scene, as plain numbers and texts.
+
+    Returns: For each term its name, its contribution, whether that is above the tolerance, and why.
+    """
+    return [
+        {"term": e.term, "estimated_contribution": e.contribution, "above": e.above, "why": e.reason}
+        for e in term_estimates(scene).values()
+    ]
+
+
+def _quantity(trade: Trade, choices: Sequence[Choice]) -> Record:
+    hierarchy = trade.hierarchy
+    return {
+        "quantity": hierarchy.quantity,
+        "title": hierarchy.title,
+        "values": list(hierarchy.values),
+        "points": list(hierarchy.points),
+        "status": {"code": str(hierarchy.status.code), "text": hierarchy.status.text},
+        "top": hierarchy.top.name,
+        "top_uncertainty": hierarchy.top_uncertainty,
+        "top_uncertainty_from": hierarchy.top_uncertainty_from,
+        "contributions": [
+            {"term": c.term, "value": c.value, "formula": c.formula, "source": c.source}
+            for c in hierarchy.contributions.values()
+        ],
+        "rungs": [_fidelity(found) for found in trade.fidelities],
+        "knee": trade.knee,
+        "choices": [choice_document(choice) for choice in choices],
+    }
+
+
+def _fidelity(found: Measured) -> Record:
+    return {
+        "name": found.fidelity.name,
+        "models": dict(found.fidelity.models),
+        "leaves_out": sorted(found.fidelity.leaves_out),
+        "work": dict(found.fidelity.work),
+        "fixed_work": dict(found.fidelity.fixed_work),
+        "error": found.error,
+        "cost_s": found.cost,
+        "on_front": found.on_front,
+    }
+
+
+def choice_document(choice: Choice) -> Record:
+    """A choice as plain numbers and texts."""
+    return {
+        "tolerance": choice.tolerance,
+        "first": choice.first.name,
+        "rung": choice.fidelity.name,
+        "models": dict(choice.fidelity.models),
+        "reference": None if choice.reference is None else choice.reference.name,
+        "measured": choice.measured,
+        "climbed": choice.climbed,
+        "cost_s": choice.cost,
+        "checking_cost_s": choice.checking_cost,
+        "reasons": list(choice.reasons),
+    }
+
+
+def _times(study: TradeStudy) -> Record | None:
+    if study.refit is None:
+        return None
+    works, seconds = works_and_seconds(study.trades)
+    ratios = np.array([study.costs.cost(w) for w in works]) / np.array(seconds)
+    return {
+        "rungs": {
+            trade.hierarchy.quantity: [
+                {"name": found.fidelity.name, "seconds": found.seconds, "memory_bytes": found.memory}
+                for found in trade.fidelities
+            ]
+            for trade in study.trades
+        },
+        "refit_seconds": dict(study.refit.seconds),
+        "counted_over_measured": {
+            "median": float(np.median(ratios)),
+            "low": float(np.quantile(ratios, 0.1)),
+            "high": float(np.quantile(ratios, 0.9)),
+        },
+    }

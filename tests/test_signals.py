@@ -1,0 +1,60 @@
+"""An interrupt ends a run wherever it arrives."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+DROPPED = """
+import os, signal, sys, time, weakref
+from ringbalance.signals import interrupts
+
+class Thing:
+    def __del__(self):
+        if {in_finaliser}:
+            os.kill(os.getpid(), signal.{name})
+            for _ in range(1000): pass
+
+def ends():
+    thing = Thing()
+    def gone(_):
+        if not {in_finaliser}:
+            os.kill(os.getpid(), signal.{name})
+            for _ in range(1000): pass
+    kept = weakref.ref(thing, gone)
+    del thing
+    time.sleep(20)
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+try:
+    with interrupts():
+        ends()
+except KeyboardInterrupt:
+    sys.exit(130)
+"""
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize("in_finaliser", [True, False])
+def test_an_interrupt_that_python_drops_is_made_again(name: str, in_finaliser: bool) -> None:
+    program = DROPPED.format(name=name, in_finaliser=in_finaliser)
+    ended = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=15, env=dict(os.environ)
+    )
+    assert (ended.returncode, ended.stderr) == (130, "")
+
+
+def test_other_dropped_errors_are_shown_as_ever() -> None:
+    program = """
+from ringbalance.signals import interrupts
+class Thing:
+    def __del__(self):
+        raise ValueError("of the finaliser")
+with interrupts():
+    Thing()
+"""
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=15)
+    assert "of the finaliser" in ended.stderr

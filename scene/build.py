@@ -63,5 +63,7 @@ def _uncertainty(reading: Reading) -> tuple[InputUncertainty, ...]:
 def _defaulted(reading: Reading) -> tuple[str, ...]:
     """Paths "table.key" whose value is a default; what was looked up for a known liquid is none."""
     return tuple(
-        path for path in reading.values if not reading.given(path) and not path.startswith("liquid.")
+        path
+        for path in reading.values
+        if not reading.given(path) and (not path.startswith("liquid.") or path == "liquid.dissolved_gas")
     )

@@ -126,6 +126,7 @@ def liquid_at(*, name: str, temperature: float) -> Liquid:
         density=density,
         kinematic_viscosity=viscosity,
         vapour_pressure=vapour_pressure,
+        dissolved_gas="saturated",
         density_uncertainty=liquid.density_uncertainty,
         viscosity_uncertainty=liquid.viscosity_uncertainty,
         source=liquid.source,

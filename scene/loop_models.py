@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from ringbalance.scene.keys.declaration import UNCERTAIN, derived, needed, shown, standard, unused
-from ringbalance.scene.keys.derivations import same, trial_sequence
+from ringbalance.scene.keys.derivations import same, ten_times, trial_sequence
 from ringbalance.scene.keys.fields import POSITIVE, chamber_letters, quantity, whole
 from ringbalance.scene.keys.quantities import (
     Angle,
@@ -98,6 +98,16 @@ class ControllerSettings:
             "0.5 s", "wait after the gas closes, before the next sample; a run takes at most 10 000 samples"
         ),
         shown("period", "s"),
+    ]
+    hold_time: Annotated[
+        PositiveTime,
+        derived(
+            "10 times period",
+            "the run is settled once the amplitude has stayed at or below limit for this long",
+            ten_times,
+            "controller.period",
+        ),
+        shown("hold time", "s"),
     ]
     proportional: Annotated[
         float,

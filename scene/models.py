@@ -36,6 +36,9 @@ from ringbalance.scene.keys.quantities import (
 from ringbalance.scene.loop_models import ControllerSettings, Rotor, RunSettings, Sensor
 
 HumpGas = Literal["vented", "trapped"]
+HumpShape = Literal["arc", "point"]
+DissolvedGas = Literal["none", "saturated"]
+PressurePlace = Literal["chamber", "shaft"]
 Entrance = Literal["sharp", "rounded", "projecting"]
 Shaft = Literal["horizontal", "vertical"]
 GasProcess = Literal["isothermal", "adiabatic"]
@@ -81,7 +84,7 @@ class Disc:
         Length,
         standard(
             "0 mm",
-            "strip that a plate takes on each side of a chamber, so half of the plate between two chambers",
+            "strip that a plate takes on each side of a chamber: half of the plate between two chambers",
         ),
         UNCERTAIN,
         shown("plate thickness t", "mm", note="on each side of a chamber"),
@@ -89,9 +92,7 @@ class Disc:
     max_fill_ratio: Annotated[
         FillRatio,
         standard(
-            0.5,
-            "liquid of a pair of opposite chambers, as a share of the volume of one chamber; "
-            "at least a ring of 1e-8 outer_radius in depth",
+            0.5, "liquid of a pair, as a share of the volume of one chamber; depth at least 1e-8 outer_radius"
         ),
         shown("greatest fill ratio", note="liquid of a pair, per chamber volume"),
     ]
@@ -131,7 +132,7 @@ class Liquid:
         quantity("density", POSITIVE),
         derived(
             "that of the known liquid",
-            "given outright, which wins; its uncertainty is then 0 unless [uncertainty] has one",
+            "wins when given; its uncertainty is then 0 unless [uncertainty] has one",
         ),
         UNCERTAIN,
         shown("density", "kg/m^3"),
@@ -141,7 +142,7 @@ class Liquid:
         quantity("kinematic_viscosity", POSITIVE),
         derived(
             "that of the known liquid",
-            "given outright, which wins; its uncertainty is then 0 unless [uncertainty] has one",
+            "wins when given; its uncertainty is then 0 unless [uncertainty] has one",
         ),
         UNCERTAIN,
         shown("kinematic viscosity", "mm^2/s"),
@@ -151,6 +152,11 @@ class Liquid:
         derived("that of the known liquid; 0 Pa for a custom one", "absolute"),
         UNCERTAIN,
         shown("vapour pressure", "kPa", note="absolute"),
+    ]
+    dissolved_gas: Annotated[
+        DissolvedGas,
+        standard("saturated", "gas that low pressure at the siphon crest can release from the liquid"),
+        shown("dissolved gas"),
     ]
     density_uncertainty: float
     """Expanded uncertainty (95 %), relative to the density."""
@@ -197,14 +203,22 @@ class Tube:
         float,
         share(Bounds(above=0, below=1), example=0.5),
         standard(0.5, "share of the path, from the driven chamber, at which the siphon crest lies"),
+        UNCERTAIN,
         shown("siphon crest position", note="share of the path"),
+    ]
+    hump_shape: Annotated[
+        HumpShape,
+        standard(
+            "arc",
+            "between its straight legs the tube follows the circle of hump_radius, or touches it at a point",
+        ),
+        shown("siphon crest shape"),
     ]
     hump_gas: Annotated[
         HumpGas,
         standard(
             "vented",
-            "bound used for the priming pressure: gas beyond the siphon crest is vented, or must be pushed "
-            "out",
+            "bound for the priming pressure: gas beyond the siphon crest is vented, or must be pushed out",
         ),
         shown("gas beyond the siphon crest"),
     ]
@@ -266,6 +280,14 @@ class Gas:
         needed("gauge pressure in the driven chamber while its valve is open"),
         UNCERTAIN,
         shown("gas pressure", "MPa", note="gauge"),
+    ]
+    measured_at: Annotated[
+        PressurePlace,
+        standard(
+            "chamber",
+            "where `pressure` holds: at inner_radius, or on the shaft's axis; spinning gas adds to it",
+        ),
+        shown("gas pressure measured at"),
     ]
     ambient_pressure: Annotated[
         PositivePressure,

@@ -40,6 +40,14 @@ def a_tenth(value: float) -> float:
     return value / 10
 
 
+def ten_times(value: float) -> float:
+    """Ten times the value of another key.
+
+    Of samples that lie within a limit by chance half of the time, ten in a row do so once in a thousand.
+    """
+    return 10 * value
+
+
 def even_number_of_chambers(central_angle: float) -> int | None:
     """Number of chambers that fill the circle.
 

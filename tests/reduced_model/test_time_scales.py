@@ -22,6 +22,7 @@ from ringbalance.scene.models import Gas, Scene
 
 GAS = Gas(
     pressure=0.7e6,
+    measured_at="chamber",
     ambient_pressure=101325.0,
     temperature=313.15,
     conductance=1e-8,

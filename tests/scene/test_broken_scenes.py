@@ -82,6 +82,12 @@ SINGLE: dict[str, Broken] = {
         {"disc.max_fill_ratio": 0}, (Expected("disc", "max_fill_ratio", "0", "above 0", "at most 1"),)
     ),
     "fill that is not half": _one("disc.initial_fill", 0.3, "add up to max_fill_ratio (0.5)", "0.25"),
+    "no time to hold": _one("controller.hold_time", "0 s", "must be above 0", "a time above 0"),
+    "place of the gauge": _one(
+        "gas.measured_at", "valve", "not one of the known words", '"chamber" or "shaft"'
+    ),
+    "shape of the crest": _one("tube.hump_shape", "arch", 'did you mean "arc"', '"arc" or "point"'),
+    "dissolved gas": _one("liquid.dissolved_gas", True, "it is not text", '"none" or "saturated"'),
     "unknown liquid": _one("liquid.name", "watr", 'did you mean "water"', "gallium"),
     "temperature without data": _one(
         "liquid.temperature", "120 degC", "no data for water", "0 degC to 99.9 degC"

@@ -97,3 +97,29 @@ def test_derived_defaults_follow_from_what_is_known_before_them(schema: Schema) 
                 needed_table, needed_key = path.split(".")
                 assert needed_key in schema.tables[needed_table].keys
             pending.discard(f"{name}.{key}")
+
+
+def test_keys_of_the_device_as_built(
+    load: Callable[[Mapping[str, Any]], Scene], newcomer_document: dict[str, Any]
+) -> None:
+    """Left out: the defaults, marked as such; given: each as it stands in the file."""
+    scene = load(newcomer_document)
+    assert scene.controller.hold_time == pytest.approx(10 * 0.5)
+    assert (scene.gas.measured_at, scene.tube.hump_shape) == ("chamber", "arc")
+    assert scene.liquid.dissolved_gas == "saturated"
+    paths = {"controller.hold_time", "gas.measured_at", "tube.hump_shape", "liquid.dissolved_gas"}
+    assert paths <= set(scene.defaulted)
+    newcomer_document["controller"] = {"period": "0.2 s"}
+    assert load(newcomer_document).controller.hold_time == pytest.approx(2.0)
+    newcomer_document["controller"] |= {"hold_time": "3 s"}
+    newcomer_document["gas"]["measured_at"] = "shaft"
+    newcomer_document["tube"] |= {"hump_shape": "point", "hump_radius": "40 mm"}
+    newcomer_document["liquid"]["dissolved_gas"] = "none"
+    newcomer_document["uncertainty"] = {"hump_position": 0.1}
+    given = load(newcomer_document)
+    assert (given.controller.hold_time, given.gas.measured_at) == (3.0, "shaft")
+    assert (given.tube.hump_shape, given.liquid.dissolved_gas) == ("point", "none")
+    assert [(each.quantity, each.half_width, each.relative) for each in given.uncertainty] == [
+        ("hump_position", 0.1, False)
+    ]
+    assert not paths & set(given.defaulted)

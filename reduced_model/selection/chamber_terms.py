@@ -12,7 +12,7 @@ from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_area, s
 from ringbalance.reduced_model.chamber.gravity_series import second_order
 from ringbalance.reduced_model.chamber.values import ChamberValues, by_closed_form
 from ringbalance.reduced_model.paper import formulas as paper
-from ringbalance.reduced_model.selection.models import Contribution
+from ringbalance.reduced_model.selection.contribution import Contribution
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 

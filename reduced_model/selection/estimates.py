@@ -16,7 +16,7 @@ import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.reduced_model.chamber.values import by_closed_form
-from ringbalance.reduced_model.selection.chamber_models import (
+from ringbalance.reduced_model.selection.chamber_range import (
     chamber_fills,
     mean_gravity,
     range_contributions,

@@ -15,7 +15,7 @@ from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.reduced_model.chamber.gravity_choice import gravity_choice
 from ringbalance.reduced_model.chamber.values import by_closed_form
 from ringbalance.reduced_model.paper import formulas as paper
-from ringbalance.reduced_model.selection.chamber_models import mean_gravity
+from ringbalance.reduced_model.selection.chamber_range import mean_gravity
 from ringbalance.reduced_model.selection.chamber_terms import PLATES
 from ringbalance.reduced_model.selection.estimates import (
     CREST,

@@ -12,14 +12,13 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.reduced_model.selection.cost import CostModel, committed_costs
-from ringbalance.reduced_model.selection.models import Contribution, Fidelity, ModelHierarchy, relative_error
+from ringbalance.reduced_model.selection.contribution import NEGLIGIBLE, Contribution
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.verification.selection_studies.cost import CostModel, committed_costs
+from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy, relative_error
 
 TOLERANCES: Final = (1e-6, 0.1)
 """Smallest and largest tolerance that a choice is made for."""
-NEGLIGIBLE: Final = 1e-3
-"""Of the tolerance: what is worth less is left out unchecked."""
 RULED_OUT: Final = 100.0
 """Times the tolerance: a model that leaves out a single thing worth more is not tried."""
 MARGIN: Final = 1.001

@@ -16,12 +16,12 @@ from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.reduced_model.selection.loss_models import FORMULAS, loss_at
-from ringbalance.reduced_model.selection.models import Work
 from ringbalance.reduced_model.tables.fit import refined_table, table_from_samples
 from ringbalance.reduced_model.tables.hermite import HermiteTable
 from ringbalance.reduced_model.tube.heads import TABLE_ERROR, TABLE_VELOCITIES, TubeHeads
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene, Tube
+from ringbalance.verification.selection_studies.hierarchy import Work
 
 EQ_12: Final = "Eq. 12"
 CLOSED: Final = "closed form"

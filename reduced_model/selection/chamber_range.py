@@ -36,10 +36,7 @@ def chamber_fills(scene: Scene) -> FloatArray:
 
 
 def range_fills(scene: Scene) -> FloatArray:
-    """Fill ratios of `FILLS`, with the one at which sloshing is resonant where that lies within.
-
-    Returns: x, shape (n,), ascending.
-    """
+    """Fill ratios of `FILLS`, with the one at which sloshing is resonant where that lies within."""
     fills, resonant = scene.disc.max_fill_ratio * np.array(FILLS), resonant_fill(scene)
     if resonant is None or not fills[0] < resonant < fills[-1]:
         return fills
@@ -58,7 +55,6 @@ def range_contributions(scene: Scene) -> Mapping[str, Mapping[str, Contribution]
 def mean_gravity(scene: Scene) -> float:
     """Estimated contribution of gravity to the means over a turn, wall pressure or moment.
 
-    Returns: Relative, at the worst fill of the range.
     Source: second order in g/(omega^2 a).
     """
     found = range_contributions(scene)
@@ -66,10 +62,7 @@ def mean_gravity(scene: Scene) -> float:
 
 
 def chamber_status(scene: Scene) -> Status:
-    """Whether linear sloshing and a closed ring hold over the range of fills, by estimates.
-
-    Returns: Status; every result over that range inherits it.
-    """
+    """Whether linear sloshing and a closed ring hold over the range of fills, by estimates."""
     fills = chamber_fills(scene)
     if fills.size == range_fills(scene).size:
         return _waves(scene, fills)

@@ -145,7 +145,6 @@ def loss_contributions(scene: Scene) -> Mapping[str, Contribution]:
     """What the models of the loss leave out, relative to k + 1.
 
     Returns: Contributions by name; zero where the scene prescribes k, which all models then share.
-    Source: stands with each.
     """
     flow = flow_estimate(scene)
     constant = abs((PAPER_DRAG_COEFFICIENT + 1) / (flow.k + 1) - 1)

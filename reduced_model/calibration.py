@@ -106,7 +106,6 @@ def _tube(scene: Scene, velocity: FloatArray) -> TubeLoss:
 def lambda_over_fill(*, calibration: Calibration, fill_ratio: FloatArray) -> FloatArray:
     """lambda(x) per transferred mass, [U(x) - U(x_max - x)]/(rho V (x - x_max/2)), its limit at the centre.
 
-    Args: `fill_ratio`: x, shape (n,), within [0, max_fill_ratio].
     Returns: lambda, m, shape (n,).
     Source: definition; per difference of the two chambers' masses it is half of that.
     """
@@ -125,7 +124,6 @@ def lambda_over_fill(*, calibration: Calibration, fill_ratio: FloatArray) -> Flo
 def lambda_variation(*, calibration: Calibration) -> float:
     """Variation of lambda over the fill range, (largest - smallest)/value at the centre.
 
-    Returns: Relative variation.
     Source: definition; the liquid-ring paper states 0.7 %.
     """
     x = np.linspace(0.0, calibration.flow_law.max_fill_ratio, 101)

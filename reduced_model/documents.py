@@ -109,7 +109,6 @@ def _check(check: ElementCheck) -> dict[str, Any]:
 def paper_columns(calibration: Calibration, fill_ratio: FloatArray) -> Mapping[str, FloatArray]:
     """What the liquid-ring paper gives for wall pressure and moment at fill ratios.
 
-    Args: `fill_ratio`: x, shape (n,).
     Returns: "wall_pressure_paper_Pa" and "moment_paper_kg_m", shape (n,), by the paper's own volume.
     Source: Eqs. 3, 4, 7 and 12.
     """

@@ -28,10 +28,7 @@ _MARKS: Final = MappingProxyType(
 
 
 def calibration_view(calibration: Calibration) -> RenderableType:
-    """Summary, chamber, tube, law and models of a calibration, for a rich console.
-
-    Returns: Something that a rich console prints.
-    """
+    """Summary, chamber, tube, law and models of a calibration, for a rich console."""
     return Group(
         _summary(calibration),
         _chamber_table(calibration),

@@ -12,12 +12,12 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-from ringbalance.reduced_model.selection.choice import Values, choose
-from ringbalance.reduced_model.selection.models import ModelHierarchy
 from ringbalance.scene import bundled_scene, load_scene, write_whole
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.verification.selection_studies.choice import Values, choose
 from ringbalance.verification.selection_studies.choices import hierarchies_for
+from ringbalance.verification.selection_studies.hierarchy import ModelHierarchy
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "how-to-choose.md"
 TOLERANCES = (0.1, 1e-2, 1e-3, 1e-4)

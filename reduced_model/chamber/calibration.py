@@ -17,7 +17,7 @@ from ringbalance.reduced_model.chamber.gravity_choice import gravity_choice
 from ringbalance.reduced_model.chamber.gravity_open import open_ring_effect
 from ringbalance.reduced_model.chamber.inputs import InputEffect, input_effects
 from ringbalance.reduced_model.chamber.ring_values import RingValues, ring_values
-from ringbalance.reduced_model.selection.chamber_models import chamber_status, mean_gravity
+from ringbalance.reduced_model.selection.chamber_range import chamber_status, mean_gravity
 from ringbalance.reduced_model.selection.chamber_terms import unmodelled_fractions
 from ringbalance.reduced_model.tables.fit import table_from_samples
 from ringbalance.reduced_model.tables.hermite import HermiteTable

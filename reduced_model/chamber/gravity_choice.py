@@ -10,7 +10,7 @@ import numpy as np
 
 from ringbalance.reduced_model.chamber.gravity import closed_ring
 from ringbalance.reduced_model.chamber.values import ChamberValues, by_closed_form, by_quadrature
-from ringbalance.reduced_model.selection.choice import NEGLIGIBLE
+from ringbalance.reduced_model.selection.contribution import NEGLIGIBLE
 from ringbalance.scene.models import Scene
 
 CHECKED: Final = (0.25, 0.5, 1.0)

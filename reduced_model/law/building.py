@@ -24,8 +24,6 @@ _SHARED: Final = ("density", "speed")
 def calibrated_law(*, scene: Scene, chamber: ChamberCalibration, heads: TubeHeads) -> CalibratedLaw:
     """Put the flow law together.
 
-    Args: `chamber`: its wall pressures and moments. `heads`: its tube's heads.
-    Returns: CalibratedLaw named "calibrated".
     Source: Eqs. 13 to 18 of the liquid-ring paper, with finite-element wall pressures and k(u).
     """
     own = [e.wall_pressure for name, e in chamber.input_effects.items() if name not in _SHARED]
@@ -66,7 +64,6 @@ def tube_path(scene: Scene) -> TubePath:
 def column_pressure(*, scene: Scene, radius: Radius) -> Radius:
     """Pressure of a liquid column from a radius to the outer wall.
 
-    Args: `radius`: r, m, a number or an array.
     Returns: Pa, the shape of `radius`.
     Source: Eq. 11 of the liquid-ring paper, integrated.
     """

@@ -88,13 +88,7 @@ class CalibratedLaw:
         opposite_fill_ratio: npt.ArrayLike | None = None,
         gas_pressure: npt.ArrayLike = 0.0,
     ) -> TubeEnds[FloatArray]:
-        """Pressures at the tube's ends for flow out of the driven chamber; not checked.
-
-        Args: `fill_ratio`: x of the driven chamber, any shape. `opposite_fill_ratio`: of the opposite
-            chamber; default max_fill_ratio - fill_ratio. `gas_pressure`: gauge, Pa, in the driven chamber;
-            the opposite one is vented.
-        Returns: TubeEnds, of the broadcast shape of the arguments.
-        """
+        """Pressures at the tube's ends for flow out of the driven chamber; not checked."""
         x = np.asarray(fill_ratio, dtype=np.float64)
         y = self.max_fill_ratio - x if opposite_fill_ratio is None else opposite_fill_ratio
         gas, own, other = np.broadcast_arrays(

@@ -39,14 +39,6 @@ def checked_conditions(
 ) -> Conditions:
     """Check and broadcast the arguments of `FlowLaw.evaluate`.
 
-    Args:
-        max_fill_ratio: liquid of the pair as a share of one chamber's volume.
-        ambient_pressure: absolute, Pa.
-        fill_ratio: x of the driven chamber, any shape.
-        opposite_fill_ratio: of the opposite chamber, any shape; None: max_fill_ratio - fill_ratio.
-        gas_pressure: gauge, Pa, any shape.
-        primed: any shape.
-    Returns: Conditions, arrays of the broadcast shape.
     Raises: ValueError: a fill ratio outside the range, a NaN, or a negative absolute pressure.
     """
     x = _within(fill_ratio, max_fill_ratio, "fill_ratio")

@@ -155,7 +155,6 @@ def _shown(value: object) -> str:
 def load_law(path: Path | str) -> CompleteLaw:
     """Read a law that a law's `save` wrote.
 
-    Args: `path`: the file.
     Returns: The law, equal to the saved one bit for bit; it carries its moment, volumes and density.
     Raises: SceneError: a file that cannot be read or is no law; every fault names key, value and what is
         allowed.
@@ -194,8 +193,6 @@ def _content(reader: _Reader, file: Path) -> Iterator[Mapping[str, object]]:
 def load_model(path: Path | str) -> BalancerModel:
     """Read a saved law as the balancer that the closed loop takes.
 
-    Args: `path`: the file.
-    Returns: BalancerModel: flow, moment, volumes and density.
     Raises: SceneError: a file that cannot be read or is no law.
     """
     return balancer_model(load_law(path))

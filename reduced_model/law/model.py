@@ -20,7 +20,6 @@ class MomentCurve(Protocol):
 
         Args: `fill_ratio`: x of the chamber on the positive side of the axis, any shape.
             `opposite_fill_ratio`: of the opposite chamber, broadcast with `fill_ratio`.
-        Returns: Moment, kg m, of the broadcast shape.
         """
         ...
 

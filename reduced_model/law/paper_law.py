@@ -95,16 +95,7 @@ class PaperLaw:
         gas_pressure: npt.ArrayLike,
         primed: npt.ArrayLike = False,
     ) -> Flow:
-        """Flow by Eq. 19; blocked at and below the stall pressure and with the gas off.
-
-        Args:
-            fill_ratio: x of the driven chamber, any shape, within [0, max_fill_ratio].
-            opposite_fill_ratio: of the opposite chamber; default max_fill_ratio - fill_ratio.
-            gas_pressure: gauge, Pa, in the driven chamber; zero or less is gas off.
-            primed: not used by this law, which knows no hump.
-        Returns: Flow, of the broadcast shape of the arguments.
-        Raises: ValueError: a fill ratio outside the range, a NaN, or a negative absolute pressure.
-        """
+        """Flow by Eq. 19; blocked at and below the stall pressure and with the gas off."""
         asked = checked_conditions(
             max_fill_ratio=self.max_fill_ratio,
             ambient_pressure=self.ambient_pressure,
@@ -138,7 +129,6 @@ class PaperLaw:
 def paper_law(scene: AnyScene) -> PaperLaw:
     """The paper's flow law for a scene, with k = 50 unless the scene fixes it.
 
-    Args: `scene`: the scene; its own uncertainty and crest are not known to this law.
     Raises: SceneError: a balancer without liquid.
     Source: Eqs. 4 and 19; lambda = 72 mm.
     """
@@ -166,7 +156,6 @@ def paper_law(scene: AnyScene) -> PaperLaw:
 def paper_model(scene: Scene) -> BalancerModel:
     """The balancer as the paper has it: Eq. 19, V of Eq. 4, lambda = 72 mm per transferred mass.
 
-    Returns: BalancerModel named "paper".
     Source: sections 3 and 5 of the liquid-ring paper.
     """
     return balancer_model(paper_law(scene))

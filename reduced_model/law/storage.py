@@ -18,7 +18,6 @@ VERSION: Final = 1
 def save_record(*, path: Path, record: object) -> Path:
     """Write a record of floats, arrays, texts and other such records.
 
-    Args: `path`: the file. `record`: a dataclass.
     Raises: TypeError: a value that such a file cannot hold.
     Raises: ValueError: a value that is not finite.
     Raises: OSError: the file cannot be written; nothing is left behind.

@@ -12,7 +12,7 @@ from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_area, s
 from ringbalance.reduced_model.chamber.gravity_series import second_order
 from ringbalance.reduced_model.chamber.values import ChamberValues, by_closed_form
 from ringbalance.reduced_model.paper import formulas as paper
-from ringbalance.reduced_model.selection.models import Contribution
+from ringbalance.reduced_model.selection.contribution import Contribution
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
@@ -54,7 +54,6 @@ def capillary_share(scene: Scene, fills: FloatArray) -> Mapping[str, float]:
     """Largest share of the wall pressure that surface tension can make, sigma (2/B + 1/(a alpha) + 1/a)/P.
 
     The moment hardly feels it: the same share of a surface's shape, taken as a whole.
-    Args: `fills`: x, shape (n,).
     Returns: Shares by "pressures" and "moments"; zero for no fills.
     Source: contact line over area of the free surface, contact angle zero, plus the ring's own curvature.
     """
@@ -86,7 +85,6 @@ def wall_layers(scene: Scene, fill: float) -> tuple[float, float]:
 def unmodelled_fractions(scene: Scene, fills: FloatArray) -> Mapping[str, FloatArray]:
     """Contribution of what no model of a chamber holds, surface tension and friction at the walls.
 
-    Args: `fills`: x, shape (n,).
     Returns: Relative, of "pressures" and "moments", shape (n,) each; zero without liquid.
     Source: sum of both estimates, errors of one sign at worst.
     """
@@ -101,7 +99,6 @@ def unmodelled_fractions(scene: Scene, fills: FloatArray) -> Mapping[str, FloatA
 def amplification(scene: Scene, fill: float) -> float:
     """Estimate of how much the swinging liquid enlarges gravity's ripple, |1/(1 - 1/s^2)|.
 
-    Args: `fill`: x, above zero.
     Returns: Factor, at most 30; 1 on a vertical shaft.
     Source: s^2 = k tanh(k ln(R2/a)), the lowest mode without Coriolis force, undamped, driven at s = 1.
     """
@@ -130,7 +127,6 @@ def resonant_fill(scene: Scene) -> float | None:
 def mesh_error(scene: Scene, angular_cells: int) -> float:
     """Discretisation error of a mesh, relative: an arc drawn by cells of angle h, (h/2)^4/32 R2/depth.
 
-    Args: `angular_cells`: of the chamber.
     Returns: Share of the wall pressure at a fifth of the largest fill.
     Source: remainder of a quadratic interpolation of a circle.
     """
@@ -141,12 +137,7 @@ def mesh_error(scene: Scene, angular_cells: int) -> float:
 
 
 def chamber_contributions(scene: Scene, fills: FloatArray) -> Mapping[str, Terms]:
-    """Contributions to wall pressure and to moment with lambda, the largest over fills.
-
-    Args: `fills`: x, shape (n,), above zero; may be empty.
-    Returns: Contributions by name, by "pressures" and "moments".
-    Source: stands with each.
-    """
+    """Contributions to wall pressure and to moment with lambda, the largest over fills."""
     rows = [_at(scene, float(x)) for x in fills]
     return {part: _terms(scene, [row[part] for row in rows], part) for part in ("pressures", "moments")}
 

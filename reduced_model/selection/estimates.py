@@ -16,7 +16,7 @@ import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.reduced_model.chamber.values import by_closed_form
-from ringbalance.reduced_model.selection.chamber_models import (
+from ringbalance.reduced_model.selection.chamber_range import (
     chamber_fills,
     mean_gravity,
     range_contributions,
@@ -101,22 +101,14 @@ class TermEstimate:
 
 
 def percent(fraction: float) -> str:
-    """A fraction in per cent, to two digits.
-
-    Args: `fraction`: any number.
-    Returns: Text.
-    """
+    """A fraction in per cent, to two digits."""
     value = 100 * fraction
     return f"{value:.0f} %" if 99.5 <= abs(value) < 1e6 else f"{value:.2g} %"
 
 
 @lru_cache(maxsize=8)
 def term_estimates(scene: Scene) -> Mapping[str, TermEstimate]:
-    """Estimates of all terms of a scene, by term.
-
-    Returns: Chamber, tube and injection, in this order.
-    Source: the formula stands with each.
-    """
+    """Estimates of all terms of a scene, by term."""
     return MappingProxyType({**_chamber(scene), **_tube(scene), **injection_estimates(scene)})
 
 

@@ -58,7 +58,6 @@ def loss_at(scene: Scene, *, loss: str, velocity: npt.ArrayLike, tube: Tube | No
     Returns: Loss; a scene that prescribes k has that k on every model but `CONSTANT`, which then has it
         too.
     Raises: ValueError: a model that does not exist.
-    Source: the sources stand with the formulas.
     """
     if loss not in _FUNCTIONS:
         raise ValueError(f"loss must be one of {', '.join(LOSSES)}, not {loss!r}")
@@ -150,7 +149,6 @@ def velocity_under_head(
 
     Args: `loss`: one of `LOSSES`. `head`: H, m^2/s^2, above zero, any shape. `to_crest`: whether the head
         acts up to the siphon crest alone: (alpha + k_up) u^2/2 = H.
-    Returns: u, m/s, of the head's shape.
     Source: definition of k; the head grows with u, so there is one root.
     """
     target = np.asarray(head, dtype=np.float64)

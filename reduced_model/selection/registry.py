@@ -15,7 +15,7 @@ from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.reduced_model.chamber.gravity_choice import gravity_choice
 from ringbalance.reduced_model.chamber.values import by_closed_form
 from ringbalance.reduced_model.paper import formulas as paper
-from ringbalance.reduced_model.selection.chamber_models import mean_gravity
+from ringbalance.reduced_model.selection.chamber_range import mean_gravity
 from ringbalance.reduced_model.selection.chamber_terms import PLATES
 from ringbalance.reduced_model.selection.estimates import (
     CREST,
@@ -114,7 +114,7 @@ def models_used(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Neglected:
+class _Neglected:
     """Terms of an injection that a run does not model, and a bound on them."""
 
     terms: tuple[str, ...]
@@ -125,7 +125,7 @@ class Neglected:
     text: str
 
 
-def neglected_in_injections(used: Sequence[ModelUsed]) -> Neglected:
+def neglected_in_injections(used: Sequence[ModelUsed]) -> _Neglected:
     """What a run neglects beyond its flow law.
 
     Source: errors of one sign at worst; each estimate is an upper bound.
@@ -137,7 +137,7 @@ def neglected_in_injections(used: Sequence[ModelUsed]) -> Neglected:
     bound = float(sum(known.values()))
     names = f" ({', '.join(known)})" if known else ""
     more = f"; not estimated, for lack of numbers in the scene: {', '.join(unknown)}" if unknown else ""
-    return Neglected(
+    return _Neglected(
         terms=tuple(known),
         bound=bound,
         unknown=unknown,

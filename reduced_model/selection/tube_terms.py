@@ -16,13 +16,13 @@ from ringbalance.reduced_model.chamber.values import by_closed_form
 from ringbalance.reduced_model.law.building import tube_path
 from ringbalance.reduced_model.paper.formulas import PAPER_DRAG_COEFFICIENT
 from ringbalance.reduced_model.selection.chamber_terms import MEAN, PLATES, chamber_contributions
+from ringbalance.reduced_model.selection.contribution import Contribution
 from ringbalance.reduced_model.selection.loss_models import (
     CORRELATIONS,
     ROTATING,
     loss_at,
     velocity_under_head,
 )
-from ringbalance.reduced_model.selection.models import Contribution
 from ringbalance.reduced_model.tube.regime import SiphonCrest, TubeEnds, can_flow
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Scene
@@ -145,7 +145,6 @@ def loss_contributions(scene: Scene) -> Mapping[str, Contribution]:
     """What the models of the loss leave out, relative to k + 1.
 
     Returns: Contributions by name; zero where the scene prescribes k, which all models then share.
-    Source: stands with each.
     """
     flow = flow_estimate(scene)
     constant = abs((PAPER_DRAG_COEFFICIENT + 1) / (flow.k + 1) - 1)

@@ -22,9 +22,6 @@ _STEEPEST = 2.5
 def table_from_samples(*, start: float, stop: float, value: npt.ArrayLike) -> HermiteTable:
     """Interpolate equally spaced samples by a spline of degree five, fewer than six by one polynomial.
 
-    Args: `start`: x of the first sample. `stop`: x of the last sample. `value`: samples, shape (n,), n at
-        least 2.
-    Returns: HermiteTable, the same function as the spline.
     Source: not-a-knot spline; error O(step^6).
     """
     y = np.asarray(value, dtype=np.float64)
@@ -83,8 +80,6 @@ def _joints(count: int) -> tuple[FloatArray, FloatArray]:
 def level_table(*, start: float, stop: float, value: npt.ArrayLike) -> HermiteTable:
     """Interpolate equally spaced samples that may step, without ever leaving the span of two neighbours.
 
-    Args: `start`: x of the first sample. `stop`: x of the last sample. `value`: samples, shape (n,), n at
-        least 2.
     Returns: HermiteTable with slopes limited as by Fritsch and Butland and no curvature at the samples.
     Source: Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300; error O(step^2).
     """

@@ -57,19 +57,11 @@ class HermiteTable:
         return pieces[:6]
 
     def __call__(self, x: npt.ArrayLike) -> FloatArray:
-        """Value at any x.
-
-        Args: `x`: any shape.
-        Returns: y, the shape of `x`.
-        """
+        """Value at any x."""
         return self.with_slope(x)[0]
 
     def with_slope(self, x: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Value and slope at any x.
-
-        Args: `x`: any shape.
-        Returns: y and dy/dx, the shape of `x`.
-        """
+        """Value and slope at any x."""
         place = (np.asarray(x, dtype=np.float64) - self.start) / self.step
         cell = np.clip(np.floor(place), 0, self.value.size - 2).astype(np.intp)
         t = np.clip(place - cell, 0.0, 1.0)
@@ -85,11 +77,7 @@ class HermiteTable:
         return np.asarray(y, dtype=np.float64), np.asarray(slope, dtype=np.float64)
 
     def inverse(self, y: npt.ArrayLike) -> FloatArray:
-        """The x of a value, for a table that grows from node to node.
-
-        Args: `y`: any shape.
-        Returns: x, the shape of `y`, to round-off.
-        """
+        """The x of a value, for a table that grows from node to node."""
         wanted = np.asarray(y, dtype=np.float64)
         cell = np.clip(np.searchsorted(self.value, wanted) - 1, 0, self.value.size - 2)
         low = self.value[cell]

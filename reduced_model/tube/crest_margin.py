@@ -32,11 +32,7 @@ class DirectedState:
 def directed_state(
     *, law: CalibratedLaw, fills: tuple[float, float], gas_pressure: float, reverse: bool
 ) -> DirectedState:
-    """Take a state in one direction of flow.
-
-    Args: `fills`: fill ratios of the driven and the opposite chamber. `gas_pressure`: gauge, Pa, in the
-        driven chamber. `reverse`: whether the opposite chamber is upstream.
-    """
+    """Take a state in one direction of flow."""
     at = law.ends(fill_ratio=fills[0], opposite_fill_ratio=fills[1], gas_pressure=gas_pressure)
     ends = TubeEnds(
         upstream_gas=float(at.upstream_gas),

@@ -67,10 +67,6 @@ def directed_flow(
 ) -> DirectedFlow:
     """Flow from the upstream to the downstream chamber.
 
-    Args: `path`: the tube's radii. `heads`: the tube's heads and their half-widths. `hump_head`: the one of
-        its heads up to the crest that belongs to this direction; None without a crest. `inputs`: half-widths
-        of what drives the flow. `drive`: what acts on the tube.
-    Returns: DirectedFlow, of the drive's shape.
     Source: `column_flow`; half-widths by linear propagation.
     """
 

@@ -48,8 +48,6 @@ class TubeHeads:
 def velocity_of(*, table: HermiteTable, head: npt.ArrayLike, where: BoolArray) -> FloatArray:
     """Velocity that belongs to a head.
 
-    Args: `table`: ln u to ln head. `head`: m^2/s^2, any shape. `where`: of that shape; elsewhere the velocity
-        is zero and the head may be anything.
     Returns: u, m/s, the shape of `head`.
     """
     safe = np.where(where, head, 1.0)

@@ -33,7 +33,7 @@ def reversed_tube(tube: Tube) -> Tube:
     return replace(tube, hump_position=1 - tube.hump_position, bends=tube.bends[::-1])
 
 
-def bend_shares(tube: Tube) -> FloatArray:
+def _bend_shares(tube: Tube) -> FloatArray:
     """Where the bends sit, (i + 1/2)/n. Returns: s/L, shape (number of bends,)."""
     count = len(tube.bends)
     return (np.arange(count) + 0.5) / max(count, 1)
@@ -44,7 +44,7 @@ def places(*, tube: Tube, points: int, doubled: tuple[float, ...] = ()) -> Place
 
     Args: `points`: number of even places. `doubled`: further shares at which something changes at once.
     """
-    twice = np.unique(np.concatenate([[0.0, 1.0], bend_shares(tube), doubled]))
+    twice = np.unique(np.concatenate([[0.0, 1.0], _bend_shares(tube), doubled]))
     kept = twice if tube.hump_radius is None else np.append(twice, tube.hump_position)
     even = np.linspace(0.0, 1.0, points)
     # An even place that differs from another by rounding only would stand for nothing.
@@ -57,11 +57,7 @@ def places(*, tube: Tube, points: int, doubled: tuple[float, ...] = ()) -> Place
 
 
 def path_radius(*, tube: Tube, share: npt.ArrayLike) -> FloatArray:
-    """Radius along the path, straight from port to crest and back.
-
-    Args: `share`: s/L, any shape.
-    Returns: r, m, the shape of `share`.
-    """
+    """Radius along the path, straight from port to crest and back."""
     if tube.hump_radius is None:
         return np.full(np.shape(share), tube.port_radius)
     radii = [tube.port_radius, tube.hump_radius, tube.port_radius]
@@ -72,11 +68,7 @@ def path_radius(*, tube: Tube, share: npt.ArrayLike) -> FloatArray:
 
 
 def share_at_radius(*, tube: Tube, radius: float, far_leg: bool) -> float:
-    """Where a leg passes a radius, or its end when it does not reach there.
-
-    Args: `tube`: the tube, with a crest. `radius`: r, m. `far_leg`: the leg behind the crest.
-    Returns: s/L.
-    """
+    """Where a leg passes a radius, or its end when it does not reach there."""
     hump = tube.port_radius if tube.hump_radius is None else tube.hump_radius
     inward = float(np.clip((tube.port_radius - radius) / (tube.port_radius - hump), 0.0, 1.0))
     return 1 - inward * (1 - tube.hump_position) if far_leg else inward * tube.hump_position
@@ -87,15 +79,13 @@ def loss_before(*, tube: Tube, state: TubeState, at: Places) -> FloatArray:
 
     Zero before the entrance; inside, alpha and what of k lies before; behind the exit k + 1.  In turbulent
     flow the "+1" counts alpha as 1, so the pressure there rises by the small rest at the exit.
-    Args: `state`: its terms at one velocity.
-    Returns: The shape of the places.
     Source: energy balance; at the crest it is alpha and `upstream_loss`.
     """
     terms = {name: float(term) for name, term in state.terms.items()}
     along = sum(terms.get(name, 0.0) for name in ("friction", "rotation", "extra", "decree"))
     inside = float(state.kinetic_factor) + terms.get("entrance", 0.0) + along * at.share
     if "decree" not in terms:
-        for share, bend in zip(bend_shares(tube), state.bends, strict=True):
+        for share, bend in zip(_bend_shares(tube), state.bends, strict=True):
             inside = inside + float(bend) * ((at.share > share) | ((at.share == share) & at.after))
     entered = (at.share > 0) | at.after
     left = (at.share == 1) & at.after

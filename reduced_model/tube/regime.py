@@ -92,7 +92,6 @@ class SiphonCrest(Generic[Pressure]):
     def cavity_pressure(self, ends: TubeEnds[Pressure]) -> Pressure:
         """Pressure of a cavity over the crest, Pa.
 
-        Args: `ends`: pressures at the tube's ends.
         Returns: The vapour pressure, or the downstream gas pressure where the port there is open.
         """
         return _choose(ends.downstream_open(), ends.downstream_gas, self.vapour_pressure)
@@ -100,7 +99,6 @@ class SiphonCrest(Generic[Pressure]):
     def separation_margin(self, ends: TubeEnds[Pressure]) -> Pressure:
         """Crest pressure of a column at rest less the cavity pressure, p_A - p_c + P_A - D_m, Pa.
 
-        Args: `ends`: pressures at the tube's ends.
         Returns: What drives a separated column; where it is not positive, no column holds.
         """
         cavity = self.cavity_pressure(ends)
@@ -109,7 +107,6 @@ class SiphonCrest(Generic[Pressure]):
     def priming_pressure(self, ends: TubeEnds[Pressure]) -> Pressure:
         """Difference of the gas pressures that lifts liquid over the crest of an unprimed tube, Pa.
 
-        Args: `ends`: pressures at the tube's ends.
         Returns: D_m - P_A, and P_C - D_p more where trapped gas is displaced through a covered port.
         """
         lift = self.column_pressure - ends.upstream_hydrostatic
@@ -118,11 +115,7 @@ class SiphonCrest(Generic[Pressure]):
         return lift + _larger(ends.downstream_hydrostatic - ends.port_pressure, 0.0)
 
     def primes(self, ends: TubeEnds[Pressure]) -> Truth:
-        """Whether the gas starts a flow in an unprimed tube.
-
-        Args: `ends`: pressures at the tube's ends.
-        Returns: True above the priming pressure.
-        """
+        """Whether the gas starts a flow in an unprimed tube."""
         return ends.upstream_gas - ends.downstream_gas > self.priming_pressure(ends)
 
 
@@ -168,12 +161,7 @@ class ColumnFlow(Generic[Pressure]):
 
 
 def can_flow(*, ends: TubeEnds[Pressure], crest: SiphonCrest[Pressure] | None, primed: Truth) -> Truth:
-    """Whether liquid flows: port covered, driving pressure positive, crest passed.
-
-    Args: `ends`: pressures at the tube's ends. `crest`: None without one. `primed`: whether the tube holds a
-        continuous column beforehand.
-    Returns: Of the ends' shape.
-    """
+    """Whether liquid flows: port covered, driving pressure positive, crest passed."""
     return _flows(ends, ends.driving_pressure(), crest, primed)[0]
 
 
@@ -209,7 +197,6 @@ def column_flow(
         allowed: False where flow in this direction is ruled out from the start.
         siphon: velocity of the full siphon under a pressure, zero where the second argument is false.
         separation: velocity of the separated column under a pressure, likewise; not called without a crest.
-    Returns: ColumnFlow, of the ends' shape.
     Source: Eqs. 13 to 18 of the liquid-ring paper, extended to the siphon crest.
     """
     driving = ends.driving_pressure()

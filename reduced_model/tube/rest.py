@@ -17,7 +17,7 @@ Filled = Callable[[float, float], tuple[float, float]]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rest:
+class _Rest:
     """Two columns and what lies between them."""
 
     near: float
@@ -28,7 +28,7 @@ class Rest:
     """Pressure of what lies between, gauge, Pa."""
 
 
-def rest(*, scene: Scene, ends: TubeEnds[float], cavity: float | None, crest_pressure: float) -> Rest:
+def rest(*, scene: Scene, ends: TubeEnds[float], cavity: float | None, crest_pressure: float) -> _Rest:
     """Find the two columns of a tube at rest.
 
     A separated column leaves a cavity at a given pressure.  An unprimed tube holds gas: vented, it is at the
@@ -66,7 +66,7 @@ def rest(*, scene: Scene, ends: TubeEnds[float], cavity: float | None, crest_pre
     else:
         between = _trapped(scene.gas.ambient_pressure, ends, filled, crest_pressure)
     first, last = filled(between, near)
-    return Rest(near=first, far=last, between=between)
+    return _Rest(near=first, far=last, between=between)
 
 
 def _trapped(ambient: float, ends: TubeEnds[float], filled: Filled, crest_pressure: float) -> float:

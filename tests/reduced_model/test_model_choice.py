@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ringbalance.reduced_model.selection.choice import MARGIN, Values, choose
-from ringbalance.reduced_model.selection.cost import CostModel
-from ringbalance.reduced_model.selection.models import Contribution, Fidelity, ModelHierarchy, relative_error
+from ringbalance.reduced_model.selection.contribution import Contribution
+from ringbalance.verification.selection_studies.choice import MARGIN, Values, choose
+from ringbalance.verification.selection_studies.cost import CostModel
+from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy, relative_error
 
 COSTS = CostModel(seconds={"step": 1.0}, fitted_on="test")
 

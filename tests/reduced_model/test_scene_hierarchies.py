@@ -23,17 +23,6 @@ from ringbalance.reduced_model.chamber.values import (
     by_series,
 )
 from ringbalance.reduced_model.selection import chamber_terms
-from ringbalance.reduced_model.selection.chamber_models import chamber_hierarchies
-from ringbalance.reduced_model.selection.choice import choose
-from ringbalance.reduced_model.selection.law_models import (
-    CLOSED,
-    QUADRATURE,
-    REGIMES,
-    SIPHON,
-    LawModels,
-    base_law,
-    law_of,
-)
 from ringbalance.reduced_model.selection.loss_models import (
     CONSTANT,
     CORRELATIONS,
@@ -42,10 +31,21 @@ from ringbalance.reduced_model.selection.loss_models import (
     loss_at,
     velocity_under_head,
 )
-from ringbalance.reduced_model.selection.scene_numbers import scene_numbers
-from ringbalance.reduced_model.selection.tube_models import LawBook, k_hierarchy, velocity_hierarchy
 from ringbalance.scene import models
 from ringbalance.scene.models import Scene
+from ringbalance.verification.selection_studies.chamber_models import chamber_hierarchies
+from ringbalance.verification.selection_studies.choice import choose
+from ringbalance.verification.selection_studies.law_models import (
+    CLOSED,
+    QUADRATURE,
+    REGIMES,
+    SIPHON,
+    LawModels,
+    base_law,
+    law_of,
+)
+from ringbalance.verification.selection_studies.scene_numbers import scene_numbers
+from ringbalance.verification.selection_studies.tube_models import LawBook, k_hierarchy, velocity_hierarchy
 
 
 def at_speed(scene: Scene, rpm: float) -> Scene:

@@ -15,11 +15,11 @@ from ringbalance.controller.loop import simulate
 from ringbalance.controller.terms import run_models
 from ringbalance.reduced_model.calibration import Calibration, calibrate
 from ringbalance.reduced_model.documents import calibration_document
-from ringbalance.reduced_model.selection.chamber_models import chamber_hierarchies
 from ringbalance.reduced_model.selection.registry import models_used
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.verification.selection_studies.chamber_models import chamber_hierarchies
 from ringbalance.verification.selection_studies.scenes import random_scene
 from ringbalance.verification.selection_studies.study import hierarchies_of, terms_document
 

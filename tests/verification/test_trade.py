@@ -14,17 +14,16 @@ from scipy.integrate import solve_ivp
 
 from ringbalance.cli import main
 from ringbalance.physics.tube.loss import tube_loss
-from ringbalance.reduced_model.selection.choice import Values, choose
-from ringbalance.reduced_model.selection.cost import CostModel, committed_costs
-from ringbalance.reduced_model.selection.law_models import CLOSED, REGIMES, LawModels, base_law
 from ringbalance.reduced_model.selection.loss_models import TABLES
-from ringbalance.reduced_model.selection.models import ModelHierarchy
-from ringbalance.reduced_model.selection.tube_models import LawBook, k_hierarchy
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.verification.selection_studies import study as trade_module
+from ringbalance.verification.selection_studies.choice import Values, choose
 from ringbalance.verification.selection_studies.choices import judge
+from ringbalance.verification.selection_studies.cost import CostModel, committed_costs
+from ringbalance.verification.selection_studies.hierarchy import ModelHierarchy
+from ringbalance.verification.selection_studies.law_models import CLOSED, REGIMES, LawModels, base_law
 from ringbalance.verification.selection_studies.measure import Clock, knee, measure, pareto_front
 from ringbalance.verification.selection_studies.operation import (
     moved_mass,
@@ -39,6 +38,7 @@ from ringbalance.verification.selection_studies.study import (
     trade_document,
     trade_study,
 )
+from ringbalance.verification.selection_studies.tube_models import LawBook, k_hierarchy
 
 
 @pytest.fixture(scope="module")

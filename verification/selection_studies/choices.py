@@ -6,14 +6,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from ringbalance.reduced_model.selection.chamber_models import chamber_hierarchies
-from ringbalance.reduced_model.selection.choice import Values, choose, ranked_fidelities
-from ringbalance.reduced_model.selection.cost import committed_costs
-from ringbalance.reduced_model.selection.law_models import base_law
-from ringbalance.reduced_model.selection.models import Contribution, ModelHierarchy
-from ringbalance.reduced_model.selection.tube_models import LawBook, k_hierarchy, velocity_hierarchy
+from ringbalance.reduced_model.selection.contribution import Contribution
 from ringbalance.scene.models import Scene
+from ringbalance.verification.selection_studies.chamber_models import chamber_hierarchies
+from ringbalance.verification.selection_studies.choice import Values, choose, ranked_fidelities
+from ringbalance.verification.selection_studies.cost import committed_costs
+from ringbalance.verification.selection_studies.hierarchy import ModelHierarchy
+from ringbalance.verification.selection_studies.law_models import base_law
 from ringbalance.verification.selection_studies.operation import mass_hierarchy, settling_hierarchy
+from ringbalance.verification.selection_studies.tube_models import LawBook, k_hierarchy, velocity_hierarchy
 
 CHAMBER: Final = ("wall_pressure", "moment")
 TOLERANCES: Final = (0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)

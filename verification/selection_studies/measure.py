@@ -13,9 +13,9 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.reduced_model.selection.choice import Values
-from ringbalance.reduced_model.selection.cost import CostModel
-from ringbalance.reduced_model.selection.models import Fidelity, ModelHierarchy, Work
+from ringbalance.verification.selection_studies.choice import Values
+from ringbalance.verification.selection_studies.cost import CostModel
+from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy, Work
 
 QUICK: Final = 0.1
 """s, below which a run is repeated."""

@@ -18,7 +18,8 @@ from ringbalance.controller.loop import simulate
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.law.model import CompleteLaw, balancer_model
 from ringbalance.reduced_model.law.paper_law import paper_law
-from ringbalance.reduced_model.selection.chamber_models import chamber_status
+from ringbalance.reduced_model.selection.chamber_range import chamber_status
+from ringbalance.reduced_model.selection.contribution import Contribution
 from ringbalance.reduced_model.selection.estimates import (
     FILLING,
     INERTIA,
@@ -26,28 +27,28 @@ from ringbalance.reduced_model.selection.estimates import (
     injection_estimates,
     injection_time,
 )
-from ringbalance.reduced_model.selection.law_models import (
+from ringbalance.reduced_model.selection.loss_models import CONSTANT
+from ringbalance.reduced_model.selection.registry import IN_INJECTIONS
+from ringbalance.reduced_model.selection.tube_terms import flow_contributions, flow_estimate
+from ringbalance.reduced_model.time_scales import first_gas_time
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Scene
+from ringbalance.verification.reference.explicit_segments import explicit_segments
+from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy, Work
+from ringbalance.verification.selection_studies.law_models import (
     CLOSED,
     EQ_12,
     SIPHON,
     LawModels,
     law_work,
 )
-from ringbalance.reduced_model.selection.loss_models import CONSTANT
-from ringbalance.reduced_model.selection.models import Contribution, Fidelity, ModelHierarchy, Work
-from ringbalance.reduced_model.selection.registry import IN_INJECTIONS
-from ringbalance.reduced_model.selection.tube_models import (
+from ringbalance.verification.selection_studies.tube_models import (
     LawBook,
     flow_models,
     lacks,
     law_name,
     velocity_uncertainty,
 )
-from ringbalance.reduced_model.selection.tube_terms import flow_contributions, flow_estimate
-from ringbalance.reduced_model.time_scales import first_gas_time
-from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import Scene
-from ringbalance.verification.reference.explicit_segments import explicit_segments
 
 FEW: Final = 4
 MANY: Final = 16

@@ -9,9 +9,9 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from ringbalance.reduced_model.selection.choice import Choice
-from ringbalance.reduced_model.selection.scene_numbers import scene_numbers
+from ringbalance.verification.selection_studies.choice import Choice
 from ringbalance.verification.selection_studies.measure import Measured, Trade
+from ringbalance.verification.selection_studies.scene_numbers import scene_numbers
 from ringbalance.verification.selection_studies.study import TradeStudy, tolerance_text
 
 _MICRO, _MILLI = 1e-6, 1e-3

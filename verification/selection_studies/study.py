@@ -10,16 +10,14 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from ringbalance.reduced_model.chamber.gravity import check_ring
-from ringbalance.reduced_model.selection.chamber_models import chamber_hierarchies
-from ringbalance.reduced_model.selection.choice import Choice, Values, choose
-from ringbalance.reduced_model.selection.cost import CostModel, committed_costs, fitted_costs
 from ringbalance.reduced_model.selection.estimates import term_estimates
-from ringbalance.reduced_model.selection.law_models import QUADRATURE, SERIES, base_law
-from ringbalance.reduced_model.selection.models import Fidelity, ModelHierarchy
 from ringbalance.reduced_model.selection.registry import models_used
-from ringbalance.reduced_model.selection.scene_numbers import scene_numbers
-from ringbalance.reduced_model.selection.tube_models import LawBook, k_hierarchy, velocity_hierarchy
 from ringbalance.scene.models import Scene
+from ringbalance.verification.selection_studies.chamber_models import chamber_hierarchies
+from ringbalance.verification.selection_studies.choice import Choice, Values, choose
+from ringbalance.verification.selection_studies.cost import CostModel, committed_costs, fitted_costs
+from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy
+from ringbalance.verification.selection_studies.law_models import QUADRATURE, SERIES, base_law
 from ringbalance.verification.selection_studies.measure import (
     Clock,
     Measured,
@@ -33,6 +31,8 @@ from ringbalance.verification.selection_studies.operation import (
     mass_hierarchy,
     settling_hierarchy,
 )
+from ringbalance.verification.selection_studies.scene_numbers import scene_numbers
+from ringbalance.verification.selection_studies.tube_models import LawBook, k_hierarchy, velocity_hierarchy
 
 Record = dict[str, Any]
 Level = Literal["light", "heavy"]

@@ -11,19 +11,7 @@ import numpy as np
 
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.selection.chamber_models import chamber_status
-from ringbalance.reduced_model.selection.law_models import (
-    CLOSED,
-    EQ_12,
-    QUADRATURE,
-    REGIMES,
-    SERIES,
-    SIPHON,
-    LawModels,
-    law_of,
-    law_work,
-    levels_available,
-)
+from ringbalance.reduced_model.selection.chamber_range import chamber_status
 from ringbalance.reduced_model.selection.loss_models import (
     CONSTANT,
     CORRELATIONS,
@@ -33,7 +21,6 @@ from ringbalance.reduced_model.selection.loss_models import (
     TABLES,
     loss_at,
 )
-from ringbalance.reduced_model.selection.models import Fidelity, ModelHierarchy
 from ringbalance.reduced_model.selection.tube_terms import (
     GRAVITY,
     HUMP,
@@ -48,6 +35,19 @@ from ringbalance.reduced_model.selection.tube_terms import (
 )
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
+from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy
+from ringbalance.verification.selection_studies.law_models import (
+    CLOSED,
+    EQ_12,
+    QUADRATURE,
+    REGIMES,
+    SERIES,
+    SIPHON,
+    LawModels,
+    law_of,
+    law_work,
+    levels_available,
+)
 
 VELOCITY_FACTORS: Final = (0.25, 0.5, 1.0, 2.0)
 """Velocities at which k is judged, over the one estimated at equal fills."""

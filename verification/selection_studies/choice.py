@@ -12,14 +12,13 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.reduced_model.selection.cost import CostModel, committed_costs
-from ringbalance.reduced_model.selection.models import Contribution, Fidelity, ModelHierarchy, relative_error
+from ringbalance.reduced_model.selection.contribution import NEGLIGIBLE, Contribution
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.verification.selection_studies.cost import CostModel, committed_costs
+from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy, relative_error
 
 TOLERANCES: Final = (1e-6, 0.1)
 """Smallest and largest tolerance that a choice is made for."""
-NEGLIGIBLE: Final = 1e-3
-"""Of the tolerance: what is worth less is left out unchecked."""
 RULED_OUT: Final = 100.0
 """Times the tolerance: a model that leaves out a single thing worth more is not tried."""
 MARGIN: Final = 1.001
@@ -88,7 +87,7 @@ class Values:
         )
 
 
-def checked_tolerance(tolerance: float) -> float:
+def _checked_tolerance(tolerance: float) -> float:
     """Check a tolerance.
 
     Args: `tolerance`: relative.
@@ -103,7 +102,7 @@ def checked_tolerance(tolerance: float) -> float:
     return tolerance
 
 
-def predicted_error(fidelity: Fidelity, hierarchy: ModelHierarchy) -> float:
+def _predicted_error(fidelity: Fidelity, hierarchy: ModelHierarchy) -> float:
     """Sum of what a model leaves out and the finest one includes, by the estimates; infinite without a basis.
 
     Args: `hierarchy`: the model hierarchy it stands on.
@@ -131,13 +130,13 @@ def choose(
     Raises: ValueError: a tolerance out of range, or a model hierarchy without points.
     Source: the rule stands in this module's first lines.
     """
-    checked_tolerance(tolerance)
+    _checked_tolerance(tolerance)
     if not hierarchy.points:
         raise ValueError(f"{hierarchy.quantity}: {hierarchy.status.text}")
     model = costs or committed_costs()
     ranked = ranked_fidelities(hierarchy, model)
     first = next(
-        (fidelity for fidelity in ranked if predicted_error(fidelity, hierarchy) <= tolerance), hierarchy.top
+        (fidelity for fidelity in ranked if _predicted_error(fidelity, hierarchy) <= tolerance), hierarchy.top
     )
     held = values or Values(hierarchy)
     reference = _next_up(hierarchy, first, tolerance, ranked) if check else None
@@ -251,7 +250,7 @@ def _reasons(
             f"does as well: {_measured(measured)}"
         )
     if tolerance < hierarchy.top_uncertainty:
-        told.append(below_uncertainty(hierarchy, tolerance))
+        told.append(_below_uncertainty(hierarchy, tolerance))
     return tuple(told)
 
 
@@ -276,7 +275,7 @@ def _measured(measured: float | None) -> str:
     return "0" if measured is None else f"{measured:.1e}"
 
 
-def below_uncertainty(hierarchy: ModelHierarchy, tolerance: float) -> str:
+def _below_uncertainty(hierarchy: ModelHierarchy, tolerance: float) -> str:
     """The sentence for a tolerance that the finest model itself cannot keep. Args: `tolerance`: relative."""
     return (
         f"a tolerance of {tolerance:.0e} is below what “{hierarchy.top.name}”, the finest model, is known to "

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.physics import deferred
-from ringbalance.reduced_model.selection.models import Fidelity, Work
+from ringbalance.verification.selection_studies.hierarchy import Fidelity, Work
 
 RESOURCE: Final = "cost_model.json"
 _PULL: Final = 0.3
@@ -55,7 +55,11 @@ def committed_costs() -> CostModel:
 
     Source: least squares over measured runs of every model, by `ringbalance trade SCENE --save-costs FILE`.
     """
-    text = files("ringbalance.reduced_model").joinpath("data", RESOURCE).read_text(encoding="utf-8")
+    text = (
+        files("ringbalance.verification.selection_studies")
+        .joinpath("data", RESOURCE)
+        .read_text(encoding="utf-8")
+    )
     record = json.loads(text)
     return CostModel(seconds=dict(record["seconds"]), fitted_on=record["fitted_on"])
 

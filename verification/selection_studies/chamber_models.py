@@ -4,20 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 from typing import Final
 
 import numpy as np
 
 from ringbalance.mesh.chamber import default_cells
-from ringbalance.mesh.geometry import surface_radius
-from ringbalance.physics.results import Status, StatusCode
-from ringbalance.physics.sloshing.range import SMALL
 from ringbalance.reduced_model.chamber.tilted_ring import (
     POINTS,
     RADIAL_POINTS,
-    TiltedRing,
-    tilted_ring,
     turn_samples,
 )
 from ringbalance.reduced_model.chamber.values import (
@@ -31,6 +26,7 @@ from ringbalance.reduced_model.chamber.values import (
     sloshing_meshes,
     with_sloshing,
 )
+from ringbalance.reduced_model.selection.chamber_range import chamber_fills, chamber_status
 from ringbalance.reduced_model.selection.chamber_terms import (
     COARSE_MESH,
     FINE_MESH,
@@ -43,14 +39,12 @@ from ringbalance.reduced_model.selection.chamber_terms import (
     capillary_share,
     chamber_contributions,
     mesh_error,
-    resonant_fill,
 )
-from ringbalance.reduced_model.selection.models import Contribution, Fidelity, ModelHierarchy, Work
+from ringbalance.reduced_model.selection.contribution import Contribution
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
+from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy, Work
 
-FILLS: Final = (0.2, 0.5, 1.0)
-"""Fill ratios at which the model hierarchies are judged, as shares of max_fill_ratio."""
 _SWING_MESH: Final = 2e-3
 """Discretisation error of the amplification near resonance, relative, on the safe side."""
 GRAVITY_SWEEPS: Final = 5
@@ -69,45 +63,6 @@ class _Kind:
     lacks: tuple[str, ...]
     solver: Solver
     work: Work
-
-
-def chamber_fills(scene: Scene) -> FloatArray:
-    """Fill ratios at which a chamber is judged: those of the range at which gravity leaves a closed ring.
-
-    Returns: x, shape (n,); empty where there is none.
-    """
-    fills = range_fills(scene)
-    return fills[_tilted(scene, tuple(float(x) for x in fills)).closed]
-
-
-def range_fills(scene: Scene) -> FloatArray:
-    """Fill ratios of `FILLS`, with the one at which sloshing is resonant where that lies within.
-
-    Returns: x, shape (n,), ascending.
-    """
-    fills, resonant = scene.disc.max_fill_ratio * np.array(FILLS), resonant_fill(scene)
-    if resonant is None or not fills[0] < resonant < fills[-1]:
-        return fills
-    return np.unique(np.append(fills, resonant))
-
-
-def range_contributions(scene: Scene) -> Mapping[str, Mapping[str, Contribution]]:
-    """Contributions to wall pressure and moment at the worst fill of the range, as `chamber_contributions`.
-
-    Returns: By "pressures" and "moments", over `chamber_fills`; over the whole range where no ring is closed.
-    """
-    closed = chamber_fills(scene)
-    return chamber_contributions(scene, closed if closed.size else range_fills(scene))
-
-
-def mean_gravity(scene: Scene) -> float:
-    """Estimated contribution of gravity to the means over a turn, wall pressure or moment.
-
-    Returns: Relative, at the worst fill of the range.
-    Source: second order in g/(omega^2 a).
-    """
-    found = range_contributions(scene)
-    return max(found[part][MEAN].value or 0.0 for part in ("pressures", "moments"))
 
 
 def chamber_hierarchies(scene: Scene) -> tuple[ModelHierarchy, ModelHierarchy]:
@@ -168,43 +123,6 @@ def _swing_uncertainty(
 
     waves = (of("pressures", RIPPLE) * factor) ** 2
     return {part: waves + _SWING_MESH * of(part, SLOSHING) for part in ("pressures", "moments")}
-
-
-def chamber_status(scene: Scene) -> Status:
-    """Whether linear sloshing and a closed ring hold over the range of fills, by estimates.
-
-    Returns: Status; every result over that range inherits it.
-    """
-    fills = chamber_fills(scene)
-    if fills.size == range_fills(scene).size:
-        return _waves(scene, fills)
-    lowest = f"above a fill ratio of {fills[0]:.3g} only" if fills.size else "at no fill of this scene"
-    return Status(
-        code=StatusCode.NO_RING if fills.size == 0 else StatusCode.OUT_OF_RANGE,
-        text=(
-            f"gravity leaves a closed ring {lowest}: elsewhere liquid runs along the wall every turn and no "
-            "model describes it; turn faster or fill more"
-        ),
-    )
-
-
-def _waves(scene: Scene, fills: FloatArray) -> Status:
-    """Whether the swinging surface stays small against the ring's depth, by the estimate of its swing."""
-    if scene.environment.shaft == "vertical":
-        return Status()
-    length = scene.environment.gravity / scene.rotor.speed**2
-    depth = scene.disc.outer_radius - surface_radius(disc=scene.disc, fill_ratio=fills)
-    swing = np.array([amplification(scene, float(x)) for x in fills]) * length / depth
-    worst = int(np.argmax(swing))
-    if swing[worst] <= SMALL:
-        return Status()
-    return Status(
-        code=StatusCode.OUT_OF_RANGE,
-        text=(
-            f"at a fill ratio of {fills[worst]:.3g} waves would reach about {swing[worst]:.2g} of the ring's "
-            "depth, too high for linear sloshing, the finest model: avoid that fill, or turn faster"
-        ),
-    )
 
 
 def _fidelity(scene: Scene, fills: FloatArray, kind: _Kind, part: str, memo: Memo) -> Fidelity:
@@ -329,15 +247,3 @@ def _mesh_turns(scene: Scene) -> int:
         return 1
     tilt = scene.environment.gravity / (scene.rotor.speed**2 * scene.disc.inner_radius)
     return 2 * max(2, int(np.ceil(np.log(1e-8) / np.log(min(tilt, 0.3)) / 2)))
-
-
-@lru_cache(maxsize=64)
-def _tilted(scene: Scene, fills: tuple[float, ...]) -> TiltedRing:
-    return tilted_ring(
-        disc=scene.disc,
-        density=scene.liquid.density,
-        angular_velocity=scene.rotor.speed,
-        gravity=scene.environment.gravity,
-        shaft=scene.environment.shaft,
-        fill_ratio=np.array(fills),
-    )

@@ -14,24 +14,11 @@ from typing import Literal
 import numpy as np
 
 from ringbalance.physics.results import Status
+from ringbalance.reduced_model.selection.contribution import Contribution
 from ringbalance.scene.arrays import FloatArray
 
 Work = Mapping[str, float]
 """Counted work by its kind, such as {"solve": 3, "unknown_2d": 1000}; never a time."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Contribution:
-    """What leaving one thing out is worth, judged before anything is solved."""
-
-    term: str
-    """Name, as in `Fidelity.leaves_out`."""
-    value: float | None
-    """Relative to the quantity; None where the scene gives no basis for an estimate."""
-    formula: str
-    source: str
-    rough: bool = False
-    """Whether it may be far too large, so that no model is ruled out by it alone."""
 
 
 @dataclass(frozen=True, kw_only=True)

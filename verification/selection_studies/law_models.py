@@ -16,12 +16,12 @@ from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.reduced_model.selection.loss_models import FORMULAS, loss_at
-from ringbalance.reduced_model.selection.models import Work
 from ringbalance.reduced_model.tables.fit import refined_table, table_from_samples
 from ringbalance.reduced_model.tables.hermite import HermiteTable
 from ringbalance.reduced_model.tube.heads import TABLE_ERROR, TABLE_VELOCITIES, TubeHeads
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene, Tube
+from ringbalance.verification.selection_studies.hierarchy import Work
 
 EQ_12: Final = "Eq. 12"
 CLOSED: Final = "closed form"
@@ -91,8 +91,8 @@ def law_of(scene: Scene, models: LawModels, *, base: CalibratedLaw) -> Calibrate
     Returns: CalibratedLaw; its half-widths are the base law's.
     Source: Eqs. 13 to 18 of the liquid-ring paper, each part by its model.
     """
-    pressure, moment = level_tables(scene, models.level)
-    path, heads = base.path, loss_heads(scene, models.loss, base=base.heads)
+    pressure, moment = _level_tables(scene, models.level)
+    path, heads = base.path, _loss_heads(scene, models.loss, base=base.heads)
     if models.regimes == SIPHON:
         path = replace(path, hump_pressure=None)
         heads = replace(heads, hump_head=None, return_hump_head=None)
@@ -117,7 +117,7 @@ def law_work(scene: Scene, models: LawModels) -> Work:
     return {"formula": float(level), "table": float(tables * FORMULAS[models.loss])}
 
 
-def level_tables(scene: Scene, level: str) -> tuple[HermiteTable, HermiteTable]:
+def _level_tables(scene: Scene, level: str) -> tuple[HermiteTable, HermiteTable]:
     """Wall pressure and moment over the fill by one model; an empty chamber has neither.
 
     Returns: P, Pa, and U, kg m, over x from 0 to max_fill_ratio. The paper's moment is lambda times half its
@@ -161,7 +161,7 @@ def _thin_film(scene: Scene, fills: FloatArray, values: FloatArray, *, moment: b
     return held
 
 
-def loss_heads(scene: Scene, loss: str, *, base: TubeHeads) -> TubeHeads:
+def _loss_heads(scene: Scene, loss: str, *, base: TubeHeads) -> TubeHeads:
     """Heads of the tube by one model of the loss.
 
     Args: `loss`: one of `LOSSES`. `base`: heads whose half-widths are kept.

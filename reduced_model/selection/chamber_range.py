@@ -1,0 +1,107 @@
+"""Fills at which a chamber is judged, its contributions there, and where its models hold."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+
+from ringbalance.mesh.geometry import surface_radius
+from ringbalance.physics.results import Status, StatusCode
+from ringbalance.physics.sloshing.range import SMALL
+from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing, tilted_ring
+from ringbalance.reduced_model.selection.chamber_terms import (
+    MEAN,
+    amplification,
+    chamber_contributions,
+    resonant_fill,
+)
+from ringbalance.reduced_model.selection.contribution import Contribution
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Scene
+
+FILLS: Final = (0.2, 0.5, 1.0)
+"""Shares of max_fill_ratio."""
+
+
+def chamber_fills(scene: Scene) -> FloatArray:
+    """Fill ratios at which a chamber is judged: those of the range at which gravity leaves a closed ring.
+
+    Returns: x, shape (n,); empty where there is none.
+    """
+    fills = range_fills(scene)
+    return fills[_tilted(scene, tuple(float(x) for x in fills)).closed]
+
+
+def range_fills(scene: Scene) -> FloatArray:
+    """Fill ratios of `FILLS`, with the one at which sloshing is resonant where that lies within."""
+    fills, resonant = scene.disc.max_fill_ratio * np.array(FILLS), resonant_fill(scene)
+    if resonant is None or not fills[0] < resonant < fills[-1]:
+        return fills
+    return np.unique(np.append(fills, resonant))
+
+
+def range_contributions(scene: Scene) -> Mapping[str, Mapping[str, Contribution]]:
+    """Contributions to wall pressure and moment at the worst fill of the range, as `chamber_contributions`.
+
+    Returns: By "pressures" and "moments", over `chamber_fills`; over the whole range where no ring is closed.
+    """
+    closed = chamber_fills(scene)
+    return chamber_contributions(scene, closed if closed.size else range_fills(scene))
+
+
+def mean_gravity(scene: Scene) -> float:
+    """Estimated contribution of gravity to the means over a turn, wall pressure or moment.
+
+    Source: second order in g/(omega^2 a).
+    """
+    found = range_contributions(scene)
+    return max(found[part][MEAN].value or 0.0 for part in ("pressures", "moments"))
+
+
+def chamber_status(scene: Scene) -> Status:
+    """Whether linear sloshing and a closed ring hold over the range of fills, by estimates."""
+    fills = chamber_fills(scene)
+    if fills.size == range_fills(scene).size:
+        return _waves(scene, fills)
+    lowest = f"above a fill ratio of {fills[0]:.3g} only" if fills.size else "at no fill of this scene"
+    return Status(
+        code=StatusCode.NO_RING if fills.size == 0 else StatusCode.OUT_OF_RANGE,
+        text=(
+            f"gravity leaves a closed ring {lowest}: elsewhere liquid runs along the wall every turn and no "
+            "model describes it; turn faster or fill more"
+        ),
+    )
+
+
+def _waves(scene: Scene, fills: FloatArray) -> Status:
+    """Whether the swinging surface stays small against the ring's depth, by the estimate of its swing."""
+    if scene.environment.shaft == "vertical":
+        return Status()
+    length = scene.environment.gravity / scene.rotor.speed**2
+    depth = scene.disc.outer_radius - surface_radius(disc=scene.disc, fill_ratio=fills)
+    swing = np.array([amplification(scene, float(x)) for x in fills]) * length / depth
+    worst = int(np.argmax(swing))
+    if swing[worst] <= SMALL:
+        return Status()
+    return Status(
+        code=StatusCode.OUT_OF_RANGE,
+        text=(
+            f"at a fill ratio of {fills[worst]:.3g} waves would reach about {swing[worst]:.2g} of the ring's "
+            "depth, too high for linear sloshing, the finest model: avoid that fill, or turn faster"
+        ),
+    )
+
+
+@lru_cache(maxsize=64)
+def _tilted(scene: Scene, fills: tuple[float, ...]) -> TiltedRing:
+    return tilted_ring(
+        disc=scene.disc,
+        density=scene.liquid.density,
+        angular_velocity=scene.rotor.speed,
+        gravity=scene.environment.gravity,
+        shaft=scene.environment.shaft,
+        fill_ratio=np.array(fills),
+    )

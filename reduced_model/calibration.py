@@ -19,6 +19,7 @@ from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_law
 from ringbalance.reduced_model.selection.registry import ModelUsed, models_used
 from ringbalance.reduced_model.tube.heads import tube_heads
 from ringbalance.reduced_model.tube.operating_point import OperatingPoint, operating_point
+from ringbalance.reduced_model.tube.residual import ResidualLiquid, residual_liquid
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
@@ -45,6 +46,8 @@ class Calibration:
     """Eq. 19 of the liquid-ring paper, for comparison."""
     operating_point: OperatingPoint
     """At equal fills under the scene's gas pressure."""
+    residual: ResidualLiquid
+    """Of a chamber emptied under the scene's gas pressure, and what a pair can use."""
     models_used: tuple[ModelUsed, ...]
     """Every physical term, with its model and its estimated contribution."""
     identifiability: str
@@ -78,6 +81,7 @@ def calibrate(scene: AnyScene) -> Calibration:
         flow_law=law,
         paper_law=paper_law(scene),
         operating_point=point,
+        residual=residual_liquid(scene, law=law),
         models_used=models_used(scene),
         identifiability=IDENTIFIABILITY,
         statistics={

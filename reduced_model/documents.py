@@ -41,6 +41,7 @@ def calibration_document(calibration: Calibration) -> dict[str, Any]:
         "tube": _tube(calibration),
         "law": _law(calibration),
         "operating_point": _operating_point(calibration),
+        "residual_liquid": _residual(calibration),
         "identifiability": calibration.identifiability,
         "tolerance": scene.tolerance,
         "models_used": [asdict(term) for term in calibration.models_used],
@@ -191,4 +192,21 @@ def _operating_point(calibration: Calibration) -> dict[str, Any]:
         "cavity_pressure_Pa": point.cavity_pressure,
         "cavitation_margin_Pa": point.cavitation_margin,
         "cavitation_margin_uncertainty": point.cavitation_margin_uncertainty,
+    }
+
+
+def _residual(calibration: Calibration) -> dict[str, float]:
+    rest = calibration.residual
+    return {
+        "fill_ratio": rest.fill_ratio,
+        "fill_ratio_uncertainty": rest.fill_ratio_uncertainty,
+        "largest_fill_ratio": rest.largest_fill_ratio,
+        "depth_m": rest.depth,
+        "depth_uncertainty": rest.depth_uncertainty,
+        "flow_rate_m3_s": rest.flow_rate,
+        "usable_volume_m3": rest.usable_volume,
+        "usable_volume_uncertainty": rest.usable_volume_uncertainty,
+        "pair_moment_kg_m": rest.pair_moment,
+        "usable_pair_moment_kg_m": rest.usable_pair_moment,
+        "usable_pair_moment_uncertainty": rest.usable_pair_moment_uncertainty,
     }

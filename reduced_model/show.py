@@ -81,6 +81,7 @@ def _summary_rows(calibration: Calibration) -> Iterator[tuple[str, str]]:
         f"({1e3 * float(lam.value) / 2:.3f} mm per mass difference), "
         f"varies by {100 * lambda_variation(calibration=calibration):.2g} % over the fill range",
     )
+    yield "usable", _usable_text(calibration)
     yield "operating point", _point_text(point)
     if point.k is not None and point.k_uncertainty is not None:
         yield "k there", f"{point.k:.2f} ± {point.k_uncertainty:.2f} at {point.loss_velocity:.3g} m/s"
@@ -95,6 +96,20 @@ def _summary_rows(calibration: Calibration) -> Iterator[tuple[str, str]]:
         yield "cavitation margin", _margin_text(point)
     if not chamber.status.ok:
         yield "note", chamber.status.text
+
+
+def _usable_text(calibration: Calibration) -> str:
+    rest = calibration.residual
+    if rest.fill_ratio == 0:
+        return f"{1e6 * rest.pair_moment:.0f} g mm a pair; no gas enters the port before a chamber is empty"
+    return (
+        f"{1e6 * rest.usable_pair_moment:.0f} ± {1e6 * rest.usable_pair_moment_uncertainty:.0f} g mm a pair "
+        f"({1e6 * rest.pair_moment:.0f} by geometry) and {1e6 * rest.usable_volume:.1f} ± "
+        f"{1e6 * rest.usable_volume_uncertainty:.2g} ml, fills {rest.fill_ratio:.3f} ± "
+        f"{rest.fill_ratio_uncertainty:.2g} to {rest.largest_fill_ratio:.3f}: below, with "
+        f"{1e3 * rest.depth:.2f} ± {1e3 * rest.depth_uncertainty:.2g} mm of liquid over the port, gas passes "
+        "through"
+    )
 
 
 def _point_text(point: OperatingPoint) -> str:

@@ -1,0 +1,120 @@
+"""Residual liquid: what a chamber keeps when gas is drawn into its port, and what a pair can use."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from ringbalance.mesh.geometry import chamber_volume, surface_radius
+from ringbalance.physics.roots import bracketed_root
+from ringbalance.physics.tube.draw_down import DRAW_DOWN_UNCERTAINTY, draw_down_depth
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.law.flow_law import FlowLaw
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Scene
+
+_SAMPLES: Final = 201
+"""Fills at which gas in the port is looked for before the root is refined."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResidualLiquid:
+    """Limits of a pair's transfer under the scene's gas pressure; uncertainties are expanded (95 %)."""
+
+    fill_ratio: float
+    """Of the driven chamber, at which gas enters its port."""
+    fill_ratio_uncertainty: float
+    depth: float
+    """Of the liquid over the port then, m."""
+    depth_uncertainty: float
+    flow_rate: float
+    """Through the tube then, m^3/s."""
+    largest_fill_ratio: float
+    """That the opposite chamber reaches then."""
+    usable_volume: float
+    """That a pair can move from one chamber to the other, m^3."""
+    usable_volume_uncertainty: float
+    pair_moment: float
+    """Largest moment of a pair with one chamber empty, by geometry, kg m."""
+    usable_pair_moment: float
+    """Largest moment of a pair that no gas passes through, kg m."""
+    usable_pair_moment_uncertainty: float
+
+
+def residual_fill_ratio(scene: Scene, *, law: FlowLaw) -> float:
+    """Fill ratio below which gas enters the port of the driven chamber under the scene's gas pressure.
+
+    The depth over the port, r_p - a(x), equals that of `draw_down_depth` for the flow Q = S u(x) of the law's
+    running tube, g_c = omega^2 r_p; the largest such x counts, because a chamber empties from above.
+    Returns: x from 0 (no gas before the chamber is empty, or no flow) to max_fill_ratio (gas at any fill).
+    Raises: ValueError: a disc at rest.
+    """
+    return _residual(scene, law, 1.0)
+
+
+def residual_liquid(scene: Scene, *, law: CalibratedLaw) -> ResidualLiquid:
+    """Residual fill with its uncertainty, and the volume and the moment that it leaves to a pair.
+
+    Uncertainty: that of the depth's correlation, and of the velocity to the power 2/5.
+    """
+    x, top = _residual(scene, law, 1.0), scene.disc.max_fill_ratio
+    rate, width = _flow_rate(scene, law, np.array([x]))
+    relative = math.hypot(DRAW_DOWN_UNCERTAINTY, 0.4 * float(width[0] / rate[0]) if rate[0] > 0 else 0.0)
+    low, high = (_residual(scene, law, 1 + s * min(relative, 0.99)) for s in (-1, 1))
+    volume = chamber_volume(disc=scene.disc)
+
+    def moment(fill: float) -> float:
+        return float(law.moment.pair_moment(fill_ratio=max(top - fill, fill), opposite_fill_ratio=fill))
+
+    ends = law.moment.half_width(np.array([x, top - x]))
+    half = min(x, top / 2)
+    depth = float(draw_down_depth(flow_rate=rate[0], acceleration=_acceleration(scene)))
+    return ResidualLiquid(
+        fill_ratio=x,
+        fill_ratio_uncertainty=(high - low) / 2,
+        depth=depth,
+        depth_uncertainty=relative * depth,
+        flow_rate=float(rate[0]),
+        largest_fill_ratio=top - half,
+        usable_volume=(top - 2 * half) * volume,
+        usable_volume_uncertainty=(high - low) * volume,
+        pair_moment=moment(0.0),
+        usable_pair_moment=moment(half),
+        usable_pair_moment_uncertainty=math.hypot(
+            (moment(min(low, top / 2)) - moment(min(high, top / 2))) / 2, *ends
+        ),
+    )
+
+
+def _acceleration(scene: Scene) -> float:
+    return scene.rotor.speed**2 * scene.tube.port_radius
+
+
+def _flow_rate(scene: Scene, law: FlowLaw, fills: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Q of the running tube and its expanded uncertainty, m^3/s."""
+    flow = law.evaluate(fill_ratio=fills, gas_pressure=scene.gas.pressure, primed=True)
+    area = math.pi / 4 * scene.tube.bore**2
+    return area * np.maximum(flow.velocity, 0.0), area * flow.uncertainty
+
+
+def _residual(scene: Scene, law: FlowLaw, factor: float) -> float:
+    """Largest fill at which `factor` times the draw-down depth reaches the liquid's depth over the port."""
+
+    def excess(fills: FloatArray) -> FloatArray:
+        needed = draw_down_depth(
+            flow_rate=_flow_rate(scene, law, fills)[0], acceleration=_acceleration(scene)
+        )
+        depth = scene.tube.port_radius - surface_radius(disc=scene.disc, fill_ratio=fills)
+        return np.asarray(factor * needed - depth)
+
+    fills = np.linspace(0.0, scene.disc.max_fill_ratio, _SAMPLES)
+    gas = np.flatnonzero(excess(fills) > 0)
+    if gas.size == 0:
+        return 0.0
+    if gas[-1] == fills.size - 1:
+        return float(fills[-1])
+    low, high = fills[gas[-1]], fills[gas[-1] + 1]
+    return bracketed_root(lambda x: float(excess(np.array([x]))[0]), float(low), float(high), tolerance=1e-9)

@@ -16,7 +16,7 @@ from ringbalance.controller.liquid_ring.interval import Passage, pass_time
 from ringbalance.controller.liquid_ring.motion import Dynamics, Motion
 from ringbalance.controller.liquid_ring.plant import LiquidRing, initial_state
 from ringbalance.controller.liquid_ring.quadrature import quadrature
-from ringbalance.controller.liquid_ring.steps import Stepper, step
+from ringbalance.controller.liquid_ring.steps import Allowed, Stepping, step, take
 from ringbalance.controller.liquid_ring.transfer import Event
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.calibration import calibrate
@@ -325,12 +325,11 @@ def test_where_the_implicit_method_finds_no_step_the_explicit_one_goes_on() -> N
     def rates(state: FloatArray) -> list[float]:
         return [-1.0 if state[0] > 0.5 else math.nan]
 
-    stepper = Stepper(rates=rates, allowed=np.array([1e-10]), integral_error=1e-10)
-    stepper.stiff = True
-    state, time = np.array([1.0]), 0.0
+    allowed = Allowed(explicit=np.array([1e-10]), implicit=np.array([1e-10]))
+    state, time, stepping = np.array([1.0]), 0.0, Stepping(stiff=True)
     while time < 0.49999:
-        taken = stepper.take(state, time=time, stop=2.0, most=10_000)
-        state, time = taken.end, time + taken.length
+        taken = take(stepping, rates=rates, allowed=allowed, state=state, time=time, stop=2.0, most=10_000)
+        state, time, stepping = taken.end, time + taken.length, taken.after
         assert state[0] == pytest.approx(1 - time, abs=1e-12)
         assert taken.within(0.5)[0] == pytest.approx(1 - time + taken.length / 2, abs=1e-12)
 

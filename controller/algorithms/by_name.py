@@ -19,10 +19,8 @@ from ringbalance.scene.models import Scene
 
 
 def controller_of(scene: Scene, model: BalancerModel | None = None) -> Controller[Any]:
-    """The control algorithm that a scene asks for.
+    """The control algorithm that a scene asks for; `model` is the balancer as the law-based one assumes it.
 
-    Args: `model`: the balancer as the law-based algorithm assumes it; the others do without.
-    Returns: Controller, with the scene's settings.
     Raises: SceneError: an algorithm that this program does not have.
     Raises: ValueError: the law-based algorithm without a model.
     """
@@ -76,10 +74,7 @@ def trial_of(scene: Scene) -> Trial:
 
 
 def law_based_of(scene: Scene, model: BalancerModel) -> LawBased:
-    """The law-based algorithm with a scene's settings.
-
-    Args: `model`: the balancer as the algorithm assumes it, which need not be the one that is controlled.
-    """
+    """The law-based algorithm with a scene's settings; its model need not be the one that is controlled."""
     settings = scene.controller
     return LawBased(
         ring=LiquidRing(

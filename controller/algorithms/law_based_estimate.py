@@ -30,18 +30,10 @@ def updated(
 ) -> InfluenceEstimate:
     """Learn from one operation, dV = K dU + noise, by a Kalman filter of one complex number.
 
-    gain = P dU* / (P |dU|^2 + R), K <- K + gain (dV - K dU), P <- P R/(P |dU|^2 + R), with
-    R = noise + (s |K dU|)^2 with s = `law_standard_deviation`: a response that noise could have made moves K
-    little, and no moment counts as better known than by s.  P never falls below (s |K|)^2, so the estimate
-    keeps following.
-    Args:
-        estimate: before.
-        moment_change: dU that the law expects of the operation, kg m.
-        vibration_change: dV measured, m.
-        noise_variance: of dV, both components together, m^2.
-        law_standard_deviation: standard deviation of the law's velocity, relative.
-        assumed_magnitude: |K| from before the first operation, m/(kg m).
-    Returns: The estimate after; unchanged when the law expects no response.
+    gain = P dU* / (P |dU|^2 + R), K <- K + gain (dV - K dU), P <- P R/(P |dU|^2 + R), with R =
+    `noise_variance` + (s |K dU|)^2, s = `law_standard_deviation` (relative): a response that noise could have
+    made moves K little, and no moment counts as better known than by s. P never falls below (s |K|)^2, so the
+    estimate keeps following. All SI; variances are of both components together.
     Source: Kalman, "A New Approach to Linear Filtering and Prediction Problems", J. Basic Eng. 82 (1960).
     """
     k, p = estimate.value, estimate.variance

@@ -33,10 +33,7 @@ _has_turned: Final = compiled(has_turned)
 
 @compiled
 def run_members(shared: Record, runs: Any) -> None:
-    """Run members one after the other.
-
-    Args: `shared`: of type `SHARED`. `runs`: array of type `RUN`, with what differs between members; filled.
-    """
+    """Run members one after the other; `runs`, of type `RUN`, holds what differs between them and is filled."""
     clock = np.zeros(shared.confirming)
     for i in range(runs.size):
         run = runs[i]
@@ -84,10 +81,7 @@ def _pass_calm(shared: Record, run: Record, clock: FloatArray) -> None:
 
 @compiled
 def start(shared: Record, run: Record) -> None:
-    """Level chambers, nothing remembered.
-
-    Args: `shared`: of type `SHARED`. `run`: with what is its own filled in, all else zero.
-    """
+    """Level chambers, nothing remembered."""
     reset(shared, run)
     forget(run)
     _look(shared, run)
@@ -136,9 +130,7 @@ def _sample(shared: Record, run: Record) -> None:
 def react(shared: Record, run: Record, noise: tuple[float, float], noise_before: float) -> None:
     """What the sensor shows, one step of the controller, and whether the run ends here.
 
-    Args: `shared`: of type `SHARED`. `run`: the member; its `samples` counts this one already. `noise`: of
-        amplitude and phase, in standard deviations. `noise_before`: of the phase of the sample before, in
-        standard deviations.
+    `run.samples` counts this sample already; noise is of amplitude and phase, in standard deviations.
     """
     run.seen_amplitude = abs(run.amplitude + shared.amplitude_noise * noise[0])
     run.seen_phase = run.phase + shared.phase_noise * noise[1]
@@ -181,10 +173,7 @@ def _cause(shared: Record, run: Record) -> int:
 
 @compiled
 def wait(shared: Record, run: Record) -> None:
-    """Until the next sample, or the end.
-
-    Args: `shared`: of type `SHARED`. `run`: the member; its liquid moves where a tube is full.
-    """
+    """Until the next sample, or the end; liquid moves where a tube is full."""
     length = max(min(shared.period, shared.time_limit - run.time), 0.0)
     run.pair, run.other_pair = -1, -1
     if length > 0.0 and any_wet(shared, run):
@@ -199,10 +188,7 @@ def wait(shared: Record, run: Record) -> None:
 
 @compiled
 def gas(shared: Record, run: Record) -> None:
-    """All valves of a command open together; pairs flow in parallel.
-
-    Args: `shared`: of type `SHARED`. `run`: the member, with its open valves.
-    """
+    """All valves of a command open together; pairs flow in parallel."""
     both = run.other_pair >= 0
     length = max(run.duration, run.other_duration) if both else run.duration
     working = run.other_pair if both and run.other_duration > run.duration else run.pair

@@ -60,7 +60,7 @@ class Controller(Protocol[StateT]):
         ...
 
     def step(self, state: StateT, measurement: Measurement | None) -> tuple[StateT, Command]:
-        """Next state and command after one sample (None: dropped); the same arguments give the same answer."""
+        """Next state and command after one sample (None: dropped); a pure function."""
         ...
 
 

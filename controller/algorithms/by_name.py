@@ -28,7 +28,7 @@ def controller_of(scene: Scene, model: BalancerModel | None = None) -> Controlle
     if kind == "target_vector":
         return target_vector_of(scene)
     if kind == "trial":
-        return trial_of(scene)
+        return _trial_of(scene)
     if kind == "law_based":
         if model is None:
             raise ValueError("the law-based algorithm needs a model, such as calibrate(scene).model")
@@ -58,7 +58,7 @@ def target_vector_of(scene: Scene) -> TargetVector:
     )
 
 
-def trial_of(scene: Scene) -> Trial:
+def _trial_of(scene: Scene) -> Trial:
     """The one-by-one trial algorithm with a scene's settings."""
     settings, letters = scene.controller, chamber_letters(scene.disc.chambers)
     return Trial(

@@ -110,7 +110,7 @@ def note_settling(shared: Record, run: Record, length: float, points: int) -> No
 
 
 @compiled
-def back_at(shared: Record, run: Record, time: float) -> tuple[float, float]:
+def _back_at(shared: Record, run: Record, time: float) -> tuple[float, float]:
     """Vibration, m, at an instant, s, of the interval last moved through; `trial` becomes the fills then."""
     for i in range(shared.chambers // 2):
         run.trial[i] = _pair_at(shared, run, i, time)[0]
@@ -119,6 +119,6 @@ def back_at(shared: Record, run: Record, time: float) -> tuple[float, float]:
 
 @compiled
 def _note(shared: Record, run: Record, time: float) -> None:
-    real, imaginary = back_at(shared, run, time)
+    real, imaginary = _back_at(shared, run, time)
     above = math.hypot(real, imaginary) > shared.limit
     run.since = math.inf if above else min(run.since, run.time + time)

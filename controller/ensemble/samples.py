@@ -90,7 +90,7 @@ def drawn_members(scene: Scene, *, uncertainty_95: MemberUncertainty, seed: int,
 
 
 def member_uncertainty(scene: Scene, model: BalancerModel) -> MemberUncertainty:
-    """Half-widths for a scene under a law: the law's own, the scene's, and assumed ones where neither tells."""
+    """Half-widths for a scene under a law: the law's, the scene's, else assumed ones."""
     velocity, moment = _velocity(scene, model), _moment(scene, model)
     influence = _stated(scene, "influence_coefficient")
     lag = _stated(scene, "lag_angle")

@@ -29,8 +29,7 @@ def check_fit(scene: Scene, model: BalancerModel) -> None:
 def check_settings(scene: Scene) -> None:
     """Refuse settings that a loaded scene cannot have, but one changed in Python can.
 
-    Raises: SceneError: a gain, limit, time or pressure that is not a number, zero or negative where that has
-        no meaning, or a period shorter than the valve's lag.
+    Raises: SceneError: a number outside its range, or a period shorter than the valve's lag.
     """
     faults = [
         scene_fault(scene=scene, table=table, key=key, problem=problem, allowed=allowed)

@@ -57,8 +57,7 @@ class Comparison:
 def compare(first: AnyScene, second: AnyScene, *, model_of: ModelOf) -> Comparison:
     """Put two balancers on the rotor of the first scene, and let each balance it.
 
-    Args: `first`: its rotor, vibration sensor and limit hold for both. `second`: its balancer only.
-        `model_of`: makes the model of a liquid ring, such as `lambda scene: calibrate(scene).model`.
+    Of the second scene its balancer alone counts; `model_of` makes the model of a liquid ring.
     Raises: SceneError: a balancer that cannot work on that rotor.
     """
     rotor = rotor_of(first)
@@ -113,12 +112,7 @@ def _driven_side(rotor: OneRotor, scene: EccentricScene) -> Side:
 
 
 def comparison_document(comparison: Comparison) -> dict[str, Any]:
-    """Turn a comparison into plain numbers, lists and text, all in SI; lists run along `scenes`.
-
-    Args: `comparison`: of two balancers.
-    Returns: Document that `json.dumps(..., allow_nan=False)` accepts; `time_s` is null for what did not
-        settle.
-    """
+    """A comparison as a JSON document in SI; lists run along `scenes`; null: it did not settle."""
     sides, rotor = comparison.sides, comparison.rotor
     return {
         "scenes": [

@@ -59,9 +59,8 @@ class OneRotor:
 
 
 def rotor_of(scene: AnyScene) -> OneRotor:
-    """Take the rotor out of a scene.
+    """Take the rotor out of a scene; of eccentric masses the speed counts at which their strategy starts.
 
-    Args: `scene`: of any kind; of eccentric masses it counts the speed at which their strategy starts.
     Raises: SceneError: the rotor stands still, turns backwards, or does not vibrate at all.
     """
     found = _liquid_rotor(scene) if isinstance(scene, Scene) else _driven_rotor(scene)
@@ -108,9 +107,8 @@ def _driven_rotor(scene: EccentricScene) -> OneRotor:
 def own_scene(scene: AnyScene) -> AnyScene:
     """Make a scene ready to balance its own rotor in a comparison.
 
-    Args: `scene`: of any kind.
-    Returns: A liquid ring's scene as it is; eccentric masses at the constant speed at which their strategy
-        starts, opposite each other, and in the rotor's steady vibration before they start.
+    A liquid ring's scene stays as it is; eccentric masses run at the constant speed at which their strategy
+    starts, opposite each other, and in the rotor's steady vibration before they start.
     """
     if isinstance(scene, Scene):
         return scene
@@ -119,10 +117,8 @@ def own_scene(scene: AnyScene) -> AnyScene:
 
 
 def scene_on(rotor: OneRotor, scene: AnyScene) -> AnyScene:
-    """Put a scene's balancer on another scene's rotor.
+    """Put a scene's balancer on another scene's rotor, at constant speed and in its own steady vibration.
 
-    Args: `scene`: of any kind; its own rotor, sensor noise and limit are replaced.
-    Returns: The scene at constant speed, before balancing in the rotor's own steady vibration.
     Raises: SceneError: the rotor cannot be this scene's.
     """
     return _liquid_on(rotor, scene) if isinstance(scene, Scene) else _driven_on(rotor, scene)

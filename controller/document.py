@@ -12,11 +12,10 @@ from ringbalance.reduced_model.selection.registry import neglected_in_injections
 
 
 def simulation_document(simulation: Simulation) -> dict[str, Any]:
-    """Turn a run into plain numbers, lists and text, all in SI.
+    """A run as a JSON document in SI.
 
     `time_s`, `amplitude_m`, `phase_rad` and each list of `fill_ratio` run together and hold the true state;
     what the sensor showed is under `samples`, null where a sample was dropped or not a number.
-    Returns: Document that `json.dumps(..., allow_nan=False)` accepts.
     """
     return {
         "balancer": simulation.balancer,

@@ -23,8 +23,6 @@ MAX_CHAMBERS: Final = len(ascii_uppercase)
 def chamber_letters(chambers: int) -> tuple[str, ...]:
     """Names of the chambers, counter-clockwise from A at angle 0.
 
-    Args: `chambers`: n, even, at most 26.
-    Returns: n letters.
     Raises: ValueError: an odd number, or one outside 2 to 26.
     """
     _check_chambers(chambers)
@@ -32,10 +30,8 @@ def chamber_letters(chambers: int) -> tuple[str, ...]:
 
 
 def chamber_directions(chambers: int) -> ComplexArray:
-    """Unit vectors of the chambers' centre lines, e_i = exp(2 pi j i/n).
+    """Unit vectors of the chambers' centre lines, e_i = exp(2 pi j i/n); opposite ones are exact negatives.
 
-    Args: `chambers`: n, even, at most 26.
-    Returns: Complex, shape (n,); opposite ones are exact negatives.
     Raises: ValueError: an odd number, or one outside 2 to 26.
     """
     _check_chambers(chambers)
@@ -51,12 +47,9 @@ def _check_chambers(chambers: int) -> None:
 
 
 def disc_unbalance(*, moment: MomentCurve, fill_ratio: npt.ArrayLike) -> ComplexArray:
-    """Balancing moment of the whole disc, U = sum over pairs of M(x_i, x_(i+n/2)) e_i.
+    """Balancing moment of the whole disc, U = sum over pairs of M(x_i, x_(i+n/2)) e_i, kg m.
 
-    Args: `moment`: moment of a pair from its two fill ratios. `fill_ratio`: x of every chamber in the order
-        of the letters, shape (n,) or (n, times).
-    Returns: Complex moment, kg m, shape () or (times,).
-    Raises: ValueError: an odd number of chambers, or one outside 2 to 26.
+    Fill ratios of every chamber in the order of the letters run along the first axis.
     Source: Eqs. 21 and 22 of the liquid-ring paper, for any number of pairs and any moment curve.
     """
     x = np.asarray(fill_ratio, dtype=np.float64)
@@ -67,26 +60,21 @@ def disc_unbalance(*, moment: MomentCurve, fill_ratio: npt.ArrayLike) -> Complex
 
 
 def influence(*, coefficient: float, lag_angle: float) -> complex:
-    """Vibration per unbalance as a vector, K = kappa exp(-j lag).
+    """Vibration per unbalance as a vector, K = kappa exp(-j lag), m/(kg m).
 
-    Args: `coefficient`: kappa, m/(kg m), above zero. `lag_angle`: rad, by which the vibration lags behind the
-        unbalance.
-    Returns: K, m/(kg m).
     Source: Eq. 23 of the liquid-ring paper; the sign of the lag is a convention of this program.
     """
     return complex(coefficient * np.exp(-1j * lag_angle))
 
 
 def initial_vibration(*, rotor: Rotor) -> complex:
-    """Vibration with every pair level, V0 = v0 exp(j theta0). Returns: V0, m zero-to-peak."""
+    """Vibration with every pair level, V0 = v0 exp(j theta0), m zero-to-peak."""
     return complex(rotor.initial_amplitude * np.exp(1j * rotor.initial_phase))
 
 
 def vibration(*, rotor: Rotor, moment: npt.ArrayLike) -> ComplexArray:
-    """Vibration of the rotor with the disc's moment, V1 = V0 + K U.
+    """Vibration of the rotor with the disc's moment U, V1 = V0 + K U, m zero-to-peak.
 
-    Args: `moment`: U, complex, kg m, any shape.
-    Returns: V1, complex, m zero-to-peak, the shape of `moment`.
     Source: Eq. 23 of the liquid-ring paper.
     """
     k = influence(coefficient=rotor.influence_coefficient, lag_angle=rotor.lag_angle)
@@ -94,9 +82,5 @@ def vibration(*, rotor: Rotor, moment: npt.ArrayLike) -> ComplexArray:
 
 
 def wrapped(angle: float) -> float:
-    """The same angle within (-pi, pi].
-
-    Args: `angle`: rad.
-    Returns: rad.
-    """
+    """The same angle, rad, within (-pi, pi]."""
     return math.atan2(math.sin(angle), math.cos(angle))

@@ -15,12 +15,9 @@ Sensor = Callable[[float, complex], Measurement | None]
 
 
 def noisy_sensor(*, sensor: loop_models.Sensor, seed: int) -> Sensor:
-    """A sensor with independent Gaussian noise on amplitude and phase.
+    """A sensor with independent Gaussian noise on amplitude and phase from numpy's default generator.
 
     An amplitude that noise would make negative is folded back, as a rectifying instrument shows it.
-    Args: `sensor`: standard deviations, m and rad; zero: exact. `seed`: of numpy's default generator; the
-        same seed gives the same noise.
-    Returns: Sensor; every call takes the next pair of random numbers.
     """
     random = np.random.default_rng(seed)
 

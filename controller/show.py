@@ -24,16 +24,12 @@ DECADES: Final = 3.0
 
 
 def show(simulation: Simulation, *, console: Console) -> None:
-    """Print a run: summary, amplitude over time, injections. Args: `console`: where to."""
+    """Print a run: summary, amplitude over time, injections."""
     console.print(Group(*_parts(simulation)))
 
 
 def sparkline(values: FloatArray) -> str:
-    """Draw values as a line of bars, logarithmic over three decades below the largest.
-
-    Args: `values`: shape (m,), at least zero.
-    Returns: m characters; all of the lowest bar when every value is zero.
-    """
+    """Draw values as a line of bars, logarithmic over three decades below the largest."""
     top = float(np.max(values, initial=0.0))
     if top == 0:
         return BARS[0] * values.size

@@ -60,22 +60,12 @@ class Controller(Protocol[StateT]):
         ...
 
     def step(self, state: StateT, measurement: Measurement | None) -> tuple[StateT, Command]:
-        """Decide on one sample; the same arguments always give the same answer.
-
-        Args: `state`: as returned by the previous step or by `start`. `measurement`: the sample, or None when
-            it was dropped.
-        Returns: The next state and the command.
-        """
+        """Next state and command after one sample (None: dropped); a pure function."""
         ...
 
 
 def usable(measurement: Measurement | None, *, needs_phase: bool) -> bool:
-    """Whether a sample can be acted upon.
-
-    Args: `measurement`: the sample, or None when it was dropped. `needs_phase`: whether the algorithm reads
-        the phase.
-    Returns: False for a dropped sample and for one with a NaN or infinity in what the algorithm reads.
-    """
+    """Whether a sample holds finite numbers in what the algorithm reads; a dropped one does not."""
     if measurement is None or not math.isfinite(measurement.time):
         return False
     return math.isfinite(measurement.amplitude) and (not needs_phase or math.isfinite(measurement.phase))
@@ -84,12 +74,7 @@ def usable(measurement: Measurement | None, *, needs_phase: bool) -> bool:
 def valve_commands(
     times: tuple[tuple[int, float], ...], *, minimum_gas_time: float, maximum_gas_time: float
 ) -> tuple[ValveCommand, ...]:
-    """Apply the valves' limits: a shorter command is not executed, a longer one is cut.
-
-    Args: `times`: (chamber index, valve-open time in s) for each valve. `minimum_gas_time`: s.
-    `maximum_gas_time`: s.
-    Returns: The valves that open.
-    """
+    """Valves that open for (chamber, time): a shorter time is not executed, a longer one is cut, s."""
     valves = (
         ValveCommand(chamber=chamber, duration=valve_time(share, minimum_gas_time, maximum_gas_time))
         for chamber, share in times

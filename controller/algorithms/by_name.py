@@ -19,10 +19,8 @@ from ringbalance.scene.models import Scene
 
 
 def controller_of(scene: Scene, model: BalancerModel | None = None) -> Controller[Any]:
-    """The control algorithm that a scene asks for.
+    """The control algorithm that a scene asks for; `model` is the balancer as the law-based one assumes it.
 
-    Args: `model`: the balancer as the law-based algorithm assumes it; the others do without.
-    Returns: Controller, with the scene's settings.
     Raises: SceneError: an algorithm that this program does not have.
     Raises: ValueError: the law-based algorithm without a model.
     """
@@ -30,7 +28,7 @@ def controller_of(scene: Scene, model: BalancerModel | None = None) -> Controlle
     if kind == "target_vector":
         return target_vector_of(scene)
     if kind == "trial":
-        return trial_of(scene)
+        return _trial_of(scene)
     if kind == "law_based":
         if model is None:
             raise ValueError("the law-based algorithm needs a model, such as calibrate(scene).model")
@@ -60,7 +58,7 @@ def target_vector_of(scene: Scene) -> TargetVector:
     )
 
 
-def trial_of(scene: Scene) -> Trial:
+def _trial_of(scene: Scene) -> Trial:
     """The one-by-one trial algorithm with a scene's settings."""
     settings, letters = scene.controller, chamber_letters(scene.disc.chambers)
     return Trial(
@@ -76,10 +74,7 @@ def trial_of(scene: Scene) -> Trial:
 
 
 def law_based_of(scene: Scene, model: BalancerModel) -> LawBased:
-    """The law-based algorithm with a scene's settings.
-
-    Args: `model`: the balancer as the algorithm assumes it, which need not be the one that is controlled.
-    """
+    """The law-based algorithm with a scene's settings; its model need not be the one that is controlled."""
     settings = scene.controller
     return LawBased(
         ring=LiquidRing(

@@ -16,7 +16,6 @@ from ringbalance.controller.algorithms.algorithm import (
     usable,
     valve_commands,
 )
-from ringbalance.controller.algorithms.law_based_estimate import InfluenceEstimate, updated
 from ringbalance.controller.algorithms.law_based_times import fill_for_moment, gas_time, pair_changes
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing, PairState
 from ringbalance.controller.liquid_ring.transfer import Drive
@@ -26,10 +25,22 @@ PRIOR_STANDARD_DEVIATION: Final = 0.5
 """Standard deviation, relative, of the assumed influence coefficient before the first operation."""
 LEAST_LAW_STANDARD_DEVIATION: Final = 0.05
 """Standard deviation, relative, below which no flow law's velocity is trusted."""
+MAGNITUDE_RANGE: Final = 10.0
+"""Factor around the assumed magnitude that the estimate keeps to: no response proves no coefficient."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class LawBasedState:
+class InfluenceEstimate:
+    """Estimate of K in V1 = V0 + K U."""
+
+    value: complex
+    """K, m/(kg m)."""
+    variance: float
+    """Mean square of its error, both components together, (m/(kg m))^2."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _LawBasedState:
     """Everything that the algorithm remembers between samples."""
 
     disc: DiscState
@@ -94,12 +105,12 @@ class LawBased:
         own = float(found.uncertainty) / (2 * velocity) if velocity > 0 else 0.0
         return max(own, LEAST_LAW_STANDARD_DEVIATION)
 
-    def start(self) -> LawBasedState:
+    def start(self) -> _LawBasedState:
         variance = abs(PRIOR_STANDARD_DEVIATION * self.influence) ** 2
         estimate = InfluenceEstimate(value=self.influence, variance=variance)
-        return LawBasedState(disc=self.initial, influence=estimate)
+        return _LawBasedState(disc=self.initial, influence=estimate)
 
-    def step(self, state: LawBasedState, measurement: Measurement | None) -> tuple[LawBasedState, Command]:
+    def step(self, state: _LawBasedState, measurement: Measurement | None) -> tuple[_LawBasedState, Command]:
         if measurement is None or not usable(measurement, needs_phase=True):
             return state, Command(reason="no usable sample")
         seen = self._seen(state, measurement)
@@ -112,7 +123,7 @@ class LawBased:
         reason = "" if valves else "the valve-open time is below the minimum"
         return replace(seen, valves=valves), Command(valves=valves, reason=reason)
 
-    def _seen(self, state: LawBasedState, now: Measurement) -> LawBasedState:
+    def _seen(self, state: _LawBasedState, now: Measurement) -> _LawBasedState:
         """Follow the liquid to the sample's time, and learn from the response."""
         before = state.previous
         if before is None or now.time <= before.time:
@@ -128,9 +139,9 @@ class LawBased:
             law_standard_deviation=self.law_standard_deviation,
             assumed_magnitude=abs(self.influence),
         )
-        return LawBasedState(disc=disc, influence=influence, previous=now)
+        return _LawBasedState(disc=disc, influence=influence, previous=now)
 
-    def _advanced(self, state: LawBasedState, interval: float) -> DiscState:
+    def _advanced(self, state: _LawBasedState, interval: float) -> DiscState:
         times = {valve.chamber: min(valve.duration, interval) for valve in state.valves}
         disc, rest = state.disc, interval
         if times:
@@ -146,7 +157,7 @@ class LawBased:
     def _moment(self, disc: DiscState) -> complex:
         return complex(disc_unbalance(moment=self.ring.model.moment, fill_ratio=disc.fills()))
 
-    def _gas_times(self, state: LawBasedState, vibration: complex) -> tuple[tuple[int, float], ...]:
+    def _gas_times(self, state: _LawBasedState, vibration: complex) -> tuple[tuple[int, float], ...]:
         pairs = state.disc.pairs
         moments = [self._pair_moments(pair) for pair in pairs]
         changes = pair_changes(
@@ -198,3 +209,39 @@ class LawBased:
 
 def _vector(measurement: Measurement) -> complex:
     return cmath.rect(measurement.amplitude, measurement.phase)
+
+
+def updated(
+    estimate: InfluenceEstimate,
+    *,
+    moment_change: complex,
+    vibration_change: complex,
+    noise_variance: float,
+    law_standard_deviation: float,
+    assumed_magnitude: float,
+) -> InfluenceEstimate:
+    """Learn from one operation, dV = K dU + noise, by a Kalman filter of one complex number.
+
+    gain = P dU* / (P |dU|^2 + R), K <- K + gain (dV - K dU), P <- P R/(P |dU|^2 + R), with R =
+    `noise_variance` + (s |K dU|)^2, s = `law_standard_deviation` (relative): a response that noise could have
+    made moves K little, and no moment counts as better known than by s. P never falls below (s |K|)^2, so the
+    estimate keeps following. All SI; variances are of both components together.
+    Source: Kalman, "A New Approach to Linear Filtering and Prediction Problems", J. Basic Eng. 82 (1960).
+    """
+    k, p = estimate.value, estimate.variance
+    expected = abs(moment_change) ** 2 * p
+    if expected == 0:
+        return estimate
+    rest = noise_variance + abs(law_standard_deviation * k * moment_change) ** 2
+    gain = p * moment_change.conjugate() / (expected + rest)
+    value = _held(k + gain * (vibration_change - k * moment_change), k, assumed_magnitude)
+    left = p * rest / (expected + rest)
+    return InfluenceEstimate(value=value, variance=max(left, abs(law_standard_deviation * value) ** 2))
+
+
+def _held(value: complex, before: complex, assumed: float) -> complex:
+    magnitude = abs(value)
+    if magnitude == 0:
+        return before / abs(before) * assumed / MAGNITUDE_RANGE
+    bounded = min(max(magnitude, assumed / MAGNITUDE_RANGE), assumed * MAGNITUDE_RANGE)
+    return value * (bounded / magnitude)

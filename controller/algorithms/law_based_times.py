@@ -22,14 +22,11 @@ END_STEP: Final = 1e-3
 
 
 def pair_changes(*, wanted: complex, bounds: Sequence[tuple[float, float]]) -> tuple[float, ...]:
-    """Split a change of the disc's moment over its pairs, each within what it can still give.
+    """Split a change of the disc's moment over its pairs, each within the bounds of its change, kg m.
 
-    The change goes to the two directions on either side of it; what a pair cannot give goes to the pairs
-    that are left; what no pair can give is asked, by its component, of those already at their ends, for the
-    fills are only assumed.
-    Args: `wanted`: change of the disc's moment, kg m. `bounds`: (smallest, largest) change of each pair's
-        moment along its axis, kg m.
-    Returns: Change of each pair's moment along its axis, kg m.
+    The change goes to the two directions on either side of it; what a pair cannot give goes to the pairs that
+    are left; what no pair can give is asked, by its component, of those already at their ends, for the fills
+    are only assumed.
     Source: section 4.2 of the liquid-ring paper, by oblique components for other numbers of chambers.
     """
     axes = [complex(e) for e in chamber_directions(2 * len(bounds))[: len(bounds)]]
@@ -76,12 +73,9 @@ def _shares(wanted: complex, axes: dict[int, complex]) -> dict[int, float]:
 def fill_for_moment(
     *, moment: MomentCurve, wanted: float, total: float, lowest: float, highest: float
 ) -> float:
-    """Fill ratio of the positive chamber at which a pair has a moment.
+    """Fill ratio of the positive chamber at which a pair has a moment, kg m, growing with that fill.
 
-    Args: `moment`: of a pair, growing with the positive chamber's fill. `wanted`: along the pair's axis, kg
-        m. `total`: sum of the two fill ratios. `lowest`: smallest fill ratio that the pair's liquid allows.
-        `highest`: largest one.
-    Returns: x; beyond the ends it continues straight, so that it may lie outside [lowest, highest].
+    Beyond the ends it continues straight, so that it may lie outside [lowest, highest].
     """
 
     def of(x: FloatArray) -> FloatArray:
@@ -105,13 +99,11 @@ def fill_for_moment(
 
 
 def gas_time(*, drive: Drive, fill: float, integrator: Integrator, longest: float) -> float:
-    """Time of gas that lowers the driven chamber to a fill ratio, t = (V/S) integral dx/u(x).
+    """Valve-open time, s, that lowers the driven chamber to a fill ratio, t = (V/S) integral dx/u(x).
 
-    Found by inverting an integrator's x(t) with Newton's method, dx/dt = -(S/V) u, within a bracket.
-    Args: `fill`: wanted x; below the smallest possible one the last velocity is kept. `integrator`: carries
-        the drive through time. `longest`: s, above which nobody asks.
-    Returns: s, at most `longest`; zero when the wanted fill is not below the present one or nothing flows;
-        the time of the stall when the flow stalls before.
+    Found by inverting an integrator's x(t) with Newton's method, dx/dt = -(S/V) u, within a bracket. At most
+    `longest`; zero when the fill is not below the present one or nothing flows; the time of the stall when
+    the flow stalls before; below the smallest possible fill the last velocity is kept.
     Source: section 5.1 of the liquid-ring paper in the limit of small segments, solved for the time.
     """
     if fill >= drive.fill:

@@ -114,14 +114,11 @@ class TargetVector:
 
 
 def components(*, chambers: int, angle: float, length: float) -> tuple[tuple[int, float], ...]:
-    """Split a vector over the two chamber directions on either side of it.
+    """Split a vector over the chamber directions on either side of it; (chamber, share >= 0) each.
 
-    With the spacing D = 2 pi/n and d the angle past the chamber before it, the shares are
-    length sin(D - d)/sin D and length sin(d)/sin D; four chambers: T|cos|, T|sin|.  Two chambers have one
-    axis: the share is the component along it.
-    Args: `chambers`: n, even. `angle`: of the vector, rad, any multiple of a full turn away. `length`: of the
-        vector, at least zero, any unit.
-    Returns: (chamber index, share) for one or two chambers; shares >= 0, in the unit of `length`.
+    With the spacing D = 2 pi/n and d the angle past the chamber before it, the shares are length sin(D -
+    d)/sin D and length sin(d)/sin D; four chambers: T|cos|, T|sin|. Two chambers have one axis: the share is
+    the component along it.
     Source: section 4.2 of the liquid-ring paper, by oblique components for other numbers of chambers.
     """
     first, share, second, other = vector_shares(chambers, angle, length)

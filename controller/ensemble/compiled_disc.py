@@ -16,18 +16,14 @@ _piece_rise: Final = compiled(piece_rise)
 
 @compiled
 def reset(shared: Record, run: Record) -> None:
-    """All pairs level, no tube full. Args: `shared`: of type `SHARED`. `run`: changed."""
+    """All pairs level, no tube full."""
     for i in range(shared.chambers // 2):
         run.fill[i], run.wet[i], run.side[i] = shared.initial_fill, 0.0, 1.0
 
 
 @compiled
 def any_wet(shared: Record, run: Record) -> bool:
-    """Whether any tube holds a column.
-
-    Args: `shared`: of type `SHARED`. `run`: the member.
-    Returns: True when one does.
-    """
+    """Whether any tube holds a column."""
     found = False
     for i in range(shared.chambers // 2):
         found = found or run.wet[i] > 0.0
@@ -47,11 +43,7 @@ def _moment(shared: Record, fill: float) -> float:
 
 @compiled
 def vibration(shared: Record, run: Record, trial: bool) -> tuple[float, float]:
-    """Vibration of the rotor with the disc's liquid.
-
-    Args: `shared`: of type `SHARED`. `run`: the member. `trial`: whether by its fills on trial.
-    Returns: Real and imaginary part, m.
-    """
+    """Real and imaginary part of the vibration with the disc's liquid, m; `trial`: by the fills on trial."""
     real, imaginary = 0.0, 0.0
     for i in range(shared.chambers // 2):
         moment = _moment(shared, (run.trial[i] if trial else run.fill[i]))
@@ -85,10 +77,8 @@ def _pair_at(shared: Record, run: Record, i: int, time: float) -> tuple[float, b
 
 @compiled
 def move(shared: Record, run: Record, time: float) -> float:
-    """Let time pass with some valves open from its start.
+    """Let a time, s, pass with some valves open from its start; the state before is kept.
 
-    Args: `shared`: of type `SHARED`. `run`: the member, with its open valves; its liquid and its drift are
-        changed, and what was before kept. `time`: s.
     Returns: How far liquid ran back with the gas off, the most of any pair.
     """
     drift = 0.0
@@ -103,11 +93,10 @@ def move(shared: Record, run: Record, time: float) -> float:
 
 @compiled
 def note_settling(shared: Record, run: Record, length: float, points: int) -> None:
-    """Keep since when the amplitude has not been above the limit, over a stretch that `simulate` records.
+    """Keep since when the amplitude has not been above the limit, over an interval that `simulate` records.
 
-    Args: `shared`: of type `SHARED`. `run`: the member after `move`, its time still the one before; its
-        `since` is changed. `length`: of the stretch, s. `points`: equally spaced instants recorded beside the
-        closing of each valve.
+    `run` is as after `move`, its time still the one before; `points` equally spaced instants are recorded
+    beside the closing of each valve.
     """
     if run.amplitude > shared.limit:
         run.since = math.inf
@@ -121,13 +110,8 @@ def note_settling(shared: Record, run: Record, length: float, points: int) -> No
 
 
 @compiled
-def back_at(shared: Record, run: Record, time: float) -> tuple[float, float]:
-    """One instant of the stretch that was last moved through.
-
-    Args: `shared`: of type `SHARED`. `run`: the member, its valves still those of the stretch; its `trial`
-        becomes the fills then. `time`: s from the start of the stretch.
-    Returns: Real and imaginary part of the vibration then, m.
-    """
+def _back_at(shared: Record, run: Record, time: float) -> tuple[float, float]:
+    """Vibration, m, at an instant, s, of the interval last moved through; `trial` becomes the fills then."""
     for i in range(shared.chambers // 2):
         run.trial[i] = _pair_at(shared, run, i, time)[0]
     return vibration(shared, run, True)
@@ -135,6 +119,6 @@ def back_at(shared: Record, run: Record, time: float) -> tuple[float, float]:
 
 @compiled
 def _note(shared: Record, run: Record, time: float) -> None:
-    real, imaginary = back_at(shared, run, time)
+    real, imaginary = _back_at(shared, run, time)
     above = math.hypot(real, imaginary) > shared.limit
     run.since = math.inf if above else min(run.since, run.time + time)

@@ -30,22 +30,15 @@ _UNIT: Final = 2.0**-53
 
 
 def noise_key(*, seed: int) -> tuple[int, int]:
-    """The key of an ensemble's noise.
-
-    Args: `seed`: of the ensemble, at least zero.
-    Returns: Two words of 32 bits.
-    """
+    """Two words of 32 bits, the key of an ensemble's noise."""
     first, second = np.random.SeedSequence(entropy=seed, spawn_key=(1,)).generate_state(2)
     return int(first), int(second)
 
 
 @compiled
 def philox(c0: np.uint64, c1: np.uint64, c2: np.uint64, c3: np.uint64, k0: np.uint64, k1: np.uint64) -> Words:
-    """Four random words of a counter and a key.
+    """Four random words of 32 bits, kept in 64, of a counter and a key.
 
-    Args: `c0`: first word of the counter; each is a number of 32 bits kept in 64. `c1`: second word. `c2`:
-        third word. `c3`: fourth word. `k0`: first word of the key. `k1`: second word.
-    Returns: Four words of 32 bits.
     Source: Salmon, Moraes, Dror and Shaw, "Parallel Random Numbers: As Easy as 1, 2, 3", SC'11.
     """
     for _ in range(ROUNDS):
@@ -67,22 +60,14 @@ def _uniform_two(shared: Record, member: int, half: int, purpose: int) -> tuple[
 
 @compiled
 def uniform_radii(shared: Record, member: int, half: int) -> tuple[float, float]:
-    """The uniform numbers that the radii of two samples' normal pairs follow from, sqrt(-2 ln of each).
-
-    Args: `shared`: of type `SHARED`, with the key of `noise_key`. `member`: its number in the ensemble, below
-        2^63. `half`: half the number of the first of the two samples, which is even.
-    Returns: For that sample and the next one, within (0, 1].
-    """
+    """Uniform numbers within (0, 1] for the sample 2 `half` and the next; a radius is sqrt(-2 ln) of each."""
     return _uniform_two(shared, member, half, 0)
 
 
 @compiled
 def noise_pair(shared: Record, member: int, sample: int) -> tuple[float, float]:
-    """Two independent standard normal numbers for one sample of one member.
+    """Two independent standard normal numbers for one sample (below 2^32) of one member (below 2^63).
 
-    Args: `shared`: of type `SHARED`, with the key of `noise_key`. `member`: its number in the ensemble, below
-        2^63. `sample`: its number in the run, below 2^32.
-    Returns: The radius times cosine and sine of a uniform angle.
     Source: Box and Muller, "A Note on the Generation of Random Normal Deviates" (1958).
     """
     radii, turns = uniform_radii(shared, member, sample // 2), _uniform_two(shared, member, sample // 2, 1)
@@ -92,12 +77,7 @@ def noise_pair(shared: Record, member: int, sample: int) -> tuple[float, float]:
 
 
 def member_noise(*, seed: int, member: int, sample: int) -> tuple[float, float]:
-    """What one member's sensor adds to one sample, in standard deviations.
-
-    Args: `seed`: of the ensemble. `member`: its number in the ensemble. `sample`: its number in the run, from
-        0 on.
-    Returns: Of the amplitude, of the phase.
-    """
+    """Noise of amplitude and phase in one sample of one member, in standard deviations."""
     shared = np.zeros(1, dtype=SHARED)
     shared["key_0"], shared["key_1"] = noise_key(seed=seed)
     return noise_pair(shared[0], member, sample)

@@ -10,8 +10,8 @@ import numpy as np
 from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.controller.ensemble.compiled_disc import any_wet, move, note_settling, reset, vibration
 from ringbalance.controller.ensemble.compiled_noise import noise_pair, uniform_radii
-from ringbalance.controller.ensemble.compiled_pid import decide, forget
 from ringbalance.controller.ensemble.compiled_records import Record
+from ringbalance.controller.formulas.control_law import valve_time, vector_gas_time, vector_shares
 from ringbalance.controller.formulas.stopping import (
     AT_REST,
     NONE,
@@ -25,6 +25,9 @@ from ringbalance.controller.formulas.stopping import (
 from ringbalance.scene.arrays import FloatArray
 
 _CERTAIN: Final = 1 + 1e-9
+_vector_gas_time: Final = compiled(vector_gas_time)
+_vector_shares: Final = compiled(vector_shares)
+_valve_time: Final = compiled(valve_time)
 _stop_cause: Final = compiled(stop_cause)
 _has_grown: Final = compiled(has_grown)
 _has_risen: Final = compiled(has_risen)
@@ -33,14 +36,11 @@ _has_turned: Final = compiled(has_turned)
 
 @compiled
 def run_members(shared: Record, runs: Any) -> None:
-    """Run members one after the other.
-
-    Args: `shared`: of type `SHARED`. `runs`: array of type `RUN`, with what differs between members; filled.
-    """
+    """Run members one after the other; `runs`, of type `RUN`, holds what differs and is filled."""
     clock = np.zeros(shared.confirming)
     for i in range(runs.size):
         run = runs[i]
-        start(shared, run)
+        _start(shared, run)
         while run.cause == NONE and run.samples < shared.most_samples:
             if run.calm:
                 _pass_calm(shared, run, clock)
@@ -50,9 +50,9 @@ def run_members(shared: Record, runs: Any) -> None:
                 _sample(shared, run)
                 if run.cause == NONE:
                     if run.pair >= 0:
-                        gas(shared, run)
-                    wait(shared, run)
-        judge(shared, run, clock[max(run.samples - shared.confirming, 0) % shared.confirming])
+                        _gas(shared, run)
+                    _wait(shared, run)
+        _judge(shared, run, clock[max(run.samples - shared.confirming, 0) % shared.confirming])
 
 
 @compiled
@@ -77,19 +77,16 @@ def _pass_calm(shared: Record, run: Record, clock: FloatArray) -> None:
             even, odd = uniform_radii(shared, run.number, samples // 2)
     if samples > run.samples:
         # A sample in full would have left no memory and no valve.
-        forget(run)
+        _forget(run)
         run.phase_before = run.phase
     run.time, run.samples = time, samples
 
 
 @compiled
-def start(shared: Record, run: Record) -> None:
-    """Level chambers, nothing remembered.
-
-    Args: `shared`: of type `SHARED`. `run`: with what is its own filled in, all else zero.
-    """
+def _start(shared: Record, run: Record) -> None:
+    """Level chambers, nothing remembered."""
     reset(shared, run)
-    forget(run)
+    _forget(run)
     _look(shared, run)
     _expect(shared, run)
     run.start, run.phase_before = run.amplitude, run.phase
@@ -129,21 +126,19 @@ def _sample(shared: Record, run: Record) -> None:
             # The sample before was passed over: its noise is made now.
             before = noise_pair(shared, run.number, run.samples - 2)[1]
     run.noise_before, run.noise_sample = now[1], run.samples - 1
-    react(shared, run, now, before)
+    _react(shared, run, now, before)
 
 
 @compiled
-def react(shared: Record, run: Record, noise: tuple[float, float], noise_before: float) -> None:
+def _react(shared: Record, run: Record, noise: tuple[float, float], noise_before: float) -> None:
     """What the sensor shows, one step of the controller, and whether the run ends here.
 
-    Args: `shared`: of type `SHARED`. `run`: the member; its `samples` counts this one already. `noise`: of
-        amplitude and phase, in standard deviations. `noise_before`: of the phase of the sample before, in
-        standard deviations.
+    `run.samples` counts this sample already; noise is of amplitude and phase, in standard deviations.
     """
     run.seen_amplitude = abs(run.amplitude + shared.amplitude_noise * noise[0])
     run.seen_phase = run.phase + shared.phase_noise * noise[1]
     _watch(shared, run, run.phase_before + shared.phase_noise * noise_before)
-    decide(shared, run)
+    _decide(shared, run)
     run.cause = _cause(shared, run)
     run.phase_before = run.phase
 
@@ -180,11 +175,8 @@ def _cause(shared: Record, run: Record) -> int:
 
 
 @compiled
-def wait(shared: Record, run: Record) -> None:
-    """Until the next sample, or the end.
-
-    Args: `shared`: of type `SHARED`. `run`: the member; its liquid moves where a tube is full.
-    """
+def _wait(shared: Record, run: Record) -> None:
+    """Until the next sample, or the end; liquid moves where a tube is full."""
     length = max(min(shared.period, shared.time_limit - run.time), 0.0)
     run.pair, run.other_pair = -1, -1
     if length > 0.0 and any_wet(shared, run):
@@ -198,11 +190,8 @@ def wait(shared: Record, run: Record) -> None:
 
 
 @compiled
-def gas(shared: Record, run: Record) -> None:
-    """All valves of a command open together; pairs flow in parallel.
-
-    Args: `shared`: of type `SHARED`. `run`: the member, with its open valves.
-    """
+def _gas(shared: Record, run: Record) -> None:
+    """All valves of a command open together; pairs flow in parallel."""
     both = run.other_pair >= 0
     length = max(run.duration, run.other_duration) if both else run.duration
     working = run.other_pair if both and run.other_duration > run.duration else run.pair
@@ -218,7 +207,7 @@ def gas(shared: Record, run: Record) -> None:
 
 
 @compiled
-def judge(shared: Record, run: Record, confirmed: float) -> None:
+def _judge(shared: Record, run: Record, confirmed: float) -> None:
     """As `outcome_of` does.
 
     Args: `shared`: of type `SHARED`. `run`: at its end; its verdict is filled in. `confirmed`: time of the
@@ -231,3 +220,54 @@ def judge(shared: Record, run: Record, confirmed: float) -> None:
     run.drifted = 1 if run.drift > NOTICEABLE and not run.settled else 0
     grown = _has_grown(run.cause, run.amplitude > run.start + shared.noise_floor)
     run.diverged = 1 if grown and not run.settled and not run.drifted else 0
+
+
+@compiled
+def _forget(run: Record) -> None:
+    """As before the first sample, and at or below the limit: no memory, no valve. Args: `run`: changed."""
+    run.integral, run.before_time, run.pair, run.other_pair = 0.0, math.inf, -1, -1
+
+
+@compiled
+def _decide(shared: Record, run: Record) -> None:
+    """One step of the algorithm on what the sensor shows.
+
+    Args: `shared`: of type `SHARED`. `run`: the member; its memory and its valves are changed.
+    Source: as `TargetVector`.
+    """
+    if run.seen_amplitude <= shared.limit:
+        _forget(run)
+        return
+    wanted, run.integral = _vector_gas_time(
+        run.seen_amplitude,
+        run.seen_phase,
+        run.time,
+        run.integral,
+        run.before_amplitude,
+        run.before_phase,
+        run.before_time,
+        run.proportional,
+        shared.integral_time,
+        shared.derivative_time,
+        shared.maximum_gas_time,
+        True,
+    )
+    run.before_amplitude, run.before_phase, run.before_time = run.seen_amplitude, run.seen_phase, run.time
+    length = min(max(wanted, 0.0), shared.maximum_gas_time)
+    first, share, second, other = _vector_shares(shared.chambers, run.seen_phase + shared.assumed_lag, length)
+    run.pair, run.other_pair = -1, -1
+    _open(shared, run, first, share)
+    _open(shared, run, second, other)
+
+
+@compiled
+def _open(shared: Record, run: Record, chamber: int, share: float) -> None:
+    """Open the next valve, unless its share is below the minimum."""
+    time = _valve_time(share, shared.minimum_gas_time, shared.maximum_gas_time)
+    if time == 0.0:
+        return
+    half, duration = shared.chambers // 2, min(time, shared.time_limit - run.time)
+    if run.pair < 0:
+        run.pair, run.first, run.duration = chamber % half, int(chamber < half), duration
+    else:
+        run.other_pair, run.other_first, run.other_duration = chamber % half, int(chamber < half), duration

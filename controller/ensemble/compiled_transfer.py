@@ -32,14 +32,7 @@ def linear_fill(
     total: float,
     lowest: float,
 ) -> float:
-    """Fill of a driven chamber after a time of gas, by the closed form of `closed_form`.
-
-    Args: `fill`: x at the start. `time`: s. `squared_per_pressure`: a, m^3/kg, of u^2 = a (p + b (x_A -
-        x_C)). `pressure_per_fill`: b, Pa. `gas_pressure`: p, gauge, Pa. `exchange_rate`: S/V, 1/m. `total`:
-        x_A + x_C. `lowest`: smallest x.
-    Returns: x; the initial one where nothing flows.
-    Source: as `closed_form`.
-    """
+    """Fill of a driven chamber after a time of gas, by `closed_form`, for u^2 = a (p + b (x_A - x_C)), SI."""
     u0, slowing, end, stalls = _linear_course(
         fill, squared_per_pressure, pressure_per_fill, gas_pressure, exchange_rate, total, lowest
     )
@@ -103,12 +96,7 @@ def _piece(shared: Record, first: int, last: int, column: int, sign: float, want
 
 @compiled
 def gas_on(shared: Record, fill: float, wet: bool, time: float) -> tuple[float, bool]:
-    """Let gas into one chamber.
-
-    Args: `shared`: of type `SHARED`. `fill`: x of the driven chamber. `wet`: whether the tube holds a
-        continuous column beforehand. `time`: s.
-    Returns: x afterwards, and whether the tube then holds a column.
-    """
+    """Fill of a driven chamber after a time of gas, s, and whether the tube then holds a column."""
     if shared.linear:
         after = linear_fill(
             fill,
@@ -130,11 +118,7 @@ def gas_on(shared: Record, fill: float, wet: bool, time: float) -> tuple[float, 
 
 @compiled
 def gas_off(shared: Record, fill: float, time: float) -> tuple[float, bool]:
-    """Let a full tube be, with no gas on either side.
-
-    Args: `shared`: of type `SHARED`. `fill`: x of the chamber that was driven last. `time`: s.
-    Returns: x afterwards, and whether the tube then holds a column.
-    """
+    """The same for a full tube without gas; `fill` is of the chamber that was driven last."""
     if shared.linear:
         return fill, False
     return _flow(shared, OFF, fill, time)
@@ -156,11 +140,7 @@ def _flow(shared: Record, flow: int, fill: float, time: float) -> tuple[float, b
 
 @compiled
 def fills_after(shared: Record, fill: FloatArray, time: FloatArray) -> FloatArray:
-    """Fills of driven chambers after times of gas on a full tube.
-
-    Args: `shared`: of type `SHARED`. `fill`: x at the start, shape (n,). `time`: s, shape (n,).
-    Returns: x, shape (n,).
-    """
+    """Fills of driven chambers after times of gas, s, on a full tube."""
     found = np.empty(fill.size)
     for i in range(fill.size):
         found[i] = gas_on(shared, fill[i], True, time[i])[0]

@@ -26,11 +26,7 @@ class MomentTable(NamedTuple):
     """kg m per step, shape (n,)."""
 
     def at(self, fill: FloatArray) -> FloatArray:
-        """Moment along the pair's axis.
-
-        Args: `fill`: x of the positive chamber, any shape.
-        Returns: kg m, of that shape.
-        """
+        """Moment along the pair's axis, kg m, for fills of the positive chamber."""
         place = np.clip((fill - self.lowest) / self.step, 0.0, self.value.size - 1.0)
         cell = np.minimum(place.astype(np.intp), self.value.size - 2)
         t = place - cell
@@ -40,7 +36,7 @@ class MomentTable(NamedTuple):
 
 
 def moment_table(*, model: BalancerModel, total: float) -> MomentTable:
-    """Tabulate a balancer's moment of a pair. Args: `total`: sum of the two fill ratios of a pair."""
+    """Tabulate a balancer's moment of a pair whose two fill ratios sum to `total`."""
     largest = model.flow.max_fill_ratio
     lowest, highest = max(0.0, total - largest), min(total, largest)
     step = (highest - lowest) / (MOMENT_NODES - 1)

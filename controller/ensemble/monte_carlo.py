@@ -98,22 +98,13 @@ def simulate_ensemble(
     """Distributions over n noisy runs of the target-vector algorithm under a flow law.
 
     Every member has its own speed of flow, moment, influence coefficient, lag angle and noise; the algorithm
-    keeps the beliefs and the gain of the scene.  The flow law alone drives the liquid, whatever other terms
-    the scene's tolerance asks a single run to model (`Ensemble.left_out`).  The same seed gives the same
-    numbers for any `workers`, and a larger ensemble begins with the members of a smaller one.
-    Args:
-        scene: the scene; its controller's `kind` is not looked at.
-        flow_law: a law that carries its own moments, or a balancer model.
-        n: members, above zero.
-        seed: of all random numbers.
-        uncertainty_95: half-widths; default `member_uncertainty(scene, model)`.
-        transfer: of `ensemble_transfer`, when it is at hand already.
-        workers: threads, at least 1.
-        progress: called once per block of members; None for silence.
+    keeps the assumptions and the gain of the scene, whatever its `controller.kind`. The flow law alone drives
+    the liquid, whatever other terms a single run would model (`Ensemble.left_out`). The same seed gives the
+    same numbers for any number of threads (`workers`), and a larger ensemble begins with the members of a
+    smaller one.
     Raises: SceneError: a rotor too slow to form a ring, a model made for another disc, or more samples than a
         run may take.
     Raises: ValueError: no members, no workers, or a law that an ensemble cannot follow.
-    Source: as `simulate`, member by member.
     """
     if n < 1 or workers < 1:
         raise ValueError(f"an ensemble needs members and workers, not n={n} and workers={workers}")
@@ -146,12 +137,9 @@ def simulate_members(
     size: int = 1,
     seed: int = 0,
 ) -> MemberRuns:
-    """Run given members, at most one block of them, and keep each one's end.
+    """Run given members, by default `size` alike ones, and keep how each ended.
 
-    Args: `members`: what differs; default `size` alike ones. `transfer`: of `ensemble_transfer`, when it is
-        at hand already. `size`: how many alike ones. `seed`: of the noise.
-    Raises: SceneError: as `simulate_ensemble`.
-    Raises: ValueError: more members than a block holds, or a law that an ensemble cannot follow.
+    Raises: SceneError, ValueError: as `simulate_ensemble`, and for more members than a block holds.
     """
     given = members_alike(scene, size=size) if members is None else members
     if given.proportional.size > BLOCK:
@@ -161,11 +149,7 @@ def simulate_members(
 
 
 def ensemble_transfer(scene: Scene, model: BalancerModel) -> PairTransfer:
-    """The vectorised operation of a scene's balancer, after the checks that `simulate` makes.
-
-    Raises: SceneError: a rotor too slow to form a ring, or a model made for another disc.
-    Raises: ValueError: a law that an ensemble cannot follow.
-    """
+    """The compiled operation of a scene's balancer, after the checks of `simulate_ensemble`."""
     check_ring(scene)
     check_fit(scene, model)
     longest = scene.run.time_limit
@@ -264,9 +248,8 @@ class _Tally:
 
 
 def binomial_share(*, count: int, of: int) -> Probability:
-    """A share with its 95 % interval.
+    """A fraction with its 95 % interval.
 
-    Args: `count`: members that have it. `of`: all members, above zero.
     Source: Wilson, "Probable Inference, the Law of Succession, and Statistical Inference", JASA 22 (1927).
     """
     p, z2 = count / of, NORMAL_95**2 / of
@@ -276,10 +259,7 @@ def binomial_share(*, count: int, of: int) -> Probability:
 
 
 def ensemble_document(ensemble: Ensemble) -> dict[str, Any]:
-    """Turn an ensemble into plain numbers, lists and text, all in SI, arrays of at most 41 entries.
-
-    Returns: Document that `json.dumps(..., allow_nan=False)` accepts.
-    """
+    """An ensemble as a JSON document of SI numbers, with arrays of at most 41 entries."""
     shares = ("settled", "not_settled", "overshoot", "misadjustment", "diverged", "drifted")
     last = int(np.max(np.flatnonzero(ensemble.time_counts), initial=0)) + 1
     per_bin = -(-last // SHOWN_BINS)

@@ -53,13 +53,7 @@ class EnsemblePlan:
     """Type `SHARED`, shape (1,)."""
 
     def run(self, members: Members, *, seed: int, number: int = 0) -> MemberRuns:
-        """Run some members.
-
-        Args: `members`: what differs between the runs. `seed`: of the noise. `number`: of the first of them
-            in the ensemble, which identifies its noise.
-        Returns: MemberRuns, each entry as `simulate` judges that member.
-        Source: as `simulate`.
-        """
+        """Run some members; `number`, of the first of them in the ensemble, identifies its noise."""
         gain = members.moment_factor * members.influence_coefficient * np.exp(-1j * members.lag_angle)
         runs = np.zeros(members.proportional.size, dtype=RUN)
         runs["number"] = number + np.arange(runs.size)
@@ -81,11 +75,7 @@ class EnsemblePlan:
 
 
 def ensemble_plan(*, scene: Scene, model: BalancerModel, transfer: PairTransfer) -> EnsemblePlan:
-    """Prepare the runs of an ensemble.
-
-    Args: `scene`: rotor, sensor, controller settings and time limit. `transfer`: its operations, of
-        `pair_transfer`.
-    """
+    """Prepare the runs of an ensemble."""
     shared, chambers = transfer.shared.copy(), scene.disc.chambers
     axes = chamber_directions(chambers)[: chambers // 2]
     moment = moment_table(model=model, total=2 * scene.disc.initial_fill)

@@ -60,11 +60,7 @@ class Members:
 
 
 def members_alike(scene: Scene, *, size: int) -> Members:
-    """Members that do not differ.
-
-    Args: `size`: how many.
-    Returns: Members with the scene's own values.
-    """
+    """Members that all have the scene's own values."""
     one = np.ones(size)
     return Members(
         velocity_factor=one,
@@ -78,8 +74,7 @@ def members_alike(scene: Scene, *, size: int) -> Members:
 def drawn_members(scene: Scene, *, uncertainty_95: MemberUncertainty, seed: int, block: int) -> Members:
     """Draw one block of members; relative quantities log-normal, the lag angle normal.
 
-    Args: `uncertainty_95`: half-widths. `seed`: of the ensemble. `block`: its number; the same block has the
-        same members in an ensemble of any size.
+    A block has the same members in an ensemble of any size.
     """
     random = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(block, 0)))
     z = random.standard_normal((4, BLOCK)) / NORMAL_95
@@ -95,10 +90,7 @@ def drawn_members(scene: Scene, *, uncertainty_95: MemberUncertainty, seed: int,
 
 
 def member_uncertainty(scene: Scene, model: BalancerModel) -> MemberUncertainty:
-    """Half-widths for a scene under a law: the law's own, the scene's, and assumed ones where neither tells.
-
-    Returns: MemberUncertainty, with where each half-width comes from.
-    """
+    """Half-widths for a scene under a law: the law's, the scene's, else assumed ones."""
     velocity, moment = _velocity(scene, model), _moment(scene, model)
     influence = _stated(scene, "influence_coefficient")
     lag = _stated(scene, "lag_angle")

@@ -32,20 +32,15 @@ class PairTransfer:
     """Type `SHARED`, shape (1,), with what concerns a pair filled in; for compiled code."""
 
     def after(self, fill: FloatArray, time: FloatArray) -> FloatArray:
-        """Fill of the driven chamber after a time of gas on a full tube.
-
-        Args: `fill`: x at the start, any shape. `time`: s, broadcast with `fill`.
-        Returns: x, of the broadcast shape.
-        """
+        """Fill of the driven chamber after a time of gas, s, on a full tube; arguments broadcast."""
         x, t = np.broadcast_arrays(np.asarray(fill, dtype=np.float64), np.asarray(time, dtype=np.float64))
         return fills_after(self.shared[0], x.flatten(), t.flatten()).reshape(x.shape)
 
 
 def pair_transfer(*, model: BalancerModel, total: float, gas_pressure: float) -> PairTransfer:
-    """Prepare the operations of a balancer.
+    """Closed form of a pair when the law has one, else the paths of every flow, exact to 1e-11.
 
-    Args: `total`: sum of the two fill ratios of a pair. `gas_pressure`: gauge, Pa, in a driven chamber.
-    Returns: PairTransfer: the closed form when the law has one, else the paths of every flow, exact to 1e-11.
+    `total` is the sum of the two fill ratios, the gas pressure is gauge.
     Raises: ValueError: a law whose regimes change more often than can be tabled.
     """
     drive = Drive(

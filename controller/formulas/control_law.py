@@ -19,22 +19,11 @@ def vector_gas_time(
     maximum_gas_time: float,
     resets: bool,
 ) -> tuple[float, float]:
-    """PID on the amplitude, T = Kc (e + 1/Ti int e dt + Td de/dt), not limited yet.
+    """PID on the amplitude, T = Kc (e + 1/Ti int e dt + Td de/dt), s, not limited yet, and the new integral.
 
-    Args:
-        amplitude: e, m.
-        phase: rad.
-        time: s.
-        integral: of e over time until the sample before, m s.
-        before_amplitude: of the sample before, m.
-        before_phase: rad.
-        before_time: s; infinite: there was none.
-        proportional: Kc, s/m.
-        integral_time: Ti, s; infinite: no integral part.
-        derivative_time: Td, s.
-        maximum_gas_time: s; above it the integral stands still.
-        resets: whether the integral is dropped when the residual has turned by more than 90 degrees.
-    Returns: T, s, and the integral to remember.
+    An infinite `before_time`: there was no sample before; an infinite Ti: no integral part. While T is above
+    `maximum_gas_time` the integral stands still; with `resets` it is dropped when the residual has turned by
+    more than 90 degrees.
     """
     dt = time - before_time
     if not dt > 0.0:

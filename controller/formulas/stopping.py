@@ -43,18 +43,7 @@ def stop_cause(
     final: bool,
     time_left: float,
 ) -> int:
-    """Whether and why a loop ends after a sample.
-
-    Args:
-        rises: operations in a row after which the amplitude had risen.
-        rises_tolerated: one more ends a run; as many do so with `above_first`.
-        above_first: whether the last amplitude is above the first one by more than noise explains.
-        idle: commands in a row that moved nothing.
-        idle_tolerated: as many end a run.
-        final: whether nothing will change any more.
-        time_left: s.
-    Returns: The number of the cause; zero: it goes on.
-    """
+    """Number of the cause for which a loop ends after a sample; zero: it continues."""
     if rises > rises_tolerated or (rises == rises_tolerated and above_first):
         return RISING
     if idle >= idle_tolerated:

@@ -7,6 +7,7 @@ half-width 2 u_val covers 95 %.  An error inside it cannot be distinguished from
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 COVERAGE_FACTOR = 2.0
@@ -66,6 +67,15 @@ def from_half_width(half_width: float) -> float:
     Returns: half_width / 2.
     """
     return half_width / COVERAGE_FACTOR
+
+
+def from_range(values: Iterable[float]) -> float:
+    """Standard uncertainty of a number equally likely anywhere between the least and the largest value.
+
+    Source: rectangular distribution, GUM (JCGM 100:2008), 4.3.7.
+    """
+    ends = sorted(values)
+    return (ends[-1] - ends[0]) / (2 * math.sqrt(3))
 
 
 def from_rounding(last_digit: float) -> float:

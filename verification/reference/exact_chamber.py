@@ -8,7 +8,7 @@ from scipy.integrate import quad
 
 from ringbalance.mesh.geometry import chamber_volume, half_angle, surface_radius
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import Disc
+from ringbalance.scene.models import Disc, Scene
 
 _RELATIVE = 1e-13
 
@@ -45,6 +45,18 @@ def exact_wall_pressure(
     a = surface_radius(disc=disc, fill_ratio=fill_ratio)
     depth = (disc.outer_radius - a) * (disc.outer_radius + a) / 2
     return np.asarray(density * angular_velocity**2 * depth, dtype=np.float64)
+
+
+def wall_pressure_of(
+    scene: Scene, fill_ratio: npt.ArrayLike, *, disc: Disc | None = None, density: float | None = None
+) -> FloatArray:
+    """`exact_wall_pressure` of a scene, with another disc or density where one is given."""
+    return exact_wall_pressure(
+        disc=disc or scene.disc,
+        density=density or scene.liquid.density,
+        angular_velocity=scene.rotor.speed,
+        fill_ratio=fill_ratio,
+    )
 
 
 def central_lambda(*, disc: Disc) -> float:

@@ -13,7 +13,7 @@ from ringbalance.physics.pressure.assembly import at_cells, volume_points
 from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, places
 from ringbalance.physics.pressure.surface import solve_with_gravity
 from ringbalance.scene.models import Disc, Shaft
-from ringbalance.verification.evidence import Axis, Convergence, Curve, Evidence, Found, Series
+from ringbalance.verification.evidence import Convergence, Curve, Evidence, Found, figure
 from ringbalance.verification.orders import OrderStudy, order_study
 from ringbalance.verification.reference.gravity_exact import ExactRing, exact_ring
 
@@ -164,13 +164,11 @@ def gravity_evidence(study: GravityStudy) -> Evidence:
         },
         numbers={"tilt": study.tilt, "direction": _DIRECTION},
         series=(
-            Series(
-                name="error against mesh size",
-                x=Axis(name="relative mesh size", unit="1", values=np.array(study.surface.size)),
-                y=(
-                    Curve(name="free surface", unit="1", values=np.array(study.surface.error)),
-                    Curve(name="pressure field", unit="1", values=np.array(study.field.error)),
-                ),
+            figure(
+                "error against mesh size",
+                ("relative mesh size", "1", np.array(study.surface.size)),
+                Curve("free surface", "1", np.array(study.surface.error)),
+                Curve("pressure field", "1", np.array(study.field.error)),
                 log=True,
             ),
         ),

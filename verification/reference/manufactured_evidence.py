@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.scene.models import Disc
-from ringbalance.verification.evidence import Axis, Convergence, Curve, Evidence, Found, Series
+from ringbalance.verification.evidence import Convergence, Curve, Evidence, Found, Series, figure
 from ringbalance.verification.orders import OrderStudy
 from ringbalance.verification.reference.manufactured import Study, study
 
@@ -80,9 +80,9 @@ def _figure(curved: Study, straight: Study) -> Series:
         "pressure field, straight": straight.field.error,
         "wall force, straight": straight.wall.error,
     }
-    return Series(
-        name="error against mesh size",
-        x=Axis(name="relative mesh size", unit="1", values=np.array(curved.field.size)),
-        y=tuple(Curve(name=name, unit="1", values=np.array(error)) for name, error in curves.items()),
+    return figure(
+        "error against mesh size",
+        ("relative mesh size", "1", np.array(curved.field.size)),
+        *(Curve(name, "1", np.array(error)) for name, error in curves.items()),
         log=True,
     )

@@ -26,13 +26,7 @@ from ringbalance.reduced_model.selection.estimates import (
     injection_estimates,
     injection_time,
 )
-from ringbalance.reduced_model.selection.law_models import (
-    CLOSED,
-    EQ_12,
-    SIPHON,
-    LawModels,
-    law_work,
-)
+from ringbalance.reduced_model.selection.law_models import CLOSED, EQ_12, SIPHON, LawModels, law_work
 from ringbalance.reduced_model.selection.loss_models import CONSTANT
 from ringbalance.reduced_model.selection.models import Contribution, Fidelity, ModelHierarchy, Work
 from ringbalance.reduced_model.selection.registry import IN_INJECTIONS

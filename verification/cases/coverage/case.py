@@ -1,6 +1,5 @@
 """Coverage over random discs; a heavy run."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -10,15 +9,12 @@ from typing import Final
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.coverage import QUANTITIES, Coverage, coverage, error_ratios, random_samples
-from ringbalance.verification.evidence import Evidence, Found, Level, Table, no_reference
+from ringbalance.verification.evidence import Evidence, Found, Level, Table
 
 _COUNT: Final = 240
 _SEED: Final = 20
 _NAMES: Final = ("volume", "wall_pressure", "moment", "lambda")
 _FACTORS: Final = {None: 1.0, "half_widths_quartered": 0.25, "half_widths_padded": 100.0}
-
-
-reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

@@ -6,14 +6,11 @@ from typing import Final
 
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Evidence, Level, no_reference
+from ringbalance.verification.evidence import Evidence, Level
 from ringbalance.verification.reference.gravity_study import gravity_evidence, gravity_study
 
 _FILL_SHARE: Final = 0.8
 _LEVELS: Final = {"light": (1, 2, 3, 4), "heavy": (1, 2, 4, 8)}
-
-
-reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

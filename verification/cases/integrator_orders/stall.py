@@ -24,7 +24,7 @@ from ringbalance.reduced_model.law.flow_law import Flow, Regime
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.cases.integrator_orders.slowed_law import TrialLaw
-from ringbalance.verification.evidence import Axis, Curve, Series
+from ringbalance.verification.evidence import Curve, Series, figure
 from ringbalance.verification.reference.explicit_segments import explicit_segments
 
 COUNTS: Final = (8, 16, 32, 64, 128)
@@ -105,21 +105,12 @@ def stall_study(drive: Drive, law: PaperLaw, *, spoiled: bool = False) -> StallS
         cycle_error=float(np.max(np.abs(cycle / bound - 1))),
         limit_error=max(abs(_longest(drive, stall, d) * rate / math.sqrt(d) - 1) for d in _STARTS),
         longest_for_per_mille=2 * math.sqrt(1e-3) / rate,
-        series=Series(
-            name="fill beyond the stall against the length of a segment",
-            x=Axis(
-                name="segment over the time to the stall", unit="1", values=1 / np.array(COUNTS, dtype=float)
-            ),
-            y=(
-                Curve(
-                    name="largest step over the stall, Eq. 20",
-                    unit="1",
-                    values=over.max(axis=1),
-                    style="paper",
-                ),
-                Curve(name="cycle of a tube that stays full", unit="1", values=cycle),
-                Curve(name="kappa^2/4", unit="1", values=bound, style="reference"),
-            ),
+        series=figure(
+            "fill beyond the stall against the length of a segment",
+            ("segment over the time to the stall", "1", 1 / np.array(COUNTS, dtype=float)),
+            Curve("largest step over the stall, Eq. 20", "1", over.max(axis=1), style="paper"),
+            Curve("cycle of a tube that stays full", "1", cycle),
+            Curve("kappa^2/4", "1", bound, style="reference"),
             log=True,
         ),
     )

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.evidence import Evidence, Level, no_reference
+from ringbalance.verification.evidence import Evidence, Level
 from ringbalance.verification.reference.manufactured_evidence import manufactured_evidence
-
-reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

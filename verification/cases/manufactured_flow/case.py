@@ -1,6 +1,5 @@
 """Orders of velocity and pressure on the curved half section."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from typing import Final
@@ -8,22 +7,10 @@ from typing import Final
 import numpy as np
 
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import (
-    Axis,
-    Convergence,
-    Curve,
-    Evidence,
-    Found,
-    Level,
-    Series,
-    no_reference,
-)
+from ringbalance.verification.evidence import Convergence, Curve, Evidence, Found, Level, Series, figure
 from ringbalance.verification.reference.manufactured_flow import FlowStudy, flow_study
 
 _AROUND: Final = {"light": (1, 2, 4, 8), "heavy": (1, 2, 4, 8, 16)}
-
-
-reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -58,12 +45,10 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 
 
 def _figure(study: FlowStudy) -> Series:
-    return Series(
-        name="error against mesh size",
-        x=Axis(name="relative mesh size", unit="1", values=np.array(study.velocity.size)),
-        y=(
-            Curve(name="velocity", unit="1", values=np.array(study.velocity.error)),
-            Curve(name="pressure", unit="1", values=np.array(study.pressure.error)),
-        ),
+    return figure(
+        "error against mesh size",
+        ("relative mesh size", "1", np.array(study.velocity.size)),
+        Curve("velocity", "1", np.array(study.velocity.error)),
+        Curve("pressure", "1", np.array(study.pressure.error)),
         log=True,
     )

@@ -11,11 +11,11 @@ import numpy as np
 
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Simulation
+from ringbalance.reduced_model.calibration import Calibration, calibrate
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.loop_models import ControllerKind
 from ringbalance.scene.models import Scene
-from ringbalance.verification.calibrations import calibration_of
 from ringbalance.verification.evidence import Curve, Series, figure
 
 PHASES: Final = tuple(math.radians(angle) for angle in (90, 180, 270, 360))
@@ -51,6 +51,12 @@ def loop_scene(
 def run_loop(scene: Scene, law: str = "paper") -> Simulation:
     """One closed-loop run. Args: `law`: "paper" or "calibrated"."""
     return simulate(scene, _model(scene, law))
+
+
+@lru_cache(maxsize=16)
+def calibration_of(scene: Scene) -> Calibration:
+    """Calibrate a scene, once in a process."""
+    return calibrate(scene)
 
 
 def _model(scene: Scene, law: str) -> BalancerModel:

@@ -13,9 +13,8 @@ from typing import Final
 
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.comparison import from_half_width, from_rounding
+from ringbalance.verification.comparison import from_half_width, from_rounding, input_uncertainty
 from ringbalance.verification.evidence import Reference
-from ringbalance.verification.sensitivity import input_uncertainty
 
 
 @dataclass(frozen=True, kw_only=True)

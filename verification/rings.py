@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from functools import lru_cache
 
+from ringbalance.physics.convergence.grid import GridConvergence, Verdict
 from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
 from ringbalance.physics.results import Estimate
 from ringbalance.reduced_model.paper.formulas import moment_paper
@@ -12,7 +13,6 @@ from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import Convergence, Found
 from ringbalance.verification.paper_numbers import RING_RADIUS, plate_effect
-from ringbalance.verification.published import conclusive
 from ringbalance.verification.reference.exact_chamber import exact_moment
 
 
@@ -42,8 +42,13 @@ def found_of(quantities: RingQuantities, name: str, index: int, *, input_: float
         value=float(estimate.value[index]),
         numerical=from_half_width(float(estimate.uncertainty[index])),
         input=input_,
-        conclusive=quantities.status.ok and conclusive(quantities.convergence[name][index]),
+        conclusive=quantities.status.ok and _conclusive(quantities.convergence[name][index]),
     )
+
+
+def _conclusive(convergence: GridConvergence) -> bool:
+    """Whether the values converge steadily or have reached round-off."""
+    return convergence.verdict in (Verdict.MONOTONE, Verdict.ROUND_OFF)
 
 
 def scaled(found: Found, factor: float) -> Found:

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from ringbalance.mesh.geometry import chamber_volume, liquid_area, surface_radius
 from ringbalance.reduced_model.paper.formulas import chamber_volume_paper
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.comparison import COVERAGE_FACTOR, from_rounding
+from ringbalance.verification.comparison import COVERAGE_FACTOR, from_rounding, input_uncertainty
 from ringbalance.verification.evidence import Evidence, Found, Level, Table
 from ringbalance.verification.paper_numbers import (
     CHAMBER_VOLUME,
@@ -20,7 +20,6 @@ from ringbalance.verification.paper_numbers import (
     RING_RADIUS,
     with_plate,
 )
-from ringbalance.verification.sensitivity import input_uncertainty
 
 reference = dict.fromkeys(("volume", "volume_from_departure"), CHAMBER_VOLUME.reference)
 """The printed volume, for both routes to it."""

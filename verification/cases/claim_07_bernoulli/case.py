@@ -12,9 +12,9 @@ from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene.models import Scene
-from ringbalance.verification.calibrations import calibration_of
 from ringbalance.verification.comparison import from_half_width, from_range
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
+from ringbalance.verification.loops import calibration_of
 from ringbalance.verification.paper_numbers import plate_uncertainty
 from ringbalance.verification.reference.tube_running import driving_head, running_tube, tube_curve
 

@@ -9,8 +9,8 @@ import numpy as np
 from ringbalance.reduced_model.paper.formulas import departure, flat_strip_area, stall_pressure
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.calibrations import calibration_of
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
+from ringbalance.verification.loops import calibration_of
 from ringbalance.verification.paper_numbers import (
     DENSITY,
     DEPARTURE_HIGH,

@@ -12,10 +12,9 @@ from ringbalance.controller.simulation import Simulation
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.models import Scene
-from ringbalance.verification.calibrations import calibration_of
 from ringbalance.verification.comparison import from_range
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table
-from ringbalance.verification.loops import amplitude_series, loop_scene, run_loop, settling
+from ringbalance.verification.loops import amplitude_series, calibration_of, loop_scene, run_loop, settling
 
 _GAINS: Final = (0.04e6, 0.08e6, 0.12e6, 0.16e6, 0.20e6)
 """Kp of Fig. 7, s/m."""

@@ -10,10 +10,16 @@ from typing import Final
 from ringbalance.controller.simulation import Simulation
 from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.scene.models import Scene
-from ringbalance.verification.calibrations import calibration_of
 from ringbalance.verification.comparison import from_range
 from ringbalance.verification.evidence import Evidence, Found, Level, Table
-from ringbalance.verification.loops import AMPLITUDES, amplitude_series, loop_scene, run_loop, settling
+from ringbalance.verification.loops import (
+    AMPLITUDES,
+    amplitude_series,
+    calibration_of,
+    loop_scene,
+    run_loop,
+    settling,
+)
 
 _PERIODS: Final = (0.25, 0.5, 1.0)
 _BOUND: Final = 5.0

@@ -16,7 +16,7 @@ from ringbalance.physics.pressure.surface import solve_with_gravity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Found, Level
-from ringbalance.verification.reference.gravity_study import tilted_liquid
+from ringbalance.verification.reference.gravity import tilted_liquid
 from ringbalance.verification.rings import ring_of
 
 _FILL_SHARE: Final = 0.8

@@ -15,8 +15,11 @@ from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_law
 from ringbalance.reduced_model.paper.formulas import stall_pressure
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.verification.cases.integrator_orders.side_by_side import side_by_side, tapered_error
-from ringbalance.verification.cases.integrator_orders.slowed_law import SlowedLaw
+from ringbalance.verification.cases.integrator_orders.side_by_side import (
+    SlowedLaw,
+    side_by_side,
+    tapered_error,
+)
 from ringbalance.verification.cases.integrator_orders.stall import stall_study
 from ringbalance.verification.evidence import Evidence, Found, Level
 from ringbalance.verification.orders import OrderStudy, order_study, order_table

@@ -21,7 +21,7 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
 
-from ringbalance.verification.reference.flow_benchmarks import cylinder_flow, cylinder_forces, cylinder_mesh
+from published_flows import cylinder_flow, cylinder_forces, cylinder_mesh
 
 DRAG = 5.57953523384
 OURS = ((6, 8, 8), (8, 10, 12), (10, 12, 14), (12, 16, 16), (14, 18, 18), (16, 18, 24), (20, 20, 30))

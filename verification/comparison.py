@@ -7,6 +7,7 @@ half-width 2 u_val covers 95 %.  An error inside it cannot be distinguished from
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 COVERAGE_FACTOR = 2.0
@@ -68,6 +69,15 @@ def from_half_width(half_width: float) -> float:
     return half_width / COVERAGE_FACTOR
 
 
+def from_range(values: Iterable[float]) -> float:
+    """Standard uncertainty of a number equally likely anywhere between the least and the largest value.
+
+    Source: rectangular distribution, GUM (JCGM 100:2008), 4.3.7.
+    """
+    ends = sorted(values)
+    return (ends[-1] - ends[0]) / (2 * math.sqrt(3))
+
+
 def from_rounding(last_digit: float) -> float:
     """Standard uncertainty of a printed number: all within half a unit of its last digit is equally likely.
 
@@ -78,3 +88,20 @@ def from_rounding(last_digit: float) -> float:
     Source: rectangular distribution, GUM (JCGM 100:2008), 4.3.7.
     """
     return last_digit / (2 * math.sqrt(3))
+
+
+def input_uncertainty(contributions: Sequence[tuple[Callable[[float], float], float, float]]) -> float:
+    """Standard uncertainty of a number from those of its inputs.
+
+    u^2 = sum over inputs of [(f(v + u_v) - f(v - u_v))/2]^2
+    Args: `contributions`: for each input its function, its value v and its standard uncertainty u_v; an input
+        whose uncertainty is zero is not evaluated.
+    Returns: Standard uncertainty, in the unit of the functions' results.
+    Source: GUM (JCGM 100:2008), 5.1; independent inputs.
+    """
+    effects = [
+        (function(value + standard_uncertainty) - function(value - standard_uncertainty)) / 2
+        for function, value, standard_uncertainty in contributions
+        if standard_uncertainty > 0
+    ]
+    return math.hypot(*effects)

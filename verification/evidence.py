@@ -7,6 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
+import numpy as np
+import numpy.typing as npt
+
 from ringbalance.physics.results import Status
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
@@ -54,7 +57,7 @@ class Axis:
     values: FloatArray
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Curve:
     """One line of a figure, of the length of its x axis."""
 
@@ -75,6 +78,13 @@ class Series:
     y: Sequence[Curve]
     log: bool = False
     """Both axes logarithmic."""
+
+
+def figure(name: str, x: tuple[str, str, npt.ArrayLike], *curves: Curve, log: bool = False) -> Series:
+    """A figure of curves over one axis, given by its name, unit and values."""
+    title, unit, values = x
+    axis = Axis(name=title, unit=unit, values=np.asarray(values, dtype=np.float64))
+    return Series(name=name, x=axis, y=curves, log=log)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,22 +138,14 @@ def no_reference(_scene: Scene) -> Mapping[str, Reference]:
 
 
 class CaseCode(Protocol):
-    """The two functions of a case's `case.py`."""
+    """A case's `case.py`.
 
-    def reference(self, scene: Scene) -> Mapping[str, Reference]:
-        """What the judged quantities are compared with.
-
-        Args: `scene`: the scene that the case is judged on.
-        Returns: References by the names of the case's quantities; one that is not named has none.
-        """
-        ...
+    Beside `compute` it may have `reference`: what the judged quantities are compared with, by their names, or
+    a function of the scene that gives this. A quantity that is not named has none.
+    """
 
     def compute(self, scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-        """What the program finds.
-
-        Args: `scene`: the scene that the case is judged on. `level`: how much work may be done. `defect`:
-            name of a mutation to build in on purpose; None for none.
-        """
+        """What the program finds on a scene, with one of the case's mutations built in by its name."""
         ...
 
 

@@ -11,12 +11,12 @@ import numpy as np
 
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Simulation
+from ringbalance.reduced_model.calibration import Calibration, calibrate
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.loop_models import ControllerKind
 from ringbalance.scene.models import Scene
-from ringbalance.verification.calibrations import calibration_of
-from ringbalance.verification.evidence import Axis, Curve, Series
+from ringbalance.verification.evidence import Curve, Series, figure
 
 PHASES: Final = tuple(math.radians(angle) for angle in (90, 180, 270, 360))
 """Of the initial vibration, the four cases of Fig. 6."""
@@ -51,6 +51,12 @@ def loop_scene(
 def run_loop(scene: Scene, law: str = "paper") -> Simulation:
     """One closed-loop run. Args: `law`: "paper" or "calibrated"."""
     return simulate(scene, _model(scene, law))
+
+
+@lru_cache(maxsize=16)
+def calibration_of(scene: Scene) -> Calibration:
+    """Calibrate a scene, once in a process."""
+    return calibrate(scene)
 
 
 def _model(scene: Scene, law: str) -> BalancerModel:
@@ -92,8 +98,5 @@ def amplitude_series(name: str, runs: dict[str, Simulation], *, points: int = 40
     """
     longest = max(float(run.time[-1]) for run in runs.values())
     time = np.linspace(0.0, longest, points)
-    curves = tuple(
-        Curve(name=label, unit="m", values=np.interp(time, run.time, run.amplitude))
-        for label, run in runs.items()
-    )
-    return Series(name=name, x=Axis(name="time", unit="s", values=time), y=curves)
+    curves = tuple(Curve(label, "m", np.interp(time, run.time, run.amplitude)) for label, run in runs.items())
+    return figure(name, ("time", "s", time), *curves)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+
+from ringbalance.verification.evidence import Convergence, Curve, Series, figure
 
 ROUND_OFF = 1e-13
 """Relative errors below this say nothing about the order."""
@@ -51,6 +53,29 @@ def order_study(*, size: Sequence[float], error: Sequence[float]) -> OrderStudy:
         raise ValueError("errors must be finite and above round-off for an order to be seen")
     order = np.log(e[:-1] / e[1:]) / np.log(h[:-1] / h[1:])
     return OrderStudy(size=tuple(h.tolist()), error=tuple(e.tolist()), order=tuple(order.tolist()))
+
+
+def order_table(
+    quantity: str, study: OrderStudy, formal_order: float, *, geometry: str = "", note: str = ""
+) -> Convergence:
+    """The errors of a study, all relative, as a table beside the formal order."""
+    return Convergence(
+        quantity=quantity,
+        unit="1",
+        formal_order=formal_order,
+        size=study.size,
+        error=study.error,
+        observed_order=study.order,
+        geometry=geometry,
+        note=note,
+    )
+
+
+def order_figure(studies: Mapping[str, OrderStudy]) -> Series:
+    """Errors of several studies on the same meshes, by the name of their curve."""
+    size = next(iter(studies.values())).size
+    curves = (Curve(name, "1", np.array(study.error)) for name, study in studies.items())
+    return figure("error against mesh size", ("relative mesh size", "1", size), *curves, log=True)
 
 
 def extrapolate(*, coarse: float, fine: float, ratio: float, order: float) -> float:

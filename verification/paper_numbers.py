@@ -7,12 +7,13 @@ Balancing System for Rotating Machinery".
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.comparison import from_half_width, from_rounding
+from ringbalance.verification.comparison import from_half_width, from_rounding, input_uncertainty
 from ringbalance.verification.evidence import Reference
 
 
@@ -86,6 +87,12 @@ def plate_uncertainty(scene: Scene) -> float:
         return 0.0
     strips = 2 * (disc.outer_radius - disc.inner_radius) * disc.axial_width
     return from_rounding(CHAMBER_VOLUME.last_digit) / strips
+
+
+def plate_effect(scene: Scene, quantity: Callable[[Disc], float]) -> float:
+    """Standard uncertainty that the plate thickness gives to a quantity of the disc, in its unit."""
+    changed = (lambda t: quantity(with_plate(scene.disc, t)), scene.disc.plate_thickness)
+    return input_uncertainty([(*changed, plate_uncertainty(scene))])
 
 
 def with_plate(disc: Disc, thickness: float) -> Disc:

@@ -6,8 +6,6 @@ import csv
 from collections.abc import Mapping
 from importlib.resources import files
 
-from ringbalance.physics.convergence.grid import GridConvergence, Verdict
-
 
 def read_rows(case_id: str, name: str) -> tuple[Mapping[str, str], ...]:
     """Rows of a case's tabulated reference.
@@ -18,12 +16,3 @@ def read_rows(case_id: str, name: str) -> tuple[Mapping[str, str], ...]:
     path = files("ringbalance.verification.cases") / case_id / "data" / name
     lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
     return tuple(csv.DictReader(lines))
-
-
-def conclusive(convergence: GridConvergence) -> bool:
-    """Whether a sequence of values may be judged at all.
-
-    Returns: True when it converges steadily or has reached round-off; a number from a sequence that
-        oscillates, grows or is not asymptotic makes its case inconclusive.
-    """
-    return convergence.verdict in (Verdict.MONOTONE, Verdict.ROUND_OFF)

@@ -5,44 +5,27 @@ from __future__ import annotations
 import dataclasses
 from functools import lru_cache
 
+from ringbalance.physics.convergence.grid import GridConvergence, Verdict
 from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
 from ringbalance.physics.results import Estimate
+from ringbalance.reduced_model.paper.formulas import moment_paper
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import Convergence, Found
-from ringbalance.verification.paper_numbers import plate_uncertainty, with_plate
-from ringbalance.verification.published import conclusive
+from ringbalance.verification.paper_numbers import RING_RADIUS, plate_effect
 from ringbalance.verification.reference.exact_chamber import exact_moment
-from ringbalance.verification.sensitivity import input_uncertainty
 
 
 @lru_cache(maxsize=64)
-def ring(
-    *, disc: Disc, density: float, angular_velocity: float, fills: tuple[float, ...], dimension: int = 2
+def ring_of(
+    scene: Scene, fills: tuple[float, ...], *, density: float | None = None, dimension: int = 2
 ) -> RingQuantities:
-    """Finite-element totals without gravity.
-
-    Args: `density`: rho, kg/m^3. `angular_velocity`: omega, rad/s. `fills`: fill ratios. `dimension`: 2 or 3.
-    """
+    """Finite-element totals of a scene without gravity, with another density, kg/m^3, where one is given."""
     return ring_quantities(
-        disc=disc,
-        density=density,
-        angular_velocity=angular_velocity,
-        fill_ratio=fills,
-        dimension=dimension,
-    )
-
-
-def ring_of(scene: Scene, fills: tuple[float, ...], *, dimension: int = 2) -> RingQuantities:
-    """Finite-element totals of a scene's disc, liquid and speed, without gravity.
-
-    Args: `fills`: fill ratios. `dimension`: 2 or 3.
-    """
-    return ring(
         disc=scene.disc,
-        density=scene.liquid.density,
+        density=density or scene.liquid.density,
         angular_velocity=scene.rotor.speed,
-        fills=fills,
+        fill_ratio=fills,
         dimension=dimension,
     )
 
@@ -59,8 +42,13 @@ def found_of(quantities: RingQuantities, name: str, index: int, *, input_: float
         value=float(estimate.value[index]),
         numerical=from_half_width(float(estimate.uncertainty[index])),
         input=input_,
-        conclusive=quantities.status.ok and conclusive(quantities.convergence[name][index]),
+        conclusive=quantities.status.ok and _conclusive(quantities.convergence[name][index]),
     )
+
+
+def _conclusive(convergence: GridConvergence) -> bool:
+    """Whether the values converge steadily or have reached round-off."""
+    return convergence.verdict in (Verdict.MONOTONE, Verdict.ROUND_OFF)
 
 
 def scaled(found: Found, factor: float) -> Found:
@@ -74,18 +62,20 @@ def scaled(found: Found, factor: float) -> Found:
     )
 
 
-def moment_standard_uncertainty(scene: Scene, fill_ratio: float) -> float:
-    """What the plate thickness's uncertainty does to a chamber's moment at a given fill ratio.
+def chamber_moment(scene: Scene, quantities: RingQuantities, index: int, *, density: float) -> Found:
+    """Moment of one chamber, kg m, with what the plate thickness's uncertainty does to it."""
+    fill = float(quantities.fill_ratio[index])
 
-    Args: `fill_ratio`: x.
-    Returns: Standard uncertainty, kg m.
-    """
+    def moment(disc: Disc) -> float:
+        return float(exact_moment(disc=disc, density=density, fill_ratio=fill))
 
-    def moment(thickness: float) -> float:
-        disc = with_plate(scene.disc, thickness)
-        return float(exact_moment(disc=disc, density=scene.liquid.density, fill_ratio=fill_ratio))
+    return found_of(quantities, "moment", index, input_=plate_effect(scene, moment))
 
-    return input_uncertainty([(moment, scene.disc.plate_thickness, plate_uncertainty(scene))])
+
+def bare_chamber_moment(scene: Scene, *, density: float) -> Found:
+    """Moment of a half-full chamber by Eq. 7 with the printed radius, which leaves the plates out."""
+    moment = moment_paper(disc=scene.disc, density=density, surface_radius=RING_RADIUS.value)
+    return Found(value=float(moment))
 
 
 def mesh_table(quantities: RingQuantities, name: str, unit: str, index: int) -> Convergence:

@@ -73,7 +73,7 @@ def run_definition(
         mutated = scene if mutation is None else overridden(scene, mutation.scene)
         built_in = None if mutation is None or mutation.scene else mutation.id
         evidence = code.compute(mutated, level, built_in)
-        quantities = _judge(definition, evidence, code.reference(mutated))
+        quantities = _judge(definition, evidence, _references(code, mutated))
     except NotRunError as error:
         return outcome(status=str(error))
     except (ValueError, ArithmeticError, RuntimeError) as error:
@@ -132,6 +132,12 @@ def overridden(scene: Scene, overrides: Mapping[str, float | Literal["absent"]])
         part = dataclasses.replace(getattr(scene, table), **{key: None if value == "absent" else value})
         scene = dataclasses.replace(scene, **{table: part})
     return scene
+
+
+def _references(code: CaseCode, scene: Scene) -> Mapping[str, Reference]:
+    given = getattr(code, "reference", {})
+    found: Mapping[str, Reference] = given(scene) if callable(given) else given
+    return found
 
 
 def _judge(

@@ -21,8 +21,7 @@ from ringbalance.reports.section import Record, Section, Work
 from ringbalance.reports.units import given, shown
 from ringbalance.scene.models import Scene
 from ringbalance.verification import paper_numbers
-from ringbalance.verification.calibrations import calibration_of
-from ringbalance.verification.loops import AMPLITUDES, PHASES, loop_scene, run_loop
+from ringbalance.verification.loops import AMPLITUDES, PHASES, calibration_of, loop_scene, run_loop
 from ringbalance.verification.runner import paper_scene
 
 _GAINS: Final = (0.04e6, 0.08e6, 0.12e6, 0.16e6, 0.20e6)

@@ -11,7 +11,7 @@ from ringbalance.reduced_model.tube.pressure_profile import hump_profile
 from ringbalance.reports.units import given
 from ringbalance.scene import Scene
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.verification.calibrations import calibration_of
+from ringbalance.verification.loops import calibration_of
 
 Record = dict[str, Any]
 

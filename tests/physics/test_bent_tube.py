@@ -10,7 +10,6 @@ from ringbalance.physics.navier_stokes.rotating_section import SectionMesh
 from ringbalance.physics.tube.bend_terms import bend_shift, rotation_with_curvature
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.verification.reference.bent_tube import BentTubeFlow, bent_tube_flow, pressure_loss
-from ringbalance.verification.reference.bent_tube_field import bent_tube_field
 
 COARSE = SectionMesh(around=2, across=2, wall_ratio=3.0)
 STRAIGHT = (Segment(length=2.0, cells=2),)
@@ -48,23 +47,6 @@ def test_a_straight_turning_tube_keeps_the_sections_flow() -> None:
     first, last = (np.argsort(flow.tube.section_node[where], kind="stable") for where in (start, end))
     u = flow.solution.velocity
     assert np.allclose(u[:, start][:, first], u[:, end][:, last], atol=1e-9)
-
-
-def test_the_field_to_draw_is_the_whole_tube() -> None:
-    flow = _straight(117.8)
-    field = bent_tube_field(flow=flow)
-    corner = field.points[:, field.hexahedra]
-    edges = [corner[:, :, i] - corner[:, :, 0] for i in (1, 3, 4)]
-    assert np.all(np.einsum("im,im->m", np.cross(edges[0], edges[1], axis=0), edges[2]) > 0)
-    lengths, ring = np.ptp(field.points, axis=1), np.hypot(field.points[1], field.points[2])
-    assert lengths == pytest.approx([2.0, 1.0, 1.0])
-    assert np.all(field.speed[ring > 0.5 - 1e-9] == 0.0)
-    order, mirrored = (
-        np.lexsort(np.round(p, 9)) for p in (field.points, field.points * [[1.0], [1.0], [-1.0]])
-    )
-    assert np.allclose(field.speed[order], field.speed[mirrored])
-    fall = field.pressure[field.points[0] < 1e-9].mean() - field.pressure[field.points[0] > 2 - 1e-9].mean()
-    assert fall == pytest.approx(_loss(flow), rel=1e-6)
 
 
 def test_half_the_coriolis_force_is_found_out() -> None:

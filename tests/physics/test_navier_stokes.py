@@ -8,6 +8,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from published_flows import (
+    FieldErrors,
+    cavity_flow,
+    cylinder_flow,
+    cylinder_forces,
+    cylinder_mesh,
+    field_errors,
+    kovasznay,
+    kovasznay_flow,
+    taylor_couette,
+)
 from skfem import MeshHex, MeshTet
 
 from ringbalance.physics.navier_stokes.meshes import patch_mesh, tensor_patch
@@ -30,17 +41,6 @@ from ringbalance.physics.navier_stokes.system import (
 )
 from ringbalance.physics.navier_stokes.transfer import probe
 from ringbalance.physics.results import StatusCode
-from ringbalance.verification.reference.flow_benchmarks import (
-    FieldErrors,
-    cavity_flow,
-    cylinder_flow,
-    cylinder_forces,
-    cylinder_mesh,
-    field_errors,
-    kovasznay,
-    kovasznay_flow,
-    taylor_couette,
-)
 
 DATA = Path(__file__).parent / "data"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ringbalance.verification.coverage import QUANTITIES, coverage, error_ratios, random_samples
+from ringbalance.verification.cases.coverage.case import QUANTITIES, coverage, error_ratios, random_samples
 
 
 def test_samples_are_the_same_every_time_and_differ_from_one_another() -> None:

@@ -12,17 +12,12 @@ from scipy.integrate import dblquad
 
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_area, surface_radius
 from ringbalance.scene.models import Disc, Scene
+from ringbalance.verification.comparison import input_uncertainty
 from ringbalance.verification.paper_numbers import plate_uncertainty
 from ringbalance.verification.reference import manufactured_flow as flow
-from ringbalance.verification.reference.exact_chamber import (
-    central_lambda,
-    exact_moment,
-    exact_wall_pressure,
-    pair_lambda,
-)
-from ringbalance.verification.reference.gravity_exact import exact_ring
+from ringbalance.verification.reference.exact_chamber import central_lambda, exact_moment, exact_wall_pressure
+from ringbalance.verification.reference.gravity import exact_ring
 from ringbalance.verification.reference.manufactured import Manufactured
-from ringbalance.verification.sensitivity import input_uncertainty
 
 
 def test_the_moment_is_that_of_a_sector_without_plates(paper_scene: Scene) -> None:
@@ -54,10 +49,10 @@ def test_the_moment_with_plates_by_two_integrals(paper_scene: Scene) -> None:
 
 
 def test_lambda_approaches_its_limit_at_the_centre(paper_scene: Scene) -> None:
-    near = pair_lambda(disc=paper_scene.disc, fill_ratio=[0.2499, 0.2501])
-    assert near == pytest.approx([central_lambda(disc=paper_scene.disc)] * 2, rel=1e-6)
-    with pytest.raises(ValueError, match="centre"):
-        pair_lambda(disc=paper_scene.disc, fill_ratio=0.25)
+    disc, x = paper_scene.disc, np.array([0.2499, 0.2501])
+    moments = exact_moment(disc=disc, density=1.0, fill_ratio=[x, disc.max_fill_ratio - x])
+    near = (moments[0] - moments[1]) / (chamber_volume(disc=disc) * (x - disc.max_fill_ratio / 2))
+    assert near == pytest.approx([central_lambda(disc=disc)] * 2, rel=1e-6)
 
 
 def test_the_wall_pressure_holds_the_centrifugal_force_of_a_thin_film(paper_scene: Scene) -> None:

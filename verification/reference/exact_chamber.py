@@ -6,9 +6,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.integrate import quad
 
-from ringbalance.mesh.geometry import chamber_volume, half_angle, surface_radius
+from ringbalance.mesh.geometry import half_angle, surface_radius
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import Disc
+from ringbalance.scene.models import Disc, Scene
 
 _RELATIVE = 1e-13
 
@@ -47,6 +47,18 @@ def exact_wall_pressure(
     return np.asarray(density * angular_velocity**2 * depth, dtype=np.float64)
 
 
+def wall_pressure_of(
+    scene: Scene, fill_ratio: npt.ArrayLike, *, disc: Disc | None = None, density: float | None = None
+) -> FloatArray:
+    """`exact_wall_pressure` of a scene, with another disc or density where one is given."""
+    return exact_wall_pressure(
+        disc=disc or scene.disc,
+        density=density or scene.liquid.density,
+        angular_velocity=scene.rotor.speed,
+        fill_ratio=fill_ratio,
+    )
+
+
 def central_lambda(*, disc: Disc) -> float:
     """Moment per transferred mass with a pair at its centre, 2 a sin(alpha(a))/alpha(a).
 
@@ -56,20 +68,3 @@ def central_lambda(*, disc: Disc) -> float:
     a = surface_radius(disc=disc, fill_ratio=disc.max_fill_ratio / 2)
     alpha = half_angle(disc=disc, radius=a)
     return float(2 * a * np.sin(alpha) / alpha)
-
-
-def pair_lambda(*, disc: Disc, fill_ratio: npt.ArrayLike) -> FloatArray:
-    """Moment of a pair per transferred mass, lambda(x) = [U(x) - U(x_max - x)]/(rho V (x - x_max/2)).
-
-    Args: `fill_ratio`: x of one chamber, any shape, within [0, x_max], not at the centre x_max/2.
-    Returns: lambda, m, the shape of `fill_ratio`.
-    Raises: ValueError: a fill ratio at the centre, where the quotient is 0/0: use `central_lambda`.
-    """
-    x = np.asarray(fill_ratio, dtype=np.float64)
-    transferred = chamber_volume(disc=disc) * (x - disc.max_fill_ratio / 2)
-    if np.any(transferred == 0):
-        raise ValueError("lambda at the centre is a limit: use central_lambda")
-    difference = exact_moment(disc=disc, density=1.0, fill_ratio=x) - exact_moment(
-        disc=disc, density=1.0, fill_ratio=disc.max_fill_ratio - x
-    )
-    return np.asarray(difference / transferred, dtype=np.float64)

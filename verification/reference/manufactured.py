@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 
@@ -20,15 +20,18 @@ from ringbalance.physics.pressure.assembly import at_cells, at_facets, facet_poi
 from ringbalance.physics.pressure.solve import PressureProblem, PressureSolution, solve_pressure
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc
-from ringbalance.verification.orders import OrderStudy, order_study
+from ringbalance.verification.evidence import Convergence, Evidence, Found
+from ringbalance.verification.orders import OrderStudy, order_figure, order_study, order_table
 
-Defect = Literal["source_off_by_a_percent", "wall_flux_dropped", "surface_pressure_shifted"]
-
-SCALE: Final = 1e5
+_SCALE: Final = 1e5
 """P, Pa."""
 _SLOPES: Final = (3.0, 0.7, 1.8)
 _SHIFTS: Final = (0.4, 0.2)
 _GAUSS: Final = 40
+_FIELD_ORDER: Final = 3.0
+_WALL_ORDER: Final = {"quadratic": 4.0, "straight": 2.0}
+_FILL_SHARE: Final = 0.8
+"""Of the largest fill: a ring deep enough to show every direction."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,21 +51,13 @@ class Manufactured:
         return _SLOPES[0] * x + _SHIFTS[0], np.exp(_SLOPES[1] * y), _SLOPES[2] * z + _SHIFTS[1]
 
     def pressure(self, places: FloatArray) -> FloatArray:
-        """The chosen pressure.
-
-        Args: `places`: m, shape (dimension, ...).
-        Returns: Pa.
-        """
+        """The chosen pressure, Pa, at places in m, shape (dimension, ...)."""
         wave, growth, axial = self._factors(places)
         square = (places[0] ** 2 + places[1] ** 2) / (2 * self.length**2)
-        return np.asarray(SCALE * (np.sin(wave) * growth * np.cos(axial) + square))
+        return np.asarray(_SCALE * (np.sin(wave) * growth * np.cos(axial) + square))
 
     def gradient(self, places: FloatArray) -> FloatArray:
-        """Its gradient.
-
-        Args: `places`: m, shape (dimension, ...).
-        Returns: Pa/m, the shape of `places`.
-        """
+        """Its gradient, Pa/m, the shape of `places`."""
         wave, growth, axial = self._factors(places)
         a, b, c = _SLOPES
         parts = [
@@ -70,25 +65,18 @@ class Manufactured:
             b * np.sin(wave) * growth * np.cos(axial) + places[1] / self.length,
             -c * np.sin(wave) * growth * np.sin(axial) * (self.length / self.width),
         ]
-        return np.asarray(np.stack(parts[: len(places)]) * SCALE / self.length)
+        return np.asarray(np.stack(parts[: len(places)]) * _SCALE / self.length)
 
     def laplacian(self, places: FloatArray) -> FloatArray:
-        """Its Laplacian, in as many dimensions as the places have.
-
-        Args: `places`: m, shape (dimension, ...).
-        Returns: Pa/m^2.
-        """
+        """Its Laplacian, Pa/m^2, in as many dimensions as the places have."""
         wave, growth, axial = self._factors(places)
         a, b, c = _SLOPES
         axial_part = (c * self.length / self.width) ** 2 if len(places) == 3 else 0.0
         curvature = -(a**2) + b**2 - axial_part
-        return np.asarray(SCALE / self.length**2 * (curvature * np.sin(wave) * growth * np.cos(axial) + 2))
+        return np.asarray(_SCALE / self.length**2 * (curvature * np.sin(wave) * growth * np.cos(axial) + 2))
 
     def problem(self, defect: str | None = None) -> PressureProblem:
-        """The right-hand sides that make this pressure the solution.
-
-        Args: `defect`: a deliberate error to build in, one of `Defect`; None for none.
-        """
+        """The right-hand sides that make this pressure the solution, with a deliberate error built in."""
         exact = PressureProblem(
             source=self.laplacian,
             wall_flux=lambda places, normals: np.einsum("i...,i...->...", self.gradient(places), normals),
@@ -103,7 +91,7 @@ def _spoiled(exact: PressureProblem, defect: str | None, *, across: tuple[float,
     if defect == "wall_flux_dropped":
         return replace(exact, wall_flux=partial(_without_one_plate, exact, across))
     if defect == "surface_pressure_shifted":
-        return replace(exact, surface_pressure=lambda places: exact.surface_pressure(places) + 1e-3 * SCALE)
+        return replace(exact, surface_pressure=lambda places: exact.surface_pressure(places) + 1e-3 * _SCALE)
     if defect is not None:
         raise ValueError(f"unknown defect {defect}")
     return exact
@@ -118,35 +106,66 @@ def _without_one_plate(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Study:
+class _Study:
     """Errors of one geometry over all levels."""
 
     geometry: Geometry
-    cells: tuple[tuple[int, ...], ...]
-    unknowns: tuple[int, ...]
+    cells: Sequence[tuple[int, ...]]
+    unknowns: int
+    """On the finest mesh."""
     field: OrderStudy
     """Root mean square of the pressure's error over the liquid, relative."""
     wall: OrderStudy
     """Error of the integral of the pressure over the outer wall, relative."""
 
+    def tables(self) -> tuple[Convergence, Convergence]:
+        """Both errors beside their formal orders."""
+        cells = ", ".join(" x ".join(map(str, count)) for count in self.cells)
+        note = f"cells {cells}; up to {self.unknowns} unknowns"
+        table = partial(order_table, geometry=self.geometry, note=note)
+        return (
+            table("pressure field, relative error", self.field, _FIELD_ORDER),
+            table("force on the outer wall, relative error", self.wall, _WALL_ORDER[self.geometry]),
+        )
 
-def study(
-    *,
-    disc: Disc,
-    fill_ratio: float,
-    cells: Sequence[tuple[int, ...]],
-    geometry: Geometry,
-    defect: str | None = None,
-) -> Study:
-    """Solve the manufactured problem on a sequence of meshes.
 
-    Args: `fill_ratio`: x. `cells`: of each level, coarse to fine, halving h each time. `geometry`:
-        "quadratic" or "straight". `defect`: a deliberate error to build in, one of `Defect`; None for none.
-    Returns: Study; a wrong wall integral is seen against the true arc, so straight sides show in it.
+def manufactured_evidence(*, disc: Disc, cells: Sequence[tuple[int, ...]], defect: str | None) -> Evidence:
+    """Orders and finest errors on curved and on straight-sided meshes.
+
+    Args: `cells`: of each level, coarse to fine, halving h each time. `defect`: of the right-hand sides.
     Raises: ValueError: an unknown defect.
     """
+    curved, straight = (_study(disc, cells, geometry, defect) for geometry in ("quadratic", "straight"))
+    found = {
+        "field_order_quadratic": curved.field.settled_order,
+        "field_error_quadratic": curved.field.finest_error,
+        "wall_order_quadratic": curved.wall.settled_order,
+        "wall_error_quadratic": curved.wall.finest_error,
+        "field_order_straight": straight.field.settled_order,
+        "wall_order_straight": straight.wall.settled_order,
+        "wall_error_straight": straight.wall.finest_error,
+    }
+    curves = {
+        "pressure field, curved": curved.field,
+        "wall force, curved": curved.wall,
+        "pressure field, straight": straight.field,
+        "wall force, straight": straight.wall,
+    }
+    return Evidence(
+        found={name: Found(value=value) for name, value in found.items()},
+        numbers={
+            "curving": straight.wall.finest_error / curved.wall.finest_error,
+            "unknowns": float(curved.unknowns),
+        },
+        series=(order_figure(curves),),
+        convergence=(*curved.tables(), *straight.tables()),
+    )
+
+
+def _study(disc: Disc, cells: Sequence[tuple[int, ...]], geometry: Geometry, defect: str | None) -> _Study:
+    """A wrong wall integral is seen against the true arc, so straight sides show in it."""
     exact = Manufactured(length=disc.outer_radius, width=disc.axial_width, half_angle=disc.central_angle / 2)
-    radius = float(surface_radius(disc=disc, fill_ratio=fill_ratio))
+    radius = float(surface_radius(disc=disc, fill_ratio=_FILL_SHARE * disc.max_fill_ratio))
     solutions = [
         solve_pressure(
             chamber=chamber_mesh(disc=disc, surface_radius=radius, cells=count, geometry=geometry),
@@ -156,10 +175,10 @@ def study(
     ]
     size = [cells[0][0] / count[0] for count in cells]
     wall = _exact_wall_integral(disc, exact, dimension=len(cells[0]))
-    return Study(
+    return _Study(
         geometry=geometry,
-        cells=tuple(cells),
-        unknowns=tuple(solution.pressure.size for solution in solutions),
+        cells=cells,
+        unknowns=solutions[-1].pressure.size,
         field=order_study(size=size, error=[_field_error(s, exact.pressure) for s in solutions]),
         wall=order_study(size=size, error=[abs(_wall_integral(s) / wall - 1) for s in solutions]),
     )

@@ -10,7 +10,7 @@ import numpy as np
 
 from ringbalance.physics.tube.loss import TubeLoss, tube_loss
 from ringbalance.scene.models import Scene
-from ringbalance.verification.reference.exact_chamber import exact_wall_pressure
+from ringbalance.verification.reference.exact_chamber import wall_pressure_of
 
 _VELOCITIES: Final = (1e-4, 3000.0, 401)
 _LEAST: Final = 0.05
@@ -72,11 +72,6 @@ def driving_head(scene: Scene, *, share: float) -> float:
     Returns: m^2/s^2; at least a twentieth of the gas pressure's own, short of a stall.
     """
     fills = np.array([share, 1 - share]) * scene.disc.max_fill_ratio
-    wall = exact_wall_pressure(
-        disc=scene.disc,
-        density=scene.liquid.density,
-        angular_velocity=scene.rotor.speed,
-        fill_ratio=fills,
-    )
+    wall = wall_pressure_of(scene, fills)
     driving = scene.gas.pressure + float(wall[0] - wall[1])
     return max(driving, _LEAST * scene.gas.pressure) / scene.liquid.density

@@ -1,6 +1,5 @@
 """A tube with two bends over a crest, turning, solved in three dimensions; a heavy run."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import dataclasses
@@ -19,7 +18,6 @@ from ringbalance.physics.tube.numbers import rotation_reynolds_number
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import (
-    Axis,
     Convergence,
     Curve,
     Evidence,
@@ -28,6 +26,7 @@ from ringbalance.verification.evidence import (
     Reference,
     Series,
     Table,
+    figure,
 )
 from ringbalance.verification.reference.bent_tube import BentTubeFlow, bent_tube_flow, pressure_loss
 
@@ -44,9 +43,7 @@ _DEVELOPED: Final = (5.0, 1.0)
 """Where flow has developed again: from and to, bores before the outlet."""
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """One, for ratios."""
-    return {"straight": Reference(value=1.0), "explained": Reference(value=1.0)}
+reference = dict.fromkeys(("straight", "explained"), Reference(value=1.0))
 
 
 def path(scene: Scene, refinement: float) -> tuple[Segment, ...]:
@@ -227,10 +224,10 @@ def _figure(flow: BentTubeFlow) -> Series:
     s = flow.arc_length
     fall = 2 / flow.reynolds * flow.gradient * s
     loss = np.array([pressure_loss(flow=flow, start=0.0, end=float(end)) for end in s])
-    return Series(
-        name="loss along the path beyond that of the straight turning tube",
-        x=Axis(name="arc length over bore", unit="1", values=s),
-        y=(Curve(name="three dimensions", unit="1", values=loss - fall),),
+    return figure(
+        "loss along the path beyond that of the straight turning tube",
+        ("arc length over bore", "1", s),
+        Curve("three dimensions", "1", loss - fall),
     )
 
 

@@ -1,18 +1,17 @@
 """The chamber's volume from printed numbers that do not contain it: R1'min and Fig. 4's departure."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable
 
 from scipy.optimize import brentq
 
 from ringbalance.mesh.geometry import chamber_volume, liquid_area, surface_radius
 from ringbalance.reduced_model.paper.formulas import chamber_volume_paper
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.comparison import COVERAGE_FACTOR, from_rounding
-from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table
+from ringbalance.verification.comparison import COVERAGE_FACTOR, from_rounding, input_uncertainty
+from ringbalance.verification.evidence import Evidence, Found, Level, Table
 from ringbalance.verification.paper_numbers import (
     CHAMBER_VOLUME,
     DENSITY,
@@ -21,12 +20,9 @@ from ringbalance.verification.paper_numbers import (
     RING_RADIUS,
     with_plate,
 )
-from ringbalance.verification.sensitivity import input_uncertainty
 
-
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """The printed volume, for both routes to it."""
-    return dict.fromkeys(("volume", "volume_from_departure"), CHAMBER_VOLUME.reference)
+reference = dict.fromkeys(("volume", "volume_from_departure"), CHAMBER_VOLUME.reference)
+"""The printed volume, for both routes to it."""
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -37,13 +33,11 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         value=_volume_from_departure(scene, DEPARTURE_LOW.value),
         input=math.hypot(_departure_uncertainty(scene), _rounded_radius_uncertainty(disc)),
     )
-    radius_half_width = COVERAGE_FACTOR * _plate_uncertainty(disc)
+    radius_half_width = COVERAGE_FACTOR * _rounded_radius(lambda r: _plate_from_radius(disc, r))
     found = {
         "volume": Found(
             value=volume(disc, RING_RADIUS.value),
-            input=input_uncertainty(
-                [(lambda r: volume(disc, r), RING_RADIUS.value, from_rounding(RING_RADIUS.last_digit))]
-            ),
+            input=_rounded_radius(lambda radius: volume(disc, radius)),
         ),
         "volume_from_departure": departure,
         "flat_strip": Found(value=abs(chamber_volume_paper(disc=disc) / chamber_volume(disc=disc) - 1)),
@@ -69,9 +63,9 @@ def _plate_from_radius(disc: Disc, radius: float) -> float:
     return float(brentq(excess, 0.0, 0.3 * disc.inner_radius, xtol=1e-12))
 
 
-def _plate_uncertainty(disc: Disc) -> float:
-    rounding = from_rounding(RING_RADIUS.last_digit)
-    return input_uncertainty([(lambda r: _plate_from_radius(disc, r), RING_RADIUS.value, rounding)])
+def _rounded_radius(quantity: Callable[[float], float]) -> float:
+    """Standard uncertainty that the rounding of the printed radius gives to a quantity."""
+    return input_uncertainty([(quantity, RING_RADIUS.value, from_rounding(RING_RADIUS.last_digit))])
 
 
 def _volume_from_radius(disc: Disc, radius: float) -> float:
@@ -102,8 +96,7 @@ def _rounded_radius_uncertainty(disc: Disc) -> float:
     def twice_the_liquid(radius: float) -> float:
         return 2 * disc.axial_width * float(liquid_area(disc=disc, surface_radius=radius))
 
-    rounding = from_rounding(RING_RADIUS.last_digit)
-    return input_uncertainty([(twice_the_liquid, RING_RADIUS.value, rounding)])
+    return _rounded_radius(twice_the_liquid)
 
 
 def _table(disc: Disc, from_radius: Found, from_departure: Found) -> Table:

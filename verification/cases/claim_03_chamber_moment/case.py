@@ -1,9 +1,7 @@
 """Moment of one half-full chamber by finite elements, and the arithmetic of Eq. 7."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
@@ -14,23 +12,21 @@ from ringbalance.reduced_model.paper.formulas import (
     surface_radius_paper,
 )
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
+from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
 from ringbalance.verification.paper_numbers import CHAMBER_MOMENT, DENSITY, RING_RADIUS, at_paper_density
-from ringbalance.verification.rings import found_of, mesh_table, moment_standard_uncertainty, ring_of
+from ringbalance.verification.rings import chamber_moment, mesh_table, ring_of
 
 _FILLS: Final = (0.1, 0.2, 0.3, 0.4, 0.5)
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """The printed moment, for the liquid and for the arithmetic."""
-    return {"moment": CHAMBER_MOMENT.reference, "arithmetic": CHAMBER_MOMENT.reference}
+reference = dict.fromkeys(("moment", "arithmetic"), CHAMBER_MOMENT.reference)
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """Moment by finite elements, and by Eq. 7 with and without the paper's rounding."""
     given = at_paper_density(scene)
     ring = ring_of(given, _FILLS)
-    by_elements = found_of(ring, "moment", -1, input_=moment_standard_uncertainty(given, _FILLS[-1]))
+    by_elements = chamber_moment(given, ring, -1, density=DENSITY)
     unrounded, rounded = (_eq_7(given.disc, radius) for radius in (_radius(given.disc), RING_RADIUS.value))
     arithmetic = Found(value=unrounded, corrected=rounded)
     moment = arithmetic if defect == "plates_left_out" else by_elements
@@ -59,11 +55,9 @@ def _figure(scene: Scene, moment: np.ndarray, uncertainty: np.ndarray) -> Series
     liquid = 2 * x * max_liquid_volume_paper(disc=scene.disc)
     radius = surface_radius_paper(disc=scene.disc, liquid_volume=liquid)
     by_eq_7 = moment_paper(disc=scene.disc, density=DENSITY, surface_radius=radius)
-    return Series(
-        name="moment of one chamber",
-        x=Axis(name="fill ratio", unit="1", values=x),
-        y=(
-            Curve(name="finite elements", unit="kg m", values=moment, uncertainty=uncertainty),
-            Curve(name="Eq. 7", unit="kg m", values=by_eq_7, style="paper"),
-        ),
+    return figure(
+        "moment of one chamber",
+        ("fill ratio", "1", x),
+        Curve("finite elements", "kg m", moment, uncertainty=uncertainty),
+        Curve("Eq. 7", "kg m", by_eq_7, style="paper"),
     )

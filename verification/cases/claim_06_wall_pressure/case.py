@@ -1,6 +1,5 @@
 """Eq. 12 against finite elements over fill, plate thickness, speed and gravity."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import dataclasses
@@ -14,19 +13,10 @@ from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
 from ringbalance.reduced_model.paper.formulas import wall_pressure_paper
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.evidence import (
-    Axis,
-    Curve,
-    Evidence,
-    Level,
-    Reference,
-    Series,
-    Table,
-)
-from ringbalance.verification.paper_numbers import plate_uncertainty, with_plate
-from ringbalance.verification.reference.exact_chamber import exact_wall_pressure
+from ringbalance.verification.evidence import Curve, Evidence, Level, Reference, Series, Table, figure
+from ringbalance.verification.paper_numbers import plate_effect, with_plate
+from ringbalance.verification.reference.exact_chamber import wall_pressure_of
 from ringbalance.verification.rings import found_of, mesh_table, ring_of
-from ringbalance.verification.sensitivity import input_uncertainty
 
 _SHARES: Final = (0.1, 0.3, 0.5, 0.7, 0.9, 1.0)
 """Of the largest fill."""
@@ -49,7 +39,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     x = np.array(fills)
     shortfall = 1 - _eq_12(scene, scene.disc, x) / ring.wall_pressure.value
     bare = with_plate(scene.disc, 0.0)
-    bare_ratio = _eq_12(scene, bare, x) / _exact(scene, bare, x)
+    bare_ratio = _eq_12(scene, bare, x) / wall_pressure_of(scene, x, disc=bare)
     gravity = _gravity_table(scene)
     return Evidence(
         found={
@@ -82,38 +72,22 @@ def _eq_12(scene: Scene, disc: Disc, fill: FloatArray) -> FloatArray:
     )
 
 
-def _exact(scene: Scene, disc: Disc, fill: FloatArray) -> FloatArray:
-    return exact_wall_pressure(
-        disc=disc,
-        density=scene.liquid.density,
-        angular_velocity=scene.rotor.speed,
-        fill_ratio=fill,
-    )
-
-
 def _standard_uncertainty(scene: Scene, fill: float) -> float:
     """Input uncertainty of the difference: the plates are in the finite elements and in Eq. 12's volume."""
 
-    def difference(thickness: float) -> float:
-        disc, x = with_plate(scene.disc, thickness), np.array([fill])
-        return float((_exact(scene, disc, x) - _eq_12(scene, disc, x))[0])
+    def difference(disc: Disc) -> float:
+        x = np.array([fill])
+        return float((wall_pressure_of(scene, x, disc=disc) - _eq_12(scene, disc, x))[0])
 
-    return input_uncertainty([(difference, scene.disc.plate_thickness, plate_uncertainty(scene))])
+    return plate_effect(scene, difference)
 
 
 def _over_fill(scene: Scene, ring: RingQuantities) -> Series:
-    return Series(
-        name="pressure on the outer wall",
-        x=Axis(name="fill ratio", unit="1", values=ring.fill_ratio),
-        y=(
-            Curve(
-                name="finite elements",
-                unit="Pa",
-                values=ring.wall_pressure.value,
-                uncertainty=ring.wall_pressure.uncertainty,
-            ),
-            Curve(name="Eq. 12", unit="Pa", values=_eq_12(scene, scene.disc, ring.fill_ratio), style="paper"),
-        ),
+    return figure(
+        "pressure on the outer wall",
+        ("fill ratio", "1", ring.fill_ratio),
+        Curve("finite elements", "Pa", ring.wall_pressure.value, uncertainty=ring.wall_pressure.uncertainty),
+        Curve("Eq. 12", "Pa", _eq_12(scene, scene.disc, ring.fill_ratio), style="paper"),
     )
 
 
@@ -122,20 +96,14 @@ def _over_plates(scene: Scene) -> Series:
     widest = 0.5 * scene.disc.inner_radius * np.sin(scene.disc.central_angle / 2)
     thickness = np.linspace(0, widest, 21)
     fills = np.array([0.02, 1.0]) * scene.disc.max_fill_ratio
-    error = np.array(
-        [
-            _eq_12(scene, with_plate(scene.disc, t), fills) / _exact(scene, with_plate(scene.disc, t), fills)
-            - 1
-            for t in thickness
-        ]
-    )
-    return Series(
-        name="error of Eq. 12 against the thickness of the plates",
-        x=Axis(name="plate thickness", unit="m", values=thickness),
-        y=(
-            Curve(name="thin ring", unit="1", values=error[:, 0], style="paper"),
-            Curve(name="largest fill", unit="1", values=error[:, 1], style="paper"),
-        ),
+    discs = [with_plate(scene.disc, t) for t in thickness]
+    ratio = [_eq_12(scene, disc, fills) / wall_pressure_of(scene, fills, disc=disc) for disc in discs]
+    error = np.array(ratio) - 1
+    return figure(
+        "error of Eq. 12 against the thickness of the plates",
+        ("plate thickness", "m", thickness),
+        Curve("thin ring", "1", error[:, 0], style="paper"),
+        Curve("largest fill", "1", error[:, 1], style="paper"),
     )
 
 
@@ -144,7 +112,7 @@ def _gravity_table(scene: Scene) -> Table:
     speeds = [share * scene.rotor.speed for share in _SPEEDS]
     rings = [_with_gravity(scene, speed) for speed in speeds]
     middle = scene.disc.max_fill_ratio / 2
-    plain = [float(_exact(_at_speed(scene, speed), scene.disc, np.array(middle))) for speed in speeds]
+    plain = [float(wall_pressure_of(_at_speed(scene, speed), middle)) for speed in speeds]
     pairs = list(zip(rings, plain, strict=True))
     return Table(
         name="gravity across the shaft: change of the mean wall pressure, and its ripple over a turn",

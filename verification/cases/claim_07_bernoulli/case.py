@@ -1,6 +1,5 @@
 """The three things that Eqs. 13 to 18 take for granted: one k, '+1', and a tube that runs full."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import dataclasses
@@ -13,9 +12,9 @@ from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene.models import Scene
-from ringbalance.verification.calibrations import calibration_of
-from ringbalance.verification.comparison import from_half_width
-from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series, no_reference
+from ringbalance.verification.comparison import from_half_width, from_range
+from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
+from ringbalance.verification.loops import calibration_of
 from ringbalance.verification.paper_numbers import plate_uncertainty
 from ringbalance.verification.reference.tube_running import driving_head, running_tube, tube_curve
 
@@ -24,9 +23,6 @@ _PRESSURES: Final = np.geomspace(0.77, 2.53, 9)
 _FILLS: Final = np.linspace(0.02, 1.0, 50)
 """In units of the largest."""
 _HUMP: Final = "hump_radius"
-
-
-reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -109,7 +105,7 @@ def _hump_uncertainty(scene: Scene, at_low: float, at_high: float) -> float:
             ends = [_siphon_share(_with_hump(scene, scene.tube.hump_radius + s * width)) for s in (-1, 1)]
             return from_half_width(abs(ends[1] - ends[0]) / 2)
     inferred = plate_uncertainty(scene) > 0
-    return abs(at_high - at_low) / (2 * math.sqrt(3)) if inferred else 0.0
+    return from_range((at_low, at_high)) if inferred else 0.0
 
 
 def _figure(scene: Scene) -> Series:
@@ -118,16 +114,9 @@ def _figure(scene: Scene) -> Series:
     flow = law.evaluate(fill_ratio=fills, gas_pressure=scene.gas.pressure, primed=False)
     middle = running_tube(scene, head=driving_head(scene, share=0.5))
     one_k = [math.sqrt(2 * driving_head(scene, share=float(s)) / (middle.k + 1)) for s in _FILLS]
-    return Series(
-        name="velocity at the scene's gas pressure",
-        x=Axis(name="fill ratio", unit="1", values=fills),
-        y=(
-            Curve(
-                name="calibrated law",
-                unit="m/s",
-                values=flow.velocity,
-                uncertainty=flow.uncertainty,
-            ),
-            Curve(name="Eq. 14 with one k", unit="m/s", values=np.array(one_k), style="paper"),
-        ),
+    return figure(
+        "velocity at the scene's gas pressure",
+        ("fill ratio", "1", fills),
+        Curve("calibrated law", "m/s", flow.velocity, uncertainty=flow.uncertainty),
+        Curve("Eq. 14 with one k", "m/s", np.array(one_k), style="paper"),
     )

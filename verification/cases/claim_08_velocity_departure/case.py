@@ -1,9 +1,7 @@
 """The velocity's fall under the true wall pressure, by Eq. 19's own arithmetic, and by the calibrated law."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
@@ -11,16 +9,8 @@ import numpy as np
 from ringbalance.reduced_model.paper.formulas import departure, flat_strip_area, stall_pressure
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.calibrations import calibration_of
-from ringbalance.verification.evidence import (
-    Axis,
-    Curve,
-    Evidence,
-    Found,
-    Level,
-    Reference,
-    Series,
-)
+from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
+from ringbalance.verification.loops import calibration_of
 from ringbalance.verification.paper_numbers import (
     DENSITY,
     DEPARTURE_HIGH,
@@ -29,24 +19,19 @@ from ringbalance.verification.paper_numbers import (
     LOW_PRESSURE,
     RING_RADIUS,
     at_paper_density,
-    plate_uncertainty,
-    with_plate,
+    plate_effect,
 )
-from ringbalance.verification.reference.exact_chamber import exact_wall_pressure
-from ringbalance.verification.sensitivity import input_uncertainty
+from ringbalance.verification.reference.exact_chamber import wall_pressure_of
 
 _PRESSURES: Final = {"low": LOW_PRESSURE, "high": HIGH_PRESSURE}
 _POINTS: Final = 41
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """The printed departures, for the physics and for the arithmetic."""
-    printed = {"low": DEPARTURE_LOW, "high": DEPARTURE_HIGH}
-    return {
-        f"{what}_{name}": number.reference
-        for name, number in printed.items()
-        for what in ("departure", "arithmetic")
-    }
+reference = {
+    f"{what}_{name}": number.reference
+    for name, number in {"low": DEPARTURE_LOW, "high": DEPARTURE_HIGH}.items()
+    for what in ("departure", "arithmetic")
+}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -76,13 +61,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 
 def _level(scene: Scene, disc: Disc) -> float:
     """True wall pressure of a full chamber, Pa."""
-    pressure = exact_wall_pressure(
-        disc=disc,
-        density=DENSITY,
-        angular_velocity=scene.rotor.speed,
-        fill_ratio=disc.max_fill_ratio,
-    )
-    return float(pressure)
+    return float(wall_pressure_of(scene, disc.max_fill_ratio, disc=disc, density=DENSITY))
 
 
 def _stall(scene: Scene) -> float:
@@ -91,13 +70,11 @@ def _stall(scene: Scene) -> float:
 
 
 def _physics(scene: Scene, pressure: float) -> Found:
-    def fall(thickness: float) -> float:
-        level = _level(scene, with_plate(scene.disc, thickness))
+    def fall(disc: Disc) -> float:
+        level = _level(scene, disc)
         return 1 - float(np.sqrt((pressure - level) / (pressure + level)))
 
-    thickness = scene.disc.plate_thickness
-    standard_uncertainty = input_uncertainty([(fall, thickness, plate_uncertainty(scene))])
-    return Found(value=fall(thickness), input=standard_uncertainty)
+    return Found(value=fall(scene.disc), input=plate_effect(scene, fall))
 
 
 def _arithmetic(scene: Scene, pressure: float) -> Found:
@@ -122,12 +99,8 @@ def _arithmetic(scene: Scene, pressure: float) -> Found:
 def _relative_velocity(scene: Scene, pressure: float, share: FloatArray) -> FloatArray:
     """u(x)/u(x_max) with the true wall pressure and one k."""
     largest = scene.disc.max_fill_ratio
-    own, other = (
-        exact_wall_pressure(
-            disc=scene.disc, density=DENSITY, angular_velocity=scene.rotor.speed, fill_ratio=x
-        )
-        for x in (share * largest, (1 - share) * largest)
-    )
+    fills = (share * largest, (1 - share) * largest)
+    own, other = (wall_pressure_of(scene, x, density=DENSITY) for x in fills)
     squared = pressure + own - other
     return np.asarray(np.sqrt(squared / squared[-1]), dtype=np.float64)
 
@@ -146,16 +119,10 @@ def _figure(scene: Scene, pressure: float, share: FloatArray) -> Series:
     level = _stall(scene)
     eq_19 = np.sqrt((pressure + level * (2 * share - 1)) / (pressure + level))
     law = _law_velocity(scene, pressure, share)
-    return Series(
-        name=f"velocity over that of a full chamber, {pressure / 1e6:.1f} MPa",
-        x=Axis(name="fill ratio", unit="1", values=share * scene.disc.max_fill_ratio),
-        y=(
-            Curve(name="Eq. 19", unit="1", values=eq_19, style="paper"),
-            Curve(
-                name="true wall pressure, one k",
-                unit="1",
-                values=_relative_velocity(scene, pressure, share),
-            ),
-            Curve(name="calibrated law of the scene", unit="1", values=law / law[-1], style="reference"),
-        ),
+    return figure(
+        f"velocity over that of a full chamber, {pressure / 1e6:.1f} MPa",
+        ("fill ratio", "1", share * scene.disc.max_fill_ratio),
+        Curve("Eq. 19", "1", eq_19, style="paper"),
+        Curve("true wall pressure, one k", "1", _relative_velocity(scene, pressure, share)),
+        Curve("calibrated law of the scene", "1", law / law[-1], style="reference"),
     )

@@ -1,6 +1,5 @@
 """k(u) over fills, bores, liquids and pressures, each tube at the velocity that it takes by itself."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import dataclasses
@@ -15,16 +14,7 @@ from ringbalance.reduced_model.paper.formulas import PAPER_DRAG_COEFFICIENT
 from ringbalance.scene import known_liquids, liquid_at
 from ringbalance.scene.models import Liquid, Scene
 from ringbalance.verification.comparison import from_half_width
-from ringbalance.verification.evidence import (
-    Axis,
-    Curve,
-    Evidence,
-    Found,
-    Level,
-    Reference,
-    Series,
-    Table,
-)
+from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, Series, Table, figure
 from ringbalance.verification.reference.tube_running import Running, driving_head, running_tube, tube_curve
 
 _ABOUT: Final = 0.1
@@ -37,10 +27,11 @@ _NARROWEST: Final = 0.1
 """Smallest bore searched for k = 50, in units of the scene's."""
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """About 50."""
-    standard_uncertainty = from_half_width(_ABOUT * PAPER_DRAG_COEFFICIENT)
-    return {"k_scene": Reference(value=PAPER_DRAG_COEFFICIENT, uncertainty=standard_uncertainty)}
+reference = {
+    "k_scene": Reference(
+        value=PAPER_DRAG_COEFFICIENT, uncertainty=from_half_width(_ABOUT * PAPER_DRAG_COEFFICIENT)
+    )
+}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -129,18 +120,11 @@ def _bore_for(scene: Scene, k: float) -> float:
 
 def _over_velocity(scene: Scene) -> Series:
     curve = tube_curve(scene)
-    return Series(
-        name="k against the velocity, the scene's tube and liquid",
-        x=Axis(name="velocity", unit="m/s", values=curve.velocity),
-        y=(
-            Curve(name="k(u)", unit="1", values=curve.k.value, uncertainty=curve.k.uncertainty),
-            Curve(
-                name="50",
-                unit="1",
-                values=np.full(curve.velocity.shape, PAPER_DRAG_COEFFICIENT),
-                style="paper",
-            ),
-        ),
+    return figure(
+        "k against the velocity, the scene's tube and liquid",
+        ("velocity", "m/s", curve.velocity),
+        Curve("k(u)", "1", curve.k.value, uncertainty=curve.k.uncertainty),
+        Curve("50", "1", np.full(curve.velocity.shape, PAPER_DRAG_COEFFICIENT), style="paper"),
         log=True,
     )
 

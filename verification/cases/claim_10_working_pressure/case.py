@@ -1,40 +1,18 @@
 """Stall by Eq. 19, stall by the true wall pressure, and priming over the crest, beside the printed range."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
-
-import math
-from collections.abc import Mapping
 
 import numpy as np
 
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.paper.formulas import PAPER_DRAG_COEFFICIENT, stall_pressure, velocity_paper
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.evidence import (
-    Axis,
-    Curve,
-    Evidence,
-    Found,
-    Level,
-    NotRunError,
-    Reference,
-    Series,
-)
-from ringbalance.verification.paper_numbers import (
-    DENSITY,
-    HIGHEST_PRESSURE,
-    LOWEST_PRESSURE,
-    plate_uncertainty,
-    with_plate,
-)
-from ringbalance.verification.reference.exact_chamber import exact_wall_pressure
-from ringbalance.verification.sensitivity import input_uncertainty
+from ringbalance.verification.comparison import from_range
+from ringbalance.verification.evidence import Curve, Evidence, Found, Level, NotRunError, Series, figure
+from ringbalance.verification.paper_numbers import DENSITY, HIGHEST_PRESSURE, LOWEST_PRESSURE, plate_effect
+from ringbalance.verification.reference.exact_chamber import wall_pressure_of
 
-
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """The lower end of the printed range, for both readings."""
-    return {"by_eq_19": LOWEST_PRESSURE.reference, "by_priming": LOWEST_PRESSURE.reference}
+reference = dict.fromkeys(("by_eq_19", "by_priming"), LOWEST_PRESSURE.reference)
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -47,23 +25,13 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         found={
             "by_eq_19": Found(
                 value=_stall(scene, scene.disc),
-                input=input_uncertainty(
-                    [
-                        (
-                            lambda t: _stall(scene, with_plate(scene.disc, t)),
-                            scene.disc.plate_thickness,
-                            plate_uncertainty(scene),
-                        )
-                    ]
-                ),
+                input=plate_effect(scene, lambda disc: _stall(scene, disc)),
             ),
             # Anything between the two bounds is equally likely: a rectangular distribution.
-            "by_priming": Found(
-                value=_priming(scene, scene.tube.hump_radius), input=(high - low) / (2 * math.sqrt(3))
-            ),
+            "by_priming": Found(value=_priming(scene, scene.tube.hump_radius), input=from_range((low, high))),
         },
         numbers={
-            "by_ring": float(_wall(scene, scene.disc.max_fill_ratio)),
+            "by_ring": float(wall_pressure_of(scene, scene.disc.max_fill_ratio, density=DENSITY)),
             "scene_hump": scene.tube.hump_radius,
             "priming_low": low,
             "priming_high": high,
@@ -75,14 +43,6 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 
 def _stall(scene: Scene, disc: Disc) -> float:
     return float(stall_pressure(disc=disc, density=DENSITY, angular_velocity=scene.rotor.speed))
-
-
-def _wall(scene: Scene, fill: float) -> float:
-    return float(
-        exact_wall_pressure(
-            disc=scene.disc, density=DENSITY, angular_velocity=scene.rotor.speed, fill_ratio=fill
-        )
-    )
 
 
 def _priming(scene: Scene, hump_radius: float) -> float:
@@ -109,12 +69,10 @@ def _figure(scene: Scene) -> Series:
     priming = np.array([_priming(scene, float(r)) for r in radius])
     lowest = np.full(radius.shape, LOWEST_PRESSURE.value)
     stall = np.full(radius.shape, _stall(scene, scene.disc))
-    return Series(
-        name="pressure that starts the flow from an almost empty chamber",
-        x=Axis(name="inner radius of the siphon crest", unit="m", values=radius),
-        y=(
-            Curve(name="priming, other chamber vented", unit="Pa", values=priming),
-            Curve(name="0.54 MPa", unit="Pa", values=lowest, style="paper"),
-            Curve(name="stall by Eq. 19", unit="Pa", values=stall, style="reference"),
-        ),
+    return figure(
+        "pressure that starts the flow from an almost empty chamber",
+        ("inner radius of the siphon crest", "m", radius),
+        Curve("priming, other chamber vented", "Pa", priming),
+        Curve("0.54 MPa", "Pa", lowest, style="paper"),
+        Curve("stall by Eq. 19", "Pa", stall, style="reference"),
     )

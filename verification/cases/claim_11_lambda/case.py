@@ -1,10 +1,8 @@
 """lambda at the centre and over the range by finite elements."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
@@ -14,11 +12,10 @@ from ringbalance.physics.pressure.ring import RingQuantities
 from ringbalance.reduced_model.paper.formulas import PAPER_LAMBDA
 from ringbalance.scene.models import Scene
 from ringbalance.verification.comparison import from_half_width, from_rounding
-from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
-from ringbalance.verification.paper_numbers import LAMBDA_TOLERANCE, plate_uncertainty, with_plate
+from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, Series, figure
+from ringbalance.verification.paper_numbers import LAMBDA_TOLERANCE, plate_effect, with_plate
 from ringbalance.verification.reference.exact_chamber import central_lambda
 from ringbalance.verification.rings import found_of, mesh_table, ring_of, scaled
-from ringbalance.verification.sensitivity import input_uncertainty
 
 _SHARES: Final = tuple(np.linspace(0.0, 1.0, 11).tolist())
 """Of the largest fill; the middle one is the centre."""
@@ -26,11 +23,10 @@ _CENTRE: Final = 5
 _LAST_DIGIT: Final = 1e-3
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """72 mm with its stated error range and its rounding."""
-    stated = from_half_width(LAMBDA_TOLERANCE * PAPER_LAMBDA)
-    standard_uncertainty = math.hypot(stated, from_rounding(_LAST_DIGIT))
-    return {"central": Reference(value=PAPER_LAMBDA, uncertainty=standard_uncertainty)}
+_STATED: Final = math.hypot(from_half_width(LAMBDA_TOLERANCE * PAPER_LAMBDA), from_rounding(_LAST_DIGIT))
+"""Standard uncertainty from the stated error range and the rounding, m."""
+
+reference = {"central": Reference(value=PAPER_LAMBDA, uncertainty=_STATED)}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -57,15 +53,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 def _standard_uncertainty(scene: Scene) -> float:
     """Of dU/dV', from the plate thickness."""
     scale = scene.liquid.density / 2
-    return scale * input_uncertainty(
-        [
-            (
-                lambda t: central_lambda(disc=with_plate(scene.disc, t)),
-                scene.disc.plate_thickness,
-                plate_uncertainty(scene),
-            )
-        ]
-    )
+    return scale * plate_effect(scene, lambda disc: central_lambda(disc=disc))
 
 
 def _over_range(scene: Scene, ring: RingQuantities, central: float) -> np.ndarray:
@@ -80,17 +68,9 @@ def _over_range(scene: Scene, ring: RingQuantities, central: float) -> np.ndarra
 
 def _figure(fills: np.ndarray, curve: np.ndarray) -> Series:
     claimed = np.full(fills.shape, PAPER_LAMBDA)
-    return Series(
-        name="moment of a pair per transferred mass",
-        x=Axis(name="fill ratio of one chamber", unit="1", values=fills),
-        y=(
-            Curve(name="finite elements", unit="m", values=curve),
-            Curve(
-                name="72 mm within 0.7 %",
-                unit="m",
-                values=claimed,
-                style="paper",
-                uncertainty=LAMBDA_TOLERANCE * claimed,
-            ),
-        ),
+    return figure(
+        "moment of a pair per transferred mass",
+        ("fill ratio of one chamber", "1", fills),
+        Curve("finite elements", "m", curve),
+        Curve("72 mm within 0.7 %", "m", claimed, style="paper", uncertainty=LAMBDA_TOLERANCE * claimed),
     )

@@ -1,24 +1,20 @@
 """Eq. 22 with Eq. 21's mass, literally and per transferred mass, beside Eqs. 7 and 8."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 from ringbalance.reduced_model.paper.formulas import PAPER_LAMBDA, correction_mass, correction_moment
 from ringbalance.scene.models import Scene
 from ringbalance.verification.comparison import from_half_width, from_rounding
-from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table
+from ringbalance.verification.evidence import Evidence, Found, Level, Table
 from ringbalance.verification.paper_numbers import CHAMBER_MOMENT, DENSITY, DISC_MOMENT, LAMBDA_TOLERANCE
 from ringbalance.verification.reference.exact_chamber import exact_moment
 
 _LAMBDA_DIGIT = 1e-3
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """The printed moments of a chamber and of the disc."""
-    return {"chamber": CHAMBER_MOMENT.reference, "disc": DISC_MOMENT.reference}
+reference = {"chamber": CHAMBER_MOMENT.reference, "disc": DISC_MOMENT.reference}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

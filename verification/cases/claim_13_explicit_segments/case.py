@@ -1,6 +1,5 @@
 """Explicit segments against the closed form over one long operation."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -14,8 +13,6 @@ from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_law
 from ringbalance.scene.models import Scene
 from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import (
-    Axis,
-    Convergence,
     Curve,
     Evidence,
     Found,
@@ -23,8 +20,9 @@ from ringbalance.verification.evidence import (
     NotRunError,
     Reference,
     Series,
+    figure,
 )
-from ringbalance.verification.orders import extrapolate, order_study
+from ringbalance.verification.orders import extrapolate, order_study, order_table
 from ringbalance.verification.reference.explicit_segments import explicit_segments
 
 _COUNTS = (4, 8, 16, 32, 64, 128, 256, 512)
@@ -77,7 +75,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     exact = operation.exact()
     moved = [operation.frozen() if frozen else operation.stepped(count) for count in _COUNTS]
     error = [abs(value / exact - 1) for value in moved]
-    study = order_study(size=[1 / count for count in _COUNTS], error=error)
+    study = order_study(size=[_COUNTS[0] / count for count in _COUNTS], error=error)
     limit = extrapolate(coarse=moved[-2], fine=moved[-1], ratio=2, order=1)
     # One half of the last correction bounds what the extrapolation has left.
     standard_uncertainty = from_half_width(abs(limit - moved[-1]) / 2)
@@ -89,16 +87,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         },
         numbers=_numbers(operation),
         series=(_figure(error),),
-        convergence=(
-            Convergence(
-                quantity="moved fill ratio, relative",
-                unit="1",
-                formal_order=1.0,
-                size=[_COUNTS[0] / count for count in _COUNTS],
-                error=error,
-                observed_order=study.order,
-            ),
-        ),
+        convergence=(order_table("moved fill ratio, relative", study, 1.0),),
     )
 
 
@@ -147,12 +136,10 @@ def _segments_for(operation: _Operation, tolerance: float) -> float:
 def _figure(error: list[float]) -> Series:
     counts = np.array(_COUNTS, dtype=np.float64)
     first_order = error[0] * counts[0] / counts
-    return Series(
-        name="error of the moved fill against the number of segments",
-        x=Axis(name="segments", unit="1", values=counts),
-        y=(
-            Curve(name="Eq. 20", unit="1", values=np.array(error), style="paper"),
-            Curve(name="first order", unit="1", values=first_order, style="reference"),
-        ),
+    return figure(
+        "error of the moved fill against the number of segments",
+        ("segments", "1", counts),
+        Curve("Eq. 20", "1", np.array(error), style="paper"),
+        Curve("first order", "1", first_order, style="reference"),
         log=True,
     )

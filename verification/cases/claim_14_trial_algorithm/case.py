@@ -1,18 +1,17 @@
 """The trial algorithm at four phases over plausible steps and periods."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
 from ringbalance.controller.simulation import Simulation
 from ringbalance.scene.models import Scene
-from ringbalance.verification.comparison import from_rounding
+from ringbalance.verification.comparison import from_range, from_rounding
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Series, Table
 from ringbalance.verification.loops import PHASES, amplitude_series, loop_scene, run_loop, settling
 
@@ -25,9 +24,7 @@ _STEPS: Final = {
 """First trial, long step, short step and period, s: each from barely visible to barely below the limit."""
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """About 40 s."""
-    return {"settling_time": Reference(value=_ABOUT, uncertainty=from_rounding(_TEN_SECONDS))}
+reference = {"settling_time": Reference(value=_ABOUT, uncertainty=from_rounding(_TEN_SECONDS))}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -44,7 +41,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     counts = [run.misadjustments for runs in sets for run in runs if run.settled]
     own = max(settling(run) for run in _own(scene))
     # Any of the sets may have been the paper's: the spread over them is the input's.
-    standard_uncertainty = float(np.ptp(settled)) / (2 * math.sqrt(3))
+    standard_uncertainty = from_range(settled)
     return Evidence(
         found={
             "settling_time": Found(value=float(np.mean(settled)), input=standard_uncertainty),

@@ -1,6 +1,5 @@
 """Overshoot of the target-vector algorithm over Kp, and the rule behind it."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import math
@@ -13,9 +12,9 @@ from ringbalance.controller.simulation import Simulation
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.models import Scene
-from ringbalance.verification.calibrations import calibration_of
+from ringbalance.verification.comparison import from_range
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table
-from ringbalance.verification.loops import amplitude_series, loop_scene, run_loop, settling
+from ringbalance.verification.loops import amplitude_series, calibration_of, loop_scene, run_loop, settling
 
 _GAINS: Final = (0.04e6, 0.08e6, 0.12e6, 0.16e6, 0.20e6)
 """Kp of Fig. 7, s/m."""
@@ -26,14 +25,12 @@ _UNKNOWN: Final = 0.25
 """Standard uncertainty of the rate, relative: influence coefficient and bore are not in the paper."""
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """Between 0.12 and 0.16, and half a turn."""
-    middle = (_LAST_WITHOUT + _FIRST_WITH) / 2
-    between = (_FIRST_WITH - _LAST_WITHOUT) / (2 * math.sqrt(3))
-    return {
-        "onset": Reference(value=middle, uncertainty=between),
-        "overshoot_turn": Reference(value=math.pi),
-    }
+_BETWEEN: Final = (_LAST_WITHOUT, _FIRST_WITH)
+
+reference = {
+    "onset": Reference(value=sum(_BETWEEN) / 2, uncertainty=from_range(_BETWEEN)),
+    "overshoot_turn": Reference(value=math.pi),
+}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

@@ -1,6 +1,5 @@
 """The target-vector algorithm over amplitudes and periods."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import dataclasses
@@ -8,42 +7,42 @@ import math
 from collections.abc import Mapping
 from typing import Final
 
-import numpy as np
-
 from ringbalance.controller.simulation import Simulation
 from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.scene.models import Scene
-from ringbalance.verification.calibrations import calibration_of
-from ringbalance.verification.evidence import Evidence, Found, Level, Table, no_reference
-from ringbalance.verification.loops import AMPLITUDES, amplitude_series, loop_scene, run_loop, settling
+from ringbalance.verification.comparison import from_range
+from ringbalance.verification.evidence import Evidence, Found, Level, Table
+from ringbalance.verification.loops import (
+    AMPLITUDES,
+    amplitude_series,
+    calibration_of,
+    loop_scene,
+    run_loop,
+    settling,
+)
 
 _PERIODS: Final = (0.25, 0.5, 1.0)
 _BOUND: Final = 5.0
 _WRONG: Final = math.radians(120)
 
 
-reference = no_reference
-
-
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """Runs over amplitudes and periods under the paper's law; amplitudes under the calibrated one."""
     given = _mistaken(scene) if defect == "lag_angle_wrong" else scene
     runs = {period: _runs(given, period) for period in _PERIODS}
-    slowest = np.array([min(max(map(settling, group)), scene.run.time_limit) for group in runs.values()])
-    rises = np.array([max(run.misadjustments for run in group) for group in runs.values()])
+    slowest = [min(max(map(settling, group)), scene.run.time_limit) for group in runs.values()]
+    rises = [max(run.misadjustments for run in group) for group in runs.values()]
     calibrated = _short_runs(given)
     return Evidence(
         found={
             # The period may be any of these: the spread over them is the input's.
-            "settling_time": Found(
-                value=float(slowest[1]), input=float(np.ptp(slowest)) / (2 * math.sqrt(3))
-            ),
-            "misadjustments": Found(value=float(rises[1]), input=float(np.ptp(rises)) / (2 * math.sqrt(3))),
+            "settling_time": Found(value=slowest[1], input=from_range(slowest)),
+            "misadjustments": Found(value=float(rises[1]), input=from_range(rises)),
         },
         numbers={
-            "fastest": float(slowest[0]),
-            "middle": float(slowest[1]),
-            "slowest": float(slowest[2]),
+            "fastest": slowest[0],
+            "middle": slowest[1],
+            "slowest": slowest[2],
             "rises_slow": float(rises[2]),
             "ratio": _flow_ratio(scene),
             "calibrated_settled": float(sum(settling(run) <= _BOUND for run in calibrated)),

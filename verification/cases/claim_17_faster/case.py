@@ -1,6 +1,5 @@
 """Both algorithms side by side at four phases and several periods."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import dataclasses
@@ -11,7 +10,7 @@ import numpy as np
 
 from ringbalance.controller.simulation import Simulation
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Evidence, Found, Level, Table, no_reference
+from ringbalance.verification.evidence import Evidence, Found, Level, Table
 from ringbalance.verification.loops import (
     PHASES,
     amplitude_series,
@@ -25,9 +24,6 @@ _PERIODS: Final = (0.25, 0.5, 1.0)
 _TRIAL: Final = {"first_trial": 0.02, "long_step": 0.1, "short_step": 0.005}
 """Steps with which the trial algorithm settles at every phase, s."""
 _WRONG: Final = math.radians(120)
-
-
-reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

@@ -1,6 +1,5 @@
 """The largest fill that leaves a point of the chamber dry at every angle, at rest and at every speed."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -13,16 +12,7 @@ from ringbalance.mesh.geometry import half_angle, surface_radius
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.comparison import from_half_width
-from ringbalance.verification.evidence import (
-    Axis,
-    Curve,
-    Evidence,
-    Found,
-    Level,
-    NotRunError,
-    Series,
-    no_reference,
-)
+from ringbalance.verification.evidence import Curve, Evidence, Found, Level, NotRunError, Series, figure
 
 _GRIDS = ((30, 45), (60, 90))
 """Radial and angular cells, coarse and fine."""
@@ -43,9 +33,6 @@ class _Cells:
     """Of the chamber's area."""
     width: FloatArray
     """Distance over which the surface passes a cell, m."""
-
-
-reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -147,17 +134,10 @@ def _figure(disc: Disc, cells: _Cells, offset: float) -> Series:
     radius = np.linspace(disc.inner_radius, disc.outer_radius, 61)
     rest = np.array([_safe_at_rest(cells, r, _ANGLES[::4]) for r in radius])
     running = np.array([_safe_turning(cells, r, np.array([offset]), _ANGLES[::30]) for r in radius])
-    return Series(
-        name="largest fill that leaves the gas hole dry",
-        x=Axis(name="radius of the hole on the centre line", unit="m", values=radius),
-        y=(
-            Curve(name="running", unit="1", values=running),
-            Curve(name="stopped, worst angle", unit="1", values=rest),
-            Curve(
-                name="largest fill",
-                unit="1",
-                values=np.full(radius.shape, disc.max_fill_ratio),
-                style="paper",
-            ),
-        ),
+    return figure(
+        "largest fill that leaves the gas hole dry",
+        ("radius of the hole on the centre line", "m", radius),
+        Curve("running", "1", running),
+        Curve("stopped, worst angle", "1", rest),
+        Curve("largest fill", "1", np.full(radius.shape, disc.max_fill_ratio), style="paper"),
     )

@@ -1,24 +1,20 @@
 """What the same gas pressure achieves with a liquid of twice the density."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 from scipy.optimize import brentq
 
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
-from ringbalance.verification.reference.exact_chamber import exact_moment, exact_wall_pressure
-from ringbalance.verification.rings import found_of, ring
+from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, Series, figure
+from ringbalance.verification.reference.exact_chamber import exact_moment, wall_pressure_of
+from ringbalance.verification.rings import found_of, ring_of
 
-
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """A free gain: no more pressure, twice the ability."""
-    return {"pressure_ratio": Reference(value=1.0), "gain": Reference(value=2.0)}
+reference = {"pressure_ratio": Reference(value=1.0), "gain": Reference(value=2.0)}
+"""A free gain: no more pressure, twice the ability."""
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -51,21 +47,11 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 
 def _stall_by_elements(scene: Scene, density: float) -> Found:
     """Wall pressure of a full opposite chamber: what the gas has to overcome when the driven one is empty."""
-    quantities = ring(
-        disc=scene.disc,
-        density=density,
-        angular_velocity=scene.rotor.speed,
-        fills=(scene.disc.max_fill_ratio,),
-    )
-    return found_of(quantities, "wall_pressure", 0)
+    return found_of(ring_of(scene, (scene.disc.max_fill_ratio,), density=density), "wall_pressure", 0)
 
 
 def _wall(scene: Scene, density: float, fill: float) -> float:
-    return float(
-        exact_wall_pressure(
-            disc=scene.disc, density=density, angular_velocity=scene.rotor.speed, fill_ratio=fill
-        )
-    )
+    return float(wall_pressure_of(scene, fill, density=density))
 
 
 def _reach(scene: Scene, density: float, pressure: float) -> float:
@@ -102,11 +88,9 @@ def _figure(scene: Scene) -> Series:
         density = factor * scene.liquid.density
         return np.array([_ability(scene, density, _reach(scene, density, float(p))) for p in pressure])
 
-    return Series(
-        name="ability of a pair against the gas pressure",
-        x=Axis(name="gas pressure", unit="Pa", values=pressure),
-        y=(
-            Curve(name="the scene's liquid", unit="kg m", values=ability(1.0)),
-            Curve(name="twice as dense", unit="kg m", values=ability(2.0)),
-        ),
+    return figure(
+        "ability of a pair against the gas pressure",
+        ("gas pressure", "Pa", pressure),
+        Curve("the scene's liquid", "kg m", ability(1.0)),
+        Curve("twice as dense", "kg m", ability(2.0)),
     )

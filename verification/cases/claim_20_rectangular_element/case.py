@@ -1,6 +1,5 @@
 """The integral of Eq. 11 against finite elements, and against the force balance of the whole liquid."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import dataclasses
@@ -12,15 +11,15 @@ from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.pressure.ring import RingQuantities
 from ringbalance.scene.models import Scene
 from ringbalance.verification.comparison import from_half_width
-from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
-from ringbalance.verification.reference.exact_chamber import exact_moment, exact_wall_pressure
+from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, Series, figure
+from ringbalance.verification.reference.exact_chamber import exact_moment, wall_pressure_of
 from ringbalance.verification.rings import found_of, mesh_table, ring_of
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
     """The integral of Eq. 11, and a balance of one."""
-    pressure = _integrated(scene, np.array([scene.disc.max_fill_ratio]))
-    return {"wall_pressure": Reference(value=float(pressure[0])), "force_balance": Reference(value=1.0)}
+    pressure = float(wall_pressure_of(scene, scene.disc.max_fill_ratio))
+    return {"wall_pressure": Reference(value=pressure), "force_balance": Reference(value=1.0)}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -32,19 +31,10 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         pressure = dataclasses.replace(pressure, value=_whole_ring(scene))
     return Evidence(
         found={"wall_pressure": pressure, "force_balance": _balance(scene, ring)},
-        numbers={"whole_ring": 1 - _whole_ring(scene) / float(_integrated(scene, np.array([fills[-1]]))[0])},
+        numbers={"whole_ring": 1 - _whole_ring(scene) / float(wall_pressure_of(scene, fills[-1]))},
         series=(_figure(scene, ring),),
         convergence=(mesh_table(ring, "wall_pressure", "Pa", len(fills) - 1),),
         status=ring.status,
-    )
-
-
-def _integrated(scene: Scene, fill: np.ndarray) -> np.ndarray:
-    return exact_wall_pressure(
-        disc=scene.disc,
-        density=scene.liquid.density,
-        angular_velocity=scene.rotor.speed,
-        fill_ratio=fill,
     )
 
 
@@ -65,12 +55,10 @@ def _balance(scene: Scene, ring: RingQuantities) -> Found:
 
 
 def _figure(scene: Scene, ring: RingQuantities) -> Series:
-    integrated = _integrated(scene, ring.fill_ratio)
-    return Series(
-        name="pressure on the outer wall",
-        x=Axis(name="fill ratio", unit="1", values=ring.fill_ratio),
-        y=(
-            Curve(name="finite elements", unit="Pa", values=ring.wall_pressure.value),
-            Curve(name="Eq. 11 integrated", unit="Pa", values=integrated, style="paper"),
-        ),
+    integrated = wall_pressure_of(scene, ring.fill_ratio)
+    return figure(
+        "pressure on the outer wall",
+        ("fill ratio", "1", ring.fill_ratio),
+        Curve("finite elements", "Pa", ring.wall_pressure.value),
+        Curve("Eq. 11 integrated", "Pa", integrated, style="paper"),
     )

@@ -1,6 +1,5 @@
 """Balances on meshes with a free surface found under gravity."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
@@ -16,8 +15,8 @@ from ringbalance.physics.pressure.solve import FREE_SURFACE, PressureSolution, R
 from ringbalance.physics.pressure.surface import solve_with_gravity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Evidence, Found, Level, no_reference
-from ringbalance.verification.reference.gravity_study import tilted_liquid
+from ringbalance.verification.evidence import Evidence, Found, Level
+from ringbalance.verification.reference.gravity import tilted_liquid
 from ringbalance.verification.rings import ring_of
 
 _FILL_SHARE: Final = 0.8
@@ -31,9 +30,6 @@ class _Balance:
     torque: float
     flux: float
     volume: float
-
-
-reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

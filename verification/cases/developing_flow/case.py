@@ -1,9 +1,7 @@
 """Decay rates along the turning tube: creeping flow at rest, fast rotation, and the bound that k(u) uses."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
-from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
@@ -41,9 +39,7 @@ _MESHES: Final = MappingProxyType(
 _SPEED: Final = MappingProxyType({None: 1.0, "radius_for_bore": 1.0, "coriolis_too_weak": 0.7})
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """The exact rates."""
-    return {"fast": Reference(value=_GEOSTROPHIC)}
+reference = {"fast": Reference(value=_GEOSTROPHIC)}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

@@ -1,6 +1,5 @@
 """The printed force beside the largest one, and the corrected bound beside a run."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters

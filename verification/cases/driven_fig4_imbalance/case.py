@@ -1,6 +1,5 @@
 """Four imbalances estimated, and the covariances that the printed time needs."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import numpy as np

@@ -1,6 +1,5 @@
 """Two friction arms found while both masses go round."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import numpy as np

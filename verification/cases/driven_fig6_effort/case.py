@@ -1,6 +1,5 @@
 """Effort over the speed under four ways of compensating friction."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from ringbalance.scene.models import Scene

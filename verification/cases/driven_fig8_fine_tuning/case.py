@@ -1,6 +1,5 @@
 """Masses ten degrees beside their targets, then tuned by trial."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import numpy as np

@@ -1,6 +1,5 @@
 """The run-up, balanced at low speed and locked."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from collections.abc import Mapping

@@ -1,6 +1,5 @@
 """The designed set, the axes and the maps of the extremes; a heavy run."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import tomllib
@@ -9,7 +8,7 @@ from typing import Final
 from ringbalance.scene import bundled_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.platform.files import cache_folder
-from ringbalance.verification.evidence import Evidence, Found, Level, Table, no_reference
+from ringbalance.verification.evidence import Evidence, Found, Level, Table
 from ringbalance.verification.extremes.design import Base
 from ringbalance.verification.extremes.point import SOUND, Defect, Ending
 from ringbalance.verification.extremes.study import (
@@ -38,9 +37,6 @@ _NUMBERS: Final = {
     "status": Ending.STATUS,
     "refused": Ending.REFUSED,
 }
-
-
-reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

@@ -1,6 +1,5 @@
 """Friction factors against smooth-tube and rough-tube measurements."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -13,7 +12,7 @@ import numpy as np
 from ringbalance.physics.tube.friction import friction_factor, friction_uncertainty
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series, no_reference
+from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
 from ringbalance.verification.published import read_rows
 
 Friction = Callable[[FloatArray, FloatArray], FloatArray]
@@ -36,9 +35,6 @@ class _Points:
     """Darcy."""
     uncertainty: float
     """Expanded uncertainty (95 %), relative."""
-
-
-reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -120,12 +116,10 @@ def _figure(friction: Friction, points: _Points) -> Series:
     half_width = np.array(
         [float(friction_uncertainty(reynolds=re, relative_roughness=0.0)) for re in points.reynolds]
     )
-    return Series(
-        name="friction factor of a smooth tube",
-        x=Axis(name="Reynolds number", unit="1", values=points.reynolds),
-        y=(
-            Curve(name="found", unit="1", values=near, uncertainty=half_width),
-            Curve(name="McKeon et al. (2004)", unit="1", values=points.friction, style="reference"),
-        ),
+    return figure(
+        "friction factor of a smooth tube",
+        ("Reynolds number", "1", points.reynolds),
+        Curve("found", "1", near, uncertainty=half_width),
+        Curve("McKeon et al. (2004)", "1", points.friction, style="reference"),
         log=True,
     )

@@ -1,6 +1,5 @@
 """Three-mesh grid convergence against the published worked examples."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
@@ -10,7 +9,7 @@ from typing import Final
 
 from ringbalance.physics.convergence.grid import GridConvergence, Verdict, gci
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Evidence, Found, Level, Table, no_reference
+from ringbalance.verification.evidence import Evidence, Found, Level, Table
 from ringbalance.verification.published import read_rows
 
 _FORMAL_ORDER: Final = 2.0
@@ -27,9 +26,6 @@ class _Column:
     values: tuple[float, ...]
     sizes: tuple[float, ...]
     printed: Mapping[str, tuple[float, ...]]
-
-
-reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

@@ -6,25 +6,14 @@ from typing import Final
 
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Evidence, Level, no_reference
-from ringbalance.verification.reference.gravity_study import gravity_evidence, gravity_study
+from ringbalance.verification.evidence import Evidence, Level
+from ringbalance.verification.reference.gravity import gravity_evidence
 
-_FILL_SHARE: Final = 0.8
 _LEVELS: Final = {"light": (1, 2, 3, 4), "heavy": (1, 2, 4, 8)}
-
-
-reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """Errors of surface and pressure over levels."""
     angular = default_cells(disc=scene.disc)[1] // 8
-    study = gravity_study(
-        disc=scene.disc,
-        density=scene.liquid.density,
-        fill_ratio=_FILL_SHARE * scene.disc.max_fill_ratio,
-        cells=[(n, angular * n, n) for n in _LEVELS[level]],
-        shaft="vertical",
-        defect=defect,
-    )
-    return gravity_evidence(study)
+    cells = [(n, angular * n, n) for n in _LEVELS[level]]
+    return gravity_evidence(scene, cells=cells, shaft="vertical", defect=defect)

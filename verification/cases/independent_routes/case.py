@@ -1,6 +1,5 @@
 """Wall pressure, moment, volume and lambda by three routes."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -10,7 +9,7 @@ from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, Reference
 from ringbalance.verification.paper_numbers import with_plate
-from ringbalance.verification.reference.exact_chamber import central_lambda, exact_moment, exact_wall_pressure
+from ringbalance.verification.reference.exact_chamber import central_lambda, exact_moment, wall_pressure_of
 from ringbalance.verification.rings import found_of, mesh_table, scaled
 
 _SCALARS = {"wall_pressure": "Pa", "moment": "kg m", "liquid_volume": "m^3"}
@@ -19,14 +18,8 @@ _SCALARS = {"wall_pressure": "Pa", "moment": "kg m", "liquid_volume": "m^3"}
 def reference(scene: Scene) -> Mapping[str, Reference]:
     """The closed forms."""
     disc, full = scene.disc, scene.disc.max_fill_ratio
-    pressure = exact_wall_pressure(
-        disc=disc,
-        density=scene.liquid.density,
-        angular_velocity=scene.rotor.speed,
-        fill_ratio=full,
-    )
     values = {
-        "wall_pressure": float(pressure),
+        "wall_pressure": float(wall_pressure_of(scene, full)),
         "moment": float(exact_moment(disc=disc, density=scene.liquid.density, fill_ratio=full)),
         "volume": full * chamber_volume(disc=disc),
     }

@@ -1,6 +1,5 @@
 """Every integrator on one operation, and Eq. 20's segments into a stall."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import math
@@ -16,11 +15,14 @@ from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_law
 from ringbalance.reduced_model.paper.formulas import stall_pressure
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.verification.cases.integrator_orders.side_by_side import side_by_side, tapered_error
-from ringbalance.verification.cases.integrator_orders.slowed_law import SlowedLaw
+from ringbalance.verification.cases.integrator_orders.side_by_side import (
+    SlowedLaw,
+    side_by_side,
+    tapered_error,
+)
 from ringbalance.verification.cases.integrator_orders.stall import stall_study
-from ringbalance.verification.evidence import Convergence, Evidence, Found, Level, no_reference
-from ringbalance.verification.orders import OrderStudy, order_study
+from ringbalance.verification.evidence import Evidence, Found, Level
+from ringbalance.verification.orders import OrderStudy, order_study, order_table
 from ringbalance.verification.reference.adaptive_ode import adaptive_ode
 from ringbalance.verification.reference.explicit_segments import explicit_segments
 
@@ -37,9 +39,6 @@ _KINK: Final = 0.6
 def _kinked(fill_ratio: FloatArray, largest: float) -> FloatArray:
     """Slower in proportion to the fill once that is below a kink; continuous, not smooth."""
     return np.asarray(np.minimum(1.0, 0.5 + 0.5 * fill_ratio / (_KINK * largest)))
-
-
-reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -73,16 +72,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         numbers={"longest_for_per_mille": stall.longest_for_per_mille, "time_to_stall": _end(low)},
         series=(stall.series,),
         tables=(side_by_side(long, law, duration),),
-        convergence=(
-            Convergence(
-                quantity="fill by explicit segments, relative error",
-                unit="1",
-                formal_order=1.0,
-                size=study.size,
-                error=study.error,
-                observed_order=study.order,
-            ),
-        ),
+        convergence=(order_table("fill by explicit segments, relative error", study, 1.0),),
     )
 
 

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from ringbalance.controller.liquid_ring.closed_form import closed_form
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Drive, Integrator
+from ringbalance.reduced_model.law.flow_law import Flow
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.verification.cases.integrator_orders.slowed_law import SlowedLaw
 from ringbalance.verification.evidence import Table
 from ringbalance.verification.reference.adaptive_ode import adaptive_ode
 from ringbalance.verification.reference.explicit_segments import explicit_segments
 
-WAYS: Final[Mapping[str, Integrator]] = {
+_WAYS: Final[Mapping[str, Integrator]] = {
     "closed form": closed_form,
     "quadrature": quadrature,
     "adaptive, 1e-5": adaptive_ode(tolerance=1e-5),
@@ -31,18 +32,59 @@ WAYS: Final[Mapping[str, Integrator]] = {
 }
 
 
+@dataclass(frozen=True, kw_only=True)
+class TrialLaw:
+    """What every such law has of the paper's."""
+
+    name: str
+    base: PaperLaw
+
+    @property
+    def max_fill_ratio(self) -> float:
+        """Of the paper's law."""
+        return self.base.max_fill_ratio
+
+    def table(self) -> Mapping[str, FloatArray]:
+        """Of the paper's law."""
+        return self.base.table()
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlowedLaw(TrialLaw):
+    """The paper's law, slower in the share of its velocity that a function of the fill gives."""
+
+    share: Callable[[FloatArray, float], FloatArray]
+    """From x of the driven chamber and the largest x."""
+
+    def evaluate(
+        self,
+        *,
+        fill_ratio: npt.ArrayLike,
+        opposite_fill_ratio: npt.ArrayLike | None = None,
+        gas_pressure: npt.ArrayLike,
+        primed: npt.ArrayLike = False,
+    ) -> Flow:
+        """As the paper's law, slowed."""
+        flow = self.base.evaluate(
+            fill_ratio=fill_ratio,
+            opposite_fill_ratio=opposite_fill_ratio,
+            gas_pressure=gas_pressure,
+            primed=primed,
+        )
+        share = self.share(np.asarray(fill_ratio, dtype=np.float64), self.max_fill_ratio)
+        return replace(flow, velocity=flow.velocity * share)
+
+
 def _tapered(fill_ratio: FloatArray, largest: float) -> FloatArray:
     """Smooth, and with an exact solution of its own."""
     return np.asarray((1 + fill_ratio / largest) / 2)
 
 
-def tapered_fill(drive: Drive, law: PaperLaw, time: FloatArray) -> FloatArray:
+def _tapered_fill(drive: Drive, law: PaperLaw, time: FloatArray) -> FloatArray:
     """Exact fill under the tapered law, from a gas pressure that empties the chamber.
 
     With s = sqrt(alpha + beta x) and u = s (1 + x/x_max)/2 the fill obeys ds/dt = -(S/V) (A + D s^2)/2, so
     s = sqrt(A/D) tan(atan(s_0 sqrt(D/A)) - (S/V) sqrt(A D) t/2).
-    Args: `drive`: from a fill at which liquid flows. `law`: the paper's law. `time`: s, any shape.
-    Returns: x, of that shape.
     """
     a, b = law.velocity_squared_per_pressure, law.pressure_per_fill_difference
     alpha, beta = a * (drive.gas_pressure - b * drive.total), 2 * a * b
@@ -54,25 +96,17 @@ def tapered_fill(drive: Drive, law: PaperLaw, time: FloatArray) -> FloatArray:
 
 
 def tapered_error(drive: Drive, law: PaperLaw, time: FloatArray, way: Integrator) -> float:
-    """Largest error of an integrator under the tapered law.
-
-    Args: `drive`: under the paper's law. `law`: the paper's law. `time`: s, ascending.
-    Returns: In fill.
-    """
+    """Largest error in fill of an integrator under the tapered law."""
     found = way(replace(drive, law=SlowedLaw(name="tapered", base=law, share=_tapered)), time).fill
-    return float(np.max(np.abs(found - tapered_fill(drive, law, time))))
+    return float(np.max(np.abs(found - _tapered_fill(drive, law, time))))
 
 
 def side_by_side(drive: Drive, law: PaperLaw, duration: float) -> Table:
-    """Error at the end of a long operation, and what it costs, for every integrator.
-
-    Args: `drive`: under the paper's law. `law`: the paper's law. `duration`: s.
-    Returns: Table; the closed form has no row for the tapered law, and its own is the reference.
-    """
+    """Error at the end of a long operation, and what it costs; the closed form is the reference."""
     t = np.array([duration])
     exact = float(closed_form(drive, t).fill[-1])
     rows = []
-    for name, way in WAYS.items():
+    for name, way in _WAYS.items():
         done, count = way(drive, t), _velocities_taken(drive, law, t, way)
         tapered = math.nan if way is closed_form else tapered_error(drive, law, t, way)
         error = abs(float(done.fill[-1]) - exact)

@@ -23,11 +23,11 @@ from ringbalance.controller.liquid_ring.transfer import Drive
 from ringbalance.reduced_model.law.flow_law import Flow, Regime
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.verification.cases.integrator_orders.slowed_law import TrialLaw
-from ringbalance.verification.evidence import Axis, Curve, Series
+from ringbalance.verification.cases.integrator_orders.side_by_side import TrialLaw
+from ringbalance.verification.evidence import Curve, Series, figure
 from ringbalance.verification.reference.explicit_segments import explicit_segments
 
-COUNTS: Final = (8, 16, 32, 64, 128)
+_COUNTS: Final = (8, 16, 32, 64, 128)
 _PHASES: Final = np.linspace(1.0, 1.3, 31)
 """Durations, in units of the time to the stall: each lets the segments meet the stall differently."""
 _STARTS: Final = (0.02, 0.05, 0.1)
@@ -37,7 +37,7 @@ _CYCLES: Final = 5
 
 
 @dataclass(frozen=True, kw_only=True)
-class FullTube(TrialLaw):
+class _FullTube(TrialLaw):
     """The paper's law of a tube that stays full: beyond the stall it flows back."""
 
     name: str = "full tube"
@@ -50,10 +50,7 @@ class FullTube(TrialLaw):
         gas_pressure: npt.ArrayLike,
         primed: npt.ArrayLike = False,
     ) -> Flow:
-        """u = sign(D) sqrt(|D|) with D the paper's u^2.
-
-        Args: `fill_ratio`: x of the driven chamber, any shape. `gas_pressure`: gauge, Pa.
-        """
+        """u = sign(D) sqrt(|D|) with D the paper's u^2."""
         x, p = np.asarray(fill_ratio, dtype=np.float64), np.asarray(gas_pressure, dtype=np.float64)
         other = self.max_fill_ratio - x if opposite_fill_ratio is None else np.asarray(opposite_fill_ratio)
         squared = self.base.velocity_squared_per_pressure * (
@@ -69,7 +66,7 @@ class FullTube(TrialLaw):
 
 
 @dataclass(frozen=True, kw_only=True)
-class StallStudy:
+class _StallStudy:
     """What the runs show, each beside what the derivation says."""
 
     overshoot_share: float
@@ -85,41 +82,28 @@ class StallStudy:
     series: Series
 
 
-def stall_study(drive: Drive, law: PaperLaw, *, spoiled: bool = False) -> StallStudy:
-    """Run the segments into the stall.
-
-    Args: `drive`: under the paper's law at a pressure that stalls. `law`: the paper's law. `spoiled`: whether
-        the derivation's rate is off by a tenth on purpose.
-    """
+def stall_study(drive: Drive, law: PaperLaw, *, spoiled: bool = False) -> _StallStudy:
+    """Run the segments into the stall; `spoiled`: with the derivation's rate off by a tenth on purpose."""
     stall, per_root = _stall(drive, law)
     rate = per_root * (1.1 if spoiled else 1.0)
     end = 2 * math.sqrt(drive.fill - stall) / per_root
-    bound = np.array([(rate * end / n) ** 2 / 4 for n in COUNTS])
-    over = np.array([_overshoots(drive, stall, end, n) for n in COUNTS])
-    cycle = np.array([_cycle(drive, law, stall, end, n) for n in COUNTS])
+    bound = np.array([(rate * end / n) ** 2 / 4 for n in _COUNTS])
+    over = np.array([_overshoots(drive, stall, end, n) for n in _COUNTS])
+    cycle = np.array([_cycle(drive, law, stall, end, n) for n in _COUNTS])
     # Durations differ a little between the runs of one count, so each is compared with its own bound.
     share = over / (bound[:, None] * _PHASES**2)
-    return StallStudy(
+    return _StallStudy(
         overshoot_share=float(share.max()),
         overshoot_reach=float(share.max(axis=1).min()),
         cycle_error=float(np.max(np.abs(cycle / bound - 1))),
         limit_error=max(abs(_longest(drive, stall, d) * rate / math.sqrt(d) - 1) for d in _STARTS),
         longest_for_per_mille=2 * math.sqrt(1e-3) / rate,
-        series=Series(
-            name="fill beyond the stall against the length of a segment",
-            x=Axis(
-                name="segment over the time to the stall", unit="1", values=1 / np.array(COUNTS, dtype=float)
-            ),
-            y=(
-                Curve(
-                    name="largest step over the stall, Eq. 20",
-                    unit="1",
-                    values=over.max(axis=1),
-                    style="paper",
-                ),
-                Curve(name="cycle of a tube that stays full", unit="1", values=cycle),
-                Curve(name="kappa^2/4", unit="1", values=bound, style="reference"),
-            ),
+        series=figure(
+            "fill beyond the stall against the length of a segment",
+            ("segment over the time to the stall", "1", 1 / np.array(_COUNTS, dtype=float)),
+            Curve("largest step over the stall, Eq. 20", "1", over.max(axis=1), style="paper"),
+            Curve("cycle of a tube that stays full", "1", cycle),
+            Curve("kappa^2/4", "1", bound, style="reference"),
             log=True,
         ),
     )
@@ -140,7 +124,7 @@ def _overshoots(drive: Drive, stall: float, end: float, count: int) -> FloatArra
 
 def _cycle(drive: Drive, law: PaperLaw, stall: float, end: float, count: int) -> float:
     """Distance from the stall in which the steps of a tube that stays full end."""
-    full = replace(drive, law=FullTube(base=law))
+    full = replace(drive, law=_FullTube(base=law))
     way = explicit_segments(_CYCLES * count)
     return abs(float(way(full, np.array([_CYCLES * end])).fill[-1]) - stall)
 

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from ringbalance.mesh.chamber import default_cells
-from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.evidence import Evidence, Level, no_reference
-from ringbalance.verification.reference.manufactured_evidence import manufactured_evidence
+from typing import Final
 
-reference = no_reference
+from ringbalance.mesh.chamber import default_cells
+from ringbalance.scene.models import Scene
+from ringbalance.verification.evidence import Evidence, Level
+from ringbalance.verification.reference.manufactured import manufactured_evidence
+
+_LEVELS: Final = {"light": (1, 2, 4, 8), "heavy": (1, 2, 4, 8, 16)}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Errors over four levels, five at level heavy."""
-    return manufactured_evidence(disc=scene.disc, cells=_cells(scene.disc, level), defect=defect)
-
-
-def _cells(disc: Disc, level: Level) -> list[tuple[int, ...]]:
-    angular = default_cells(disc=disc)[1] // 8
-    return [(n, angular * n, n) for n in ((1, 2, 4, 8) if level == "light" else (1, 2, 4, 8, 16))]
+    """Errors over levels."""
+    angular = default_cells(disc=scene.disc)[1] // 8
+    cells = [(n, angular * n, n) for n in _LEVELS[level]]
+    return manufactured_evidence(disc=scene.disc, cells=cells, defect=defect)

@@ -1,34 +1,23 @@
 """Orders of velocity and pressure on the curved half section."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
+from functools import partial
 from typing import Final
 
-import numpy as np
-
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import (
-    Axis,
-    Convergence,
-    Curve,
-    Evidence,
-    Found,
-    Level,
-    Series,
-    no_reference,
-)
-from ringbalance.verification.reference.manufactured_flow import FlowStudy, flow_study
+from ringbalance.verification.evidence import Evidence, Found, Level
+from ringbalance.verification.orders import order_figure, order_table
+from ringbalance.verification.reference.manufactured_flow import flow_study
 
 _AROUND: Final = {"light": (1, 2, 4, 8), "heavy": (1, 2, 4, 8, 16)}
-
-
-reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """Errors over levels."""
     study = flow_study(around=_AROUND[level], defect=defect)
+    note = f"unknowns {', '.join(map(str, study.unknowns))}"
+    table = partial(order_table, geometry="quadratic", note=note)
     return Evidence(
         found={
             "velocity_order": Found(value=study.velocity.settled_order),
@@ -37,33 +26,9 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "pressure_error": Found(value=study.pressure.finest_error),
         },
         numbers={"unknowns": float(study.unknowns[-1])},
-        series=(_figure(study),),
-        convergence=tuple(
-            Convergence(
-                quantity=f"{name}, relative error",
-                unit="1",
-                formal_order=formal,
-                size=orders.size,
-                error=orders.error,
-                observed_order=orders.order,
-                geometry="quadratic",
-                note=f"unknowns {', '.join(map(str, study.unknowns))}",
-            )
-            for name, formal, orders in (
-                ("velocity", 3.0, study.velocity),
-                ("pressure", 2.0, study.pressure),
-            )
+        series=(order_figure({"velocity": study.velocity, "pressure": study.pressure}),),
+        convergence=(
+            table("velocity, relative error", study.velocity, 3.0),
+            table("pressure, relative error", study.pressure, 2.0),
         ),
-    )
-
-
-def _figure(study: FlowStudy) -> Series:
-    return Series(
-        name="error against mesh size",
-        x=Axis(name="relative mesh size", unit="1", values=np.array(study.velocity.size)),
-        y=(
-            Curve(name="velocity", unit="1", values=np.array(study.velocity.error)),
-            Curve(name="pressure", unit="1", values=np.array(study.pressure.error)),
-        ),
-        log=True,
     )

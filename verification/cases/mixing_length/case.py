@@ -1,6 +1,5 @@
 """The friction formula beside a mixing-length solution, on smooth and on sand-rough walls."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 import itertools
@@ -16,7 +15,7 @@ from scipy.integrate import quad
 from ringbalance.physics.tube.friction import friction_factor, friction_uncertainty
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series, no_reference
+from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
 from ringbalance.verification.published import read_rows
 from ringbalance.verification.reference.mixing_length import MixingLength, mixing_length, mixing_length_flow
 
@@ -53,9 +52,6 @@ class _Points:
     """ks/d."""
     friction: FloatArray
     """Darcy."""
-
-
-reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -147,13 +143,11 @@ def _figure(by_length: Friction) -> Series:
     shown = np.isclose(sand.roughness, 0.5 / _SHOWN)
     reynolds, roughness = sand.reynolds[shown], sand.roughness[shown]
     one = _Points(reynolds=reynolds, roughness=roughness, friction=_formula(reynolds, roughness))
-    return Series(
-        name=f"friction factor on sand of R/ks = {_SHOWN:.0f}",
-        x=Axis(name="Reynolds number", unit="1", values=reynolds),
-        y=(
-            Curve(name="formula", unit="1", values=one.friction, uncertainty=_bar(one) * one.friction),
-            Curve(name="mixing length", unit="1", values=by_length(reynolds, roughness), style="paper"),
-            Curve(name="Nikuradse (1933)", unit="1", values=sand.friction[shown], style="reference"),
-        ),
+    return figure(
+        f"friction factor on sand of R/ks = {_SHOWN:.0f}",
+        ("Reynolds number", "1", reynolds),
+        Curve("formula", "1", one.friction, uncertainty=_bar(one) * one.friction),
+        Curve("mixing length", "1", by_length(reynolds, roughness), style="paper"),
+        Curve("Nikuradse (1933)", "1", sand.friction[shown], style="reference"),
         log=True,
     )

@@ -3,22 +3,18 @@
 The loss of the tube on twelve scenes and the chamber of one; `model_choice_many` has the rest.
 """
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from typing import Final
 
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Evidence, Level, no_reference
+from ringbalance.verification.evidence import Evidence, Level
 from ringbalance.verification.selection_studies.choices import CHAMBER
 from ringbalance.verification.selection_studies.evidence import choices_evidence
 
 SCENES: Final = 12
 _ALONE: Final = 2
 """Number of the one scene whose chamber is judged."""
-
-
-reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

@@ -4,13 +4,12 @@ Chamber, loss and velocity on all of them, the mass moved by one operation and t
 tenth.
 """
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
 from typing import Final
 
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Evidence, Level, no_reference
+from ringbalance.verification.evidence import Evidence, Level
 from ringbalance.verification.selection_studies.choices import CHAMBER
 from ringbalance.verification.selection_studies.evidence import choices_evidence
 
@@ -18,9 +17,6 @@ SCENES: Final = 300
 _FEW: Final = 12
 """Scenes on which a mutation shows."""
 _TENTH: Final = 10
-
-
-reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

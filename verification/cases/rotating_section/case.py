@@ -1,9 +1,7 @@
 """The rotating section at rest, in slow rotation and in fast rotation."""
 
-# ruff: noqa: ARG001 - every case has the uniform case interface
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
@@ -17,7 +15,7 @@ from ringbalance.physics.navier_stokes.rotating_section import (
     solve_section_without_inertia,
 )
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
+from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, Series, figure
 
 _SERIES: Final = 9216.0
 _INERTIA_SERIES: Final = 16515072.0
@@ -29,13 +27,12 @@ _FACTORS: Final = {None: 1.0, "coriolis_off_by_a_percent": 1.01, "radius_for_bor
 _AROUND: Final = {"light": 8, "heavy": 20}
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
-    """The exact limits."""
-    return {
-        "slow": Reference(value=1.0),
-        "inertia": Reference(value=1.0),
-        "ekman": Reference(value=float(np.sqrt(10))),
-    }
+reference = {
+    "slow": Reference(value=1.0),
+    "inertia": Reference(value=1.0),
+    "ekman": Reference(value=float(np.sqrt(10))),
+}
+"""Exact limits."""
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -70,13 +67,11 @@ def _linear(system: FlowSystem, rotation: float) -> float:
 
 def _figure(fast: np.ndarray) -> Series:
     rotation = np.array(_FAST)
-    return Series(
-        name="friction over that at rest, without inertia",
-        x=Axis(name="rotation Reynolds number", unit="1", values=rotation),
-        y=(
-            Curve(name="finite elements", unit="1", values=fast),
-            Curve(name="slow series", unit="1", values=1 + rotation**2 / _SERIES, style="reference"),
-            Curve(name="fast limit", unit="1", values=_LIMIT * np.sqrt(rotation), style="reference"),
-        ),
+    return figure(
+        "friction over that at rest, without inertia",
+        ("rotation Reynolds number", "1", rotation),
+        Curve("finite elements", "1", fast),
+        Curve("slow series", "1", 1 + rotation**2 / _SERIES, style="reference"),
+        Curve("fast limit", "1", _LIMIT * np.sqrt(rotation), style="reference"),
         log=True,
     )

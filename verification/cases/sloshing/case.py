@@ -11,7 +11,7 @@ from ringbalance.physics.sloshing.modes import resonant_fills, sloshing_modes
 from ringbalance.physics.sloshing.response import SloshingResponse, sloshing_response
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series, no_reference
+from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
 from ringbalance.verification.reference.sloshing_exact import (
     cosine_amplification,
     cosine_frequencies,
@@ -25,9 +25,6 @@ _POINTS: Final = {"light": 13, "heavy": 49}
 _COARSE: Final = ((8, 24), (4, 12), (2, 6))
 """Meshes of the figures: three digits."""
 _CORIOLIS: Final = {"coriolis_off_by_a_percent": 1.01}
-
-
-reference = no_reference
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -114,25 +111,18 @@ def _response(scene: Scene, fills: FloatArray) -> SloshingResponse:
 
 
 def _frequencies_figure(fills: FloatArray, ratios: FloatArray) -> Series:
-    return Series(
-        name="natural frequencies over the speed",
-        x=Axis(name="fill ratio", unit="1", values=fills),
-        y=(
-            *(
-                Curve(name=f"mode {n + 1}", unit="1", values=np.array(column))
-                for n, column in enumerate(ratios.T)
-            ),
-            Curve(name="gravity, once a turn", unit="1", values=np.ones_like(fills), style="reference"),
-        ),
+    return figure(
+        "natural frequencies over the speed",
+        ("fill ratio", "1", fills),
+        *(Curve(f"mode {n + 1}", "1", np.array(column)) for n, column in enumerate(ratios.T)),
+        Curve("gravity, once a turn", "1", np.ones_like(fills), style="reference"),
     )
 
 
 def _swings_figure(fills: FloatArray, swings: FloatArray) -> Series:
-    return Series(
-        name="swing of the moment over that of a surface that follows gravity at once",
-        x=Axis(name="fill ratio", unit="1", values=fills),
-        y=(
-            Curve(name="with inertia and Coriolis force", unit="1", values=swings),
-            Curve(name="quasi-static", unit="1", values=np.ones_like(fills), style="reference"),
-        ),
+    return figure(
+        "swing of the moment over that of a surface that follows gravity at once",
+        ("fill ratio", "1", fills),
+        Curve("with inertia and Coriolis force", "1", swings),
+        Curve("quasi-static", "1", np.ones_like(fills), style="reference"),
     )

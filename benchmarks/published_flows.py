@@ -28,20 +28,6 @@ from ringbalance.physics.navier_stokes.newton import (
 from ringbalance.physics.navier_stokes.space import at_points, taylor_hood
 from ringbalance.scene.arrays import FloatArray
 
-__all__ = [
-    "CylinderForces",
-    "FieldErrors",
-    "TaylorCouette",
-    "cavity_flow",
-    "cylinder_flow",
-    "cylinder_forces",
-    "cylinder_mesh",
-    "field_errors",
-    "kovasznay",
-    "kovasznay_flow",
-    "taylor_couette",
-]
-
 Field = Callable[[FloatArray], FloatArray]
 
 

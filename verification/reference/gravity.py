@@ -1,0 +1,244 @@
+"""The exact quasi-static ring under gravity, and finite elements compared with it over several levels.
+
+Its surface is a circle about -g/omega^2, or a paraboloid about the shaft:
+
+p = rho omega^2 (|r + g/omega^2|^2 - c^2)/2 across the shaft, p = rho (omega^2 (r^2 - c^2)/2 - g z) along it;
+c from the liquid's volume, by quadrature of the closed-form area.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import brentq
+
+from ringbalance.mesh.geometry import half_angle, liquid_area, surface_radius
+from ringbalance.physics.pressure.assembly import at_cells, volume_points
+from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, places
+from ringbalance.physics.pressure.surface import solve_with_gravity
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Disc, Scene, Shaft
+from ringbalance.verification.evidence import Evidence, Found
+from ringbalance.verification.orders import order_figure, order_study, order_table
+
+_GAUSS: Final = 60
+_TILT: Final = 0.1
+"""Largest g/(omega^2 R1): a surface so tilted that a concentric one would be visibly wrong."""
+_ROOM: Final = 0.3
+"""Share of the room between surface and walls that the tilt may take."""
+_DIRECTION: Final = 0.6
+"""Of gravity from the chamber's centre line, rad: no axis of symmetry."""
+_GRAVITY: Final = 9.80665
+_FILL_SHARE: Final = 0.8
+"""Of the largest fill, in the study."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExactRing:
+    """The free surface and the pressure below it, exactly."""
+
+    density: float
+    """rho, kg/m^3."""
+    angular_velocity: float
+    """omega, rad/s."""
+    offset: tuple[float, float]
+    """g/omega^2 across the shaft in the chamber's axes, m."""
+    axial: float
+    """g/omega^2 along the negative z axis, m; zero across the shaft."""
+    level: float
+    """c, m."""
+
+    def radius(self, angle: npt.ArrayLike, axial_place: npt.ArrayLike = 0.0) -> FloatArray:
+        """Radius of the free surface.
+
+        Args: `angle`: from the chamber's centre line, rad, any shape. `axial_place`: z, m, broadcasts.
+        Returns: r, m.
+        Source: r^2 + 2 r G.e_r + |G|^2 = c^2 with G = g/omega^2; r^2 = c^2 + 2 G z along the shaft.
+        """
+        phi, z = np.asarray(angle, dtype=np.float64), np.asarray(axial_place, dtype=np.float64)
+        along = self.offset[0] * np.cos(phi) + self.offset[1] * np.sin(phi)
+        across = self.offset[0] ** 2 + self.offset[1] ** 2
+        return np.asarray(-along + np.sqrt(along**2 + self.level**2 - across + 2 * self.axial * z))
+
+    def pressure(self, places: FloatArray) -> FloatArray:
+        """Pressure of the liquid, the gas counted as zero.
+
+        Args: `places`: m, shape (2 or 3, ...).
+        Returns: Pa.
+        """
+        square = (places[0] + self.offset[0]) ** 2 + (places[1] + self.offset[1]) ** 2
+        depth = self.axial * places[2] if len(places) == 3 else 0.0
+        scale = self.density * self.angular_velocity**2
+        return np.asarray(scale * ((square - self.level**2) / 2 - depth))
+
+
+def exact_ring(
+    *,
+    disc: Disc,
+    density: float,
+    angular_velocity: float,
+    fill_ratio: float,
+    across: tuple[float, float] = (0.0, 0.0),
+    along: float = 0.0,
+) -> ExactRing:
+    """The ring that holds a fill ratio under gravity.
+
+    Args: `density`: rho, kg/m^3. `angular_velocity`: omega, rad/s. `fill_ratio`: x. `across`: gravity across
+        the shaft in the chamber's axes, m/s^2. `along`: gravity along the negative z axis, m/s^2.
+    Raises: ValueError: gravity so strong that no closed ring holds the liquid.
+    """
+    square = angular_velocity**2
+    target = fill_ratio * float(liquid_area(disc=disc, surface_radius=disc.inner_radius))
+    middle = float(surface_radius(disc=disc, fill_ratio=fill_ratio))
+
+    def ring(level: float) -> ExactRing:
+        return ExactRing(
+            density=density,
+            angular_velocity=angular_velocity,
+            offset=(across[0] / square, across[1] / square),
+            axial=along / square,
+            level=level,
+        )
+
+    area = _mean_area_along if along else _area_across
+    reach = 1.5 * float(np.hypot(*across)) / square + 1.5 * along / square * disc.axial_width / middle
+    level = brentq(
+        lambda c: area(disc, ring(c)) - target, middle - reach, middle + reach, xtol=1e-17, rtol=1e-15
+    )
+    return ring(float(level))
+
+
+def _rule() -> tuple[FloatArray, FloatArray]:
+    abscissa, weight = np.polynomial.legendre.leggauss(_GAUSS)
+    return np.asarray(abscissa), np.asarray(weight)
+
+
+def _on_rays(disc: Disc, radius: Callable[[FloatArray], FloatArray], eta: FloatArray) -> FloatArray:
+    """Surface radius on the rays phi = eta alpha(r), whose angle depends on the radius through the plates."""
+    r = np.full(eta.shape, disc.outer_radius)
+    for _ in range(100):
+        update = radius(eta * half_angle(disc=disc, radius=r))
+        if np.max(np.abs(update - r)) < 1e-16:
+            break
+        r = update
+    return r
+
+
+def _area_across(disc: Disc, ring: ExactRing) -> float:
+    """With phi = eta alpha(r) the area element is alpha r dr d eta, so each ray holds half of A(r_s)."""
+    eta, weight = _rule()
+    return float(weight @ liquid_area(disc=disc, surface_radius=_on_rays(disc, ring.radius, eta)) / 2)
+
+
+def _mean_area_along(disc: Disc, ring: ExactRing) -> float:
+    zeta, weight = _rule()
+    radius = ring.radius(np.zeros_like(zeta), disc.axial_width / 2 * zeta)
+    return float(weight @ liquid_area(disc=disc, surface_radius=radius) / 2)
+
+
+def gravity_evidence(
+    scene: Scene, *, cells: Sequence[tuple[int, ...]], shaft: Shaft, defect: str | None
+) -> Evidence:
+    """Find the free surface on a sequence of meshes, and compare it with the exact one.
+
+    Args: `cells`: of each level, coarse to fine, halving h each time. `shaft`: "horizontal" for gravity
+        across the chamber, "vertical" for gravity along the shaft. `defect`: "gravity_sign_flipped",
+        "source_off_by_a_percent" or "wall_condition_off_by_a_percent".
+    Raises: ValueError: a search or solve that failed on some level.
+    """
+    disc, fill = scene.disc, _FILL_SHARE * scene.disc.max_fill_ratio
+    true = tilted_liquid(disc=disc, density=scene.liquid.density, fill_ratio=fill, shaft=shaft)
+    exact = exact_ring(
+        disc=disc,
+        density=true.density,
+        angular_velocity=true.angular_velocity,
+        fill_ratio=fill,
+        across=(true.gravity[0], true.gravity[1]),
+        along=-sum(true.gravity[2:]),
+    )
+    liquid = _spoiled(true, defect)
+    solutions = [solve_with_gravity(disc=disc, liquid=liquid, fill_ratio=fill, cells=c) for c in cells]
+    for solution in solutions:
+        if not solution.status.ok:
+            raise ValueError(solution.status.text)
+    size = [cells[0][0] / count[0] for count in cells]
+    surface = order_study(size=size, error=[_surface_error(disc, s, exact) for s in solutions])
+    field = order_study(size=size, error=[_field_error(s, exact) for s in solutions])
+    volume = max(abs(s.statistics.extra["volume_error"]) for s in solutions)
+    middle = float(surface_radius(disc=disc, fill_ratio=fill))
+    note = "cells " + ", ".join(" x ".join(map(str, count)) for count in cells)
+    table = partial(order_table, formal_order=3.0, geometry="quadratic", note=note)
+    return Evidence(
+        found={
+            "surface_order": Found(value=surface.settled_order),
+            "surface_error": Found(value=surface.finest_error),
+            "field_order": Found(value=field.settled_order),
+            "field_error": Found(value=field.finest_error),
+            "volume_error": Found(value=volume),
+        },
+        numbers={"tilt": _GRAVITY / (true.angular_velocity**2 * middle), "direction": _DIRECTION},
+        series=(order_figure({"free surface": surface, "pressure field": field}),),
+        convergence=(
+            table("place of the free surface, over the depth", surface),
+            table("pressure field, relative error", field),
+        ),
+    )
+
+
+def tilted_liquid(*, disc: Disc, density: float, fill_ratio: float, shaft: Shaft) -> RotatingLiquid:
+    """Liquid that turns so slowly that gravity tilts its surface far, yet leaves the ring closed.
+
+    Args: `density`: rho, kg/m^3. `fill_ratio`: x. `shaft`: "horizontal" for gravity across the chamber, at no
+        angle of symmetry; "vertical" for gravity along the shaft.
+    Returns: RotatingLiquid with two components of gravity across the shaft, three along it.
+    """
+    middle = float(surface_radius(disc=disc, fill_ratio=fill_ratio))
+    speed = float(np.sqrt(_GRAVITY / _offset(disc, middle, shaft)))
+    gravity = (0.0, 0.0, -_GRAVITY) if shaft == "vertical" else _across()
+    return RotatingLiquid(density=density, angular_velocity=speed, gravity=gravity)
+
+
+def _offset(disc: Disc, middle: float, shaft: Shaft) -> float:
+    """g/omega^2, so large that the surface is far from concentric and still closed."""
+    inner, outer = disc.inner_radius, disc.outer_radius
+    if shaft == "horizontal":
+        return min(_TILT * inner, _ROOM * min(middle - inner, outer - middle))
+    return _ROOM * min(middle**2 - inner**2, outer**2 - middle**2) / disc.axial_width
+
+
+def _across() -> tuple[float, float]:
+    return _GRAVITY * float(np.cos(_DIRECTION)), _GRAVITY * float(np.sin(_DIRECTION))
+
+
+def _spoiled(liquid: RotatingLiquid, defect: str | None) -> RotatingLiquid:
+    if defect == "gravity_sign_flipped":
+        return replace(liquid, gravity=tuple(-component for component in liquid.gravity))
+    if defect == "source_off_by_a_percent":
+        return replace(liquid, source_factor=1.01)
+    if defect == "wall_condition_off_by_a_percent":
+        return replace(liquid, wall_factor=1.01)
+    if defect is not None:
+        raise ValueError(f"unknown defect {defect}")
+    return liquid
+
+
+def _surface_error(disc: Disc, solution: PressureSolution, exact: ExactRing) -> float:
+    nodes = places(solution.chamber)[:, solution.chamber.grid[0]]
+    angle = np.arctan2(nodes[1], nodes[0])
+    axial = nodes[2] if len(nodes) == 3 else np.zeros_like(angle)
+    away = np.hypot(nodes[0], nodes[1]) - exact.radius(angle, axial)
+    depth = disc.outer_radius - float(np.mean(solution.chamber.surface_radius))
+    return float(np.max(np.abs(away))) / depth
+
+
+def _field_error(solution: PressureSolution, exact: ExactRing) -> float:
+    volume = volume_points(solution.chamber.mesh)
+    true = exact.pressure(solution.chamber.length_scale * volume.points)
+    difference = at_cells(volume, solution.pressure) - true
+    squares = [np.sum(volume.weights * field**2) for field in (difference, true)]
+    return float(np.sqrt(squares[0] / squares[1]))

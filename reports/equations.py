@@ -44,8 +44,7 @@ def equations() -> Mapping[str, Equation]:
 def equation_svg(latex: str, words: str, name: str) -> str:
     """One equation as an SVG element in the current text colour, sized in the text's em.
 
-    Args: `words`: what it says, for those who cannot see it. `name`: prefix of every id within, so that two
-        equations on one page do not share glyphs.
+    Args: `name`: prefix of every id within, so that two equations on one page do not share glyphs.
     Raises: ValueError: LaTeX that cannot be set.
     """
     try:
@@ -61,11 +60,7 @@ def equation_svg(latex: str, words: str, name: str) -> str:
 
 
 def share_glyphs(page: str) -> str:
-    """Keeps one copy of each glyph for all equations of a page: equations are mostly the same letters.
-
-    Args: `page`: HTML with equations of `equation_svg`, and the line GLYPHS where the copies shall stand.
-    Returns: The page with the same look and a fraction of the bytes.
-    """
+    """Keeps one copy of each glyph for all equations of a page: equations are mostly the same letters."""
     names: dict[str, str] = {}
     renamed: dict[str, str] = {}
     for match in _SYMBOL.finditer(page):

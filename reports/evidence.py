@@ -70,13 +70,7 @@ def collect_evidence(
 ) -> Record:
     """Run everything that a report rests on, pictures excepted, and gather it in one JSON-able document.
 
-    Args:
-        level: "light" leaves heavy cases to `saved`, else `not run`.
-        scene_text: the scene file's own text, for the appendix; empty where there is none.
-        saved: case records of earlier runs, each with its `date`; one on another scene is not used.
-        workers: processes for the verification cases.
-        progress: called with the name of each stage; None for silence.
-    Returns: The document; no value in it is NaN or infinite.
+    Args: `scene_text`: the scene file's own text, for the appendix; empty where there is none.
     Raises: SceneError: a scene that cannot be calibrated or simulated.
     """
     tell = progress or (lambda _: None)
@@ -123,10 +117,7 @@ def collect_evidence(
 
 
 def versions() -> Record:
-    """Versions of this program, of Python and of the packages that numbers come from.
-
-    Returns: Versions by name; a package that is not installed is left out.
-    """
+    """Versions of this program, of Python and of the packages that numbers come from."""
     found = {"ringbalance": _version("ringbalance") or "not installed", "python": platform.python_version()}
     return found | {name: told for name in PACKAGES if (told := _version(name))}
 

@@ -1,19 +1,22 @@
-"""Numbers as a reader should meet them: no more digits than the uncertainty leaves standing."""
+"""Numbers and quantities as a reader should meet them: SI on the way in, the units that engineers of this
+field read on the way out, no more digits than the uncertainty leaves standing."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from decimal import ROUND_HALF_EVEN, Decimal
+from typing import Final
 
-THIN_SPACE = "\u202f"
-MINUS = "\u2212"
-PLUS_MINUS = "\u00a0±\u00a0"
-MISSING = "–"
+THIN_SPACE: Final = "\u202f"
+MINUS: Final = "\u2212"
+PLUS_MINUS: Final = "\u00a0±\u00a0"
+MISSING: Final = "–"
 
-_SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
-_MOST_DIGITS = 6
-_SMALLEST_PLAIN = -4
-_LARGEST_PLAIN = 6
+_SUPERSCRIPTS: Final = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+_MOST_DIGITS: Final = 6
+_SMALLEST_PLAIN: Final = -4
+_LARGEST_PLAIN: Final = 6
 
 
 def power_of_ten(exponent: int) -> str:
@@ -25,12 +28,14 @@ def _leading_exponent(value: Decimal) -> int:
     return value.adjusted() if value else 0
 
 
+def _rounded(value: Decimal, place: int) -> Decimal:
+    return value.quantize(Decimal(1).scaleb(place), rounding=ROUND_HALF_EVEN)
+
+
 def _plain(value: Decimal, decimals: int) -> str:
     """Fixed-point text with a true minus sign and thin spaces between thousands (from five digits up)."""
-    rounded = value.quantize(Decimal(1).scaleb(-decimals), rounding=ROUND_HALF_EVEN)
+    rounded = _rounded(value, -decimals)
     whole, _, fraction = f"{abs(rounded):f}".partition(".")
-    if decimals < 0:
-        whole = f"{int(rounded.copy_abs())}"
     grouped = f"{int(whole):,}".replace(",", THIN_SPACE) if len(whole) > 4 else whole
     sign = MINUS if rounded < 0 else ""
     return f"{sign}{grouped}.{fraction}" if fraction else f"{sign}{grouped}"
@@ -45,8 +50,6 @@ def _exact(value: float) -> Decimal:
 def number(value: float | None, *, digits: int = 4) -> str:
     """A number to a count of significant digits; scientific when it is very large or very small.
 
-    Args: `value`: the number; None where there is none. `digits`: significant digits, at least 1.
-    Returns: Text, with a dash for None.
     Raises: ValueError: a value that is not finite.
     """
     if value is None:
@@ -54,9 +57,7 @@ def number(value: float | None, *, digits: int = 4) -> str:
     exact = _exact(value)
     if not exact:
         return "0"
-    rounded = exact.quantize(
-        Decimal(1).scaleb(_leading_exponent(exact) - digits + 1), rounding=ROUND_HALF_EVEN
-    )
+    rounded = _rounded(exact, _leading_exponent(exact) - digits + 1)
     exponent = _leading_exponent(rounded)
     if _SMALLEST_PLAIN < exponent < _LARGEST_PLAIN:
         return _plain(rounded, max(digits - 1 - exponent, 0))
@@ -65,10 +66,8 @@ def number(value: float | None, *, digits: int = 4) -> str:
 
 
 def short(value: float | None, *, digits: int = 6) -> str:
-    """A number that was set rather than found: no trailing zeros.
+    """A prescribed number: no trailing zeros, at most so many significant digits.
 
-    Args: `value`: the number; None where there is none. `digits`: most significant digits.
-    Returns: Text, with a dash for None.
     Raises: ValueError: a value that is not finite.
     """
     body, times, power = number(value, digits=digits).partition(f"{THIN_SPACE}×")
@@ -79,8 +78,6 @@ def short(value: float | None, *, digits: int = 6) -> str:
 def fixed(value: float, decimals: int) -> str:
     """A number to a count of decimals, for a column that shares them.
 
-    Args: `decimals`: at least zero.
-    Returns: Text.
     Raises: ValueError: a value that is not finite.
     """
     return _plain(_exact(value), decimals)
@@ -89,28 +86,25 @@ def fixed(value: float, decimals: int) -> str:
 def half_width_exponent(half_width: float) -> int:
     """Decimal place to which a half-width is shown: two digits when it begins with 1 or 2, else one.
 
-    Args: `half_width`: positive, finite.
-    Returns: Exponent of ten of the last digit shown.
     Raises: ValueError: a half-width that is not positive and finite.
     Source: at most two digits, as the GUM (JCGM 100:2008, 7.2.6) asks.
     """
     if not half_width > 0:
         raise ValueError("a half-width must be positive")
-    exact = _exact(half_width)
-    leading = _leading_exponent(exact)
-    place = leading - 1 if exact.scaleb(-leading) < 3 else leading
-    rounded = exact.quantize(Decimal(1).scaleb(place), rounding=ROUND_HALF_EVEN)
-    # 0.0297 becomes 0.030 and 0.96 becomes 1.0: the rounded half-width decides.
-    leading = _leading_exponent(rounded)
-    return leading - 1 if rounded.scaleb(-leading) < 3 else leading
+    rounded = _exact(half_width)
+    # Twice: 0.0297 becomes 0.030 and 0.96 becomes 1.0, and the rounded half-width decides.
+    for _ in range(2):
+        leading = _leading_exponent(rounded)
+        place = leading - 1 if rounded.scaleb(-leading) < 3 else leading
+        rounded = _rounded(rounded, place)
+    return place
 
 
 def measured(value: float | None, half_width: float | None, *, digits: int = 4) -> str:
-    """Value ± half-width, both to the digits that the half-width leaves standing.
+    """Value ± half-width without unit, such as 72.04 ± 0.03 or (1.20 ± 0.05) × 10⁻⁶.
 
-    Args: `value`: the value; None where there is none. `half_width`: at 95 %, in the value's unit; None or
-        zero where there is none. `digits`: significant digits of the value when there is no half-width.
-    Returns: Text without unit, such as 72.04 ± 0.03 or (1.20 ± 0.05) × 10⁻⁶.
+    Both have the digits that the half-width leaves standing; without one the value has `digits`.
+    Args: `half_width`: at 95 %, in the value's unit; None or zero where there is none.
     Raises: ValueError: a value or half-width that is not finite, or a negative half-width.
     """
     if value is None or not half_width:
@@ -122,20 +116,15 @@ def measured(value: float | None, half_width: float | None, *, digits: int = 4) 
     top = max(_leading_exponent(exact), place)
     if top - place + 1 > _MOST_DIGITS:
         return f"{number(value, digits=_MOST_DIGITS)}{PLUS_MINUS}{number(half_width, digits=1)}"
-    if _SMALLEST_PLAIN < top < _LARGEST_PLAIN and place <= 0:
-        return f"{_plain(exact, -place)}{PLUS_MINUS}{_plain(width, -place)}"
-    if place > 0 and top < _LARGEST_PLAIN:
+    if top < _LARGEST_PLAIN and (place > 0 or top > _SMALLEST_PLAIN):
         return f"{_plain(exact, -place)}{PLUS_MINUS}{_plain(width, -place)}"
     body = f"{_plain(exact.scaleb(-top), top - place)}{PLUS_MINUS}{_plain(width.scaleb(-top), top - place)}"
     return f"({body}){THIN_SPACE}×{THIN_SPACE}{power_of_ten(top)}"
 
 
 def percent(fraction: float | None, *, digits: int = 2, signed: bool = False) -> str:
-    """A fraction as a percentage.
+    """A fraction as a percentage, to a count of significant digits.
 
-    Args: `fraction`: dimensionless; None where there is none. `digits`: significant digits. `signed`: whether
-        a positive one gets its plus sign.
-    Returns: Text with the percent sign.
     Raises: ValueError: a fraction that is not finite.
     """
     if fraction is None:
@@ -145,8 +134,84 @@ def percent(fraction: float | None, *, digits: int = 2, signed: bool = False) ->
 
 
 def with_unit(text: str, unit: str) -> str:
-    """A number's text with its unit, which never breaks onto the next line.
-
-    Args: `unit`: as it is shown; empty or "1" where there is none.
-    """
+    """A number's text with its unit, which never breaks onto the next line."""
     return text if unit in {"", "1"} or text == MISSING else f"{text}{THIN_SPACE}{unit}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class DisplayUnit:
+    """A unit that values are shown in: shown value = SI value * factor."""
+
+    symbol: str
+    factor: float
+    start: float = 0.0
+    """Smallest magnitude, SI, from which this unit is the one to show."""
+
+
+_Scale = tuple[str, float] | tuple[str, float, float]
+_SCALES: Final[dict[str, tuple[_Scale, ...]]] = {
+    "m": (("nm", 1e9), ("µm", 1e6, 1e-8), ("mm", 1e3, 1e-4)),
+    "Pa": (("Pa", 1.0), ("kPa", 1e-3, 1e3), ("MPa", 1e-6, 1e5)),
+    "s": (("ms", 1e3), ("s", 1.0, 0.1)),
+    "kg": (("g", 1e3), ("kg", 1.0, 10.0)),
+    "m^3": (("ml", 1e6),),
+    "m^2": (("mm²", 1e6),),
+    "kg m": (("g\u202fmm", 1e6),),
+    "m/(kg m)": (("µm/(g\u202fmm)", 1.0),),
+    "s/m": (("s/µm", 1e-6),),
+    "rad": (("°", 180 / math.pi),),
+    "rad/s": (("rpm", 30 / math.pi),),
+    "m/s": (("m/s", 1.0),),
+    "kg/m^3": (("kg/m³", 1.0),),
+    "m^2/s": (("mm²/s", 1e6),),
+    "m/s^2": (("m/s²", 1.0),),
+    "m^3/(s Pa)": (("m³/(s\u202fPa)", 1.0),),
+    "kg/m^2": (("kg/m²", 1.0),),
+    "N m": (("N\u202fm", 1.0),),
+    "1": (("", 1.0),),
+}
+"""By SI unit: symbol, factor, and the smallest magnitude (SI) from which the symbol is used."""
+
+
+def display_unit(unit: str, *values: float | None) -> DisplayUnit:
+    """The display unit that suits the largest of some SI values; an unknown unit is kept as it is."""
+    scales = _SCALES.get(unit, ((unit, 1.0),))
+    units = [DisplayUnit(symbol=s, factor=f, start=start[0] if start else 0.0) for s, f, *start in scales]
+    largest = max((abs(value) for value in values if value is not None), default=0.0)
+    # 0.1 MPa may arrive as 99 999.999 999: the last bits must not choose the unit.
+    fitting = [display for display in units if display.start <= largest * (1 + 1e-9)]
+    return fitting[-1] if largest else units[-1]
+
+
+def shown(value: float | None, unit: str, half_width: float | None = None, *, digits: int = 4) -> str:
+    """An SI quantity in the unit that suits its size, with its half-width, such as (72.04 ± 0.03) mm.
+
+    Args: `half_width`: 95 %, in `unit`; without one the value has `digits` significant digits.
+    Raises: ValueError: a value that is not finite.
+    """
+    text, symbol = shown_apart(value, unit, half_width, digits=digits)
+    wants_brackets = "±" in text and bool(symbol) and not text.startswith("(")
+    return with_unit(f"({text})" if wants_brackets else text, symbol)
+
+
+def shown_apart(
+    value: float | None, unit: str, half_width: float | None = None, *, digits: int = 4
+) -> tuple[str, str]:
+    """As `shown`, without brackets and with number and unit apart, to be set in different type.
+
+    Raises: ValueError: a value that is not finite.
+    """
+    display = display_unit(unit, value)
+    if value is None:
+        return MISSING, ""
+    width = None if half_width is None else half_width * display.factor
+    return measured(value * display.factor, width, digits=digits), display.symbol
+
+
+def given(value: float | None, unit: str, *, digits: int = 6) -> str:
+    """A prescribed SI quantity, as short as it may be, such as 0.7 MPa or 0.25.
+
+    Raises: ValueError: a value that is not finite.
+    """
+    display = display_unit(unit, value)
+    return with_unit(short(None if value is None else value * display.factor, digits=digits), display.symbol)

@@ -3,28 +3,160 @@
 from __future__ import annotations
 
 import base64
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from itertools import groupby
+from typing import Any, Final
 
 from ringbalance.reports import summary
 from ringbalance.reports.equations import equation_svg, equations
-from ringbalance.reports.figures.sections import page_figures
+from ringbalance.reports.figures.chamber import moment, pressure_error, pressure_profile, transfer_lambda
+from ringbalance.reports.figures.loop import amplitude, early_amplitude, early_time, fill_ratios, regimes
 from ringbalance.reports.figures.style import Drawing
+from ringbalance.reports.figures.tube import drag, drag_terms, flow_laws
+from ringbalance.reports.numbers import MISSING, display_unit, fixed, measured, number, percent, short, shown
 from ringbalance.reports.pages.cases import case_view
-from ringbalance.reports.pages.tables import (
-    chamber_table,
-    drag_table,
-    loop_notes,
-    mesh_facts,
-    model_row,
-    operation_tables,
-    scene_groups,
-    version_facts,
-)
+from ringbalance.reports.prose import typeset
 from ringbalance.reports.sections import drawings_in, viewed
 
 Record = dict[str, Any]
+
+FIRST_OPERATIONS: Final = 12
+"""Gas operations that are listed without being asked for."""
+
+
+def page_figures(evidence: Record) -> Record:
+    """The figures of the sections, by name; one whose evidence is missing is None."""
+    calibration, paper, runs = evidence["calibration"], evidence["paper"], evidence["closed_loop"]
+    return {
+        "pressure_profile": pressure_profile(evidence["pressure"]["profile"]),
+        "pressure_error": pressure_error(calibration["chamber"]),
+        "moment": moment(calibration["chamber"]),
+        "transfer_lambda": transfer_lambda(calibration["chamber"], calibration["lambda"], paper),
+        "drag": drag(calibration["tube"], evidence["operating_point"], paper),
+        "drag_terms": drag_terms(calibration["tube"]),
+        "flow_laws": flow_laws(evidence["flow_law"]),
+        "amplitude": amplitude(runs, evidence["limit_m"]) if runs else None,
+        "early_amplitude": early_amplitude(runs, evidence["limit_m"]) if runs else None,
+        "regimes": regimes(runs["calibrated"]) if "calibrated" in runs else None,
+        "fill_ratios": fill_ratios(runs["calibrated"], early_time(runs)) if "calibrated" in runs else None,
+    }
+
+
+def _column(values: list[float], unit: str, *, digits: int = 6) -> list[str]:
+    """One column in one unit and to one decimal place, that of its largest value's last digit."""
+    display = display_unit(unit, *values)
+    largest = max(abs(value) for value in values) * display.factor
+    decimals = max(digits - 1 - math.floor(math.log10(largest)), 0) if largest else 0
+    return [fixed(value * display.factor, decimals) for value in values]
+
+
+def _relative(values: list[float], reference: list[float]) -> list[float | None]:
+    return [value / base if base else None for value, base in zip(values, reference, strict=True)]
+
+
+def chamber_table(chamber: Record) -> Record:
+    """The chamber over its fill: heads carry the units, so that the cells are bare numbers."""
+    pressure, moment = chamber["wall_pressure_Pa"], chamber["moment_kg_m"]
+    paper, paper_moment = chamber["wall_pressure_paper_Pa"], chamber["moment_paper_kg_m"]
+    errors = [
+        [None if ratio is None else ratio - 1 for ratio in _relative(*pair)]
+        for pair in ((paper, pressure), (paper_moment, moment))
+    ]
+    columns = [
+        [short(fill) for fill in chamber["fill_ratio"]],
+        _column(chamber["free_surface_radius_m"], "m", digits=5),
+        _column(pressure, "Pa"),
+        [number(u, digits=1) for u in _relative(chamber["wall_pressure_uncertainty"], pressure)],
+        _column(paper, "Pa", digits=4),
+        [percent(error, signed=True) for error in errors[0]],
+        _column(moment, "kg m"),
+        [number(u, digits=1) for u in _relative(chamber["moment_uncertainty"], moment)],
+        _column(paper_moment, "kg m", digits=4),
+        [percent(error, signed=True) for error in errors[1]],
+    ]
+    units = {"pressure": display_unit("Pa", *pressure).symbol, "moment": display_unit("kg m", *moment).symbol}
+    return {"units": units, "rows": [list(row) for row in zip(*columns, strict=True)]}
+
+
+def drag_table(tube: Record, point: Record) -> Record:
+    """The terms of k at the tabulated velocity nearest to the operating point."""
+    wanted = point["k_at_velocity_m_s"] or tube["velocity_m_s"][-1]
+    nearest = min(range(len(tube["k"])), key=lambda i: abs(math.log(tube["velocity_m_s"][i] / wanted)))
+    rows = [
+        {"term": name.replace("_", " "), "value": number(values[nearest], digits=3)}
+        for name, values in tube["terms"].items()
+    ]
+    rows.append({"term": "k", "value": measured(tube["k"][nearest], tube["k_uncertainty"][nearest])})
+    speed = shown(tube["velocity_m_s"][nearest], "m/s", digits=3)
+    reynolds = number(tube["reynolds"][nearest], digits=3)
+    state = tube["flow_state"][nearest]
+    return {"caption": f"Terms of k at {speed}, Re {reynolds}, {state}.", "rows": rows}
+
+
+def operation_tables(run: Record | None) -> Record:
+    """The operations of a run: the first ones, and the rest for whoever wants them."""
+    rows = [_injection(row) for row in (run or {"injections": []})["injections"]]
+    return {"first": rows[:FIRST_OPERATIONS], "rest": rows[FIRST_OPERATIONS:]}
+
+
+def _injection(row: Record) -> Record:
+    regimes = dict.fromkeys((row["regime"], row.get("regime_end") or row["regime"]))
+    return {
+        "time": shown(row["time_s"], "s", digits=3),
+        "chamber": row["chamber"],
+        "duration": shown(row["duration_s"], "s", digits=3),
+        "regime": " to ".join(regimes),
+        "before": fixed(row["fill_before"], 4),
+        "after": fixed(row["fill_after"], 4),
+    }
+
+
+def loop_notes(runs: Record) -> list[Record]:
+    """How each run ended, in its own words."""
+    names = {"calibrated": "Calibrated law", "paper": "The paper’s law"}
+    return [{"law": names[law], "text": typeset(runs[law]["status"])} for law in names if law in runs]
+
+
+def model_row(row: Record) -> Record:
+    """One line of the models that were used."""
+    estimate = row.get("estimated_contribution")
+    texts = {key: typeset(row[key]) for key in ("term", "model", "why")}
+    return {**texts, "contribution": MISSING if estimate is None else percent(estimate)}
+
+
+def scene_groups(rows: list[Record]) -> list[Record]:
+    """The scene's table in its groups."""
+    texts = [{key: typeset(text) for key, text in row.items()} for row in rows]
+    return [
+        {"name": name, "rows": list(members)}
+        for name, members in groupby(texts, key=lambda row: row["group"])
+    ]
+
+
+def mesh_facts(evidence: Record) -> list[Record]:
+    """Sizes and quality of the pressure mesh."""
+    mesh = evidence["pressure"]["mesh"]
+    entries = (
+        ("Cells of the 3-D pressure mesh", " × ".join(str(count) for count in mesh["cells"])),
+        ("Unknowns", number(mesh["unknowns"], digits=6)),
+        ("Smallest scaled Jacobian", number(mesh["minimum_scaled_jacobian"], digits=3)),
+        ("Largest aspect ratio", number(mesh["largest_aspect"], digits=3)),
+        ("Solver", mesh["status"]),
+    )
+    return [{"label": label, "text": text} for label, text in entries]
+
+
+def version_facts(evidence: Record) -> list[Record]:
+    """Hash of the scene, seeds and versions."""
+    seeds = ", ".join(f"{name} {value}" for name, value in evidence["seeds"].items())
+    entries = [
+        ("Scene hash (SHA-256)", evidence["scene"]["sha256"]),
+        ("Seeds", seeds),
+        *evidence["versions"].items(),
+    ]
+    return [{"label": label, "text": text} for label, text in entries]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,8 +171,8 @@ class PageContent:
 def page_content(evidence: Record, *, pictures: Mapping[str, bytes] | None = None) -> PageContent:
     """Turn the evidence into texts, tables and figures.
 
-    Args: `evidence`: the document of `collect_evidence`. `pictures`: PNG bytes by the file names that the
-        evidence lists; a picture that is missing is left out.
+    Args: `pictures`: PNG bytes by the file names that the evidence lists; a picture that is missing is left
+    out.
     Raises: KeyError: an evidence document that lacks a part.
     """
     claims = [

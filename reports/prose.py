@@ -45,12 +45,7 @@ _UNITS: Final = {
 
 
 def typeset(text: str) -> str:
-    """Sets plain prose such as "rho omega^2 R2^2 in um" with the signs that it means.
-
-    Args: `text`: prose without markup.
-    Returns: The same with Greek letters, superscripts, subscripts and units as they are printed; numbers stay
-        what they are.
-    """
+    """Sets plain prose such as "rho omega^2 R2^2 in um" with the signs that it means."""
     greek = _GREEK_WORD.sub(lambda match: _GREEK[match[1]], text)
     indexed = _INDEXED.sub(_index, greek)
     raised = _POWER.sub(lambda match: (match[1] or match[2]).translate(_SUPERSCRIPTS), indexed)

@@ -20,16 +20,15 @@ Record = dict[str, Any]
 def render(evidence: Record, *, pictures: Mapping[str, bytes] | None = None) -> str:
     """One self-contained HTML page.
 
-    Args: `evidence`: the document of `collect_evidence`. `pictures`: PNG bytes by the file names that the
-        evidence lists; a picture that is missing is left out.
-    Returns: HTML that needs no other file and no network; the same evidence gives the same bytes.
+    Args: `pictures`: PNG bytes by the file names that the evidence lists; a picture that is missing is left
+    out.
     Raises: KeyError: an evidence document that lacks a part.
     """
     return render_page(page_content(evidence, pictures=pictures))
 
 
 def render_page(content: PageContent) -> str:
-    """Fills the templates. Returns: HTML."""
+    """Fills the templates."""
     environment = jinja2.Environment(
         loader=jinja2.FunctionLoader(_template),
         autoescape=True,

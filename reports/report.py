@@ -65,17 +65,11 @@ def write_report(
 ) -> Report:
     """Verify, calibrate, simulate and draw a scene into one folder.
 
-    Args:
-        out: folder for report.html, evidence.json, figures/ and fields/; made when there is none.
-        level: "heavy" runs the cases that take long, "light" takes them from earlier evidence.
-        scene_text: the scene file's own text, for the appendix.
-        workers: processes for the verification cases; more than one needs an importable main module.
-        progress: called with the name of each stage; None for silence.
-        opengl: what this machine can draw with; None: it is asked.
+    Args: `scene_text`: the scene file's own text, for the appendix.
     Raises: SceneError: a scene that cannot be calibrated or simulated, or a balancer without liquid; nothing
-        is written.
+    is written.
     Raises: OSError: the folder cannot be written, or holds an evidence.json that is none; known before the
-        work.
+    work.
     """
     scene = liquid_ring_scene(scene)
     folder, start = Path(out), time.perf_counter()

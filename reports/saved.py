@@ -35,10 +35,7 @@ _NAMES: Final[Mapping[type, str]] = MappingProxyType({str: "a text", list: "a li
 
 
 def heavy_cases(document: Mapping[str, Any]) -> list[Record]:
-    """The heavy cases that an evidence document holds, each stamped with the date on which it was run.
-
-    Args: `document`: of `collect_evidence`, or what `kept_document` made of it.
-    """
+    """The heavy cases that an evidence document holds, each stamped with the date on which it was run."""
     date = document.get("times", {}).get("date", "")
     return [
         {**case, "date": case.get("date") or date}
@@ -48,11 +45,7 @@ def heavy_cases(document: Mapping[str, Any]) -> list[Record]:
 
 
 def kept_document(document: Mapping[str, Any]) -> Record:
-    """What is worth keeping of an evidence document for later reports.
-
-    Args: `document`: of `collect_evidence` at the heavy level.
-    Returns: Format, versions and the heavy cases with their dates.
-    """
+    """What is worth keeping of an evidence document for later reports."""
     return {
         "format": document["format"],
         "versions": document["versions"],
@@ -63,8 +56,6 @@ def kept_document(document: Mapping[str, Any]) -> Record:
 def saved_cases(folder: Path | None = None) -> list[Record]:
     """All heavy results at hand, the oldest first: those of the program, and those of a report's folder.
 
-    Args: `folder`: of an earlier report; None for none.
-    Returns: Case records, each with its date and the hash of its scene.
     Raises: OSError: an evidence file that cannot be read, or is none.
     """
     found = _packaged()

@@ -27,7 +27,7 @@ def nothing(_work: Work) -> None:
 
 
 def everything(_evidence: Record) -> Record:
-    """Needs nothing but what every template sees. Returns: An empty record."""
+    """Needs nothing but what every template sees."""
     return {}
 
 

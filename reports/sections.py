@@ -43,22 +43,13 @@ SECTIONS: Final[tuple[Section, ...]] = (
 
 
 def collected(work: Work, *, last: bool) -> Record:
-    """The evidence of the sections that have some of their own.
-
-    Args: `work`: scene, calibration and level. `last`: whether of those that are collected after the cases
-        have run, or of the others.
-    Returns: Records by section name.
-    """
+    """The evidence of the sections that have some of their own."""
     found = {section.name: section.collect(work) for section in SECTIONS if section.last is last}
     return {name: record for name, record in found.items() if record is not None}
 
 
 def viewed(evidence: Record) -> list[Record]:
-    """What each section shows, in the page's order, without those that have nothing to show.
-
-    Args: `evidence`: the document of `collect_evidence`.
-    Returns: `name`, `title`, `template` and `view` of each.
-    """
+    """What each section shows, in the page's order, without those that have nothing to show."""
     views = [(section, section.view(evidence)) for section in SECTIONS]
     return [
         {"name": s.name, "title": s.title, "template": s.template, "view": view}
@@ -68,7 +59,7 @@ def viewed(evidence: Record) -> list[Record]:
 
 
 def drawings_in(content: Any) -> list[Drawing]:
-    """Every drawing within nested records and lists, in their order. Args: `content`: of a view."""
+    """Every drawing within nested records and lists, in their order."""
     if isinstance(content, Drawing):
         return [content]
     if isinstance(content, dict):

@@ -8,8 +8,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
-from ringbalance.reports.numbers import MISSING, PLUS_MINUS, THIN_SPACE, number, percent, short
-from ringbalance.reports.units import given, shown, shown_apart
+from ringbalance.reports.numbers import (
+    MISSING,
+    PLUS_MINUS,
+    THIN_SPACE,
+    given,
+    number,
+    percent,
+    short,
+    shown,
+    shown_apart,
+)
 
 Record = dict[str, Any]
 
@@ -66,19 +75,12 @@ class LoopRow:
 
 
 def tone(verdict: str) -> str:
-    """Colour group of a verdict.
-
-    Args: `verdict`: as in the evidence.
-    Returns: Name of the group; the page never shows a colour without the word.
-    """
+    """Colour group of a verdict."""
     return _TONES.get(verdict, "open")
 
 
 def claims(evidence: Record, *, paper: str = "liquid_ring") -> list[Record]:
-    """Cases that judge one paper, in its order.
-
-    Args: `evidence`: the document. `paper`: "liquid_ring" or "eccentric_mass".
-    """
+    """Cases that judge one paper, in its order."""
     found = [
         case
         for case in evidence["verification"]
@@ -88,25 +90,18 @@ def claims(evidence: Record, *, paper: str = "liquid_ring") -> list[Record]:
 
 
 def checks(evidence: Record) -> list[Record]:
-    """Cases that judge this program's own solvers. Args: `evidence`: the document."""
+    """Cases that judge this program's own solvers."""
     return [case for case in evidence["verification"] if case["kind"] != "claim"]
 
 
 def verdict_counts(cases: list[Record], verdicts: tuple[str, ...]) -> list[Count]:
-    """Number of cases under each verdict, in a fixed order, without the empty ones.
-
-    Args: `verdicts`: order in which to list.
-    """
+    """Number of cases under each verdict, in a fixed order, without the empty ones."""
     tally = Counter(case["verdict"] for case in cases)
     return [Count(verdict=v, tone=tone(v), count=tally[v]) for v in verdicts if tally[v]]
 
 
 def lead_sentence(evidence: Record) -> str:
-    """The whole result in two sentences, counted from the verdicts.
-
-    Args: `evidence`: the document.
-    Returns: Prose.
-    """
+    """The whole result in two sentences, counted from the verdicts."""
     counts = verdict_counts(claims(evidence), CLAIM_VERDICTS)
     parts = [f"{item.count} {'is' if item.count == 1 else 'are'} {item.verdict}" for item in counts]
     own = checks(evidence)
@@ -130,7 +125,6 @@ def _series(parts: list[str]) -> str:
 def elsewhere(case: Record, evidence: Record) -> bool:
     """Whether a case was judged on another disc than the report's, such as the paper's own.
 
-    Args: `evidence`: the document.
     Returns: True when its numbers are not those of the report's scene.
     """
     judged = case.get("scene_sha256")
@@ -138,22 +132,14 @@ def elsewhere(case: Record, evidence: Record) -> bool:
 
 
 def headlines(evidence: Record) -> list[Record]:
-    """Claims worth a line in the summary: judged on this disc and so marked, else those that did not hold.
-
-    Args: `evidence`: the document.
-    Returns: Case records.
-    """
+    """Claims worth a line in the summary: judged on this disc and so marked, else those that did not hold."""
     every = [case for case in claims(evidence) if not elsewhere(case, evidence)]
     marked = [case for case in every if case.get("headline")]
     return marked or [case for case in every if tone(case["verdict"]) in {"bad", "fair"}]
 
 
 def key_numbers(evidence: Record) -> list[KeyNumber]:
-    """The calibrated numbers with their expanded uncertainties (95 %).
-
-    Args: `evidence`: the document.
-    Returns: Numbers in reading order.
-    """
+    """The calibrated numbers with their expanded uncertainties (95 %)."""
     point, paper, calibration = evidence["operating_point"], evidence["paper"], evidence["calibration"]
     return [
         _lambda_number(calibration["lambda"], paper),
@@ -245,11 +231,7 @@ def _gas_time(run: Record) -> str:
 
 
 def loop_rows(evidence: Record) -> list[LoopRow]:
-    """The closed loop under both laws, line by line.
-
-    Args: `evidence`: the document.
-    Returns: Rows; a law that was not run shows a dash.
-    """
+    """The closed loop under both laws, line by line."""
     runs = evidence["closed_loop"]
 
     def row(label: str, read: Callable[[Record], str]) -> LoopRow:
@@ -268,11 +250,7 @@ def loop_rows(evidence: Record) -> list[LoopRow]:
 
 
 def loop_sentence(evidence: Record) -> str:
-    """What changes in the closed loop, in one sentence.
-
-    Args: `evidence`: the document.
-    Returns: A sentence made of the runs' own numbers.
-    """
+    """What changes in the closed loop, in one sentence."""
     runs = evidence["closed_loop"]
     if not set(_LAWS) <= runs.keys():
         return "The closed loop was not run under both laws."

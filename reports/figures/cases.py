@@ -6,29 +6,16 @@ from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
-from ringbalance.reports.figures.style import (
-    FIFTH,
-    FOUND,
-    FOURTH,
-    INK,
-    MUTED,
-    PAPER,
-    THIRD,
-    Drawing,
-    draw,
-    legend_above,
-    logarithmic,
-)
-from ringbalance.reports.numbers import number
+from ringbalance.reports.figures import style
+from ringbalance.reports.figures.style import Drawing, draw
+from ringbalance.reports.numbers import DisplayUnit, display_unit, number
 from ringbalance.reports.prose import typeset
-from ringbalance.reports.units import DisplayUnit, display_unit
 from ringbalance.scene.arrays import FloatArray
 
 Record = dict[str, Any]
 
-_COLOURS: Final = (FOUND, THIRD, FOURTH, FIFTH, MUTED, INK)
+_COLOURS: Final = (style.FOUND, style.THIRD, style.FOURTH, style.FIFTH, style.MUTED, style.INK)
 _LONGEST_LABEL: Final = 36
 _MARKERS: Final = ("o", "s", "^", "D", "v", "P")
 
@@ -40,14 +27,13 @@ def _positive(values: list[float | None]) -> bool:
 def order_plot(case: Record) -> Drawing | None:
     """Error against mesh size, a line per sequence, with the formal order as a slope to compare.
 
-    Args: `case`: a verification result with `convergence`.
     Returns: The figure; None when no sequence has errors.
     """
     sequences = [s for s in case.get("convergence") or [] if s.get("error") and _positive(s["error"])]
     if not sequences:
         return None
 
-    def paint(figure: Figure, axes: Axes) -> None:
+    def paint(axes: Axes) -> None:
         for index, sequence in enumerate(sequences):
             size, error = np.asarray(sequence["h"]), np.asarray(sequence["error"])
             colour = _COLOURS[index % len(_COLOURS)]
@@ -62,15 +48,15 @@ def order_plot(case: Record) -> Drawing | None:
             if sequence.get("formal_order"):
                 slope = 0.6 * error[-1] * (size / size[-1]) ** sequence["formal_order"]
                 axes.plot(size, slope, color=colour, linewidth=0.8, linestyle=":")
-        logarithmic(axes, "x", ticks=sorted({float(f"{size:.3g}") for size in sequences[0]["h"]}))
-        logarithmic(axes, "y")
-        axes.set_xlabel("relative mesh or step size")
-        axes.set_ylabel("error")
-        legend_above(figure, axes, columns=1)
+        style.logarithmic(axes, "x", ticks=sorted({float(f"{size:.3g}") for size in sequences[0]["h"]}))
+        style.logarithmic(axes, "y")
 
     last = [number(s["observed_order"][-1], digits=3) for s in sequences if s["observed_order"]]
     told = f"Observed at the finest pair: {', '.join(last)}" if last else "No order was observed"
     return draw(
+        columns=1,
+        x="relative mesh or step size",
+        y="error",
         name=f"order-{case['id'].replace('_', '-')}",
         paint=paint,
         alt=f"Error against mesh size, double logarithmic. {told}.",
@@ -79,14 +65,15 @@ def order_plot(case: Record) -> Drawing | None:
     )
 
 
-_STYLES: Final = {"paper": (PAPER, (0, (5, 2))), "found": (FOUND, "-"), "reference": (THIRD, (0, (1, 1.5)))}
+_STYLES: Final = {
+    "paper": (style.PAPER, (0, (5, 2))),
+    "found": (style.FOUND, "-"),
+    "reference": (style.THIRD, (0, (1, 1.5))),
+}
 
 
 def series_plots(case: Record) -> list[Drawing]:
-    """The figures that a case hands over as plain series.
-
-    Args: `case`: a verification result with `series`.
-    """
+    """The figures that a case hands over as plain series."""
     stem = f"case-{case['id'].replace('_', '-')}"
     return [_series_plot(f"{stem}-{index}", series) for index, series in enumerate(case.get("series") or [])]
 
@@ -105,10 +92,10 @@ def _series_plot(name: str, series: Record) -> Drawing:
     x = _with_gaps(series["x"]["values"], x_unit)
     curves, told = series["y"], typeset(series["name"][:1].upper() + series["name"][1:])
     unit = display_unit(curves[0]["unit"], *(value for curve in curves for value in curve["values"]))
-    spare = iter((FOURTH, FIFTH, MUTED, INK) * len(curves))
+    spare = iter((style.FOURTH, style.FIFTH, style.MUTED, style.INK) * len(curves))
     used: set[str] = set()
 
-    def paint(figure: Figure, axes: Axes) -> None:
+    def paint(axes: Axes) -> None:
         for curve in curves:
             colour, dashes = _STYLES[curve.get("style") or "found"]
             colour = next(spare) if colour in used else colour
@@ -119,13 +106,15 @@ def _series_plot(name: str, series: Record) -> Drawing:
                 band = _with_gaps(curve["uncertainty"], unit)
                 axes.fill_between(x, y - band, y + band, color=colour, alpha=0.2, linewidth=0)
         if series.get("log"):
-            logarithmic(axes, "x")
-            logarithmic(axes, "y")
-        axes.set_xlabel(_label(typeset(series["x"]["name"]), x_unit.symbol))
-        axes.set_ylabel(_label(told if len(told) < _LONGEST_LABEL else "", unit.symbol))
-        legend_above(figure, axes, columns=2)
+            style.logarithmic(axes, "x")
+            style.logarithmic(axes, "y")
 
     names = typeset(", ".join(curve["name"] for curve in curves))
     return draw(
-        name=name, paint=paint, alt=f"{told}: {names} against {series['x']['name']}.", caption=f"{told}."
+        x=_label(typeset(series["x"]["name"]), x_unit.symbol),
+        y=_label(told if len(told) < _LONGEST_LABEL else "", unit.symbol),
+        name=name,
+        paint=paint,
+        alt=f"{told}: {names} against {series['x']['name']}.",
+        caption=f"{told}.",
     )

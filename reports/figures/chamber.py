@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
-from ringbalance.reports.figures.style import FOUND, MUTED, PAPER, Drawing, draw, legend_above
-from ringbalance.reports.numbers import percent, short
-from ringbalance.reports.units import shown
+from ringbalance.reports.figures import style
+from ringbalance.reports.figures.style import Drawing, draw
+from ringbalance.reports.numbers import percent, short, shown
 
 Record = dict[str, Any]
 
@@ -19,36 +18,33 @@ def pressure_profile(profile: Record) -> Drawing:
     """Pressure from the free surface to the wall: finite elements against what Eq. 12 implies.
 
     p(r) = rho omega^2 (r^2 - a^2)/2; Eq. 12 has the same form with the surface a of a chamber without plates.
-    Args: `profile`: the evidence's `pressure.profile`, SI.
-    Returns: The figure.
     """
     radius = np.asarray(profile["radius_m"]) * 1e3
     pressure = np.asarray(profile["pressure_Pa"]) * 1e-6
     paper_radius = np.asarray(profile["paper_radius_m"]) * 1e3
     paper = np.asarray(profile["paper_pressure_Pa"]) * 1e-6
 
-    def paint(figure: Figure, axes: Axes) -> None:
-        axes.plot(radius, pressure, color=FOUND, marker="o", markersize=3, label="finite elements")
-        axes.plot(paper_radius, paper, color=PAPER, linestyle=(0, (5, 2)), label="as Eq. 12 implies")
-        axes.axvline(radius[0], color=MUTED, linewidth=0.8, linestyle=":")
+    def paint(axes: Axes) -> None:
+        axes.plot(radius, pressure, color=style.FOUND, marker="o", markersize=3, label="finite elements")
+        axes.plot(paper_radius, paper, **style.AS_PAPER, label="as Eq. 12 implies")
+        axes.axvline(radius[0], color=style.MUTED, linewidth=0.8, linestyle=":")
         axes.annotate(
             "free surface",
             (radius[0], pressure.max() * 0.98),
             xytext=(4, 0),
             textcoords="offset points",
-            color=MUTED,
+            color=style.MUTED,
             va="top",
             fontsize=7.5,
         )
-        axes.set_xlabel("radius in mm")
-        axes.set_ylabel("gauge pressure in MPa")
         axes.set_xlim(right=radius[-1])
         axes.set_ylim(bottom=0)
-        legend_above(figure, axes)
 
     found, printed = shown(profile["pressure_Pa"][-1], "Pa"), shown(profile["paper_pressure_Pa"][-1], "Pa")
     fill = short(profile["fill_ratio"])
     return draw(
+        x="radius in mm",
+        y="gauge pressure in MPa",
         name="pressure-profile",
         paint=paint,
         alt=f"Pressure rises from the free surface to the outer wall: {found} found, {printed} by Eq. 12.",
@@ -58,27 +54,22 @@ def pressure_profile(profile: Record) -> Drawing:
 
 
 def pressure_error(chamber: Record) -> Drawing:
-    """Error of Eq. 12 over the fill ratio, with the finite elements' 95 % band.
-
-    Args: `chamber`: the calibration's `chamber`, SI.
-    Returns: The figure.
-    """
+    """Error of Eq. 12 over the fill ratio, with the finite elements' 95 % band."""
     rows = np.asarray(chamber["wall_pressure_Pa"]) > 0
     fill = np.asarray(chamber["fill_ratio"])[rows]
     found = np.asarray(chamber["wall_pressure_Pa"])[rows]
     band = 100 * np.asarray(chamber["wall_pressure_uncertainty"])[rows] / found
     error = 100 * (np.asarray(chamber["wall_pressure_paper_Pa"])[rows] / found - 1)
 
-    def paint(figure: Figure, axes: Axes) -> None:
-        axes.axhline(0, color=FOUND, linewidth=1.2, label="finite elements, 95 % band")
-        axes.fill_between(fill, -band, band, color=FOUND, alpha=0.25, linewidth=0)
-        axes.plot(fill, error, color=PAPER, marker="o", markersize=3, label="Eq. 12")
-        axes.set_xlabel("fill ratio")
-        axes.set_ylabel("error of Eq. 12 in %")
-        legend_above(figure, axes)
+    def paint(axes: Axes) -> None:
+        axes.axhline(0, color=style.FOUND, linewidth=1.2, label="finite elements, 95 % band")
+        axes.fill_between(fill, -band, band, color=style.FOUND, alpha=0.25, linewidth=0)
+        axes.plot(fill, error, color=style.PAPER, marker="o", markersize=3, label="Eq. 12")
 
     extremes = [percent(float(value) / 100, signed=True) for value in (error.min(), error.max())]
     return draw(
+        x="fill ratio",
+        y="error of Eq. 12 in %",
         name="pressure-error",
         paint=paint,
         alt=f"The error of Eq. 12 lies between {extremes[0]} and {extremes[1]} over the fill ratio.",
@@ -88,27 +79,22 @@ def pressure_error(chamber: Record) -> Drawing:
 
 
 def moment(chamber: Record) -> Drawing:
-    """Balancing moment of one chamber over its fill, with and without the plates.
-
-    Args: `chamber`: the calibration's `chamber`, SI.
-    Returns: The figure.
-    """
+    """Balancing moment of one chamber over its fill, with and without the plates."""
     fill = chamber["fill_ratio"]
     found = np.asarray(chamber["moment_kg_m"]) * 1e6
     band = np.asarray(chamber["moment_uncertainty"]) * 1e6
     paper = np.asarray(chamber["moment_paper_kg_m"]) * 1e6
 
-    def paint(figure: Figure, axes: Axes) -> None:
-        axes.fill_between(fill, found - band, found + band, color=FOUND, alpha=0.25, linewidth=0)
-        axes.plot(fill, found, color=FOUND, marker="o", markersize=3, label="finite elements")
-        axes.plot(fill, paper, color=PAPER, linestyle=(0, (5, 2)), label="Eq. 7, plates left out")
-        axes.set_xlabel("fill ratio")
-        axes.set_ylabel("moment of one chamber in g mm")
+    def paint(axes: Axes) -> None:
+        style.band(axes, fill, found, band, style.FOUND)
+        axes.plot(fill, found, color=style.FOUND, marker="o", markersize=3, label="finite elements")
+        axes.plot(fill, paper, **style.AS_PAPER, label="Eq. 7, plates left out")
         axes.set_ylim(bottom=0)
-        legend_above(figure, axes)
 
     most, printed = shown(chamber["moment_kg_m"][-1], "kg m"), shown(chamber["moment_paper_kg_m"][-1], "kg m")
     return draw(
+        x="fill ratio",
+        y="moment of one chamber in g mm",
         name="moment",
         paint=paint,
         alt=f"The moment of a chamber grows with its fill to {most}; Eq. 7 gives {printed}.",
@@ -117,29 +103,25 @@ def moment(chamber: Record) -> Drawing:
 
 
 def transfer_lambda(chamber: Record, summary: Record, paper: Record) -> Drawing:
-    """Lambda per transferred mass over the fill, with the paper's value and its spread.
-
-    Args: `chamber`: the calibration's `chamber`, SI. `summary`: the calibration's `lambda`, SI. `paper`: the
-        evidence's `paper`.
-    Returns: The figure.
-    """
+    """Lambda per transferred mass over the fill, with the paper's value and its spread."""
     fill = chamber["fill_ratio"]
     found = np.asarray(chamber["lambda_per_transferred_mass_m"]) * 1e3
     printed, spread = paper["lambda_m"] * 1e3, paper["lambda_spread"]
     half_width = summary["uncertainty_m"] * 1e3
 
-    def paint(figure: Figure, axes: Axes) -> None:
-        axes.axhspan(printed * (1 - spread), printed * (1 + spread), color=PAPER, alpha=0.14, linewidth=0)
-        axes.axhline(printed, color=PAPER, linestyle=(0, (5, 2)), label="the paper, with its spread")
-        axes.fill_between(fill, found - half_width, found + half_width, color=FOUND, alpha=0.25, linewidth=0)
-        axes.plot(fill, found, color=FOUND, marker="o", markersize=3, label="finite elements")
-        axes.set_xlabel("fill ratio of the driven chamber")
-        axes.set_ylabel("λ per transferred mass in mm")
-        legend_above(figure, axes)
+    def paint(axes: Axes) -> None:
+        axes.axhspan(
+            printed * (1 - spread), printed * (1 + spread), color=style.PAPER, alpha=0.14, linewidth=0
+        )
+        axes.axhline(printed, **style.AS_PAPER, label="the paper, with its spread")
+        style.band(axes, fill, found, half_width, style.FOUND)
+        axes.plot(fill, found, color=style.FOUND, marker="o", markersize=3, label="finite elements")
 
     centre = shown(summary["per_transferred_mass_m"], "m", summary["uncertainty_m"])
     varies = percent(summary["variation_over_range"])
     return draw(
+        x="fill ratio of the driven chamber",
+        y="λ per transferred mass in mm",
         name="lambda",
         paint=paint,
         alt=f"Lambda is {centre} at the centre and varies by {varies} over the fill range.",

@@ -6,25 +6,12 @@ from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ringbalance.reports.figures.style import (
-    FOUND,
-    INK,
-    MUTED,
-    PAPER,
-    SURFACE,
-    THIRD,
-    WIDE,
-    Drawing,
-    draw,
-    legend_above,
-    logarithmic,
-)
-from ringbalance.reports.numbers import number, short
+from ringbalance.reports.figures import style
+from ringbalance.reports.figures.style import Drawing, draw
+from ringbalance.reports.numbers import given, number, short
 from ringbalance.reports.prose import typeset
-from ringbalance.reports.units import given
 from ringbalance.scene.arrays import FloatArray
 
 Record = dict[str, Any]
@@ -40,34 +27,32 @@ _PAPER: Final = 50.0
 
 
 def map_figure(found: Record) -> Drawing:
-    """k over bore and viscosity: lines of equal k, k = 50 with its band, the separated column, the liquids.
-
-    Args: `found`: the evidence's `fifty`.
-    """
+    """k over bore and viscosity: lines of equal k, k = 50 with its band, the separated column, liquids."""
     told = found["map"]
     bore, nu = (np.asarray(told[key]) for key in ("bore_m", "kinematic_viscosity_m2_s"))
     bore, nu = bore * 1e3, nu * 1e6
 
-    def paint(figure: Figure, axes: Axes) -> None:
+    def paint(axes: Axes) -> None:
         for name, values in (("x", bore), ("y", nu)):
-            logarithmic(axes, name, ticks=[t for t in _TICKS if values[0] <= t <= values[-1]])
+            style.logarithmic(axes, name, ticks=[t for t in _TICKS if values[0] <= t <= values[-1]])
         _shade(axes, told, bore, nu)
         _lines(axes, told, bore, nu)
         _mark_liquids(axes, found)
         axes.set_xlim(bore[0], bore[-1])
         axes.set_ylim(nu[0], nu[-1])
         axes.grid(visible=False)
-        axes.set_xlabel("bore of the tube in mm")
-        axes.set_ylabel("kinematic viscosity in mm²/s")
-        legend_above(figure, axes, columns=2)
+        style.legend_above(axes, columns=2)
         box = axes.get_position()
-        axes.set_position((box.x0, box.y0, 1 - box.x0 - _LIST / WIDE, box.height))
-        _name_liquids(figure, axes, found)
+        axes.set_position((box.x0, box.y0, 1 - box.x0 - _LIST / style.WIDE, box.height))
+        _name_liquids(axes, found)
 
     gas, density = given(told["gas_pressure_Pa"], "Pa"), short(told["density_kg_m3"], digits=4)
     blocked = "" if told["starts"] else " This gas does not start the flow: k is that of a primed tube."
     return draw(
+        x="bore of the tube in mm",
+        y="kinematic viscosity in mm²/s",
         name="fifty-map",
+        columns=0,
         paint=paint,
         wide=True,
         height=_HEIGHT,
@@ -84,33 +69,47 @@ def map_figure(found: Record) -> Drawing:
 def _shade(axes: Axes, told: Record, bore: FloatArray, nu: FloatArray) -> None:
     tearing = np.asarray(told["tearing"]).T
     if np.any(tearing > 0):
-        axes.contourf(bore, nu, tearing, levels=[0.0, 100.0], colors=[MUTED], alpha=0.16)
+        axes.contourf(bore, nu, tearing, levels=[0.0, 100.0], colors=[style.MUTED], alpha=0.16)
         axes.fill_between(
-            [], [], [], color=MUTED, alpha=0.16, linewidth=0, label="column separated at the siphon crest"
+            [],
+            [],
+            [],
+            color=style.MUTED,
+            alpha=0.16,
+            linewidth=0,
+            label="column separated at the siphon crest",
         )
     k, width = (np.asarray(told[key]).T for key in ("k", "k_uncertainty"))
     near = np.where(np.abs(np.log(np.maximum(k, 1e-9) / _PAPER)) < 2, np.abs(k - _PAPER) - width, 1.0)
-    axes.contourf(bore, nu, near, levels=[-1e9, 0], colors=[PAPER], alpha=0.2)
+    axes.contourf(bore, nu, near, levels=[-1e9, 0], colors=[style.PAPER], alpha=0.2)
 
 
 def _lines(axes: Axes, told: Record, bore: FloatArray, nu: FloatArray) -> None:
     k, read = (np.log10(np.maximum(np.asarray(told[key]).T, 1e-3)) for key in ("k", "apparent_k"))
     levels = [level for level in _LEVELS if k.min() < np.log10(level) < k.max()]
-    thin = axes.contour(bore, nu, k, levels=np.log10(levels), colors=[FOUND], linewidths=0.7)
+    thin = axes.contour(bore, nu, k, levels=np.log10(levels), colors=[style.FOUND], linewidths=0.7)
     names = dict(zip(thin.levels, (_level(level) for level in levels), strict=True))
     texts = axes.clabel(thin, fmt=names, fontsize=7.5, inline=True, inline_spacing=3)
     for text in texts:
-        text.set_color(FOUND)
+        text.set_color(style.FOUND)
     if k.min() < np.log10(_PAPER) < k.max():
-        axes.contour(bore, nu, k, levels=[np.log10(_PAPER)], colors=[PAPER], linewidths=2.2)
-        axes.plot([], [], color=PAPER, linewidth=2.2, label="k = 50, with its 95 % band")
-    axes.plot([], [], color=FOUND, linewidth=0.7, label="other k")
+        axes.contour(bore, nu, k, levels=[np.log10(_PAPER)], colors=[style.PAPER], linewidths=2.2)
+        axes.plot([], [], color=style.PAPER, linewidth=2.2, label="k = 50, with its 95 % band")
+    axes.plot([], [], color=style.FOUND, linewidth=0.7, label="other k")
     apart = np.where(read - k > 1e-3, read, np.nan)
     if np.nanmin(apart, initial=9) < np.log10(_PAPER) < np.nanmax(apart, initial=-9):
         axes.contour(
-            bore, nu, read, levels=[np.log10(_PAPER)], colors=[INK], linewidths=1.1, linestyles=[(0, (4, 2))]
+            bore,
+            nu,
+            read,
+            levels=[np.log10(_PAPER)],
+            colors=[style.INK],
+            linewidths=1.1,
+            linestyles=[(0, (4, 2))],
         )
-        axes.plot([], [], color=INK, linewidth=1.1, linestyle=(0, (4, 2)), label="Eq. 19’s velocity is right")
+        axes.plot(
+            [], [], color=style.INK, linewidth=1.1, linestyle=(0, (4, 2)), label="Eq. 19’s velocity is right"
+        )
 
 
 def _level(k: float) -> str:
@@ -124,16 +123,17 @@ def _mark_liquids(axes: Axes, found: Record) -> None:
                 [found["bore_m"] * 1e3],
                 [record["kinematic_viscosity_m2_s"] * 1e6],
                 "o",
-                color=INK,
-                markerfacecolor=INK if record["starts_at_scene_pressure"] else SURFACE,
+                color=style.INK,
+                markerfacecolor=style.INK if record["starts_at_scene_pressure"] else style.SURFACE,
                 markersize=4.5,
                 zorder=5,
             )
-    axes.axvline(found["bore_m"] * 1e3, color=INK, linewidth=0.6, linestyle=":", zorder=2)
+    axes.axvline(found["bore_m"] * 1e3, color=style.INK, linewidth=0.6, linestyle=":", zorder=2)
 
 
-def _name_liquids(figure: Figure, axes: Axes, found: Record) -> None:
+def _name_liquids(axes: Axes, found: Record) -> None:
     """Names at the right edge, level with their circles but never on top of each other."""
+    figure = style.figure_of(axes)
     shown_liquids = sorted(
         (r for r in found["liquids"] if r["runs"]), key=lambda r: float(r["kinematic_viscosity_m2_s"])
     )
@@ -142,13 +142,16 @@ def _name_liquids(figure: Figure, axes: Axes, found: Record) -> None:
     wanted = [box.y0 + s * box.height for s in share]
     for record, at, place in zip(shown_liquids, wanted, _spread(wanted, _APART / _HEIGHT), strict=True):
         edge = box.x1
-        figure.add_artist(_leader(figure, [edge, edge + 0.012, edge + 0.022], [at, at, place]))
+        leader = Line2D(
+            [edge, edge + 0.012, edge + 0.022],
+            [at, at, place],
+            color=style.MUTED,
+            linewidth=0.7,
+            transform=figure.transFigure,
+        )
+        figure.add_artist(leader)
         text = f"{typeset(record['name'])}, k {number(record['k'], digits=2)}"
-        figure.text(edge + 0.026, place, text, fontsize=7.5, va="center", ha="left", color=INK)
-
-
-def _leader(figure: Figure, x: list[float], y: list[float]) -> Any:
-    return Line2D(x, y, color=MUTED, linewidth=0.7, transform=figure.transFigure)
+        figure.text(edge + 0.026, place, text, fontsize=7.5, va="center", ha="left", color=style.INK)
 
 
 def _spread(wanted: list[float], apart: float) -> list[float]:
@@ -174,37 +177,37 @@ def apparent_figure(read: Record) -> Drawing:
     )
     excess = 2 * read["excess_head_m2_s2"] / speed**2
 
-    def paint(figure: Figure, axes: Axes) -> None:
-        axes.axhline(_PAPER, color=PAPER, linestyle=(0, (5, 2)), label="the paper’s 50")
-        axes.plot(speed, every, color=INK, linewidth=3.2, alpha=0.25, label="what Eq. 18 reads")
-        axes.plot(speed, siphon, color=FOUND, label="k(u) of the full tube")
+    def paint(axes: Axes) -> None:
+        axes.axhline(_PAPER, **style.AS_PAPER, label="the paper’s 50")
+        axes.plot(speed, every, color=style.INK, linewidth=3.2, alpha=0.25, label="what Eq. 18 reads")
+        axes.plot(speed, siphon, color=style.FOUND, label="k(u) of the full tube")
         axes.plot(
             speed,
             np.where(separated > 0, separated, np.nan),
-            color=THIRD,
+            color=style.THIRD,
             label="separated at the siphon crest",
         )
         if read["excess_head_m2_s2"] > 0:
-            axes.plot(speed, excess, color=THIRD, linewidth=0.9, linestyle=":", label="its part ∝ 1/u²")
+            axes.plot(speed, excess, color=style.THIRD, linewidth=0.9, linestyle=":", label="its part ∝ 1/u²")
         axes.plot(
             [read["operating_velocity_m_s"]],
             [read["operating_k"]],
             "o",
-            color=INK,
+            color=style.INK,
             markersize=5,
             label="this machine",
         )
         bottom = max(0.5 * min(siphon.min(), floor.min(), 2.0), 0.3)
         top = 2 * max(float(every.max()), _PAPER)
-        logarithmic(axes, "x", ticks=[t for t in _TICKS if speed[0] <= t <= speed[-1]])
-        logarithmic(axes, "y", ticks=[t for t in _TICKS if bottom <= t <= top and f"{t:e}"[0] in "15"])
+        style.logarithmic(axes, "x", ticks=[t for t in _TICKS if speed[0] <= t <= speed[-1]])
+        style.logarithmic(axes, "y", ticks=[t for t in _TICKS if bottom <= t <= top and f"{t:e}"[0] in "15"])
         axes.set_xlim(speed[0], speed[-1])
         axes.set_ylim(bottom, top)
-        axes.set_xlabel("mean velocity in the tube in m/s")
-        axes.set_ylabel("k as Eq. 18 has it")
-        legend_above(figure, axes, columns=3)
 
     return draw(
+        columns=3,
+        x="mean velocity in the tube in m/s",
+        y="k as Eq. 18 has it",
         name="fifty-apparent",
         paint=paint,
         wide=True,

@@ -7,31 +7,19 @@ from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
-from ringbalance.reports.figures.siphon_crest import REGIME_COLOURS
-from ringbalance.reports.figures.style import (
-    FIFTH,
-    FOUND,
-    FOURTH,
-    MUTED,
-    PAPER,
-    THIRD,
-    Drawing,
-    draw,
-    legend_above,
-    logarithmic,
-)
-from ringbalance.reports.units import shown
+from ringbalance.reports.figures import style
+from ringbalance.reports.figures.style import Drawing, draw
+from ringbalance.reports.numbers import shown
 from ringbalance.scene.arrays import FloatArray
 
 Record = dict[str, Any]
 
 _LAWS: Final = (
-    ("calibrated", FOUND, "-", "the calibrated law"),
-    ("paper", PAPER, (0, (5, 2)), "the paper’s law"),
+    ("calibrated", style.FOUND, "-", "the calibrated law"),
+    ("paper", style.PAPER, (0, (5, 2)), "the paper’s law"),
 )
-_CHAMBER_COLOURS: Final = (FOUND, PAPER, THIRD, FOURTH, FIFTH, MUTED)
+_CHAMBER_COLOURS: Final = (style.FOUND, style.PAPER, style.THIRD, style.FOURTH, style.FIFTH, style.MUTED)
 _TICKS: Final = [step * 10.0**exponent for exponent in range(-4, 4) for step in (1, 2, 5)]
 
 
@@ -57,8 +45,8 @@ def _decade_limits(values: FloatArray, limit: float) -> tuple[float, float]:
 
 def _amplitude_axes(axes: Axes, values: FloatArray, limit: float) -> None:
     bottom, top = _decade_limits(values, limit)
-    axes.axhline(limit, color=MUTED, linewidth=1, linestyle=":", label="limit")
-    logarithmic(axes, "y", ticks=[tick for tick in _TICKS if bottom <= tick <= top])
+    axes.axhline(limit, color=style.MUTED, linewidth=1, linestyle=":", label="limit")
+    style.logarithmic(axes, "y", ticks=[tick for tick in _TICKS if bottom <= tick <= top])
     axes.set_ylim(bottom, top)
     axes.set_xlabel("time in s")
     axes.set_ylabel("amplitude in µm, zero to peak")
@@ -68,7 +56,6 @@ def amplitude(runs: Record, limit: float) -> Drawing:
     """Vibration amplitude at the controller's samples under the calibrated law and under the paper's.
 
     Args: `runs`: simulation documents by law, SI. `limit`: amplitude below which the controller rests, m.
-    Returns: The figure.
     """
     present = [entry for entry in _LAWS if entry[0] in runs]
     sampled = {name: np.asarray(runs[name]["samples"]["time_s"]) for name, *_ in present}
@@ -77,7 +64,7 @@ def amplitude(runs: Record, limit: float) -> Drawing:
         for name, *_ in present
     }
 
-    def paint(figure: Figure, axes: Axes) -> None:
+    def paint(axes: Axes) -> None:
         for name, colour, dashes, label in present:
             axes.plot(
                 sampled[name],
@@ -91,13 +78,13 @@ def amplitude(runs: Record, limit: float) -> Drawing:
             )
         _amplitude_axes(axes, np.concatenate(list(values.values())), limit * 1e6)
         axes.set_xlim(left=0)
-        legend_above(figure, axes, columns=3)
 
     ends = ", ".join(
         f"{shown(runs[name]['amplitude_m'][-1], 'm', digits=2)} under {label}"
         for name, _, _, label in present
     )
     return draw(
+        columns=3,
         name="amplitude",
         paint=paint,
         wide=True,
@@ -111,12 +98,11 @@ def early_amplitude(runs: Record, limit: float) -> Drawing:
     """Vibration amplitude within the first operations, liquid flowing, under both laws.
 
     Args: `runs`: simulation documents by law, SI. `limit`: amplitude below which the controller rests, m.
-    Returns: The figure.
     """
     present = [entry for entry in _LAWS if entry[0] in runs]
     until = early_time(runs)
 
-    def paint(figure: Figure, axes: Axes) -> None:
+    def paint(axes: Axes) -> None:
         seen = []
         for name, colour, dashes, label in present:
             time, values = np.asarray(runs[name]["time_s"]), np.asarray(runs[name]["amplitude_m"]) * 1e6
@@ -124,9 +110,9 @@ def early_amplitude(runs: Record, limit: float) -> Drawing:
             seen.append(values[time <= until])
         _amplitude_axes(axes, np.concatenate(seen), limit * 1e6)
         axes.set_xlim(0, until)
-        legend_above(figure, axes, columns=3)
 
     return draw(
+        columns=3,
         name="amplitude-early",
         paint=paint,
         alt=f"Vibration amplitude in the first {shown(until, 's', digits=2)}, under both laws.",
@@ -156,13 +142,13 @@ def regimes(run: Record) -> Drawing | None:
             width * (share[1] - share[0]),
             left=item["time_s"] + width * share[0],
             height=0.55,
-            color=REGIME_COLOURS[regime],
+            color=style.REGIME_COLOURS[regime],
             linewidth=0,
             label=None if regime in named else regime,
         )
         named.add(regime)
 
-    def paint(figure: Figure, axes: Axes) -> None:
+    def paint(axes: Axes) -> None:
         for item in operations:
             end = item.get("regime_end") or item["regime"]
             parts = [(item["regime"], (0.0, 1.0))]
@@ -173,13 +159,13 @@ def regimes(run: Record) -> Drawing | None:
         axes.set_yticks(range(len(letters)), letters)
         axes.set_ylim(len(letters) - 0.5, -0.5)
         axes.set_xlim(0, 1.02 * (last + least))
-        axes.set_xlabel("time in s")
-        axes.set_ylabel("gas into chamber")
-        legend_above(figure, axes, columns=4)
 
     counts = Counter(item["regime"] for item in operations)
     told = ", ".join(f"{count} {name}" for name, count in sorted(counts.items()))
     return draw(
+        columns=4,
+        x="time in s",
+        y="gas into chamber",
         name="loop-regimes",
         paint=paint,
         wide=True,
@@ -194,21 +180,20 @@ def fill_ratios(run: Record, until: float) -> Drawing:
     """Fill ratio of every chamber against time under the calibrated law.
 
     Args: `run`: a simulation document, SI. `until`: end of the time axis, s.
-    Returns: The figure.
     """
 
-    def paint(figure: Figure, axes: Axes) -> None:
+    def paint(axes: Axes) -> None:
         for index, (letter, values) in enumerate(run["fill_ratio"].items()):
             axes.plot(
                 run["time_s"], values, color=_CHAMBER_COLOURS[index % len(_CHAMBER_COLOURS)], label=letter
             )
         axes.set_xlim(0, until)
-        axes.set_xlabel("time in s")
-        axes.set_ylabel("fill ratio")
-        legend_above(figure, axes, columns=6)
 
     letters = ", ".join(run["fill_ratio"])
     return draw(
+        columns=6,
+        x="time in s",
+        y="fill ratio",
         name="fill-ratios",
         paint=paint,
         alt=f"Fill ratios of chambers {letters} against time.",

@@ -7,27 +7,14 @@ from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
-from ringbalance.reports.figures.style import (
-    FIFTH,
-    FOUND,
-    FOURTH,
-    INK,
-    MUTED,
-    PAPER,
-    THIRD,
-    Drawing,
-    draw,
-    legend_above,
-    logarithmic,
-)
-from ringbalance.reports.numbers import percent, short
-from ringbalance.reports.units import given, shown
+from ringbalance.reports.figures import style
+from ringbalance.reports.figures.style import Drawing, draw
+from ringbalance.reports.numbers import given, percent, short, shown
 
 Record = dict[str, Any]
 
-_COLOURS: Final = (FOUND, THIRD, FOURTH, PAPER, FIFTH)
+_COLOURS: Final = (style.FOUND, style.THIRD, style.FOURTH, style.PAPER, style.FIFTH)
 _MARKERS: Final = ("o", "s", "^", "D", "v")
 _TICKS: Final = [step * 10.0**power for power in range(-3, 3) for step in (1, 2, 5)]
 _FLOOR: Final = 5e-9
@@ -35,18 +22,17 @@ _FLOOR: Final = 5e-9
 
 
 _LINES: Final = {
-    "paper_m_s": (PAPER, (0, (5, 2)), "Eq. 19, as Fig. 4 has it"),
-    "levels_m_s": (FOUND, "-", "k = 50, levels by finite elements"),
-    "calibrated_m_s": (THIRD, "-", "calibrated law"),
+    "paper_m_s": (style.PAPER, (0, (5, 2)), "Eq. 19, as Fig. 4 has it"),
+    "levels_m_s": (style.FOUND, "-", "k = 50, levels by finite elements"),
+    "calibrated_m_s": (style.THIRD, "-", "calibrated law"),
 }
 
 
 def figure_4(velocity: list[Record]) -> list[Drawing]:
     """Velocity over the fill at both gas pressures: Eq. 19 against finite elements, and against the law.
 
-    Args: `velocity`: the evidence's `paper_again.velocity`.
     Returns: Two figures: with the paper's k and the finite elements' wall pressures, and with the calibrated
-        law.
+    law.
     """
     falls = "; ".join(_fall(told) for told in velocity)
     return [
@@ -67,7 +53,7 @@ def figure_4(velocity: list[Record]) -> list[Drawing]:
 
 
 def _velocities(velocity: list[Record], other: str, *, name: str, caption: str) -> Drawing:
-    def paint(figure: Figure, axes: Axes) -> None:
+    def paint(axes: Axes) -> None:
         for index, told in enumerate(velocity):
             fill = np.asarray(told["fill_ratio"])
             for key in ("paper_m_s", other):
@@ -75,7 +61,7 @@ def _velocities(velocity: list[Record], other: str, *, name: str, caption: str) 
                 axes.plot(fill, told[key], color=colour, linestyle=dashes, label=None if index else label)
             if other == "calibrated_m_s":
                 found, width = (np.asarray(told[k]) for k in (other, "calibrated_uncertainty"))
-                axes.fill_between(fill, found - width, found + width, color=THIRD, alpha=0.18, linewidth=0)
+                style.band(axes, fill, found, width, style.THIRD)
             middle = len(fill) // 2
             axes.annotate(
                 given(told["gas_pressure_Pa"], "Pa"),
@@ -84,15 +70,14 @@ def _velocities(velocity: list[Record], other: str, *, name: str, caption: str) 
                 textcoords="offset points",
                 ha="center",
                 fontsize=7.5,
-                color=MUTED,
+                color=style.MUTED,
             )
         axes.set_xlim(0, fill[-1])
         axes.set_ylim(bottom=0)
-        axes.set_xlabel("fill ratio of the driven chamber")
-        axes.set_ylabel("velocity in the tube in m/s")
-        legend_above(figure, axes, columns=2)
 
     return draw(
+        x="fill ratio of the driven chamber",
+        y="velocity in the tube in m/s",
         name=name,
         paint=paint,
         alt=f"Velocity over the fill ratio at both gas pressures of Fig. 4: Eq. 19 and {_LINES[other][2]}.",
@@ -125,9 +110,9 @@ def _amplitudes(axes: Axes, runs: list[Record], labels: list[str], limit: float)
             linewidth=1.2,
             label=label,
         )
-    axes.axhline(limit * 1e6, color=MUTED, linewidth=1, linestyle=":", label="limit")
+    axes.axhline(limit * 1e6, color=style.MUTED, linewidth=1, linestyle=":", label="limit")
     low, high = bottom * 0.7e6, top * 1.5e6
-    logarithmic(axes, "y", ticks=[tick for tick in _TICKS if low <= tick <= high])
+    style.logarithmic(axes, "y", ticks=[tick for tick in _TICKS if low <= tick <= high])
     axes.set_ylim(low, high)
     axes.set_xlim(left=0)
     axes.set_xlabel("time in s")
@@ -142,13 +127,13 @@ def figure_6(runs: list[Record], limit: float) -> Drawing:
     """The trial algorithm from four phases. Args: `runs`: the evidence's `paper_again.trial`. `limit`: m."""
     names = [f"{math.degrees(run['of']):.0f}°" for run in runs]
 
-    def paint(figure: Figure, axes: Axes) -> None:
+    def paint(axes: Axes) -> None:
         _amplitudes(axes, runs, names, limit)
-        legend_above(figure, axes, columns=5)
 
     told = ", ".join(f"{_settled(run)} from {name}" for run, name in zip(runs, names, strict=True))
     rises = ", ".join(str(run["misadjustments"]) for run in runs)
     return draw(
+        columns=5,
         name="paper-figure-6",
         paint=paint,
         wide=True,
@@ -162,16 +147,16 @@ def figure_6(runs: list[Record], limit: float) -> Drawing:
 def figure_7(runs: list[Record], limit: float) -> Drawing:
     """The target-vector algorithm with five gains: amplitude.
 
-    Args: `runs`: the evidence's `paper_again.gains`. `limit`: m.
+    Args: `limit`: m.
     """
     names = [f"Kp = {run['of'] * 1e-6:.2f}" for run in runs]
 
-    def paint(figure: Figure, axes: Axes) -> None:
+    def paint(axes: Axes) -> None:
         _amplitudes(axes, runs, names, limit)
-        legend_above(figure, axes, columns=3)
 
     told = ", ".join(f"{run['overshoots']} at {run['of'] * 1e-6:.2f}" for run in runs)
     return draw(
+        columns=3,
         name="paper-figure-7",
         paint=paint,
         height=3.5,
@@ -182,9 +167,9 @@ def figure_7(runs: list[Record], limit: float) -> Drawing:
 
 
 def figure_7_phase(runs: list[Record]) -> Drawing:
-    """The same runs: phase. Args: `runs`: the evidence's `paper_again.gains`."""
+    """The same runs: phase."""
 
-    def paint(figure: Figure, axes: Axes) -> None:
+    def paint(axes: Axes) -> None:
         for index, run in enumerate(runs):
             axes.plot(
                 run["time_s"],
@@ -198,13 +183,13 @@ def figure_7_phase(runs: list[Record]) -> Drawing:
         axes.set_ylim(-190, 190)
         axes.set_yticks([-180, -90, 0, 90, 180])
         axes.set_xlim(left=0)
-        axes.set_xlabel("time in s")
-        axes.set_ylabel("phase in °")
-        axes.spines["bottom"].set_color(INK)
-        legend_above(figure, axes, columns=3)
+        axes.spines["bottom"].set_color(style.INK)
 
     loud = [short(run["of"] * 1e-6) for run in runs if run["overshoots"]]
     return draw(
+        columns=3,
+        x="time in s",
+        y="phase in °",
         name="paper-figure-7-phase",
         paint=paint,
         height=3.5,
@@ -217,18 +202,20 @@ def figure_7_phase(runs: list[Record]) -> Drawing:
 def figure_8(runs: list[Record], limit: float) -> Drawing:
     """The target-vector algorithm with the paper's parameters from five amplitudes.
 
-    Args: `runs`: the evidence's `paper_again.amplitudes`. `limit`: m.
+    Args: `limit`: m.
     """
     names = [given(run["of"], "m") for run in runs]
 
-    def paint(figure: Figure, axes: Axes) -> None:
+    def paint(axes: Axes) -> None:
         _amplitudes(axes, runs, names, limit)
-        axes.axvline(5.0, color=INK, linewidth=0.8, linestyle=(0, (5, 2)), label="the paper’s bound, 5 s")
+        axes.axvline(
+            5.0, color=style.INK, linewidth=0.8, linestyle=(0, (5, 2)), label="the paper’s bound, 5 s"
+        )
         axes.set_xlim(0, max(5.4, *(run["time_s"][-1] for run in runs)))
-        legend_above(figure, axes, columns=4)
 
     told = ", ".join(f"{_settled(run)} from {name}" for run, name in zip(runs, names, strict=True))
     return draw(
+        columns=4,
         name="paper-figure-8",
         paint=paint,
         wide=True,

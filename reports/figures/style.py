@@ -11,15 +11,17 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from html import escape
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap, to_hex
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullLocator
+from numpy.typing import ArrayLike
 
 from ringbalance.reports.numbers import MINUS, number, power_of_ten
+from ringbalance.scene.arrays import FloatArray
 
 INK: Final = "#010101"
 MUTED: Final = "#020202"
@@ -34,6 +36,9 @@ FIFTH: Final = "#080808"
 SURFACE: Final = "#090909"
 """The page behind the figure."""
 
+AS_PAPER: Final[dict[str, Any]] = {"color": PAPER, "linestyle": (0, (5, 2))}
+"""A line of the paper's formulas."""
+REGIME_COLOURS: Final = {"siphon": FOUND, "separated": THIRD, "blocked": FIFTH, "reverse": FOURTH}
 MAP: Final = tuple(f"#0a0a{step:02x}" for step in range(1, 13))
 """Twelve shades from low to high, for a field in colour."""
 
@@ -122,7 +127,7 @@ _RC: Final = {
     "text.parse_math": False,
 }
 
-Draw = Callable[[Figure, Axes], None]
+Draw = Callable[[Axes], None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,10 +157,7 @@ _TOP_AXIS: Final = 0.42
 
 
 def plain_number(value: float, _position: object = None) -> str:
-    """Tick label in plain text, because matplotlib's own would be mathtext.
-
-    Returns: Text, such as 0.05, 250 or 10⁻³.
-    """
+    """Tick label in plain text, because matplotlib's own would be mathtext."""
     if value == 0:
         return "0"
     text = f"{value:.6g}"
@@ -166,17 +168,13 @@ def decade(value: float, _position: object = None) -> str:
     """Tick label of a logarithmic axis that spans many decades.
 
     Args: `value`: the tick, positive.
-    Returns: Power of ten, or nothing between decades.
     """
     exponent = f"{value:.0e}".split("e")
     return power_of_ten(int(exponent[1])) if exponent[0] == "1" else ""
 
 
 def logarithmic(axes: Axes, axis: str, *, ticks: list[float] | None = None) -> None:
-    """Makes one axis logarithmic, with labels in plain text.
-
-    Args: `axis`: "x" or "y". `ticks`: where to label; None: the decades.
-    """
+    """Makes one axis logarithmic, with labels in plain text."""
     getattr(axes, f"set_{axis}scale")("log")
     target = getattr(axes, f"{axis}axis")
     if ticks is not None:
@@ -205,14 +203,20 @@ def _to_page(text: str, name: str, alt: str) -> str:
 
 
 def draw(
-    *, name: str, paint: Draw, alt: str, caption: str, wide: bool = False, height: float = 3.0
+    *,
+    name: str,
+    paint: Draw,
+    alt: str,
+    caption: str,
+    x: str = "",
+    y: str = "",
+    columns: int = 2,
+    wide: bool = False,
+    height: float = 3.0,
 ) -> Drawing:
-    """Draws one figure with one axis.
+    """Draws one figure with one axis, its labels, and the legend of what is labelled above it.
 
-    Args: `name`: of the figure; a file name without its ending. `paint`: draws into the figure and its axes.
-        `alt`: one sentence on what is to be seen. `caption`: as printed below. `wide`: whether it takes the
-        page's whole width. `height`: inches of 72 units.
-    Returns: The figure as SVG.
+    Args: `columns`: of the legend; 0: none. `height`: inches of 72 units.
     """
     settings: Any = dict(_RC)
     with matplotlib.rc_context(settings):
@@ -222,17 +226,28 @@ def draw(
         axes = figure.add_axes((_LEFT / width, _BOTTOM / height, 1 - (_LEFT + _RIGHT) / width, 0.5))
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_formatter(FuncFormatter(plain_number))
-        paint(figure, axes)
+        axes.set(xlabel=x, ylabel=y)
+        paint(axes)
+        if columns:
+            legend_above(axes, columns=columns)
         buffer = io.StringIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     return Drawing(name=name, svg=_to_page(buffer.getvalue(), name, alt), alt=alt, caption=caption, wide=wide)
 
 
-def legend_above(figure: Figure, axes: Axes, *, columns: int = 2) -> None:
-    """Puts the legend above the axes and gives the axes the height that is left; call it last.
+def band(axes: Axes, x: ArrayLike, y: FloatArray, width: FloatArray, colour: str) -> None:
+    """Shades a value's half-width, in the value's unit, about its line."""
+    axes.fill_between(x, y - width, y + width, color=colour, alpha=0.2, linewidth=0)
 
-    Args: `axes`: whose labelled artists are listed.
-    """
+
+def figure_of(axes: Axes) -> Figure:
+    """The figure that axes belong to."""
+    return cast(Figure, axes.get_figure())
+
+
+def legend_above(axes: Axes, *, columns: int) -> None:
+    """Puts the legend above the axes and gives the axes the height that is left; call it last."""
+    figure = figure_of(axes)
     handles, labels = axes.get_legend_handles_labels()
     figure.legend(
         handles,
@@ -252,10 +267,7 @@ def legend_above(figure: Figure, axes: Axes, *, columns: int = 2) -> None:
 
 
 def standalone(drawing: Drawing) -> str:
-    """The figure as a file of its own, which follows the viewer's light or dark scheme.
-
-    Returns: An SVG document.
-    """
+    """The figure as a file of its own, which follows the viewer's light or dark scheme."""
 
     def block(colours: dict[str, str]) -> str:
         return "".join(f"{key}:{value};" for key, value in colours.items())

@@ -8,31 +8,17 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullLocator
 
-from ringbalance.reports.figures.style import (
-    FIFTH,
-    FOUND,
-    FOURTH,
-    INK,
-    MUTED,
-    PAPER,
-    THIRD,
-    Drawing,
-    decade,
-    draw,
-    legend_above,
-    logarithmic,
-)
-from ringbalance.reports.numbers import measured, short
-from ringbalance.reports.units import given
+from ringbalance.reports.figures import style
+from ringbalance.reports.figures.style import Drawing, draw
+from ringbalance.reports.numbers import given, measured, short
 from ringbalance.scene.arrays import FloatArray
 
 Record = dict[str, Any]
 
 _VELOCITY_TICKS: Final = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0]
-_TERM_COLOURS: Final = (FOUND, THIRD, FOURTH, FIFTH, PAPER, MUTED)
+_TERM_COLOURS: Final = (style.FOUND, style.THIRD, style.FOURTH, style.FIFTH, style.PAPER, style.MUTED)
 
 
 def _nice_ticks(low: float, high: float) -> list[float]:
@@ -50,7 +36,9 @@ def _shade_transition(axes: Axes, velocity: FloatArray, states: list[str]) -> No
         count = len(list(members))
         if state == "transitional":
             last = min(start + count, velocity.size - 1)
-            axes.axvspan(velocity[start], velocity[last], color=MUTED, alpha=0.13, linewidth=0, label=state)
+            axes.axvspan(
+                velocity[start], velocity[last], color=style.MUTED, alpha=0.13, linewidth=0, label=state
+            )
         start += count
 
 
@@ -62,45 +50,40 @@ def _reynolds_axis(axes: Axes, reynolds_per_velocity: float) -> None:
         return np.asarray(reynolds, dtype=np.float64) / reynolds_per_velocity
 
     top = axes.secondary_xaxis("top", functions=(to_reynolds, to_velocity))
-    top.set_xlabel("Reynolds number", color=MUTED)
-    top.xaxis.set_major_formatter(FuncFormatter(decade))
+    top.set_xlabel("Reynolds number", color=style.MUTED)
+    top.xaxis.set_major_formatter(FuncFormatter(style.decade))
     top.xaxis.set_minor_locator(NullLocator())
 
 
 def drag(tube: Record, point: Record, paper: Record) -> Drawing:
-    """k against velocity and Reynolds number, with its 95 % band and the paper's one number.
-
-    Args: `tube`: the calibration's `tube`, SI. `point`: the evidence's `operating_point`. `paper`: the
-        evidence's `paper`.
-    Returns: The figure.
-    """
+    """k against velocity and Reynolds number, with its 95 % band and the paper's one number."""
     velocity, k = np.asarray(tube["velocity_m_s"]), np.asarray(tube["k"])
     band = np.asarray(tube["k_uncertainty"])
     low, high = np.maximum(k - band, k.min() * 0.2), k + band
     printed = paper["drag_coefficient"]
 
-    def paint(figure: Figure, axes: Axes) -> None:
-        logarithmic(axes, "x", ticks=_VELOCITY_TICKS)
+    def paint(axes: Axes) -> None:
+        style.logarithmic(axes, "x", ticks=_VELOCITY_TICKS)
         axes.set_xlim(velocity[0], velocity[-1])
         _shade_transition(axes, velocity, tube["flow_state"])
-        axes.axhline(printed, color=PAPER, linestyle=(0, (5, 2)), label="the paper")
-        axes.fill_between(velocity, low, high, color=FOUND, alpha=0.2, linewidth=0)
-        axes.plot(velocity, k, color=FOUND, label="found, 95 % band")
+        axes.axhline(printed, **style.AS_PAPER, label="the paper")
+        axes.fill_between(velocity, low, high, color=style.FOUND, alpha=0.2, linewidth=0)
+        axes.plot(velocity, k, color=style.FOUND, label="found, 95 % band")
         if point["k"] is not None:
             place = [point["k_at_velocity_m_s"]], [point["k"]]
-            axes.plot(*place, "o", color=INK, markersize=4.5, label="operating point")
+            axes.plot(*place, "o", color=style.INK, markersize=4.5, label="operating point")
         bottom, ceiling = min(low.min(), printed) * 0.8, max(high.max(), printed) * 1.3
-        logarithmic(axes, "y", ticks=_nice_ticks(bottom, ceiling))
+        style.logarithmic(axes, "y", ticks=_nice_ticks(bottom, ceiling))
         axes.set_ylim(bottom, ceiling)
-        axes.set_xlabel("mean velocity in the tube in m/s")
-        axes.set_ylabel("drag coefficient k")
         _reynolds_axis(axes, tube["reynolds"][-1] / tube["velocity_m_s"][-1])
-        legend_above(figure, axes, columns=4)
 
     ends = [measured(tube["k"][i], tube["k_uncertainty"][i]) for i in (0, -1)]
     speeds = [given(tube["velocity_m_s"][i], "m/s") for i in (0, -1)]
     shaded = " Grey: transition." if "transitional" in tube["flow_state"] else ""
     return draw(
+        columns=4,
+        x="mean velocity in the tube in m/s",
+        y="drag coefficient k",
         name="drag",
         paint=paint,
         wide=True,
@@ -113,18 +96,14 @@ def drag(tube: Record, point: Record, paper: Record) -> Drawing:
 
 
 def drag_terms(tube: Record) -> Drawing:
-    """What k is made of, term by term, over velocity.
-
-    Args: `tube`: the calibration's `tube`, SI.
-    Returns: The figure.
-    """
+    """What k is made of, term by term, over velocity."""
     velocity = np.asarray(tube["velocity_m_s"])
     terms = {name: np.asarray(values) for name, values in tube["terms"].items() if np.any(values)}
     largest = max(np.abs(values).max() for values in terms.values())
     shown_terms = {name: v for name, v in terms.items() if np.abs(v).max() > 1e-3 * largest}
 
-    def paint(figure: Figure, axes: Axes) -> None:
-        logarithmic(axes, "x", ticks=_VELOCITY_TICKS)
+    def paint(axes: Axes) -> None:
+        style.logarithmic(axes, "x", ticks=_VELOCITY_TICKS)
         for index, (name, values) in enumerate(shown_terms.items()):
             colour = _TERM_COLOURS[index % len(_TERM_COLOURS)]
             dashes = "-" if index < len(_TERM_COLOURS) else (0, (5, 2))
@@ -135,14 +114,14 @@ def drag_terms(tube: Record) -> Drawing:
                 linestyle=dashes,
                 label=name.replace("_", " "),
             )
-        logarithmic(axes, "y")
+        style.logarithmic(axes, "y")
         axes.set_xlim(velocity[0], velocity[-1])
-        axes.set_xlabel("mean velocity in the tube in m/s")
-        axes.set_ylabel("contribution to k")
-        legend_above(figure, axes, columns=3)
 
     names = ", ".join(name.replace("_", " ") for name in shown_terms)
     return draw(
+        columns=3,
+        x="mean velocity in the tube in m/s",
+        y="contribution to k",
         name="drag-terms",
         paint=paint,
         alt=f"Contributions to the drag coefficient over velocity: {names}.",
@@ -169,33 +148,29 @@ _REGIME_LINES: Final[dict[str, Record]] = {
 
 
 def flow_law(law: Record, row: int) -> Drawing:
-    """Velocity over fill ratio at one gas pressure: the calibrated law with its regimes against Eq. 19.
-
-    Args: `law`: the evidence's `flow_law`, SI. `row`: index of the gas pressure.
-    Returns: The figure.
-    """
+    """Velocity over fill ratio at one gas pressure: the calibrated law with its regimes against Eq. 19."""
     fill = np.asarray(law["fill_ratio"])
     velocity, paper = np.asarray(law["velocity_m_s"][row]), np.asarray(law["velocity_paper_m_s"][row])
     band, regimes = np.asarray(law["velocity_uncertainty"][row]), list(law["regime"][row])
 
-    def paint(figure: Figure, axes: Axes) -> None:
-        axes.plot(fill, paper, color=PAPER, linestyle=(0, (5, 2)), label="Eq. 19")
+    def paint(axes: Axes) -> None:
+        axes.plot(fill, paper, **style.AS_PAPER, label="Eq. 19")
         axes.fill_between(
-            fill, np.maximum(velocity - band, 0), velocity + band, color=FOUND, alpha=0.2, linewidth=0
+            fill, np.maximum(velocity - band, 0), velocity + band, color=style.FOUND, alpha=0.2, linewidth=0
         )
         named: set[str] = set()
         for regime, part in _regime_runs(regimes):
             label = None if regime in named else f"calibrated, {regime}"
-            axes.plot(fill[part], velocity[part], color=FOUND, label=label, **_REGIME_LINES[regime])
+            axes.plot(fill[part], velocity[part], color=style.FOUND, label=label, **_REGIME_LINES[regime])
             named.add(regime)
-        axes.set_xlabel("fill ratio of the driven chamber")
-        axes.set_ylabel("velocity in the tube in m/s")
         axes.set_ylim(bottom=0)
-        legend_above(figure, axes, columns=3)
 
     pressure = given(law["gas_pressure_Pa"][row], "Pa")
     names = " and ".join(dict.fromkeys(regimes))
     return draw(
+        columns=3,
+        x="fill ratio of the driven chamber",
+        y="velocity in the tube in m/s",
         name=f"flow-law-{row}",
         paint=paint,
         alt=f"Velocity over fill ratio at {pressure}: calibrated ({names}), and by Eq. 19.",
@@ -204,9 +179,5 @@ def flow_law(law: Record, row: int) -> Drawing:
 
 
 def flow_laws(law: Record) -> list[Drawing]:
-    """The flow law at every gas pressure of the evidence.
-
-    Args: `law`: the evidence's `flow_law`, SI.
-    Returns: One figure for each pressure.
-    """
+    """The flow law at every gas pressure of the evidence."""
     return [flow_law(law, row) for row in range(len(law["gas_pressure_Pa"]))]

@@ -6,9 +6,19 @@ from typing import Any, Final
 
 from ringbalance.reports.equations import equation_svg
 from ringbalance.reports.figures.cases import order_plot, series_plots
-from ringbalance.reports.numbers import MISSING, PLUS_MINUS, THIN_SPACE, number, percent, short, with_unit
+from ringbalance.reports.numbers import (
+    MISSING,
+    PLUS_MINUS,
+    THIN_SPACE,
+    display_unit,
+    given,
+    number,
+    percent,
+    short,
+    shown,
+    with_unit,
+)
 from ringbalance.reports.prose import typeset
-from ringbalance.reports.units import display_unit, given, shown
 from ringbalance.verification.catalogue import load_cases
 
 Record = dict[str, Any]
@@ -25,11 +35,7 @@ _RELATIVE_METRICS: Final = ("relative", "validation", "within_uncertainty")
 
 
 def anchor(case: Record) -> str:
-    """Place of a case on the page.
-
-    Args: `case`: the result.
-    Returns: An id.
-    """
+    """Place of a case on the page."""
     return f"case-{str(case['id']).replace('_', '-')}"
 
 
@@ -77,11 +83,7 @@ def _criterion(quantity: Record) -> str:
 
 
 def quantity_row(quantity: Record) -> Record:
-    """One judged quantity, every number in the unit that suits its size.
-
-    Args: `quantity`: of the case; SI.
-    Returns: Texts by column.
-    """
+    """One judged quantity, every number in the unit that suits its size."""
     unit = quantity.get("unit") or "1"
     own = quantity.get("value_uncertainty")
     half_width = quantity.get("uncertainty") if own is None else own
@@ -105,11 +107,7 @@ def _value(quantity: Record, half_width: float | None) -> str:
 
 
 def sequence_view(sequence: Record) -> Record:
-    """One convergence table.
-
-    Args: `sequence`: of the case's `convergence`.
-    Returns: Texts by row, and which columns there are.
-    """
+    """One convergence table."""
     orders = list(sequence.get("observed_order") or [])
     levels = len(sequence["h"])
     padded = [None] * (levels - len(orders)) + orders
@@ -138,11 +136,7 @@ def sequence_view(sequence: Record) -> Record:
 
 
 def sequence_label(sequence: Record) -> str:
-    """What a convergence sequence is of.
-
-    Args: `sequence`: of the case's `convergence`.
-    Returns: Text.
-    """
+    """What a convergence sequence is of."""
     geometry = f", {sequence['geometry']} geometry" if sequence.get("geometry") else ""
     return typeset(f"{sequence['quantity']}{geometry}")
 
@@ -161,11 +155,7 @@ def _equations(case: Record) -> list[Record]:
 
 
 def table_view(table: Record) -> Record:
-    """One data table of a case, each column in one unit.
-
-    Args: `table`: of the case's `tables`.
-    Returns: Heads and rows as texts.
-    """
+    """One data table of a case, each column in one unit."""
     columns = [
         _column(name, values, table["units"].get(name, "1")) for name, values in table["columns"].items()
     ]
@@ -202,7 +192,6 @@ def _mutations(case: Record) -> list[str]:
 def deciding_quantity(case: Record) -> Record | None:
     """The judged quantity that a case's verdict rests on: the first that has the case's own verdict.
 
-    Args: `case`: the result.
     Returns: The quantity; None when there is none.
     """
     quantities = case.get("quantities") or []
@@ -237,11 +226,7 @@ def _without_half_width(text: str) -> str:
 
 
 def case_view(case: Record) -> Record:
-    """Everything that the page shows of one case.
-
-    Args: `case`: the result.
-    Returns: Texts, tables and figures.
-    """
+    """Everything that the page shows of one case."""
     sequences = [{**item, "label": sequence_label(item)} for item in case.get("convergence") or []]
     return {
         "id": case["id"],

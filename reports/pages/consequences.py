@@ -6,22 +6,12 @@ from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
-from ringbalance.reports.figures.style import (
-    FOUND,
-    INK,
-    MUTED,
-    PAPER,
-    Drawing,
-    draw,
-    legend_above,
-    logarithmic,
-)
-from ringbalance.reports.numbers import MISSING, number, percent, short
+from ringbalance.reports.figures import style
+from ringbalance.reports.figures.style import Drawing, draw
+from ringbalance.reports.numbers import MISSING, number, percent, short, shown
 from ringbalance.reports.prose import typeset
 from ringbalance.reports.section import Section
-from ringbalance.reports.units import shown
 
 Record = dict[str, Any]
 
@@ -37,9 +27,8 @@ _CHANCES: Final = (
 def consequence_view(found: Record | None) -> Record | None:
     """The section on consequences, every number already text.
 
-    Args: `found`: `consequences` of the evidence; None or absent where it was not run.
     Returns: `findings`, `notes`, `gains`, `runs`, `chances` and `figure`; None where there is nothing to
-        show.
+    show.
     """
     if not found:
         return None
@@ -119,32 +108,33 @@ def gain_margin(gain: Record) -> Drawing:
     """Gains at which the loop starts to overshoot and to be unstable, over the tube's drag coefficient.
 
     Args: `gain`: one law's entry of `gain`, SI.
-    Returns: The figure.
     """
     curve = gain["over_drag_coefficient"]
     k, seen = np.asarray(curve["values"]), np.asarray(curve["simulated_values"])
     lines = (
-        ("overshoot_gain", "simulated_overshoot_gain", FOUND, "overshoot from"),
-        ("instability_gain", "simulated_instability_gain", PAPER, "unstable from"),
+        ("overshoot_gain", "simulated_overshoot_gain", style.FOUND, "overshoot from"),
+        ("instability_gain", "simulated_instability_gain", style.PAPER, "unstable from"),
     )
     scene = gain["proportional_s_per_m"] * 1e-6
 
-    def paint(figure: Figure, axes: Axes) -> None:
+    def paint(axes: Axes) -> None:
         for analytic, simulated, colour, label in lines:
             axes.plot(k, np.asarray(curve[analytic]) * 1e-6, color=colour, label=label)
             axes.plot(seen, np.asarray(curve[simulated], dtype=float) * 1e-6, "o", color=colour, markersize=4)
-        axes.axhline(scene, color=MUTED, linewidth=1, linestyle=":", label="Kc in the scene")
-        axes.plot([gain["drag_coefficient"]], [scene], "D", color=INK, markersize=5, label="this machine")
+        axes.axhline(scene, color=style.MUTED, linewidth=1, linestyle=":", label="Kc in the scene")
+        axes.plot(
+            [gain["drag_coefficient"]], [scene], "D", color=style.INK, markersize=5, label="this machine"
+        )
         values = np.concatenate([np.asarray(curve[name]) * 1e-6 for name, *_ in lines] + [[scene]])
         low, high = values.min() * 0.8, values.max() * 1.25
-        logarithmic(axes, "x", ticks=[tick for tick in _TICKS if k[0] <= tick <= k[-1]])
-        logarithmic(axes, "y", ticks=[tick for tick in _TICKS if low <= tick <= high])
+        style.logarithmic(axes, "x", ticks=[tick for tick in _TICKS if k[0] <= tick <= k[-1]])
+        style.logarithmic(axes, "y", ticks=[tick for tick in _TICKS if low <= tick <= high])
         axes.set_ylim(low, high)
-        axes.set_xlabel("drag coefficient k at equal fills")
-        axes.set_ylabel("Kc in s/µm")
-        legend_above(figure, axes, columns=4)
 
     return draw(
+        columns=4,
+        x="drag coefficient k at equal fills",
+        y="Kc in s/µm",
         name="gain-margin",
         paint=paint,
         wide=True,

@@ -12,7 +12,7 @@ from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.reports.figures.drag_coefficient import apparent_figure, map_figure
-from ringbalance.reports.numbers import MISSING, measured, percent
+from ringbalance.reports.numbers import MISSING, given, measured, percent, shown
 from ringbalance.reports.prose import typeset
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.reports.studies.apparent_drag import apparent_drag
@@ -26,17 +26,13 @@ from ringbalance.reports.studies.drag_map import (
     velocity_errors,
 )
 from ringbalance.reports.studies.drag_point import DragPoint
-from ringbalance.reports.units import given, shown
 
 _DIGITS: Final = 5
 _READINGS: Final = 60
 
 
 def collect(work: Work) -> Record:
-    """The map, its contours, the liquids, and Eq. 18's reading of a separated column, as plain numbers.
-
-    Args: `work`: scene, calibration and level.
-    """
+    """The map, its contours, the liquids, and Eq. 18's reading of a separated column, as plain numbers."""
     found = drag_map(calibration=work.calibration)
     verdicts = liquid_verdicts(calibration=work.calibration)
     return {
@@ -152,10 +148,7 @@ def _apparent(calibration: Calibration) -> Record | None:
 
 
 def verdict_on_fifty(record: Record) -> str:
-    """What a liquid says of k = 50, judged by the velocity that Eq. 19 gives with it.
-
-    Returns: "right", "too high", "too low", or "nothing flows".
-    """
+    """What a liquid says of k = 50, judged by the velocity that Eq. 19 gives with it."""
     if not record["runs"]:
         return "nothing flows"
     gap = record["velocity_paper_m_s"] - record["velocity_m_s"]
@@ -165,7 +158,7 @@ def verdict_on_fifty(record: Record) -> str:
 
 
 def liquid_row(record: Record) -> Record:
-    """One liquid as the tables show it. Returns: Texts."""
+    """One liquid as the tables show it."""
     runs, bore = record["runs"], record["bore_for_paper_m"]
     pressure = given(record["gas_pressure_Pa"], "Pa", digits=3)
     start = shown(record["starting_pressure_Pa"], "Pa", digits=2)
@@ -198,7 +191,6 @@ def _outside(record: Record) -> str:
 def view(evidence: Record) -> Record | None:
     """The section's texts, table and figures.
 
-    Args: `evidence`: the whole document.
     Returns: Record; None where the evidence has none of it.
     """
     found = evidence.get("fifty")

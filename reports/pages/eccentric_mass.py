@@ -8,11 +8,10 @@ from typing import Any, Final
 
 from ringbalance.controller.compare import compare, comparison_document
 from ringbalance.reports import summary
-from ringbalance.reports.numbers import MISSING, percent
+from ringbalance.reports.numbers import MISSING, percent, shown
 from ringbalance.reports.pages.cases import case_view
 from ringbalance.reports.prose import typeset
 from ringbalance.reports.section import Record, Section, Work
-from ringbalance.reports.units import shown
 from ringbalance.scene import SceneError, bundled_scene, load_scene
 
 PAPER: Final = "eccentric_mass"
@@ -22,11 +21,7 @@ _NAMES: Final = {"liquid_ring": "liquid ring", "eccentric_mass": "two eccentric 
 
 
 def collect(work: Work) -> Record:
-    """Both balancers on the scene's rotor.
-
-    Args: `work`: scene, calibration and level.
-    Returns: The comparison, or why there is none.
-    """
+    """Both balancers on the scene's rotor."""
     rival = load_scene(bundled_scene(RIVAL))
     try:
         found = compare(work.scene, rival, model_of=lambda _: work.calibration.model)
@@ -40,7 +35,6 @@ def collect(work: Work) -> Record:
 def view(evidence: Record) -> Record | None:
     """Claims, their counts, and the comparison as a table.
 
-    Args: `evidence`: the whole evidence.
     Returns: `claims`, `lead`, `compared` and `text`; None without claims of that paper.
     """
     cases = summary.claims(evidence, paper=PAPER)

@@ -8,10 +8,10 @@ from typing import Final
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from ringbalance.reports.figures.style import FOUND, MUTED, PAPER, THIRD, Drawing, draw, logarithmic
+from ringbalance.reports.figures import style
+from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import number
 from ringbalance.reports.prose import typeset
 from ringbalance.reports.section import Record, Section
@@ -22,11 +22,11 @@ from ringbalance.verification.extremes.study import MAP_PREFIX
 
 CASE: Final = "extremes"
 _COLOURS: Final = {
-    Ending.SOLVED: (FOUND, 0.55),
-    Ending.WIDE: (FOUND, 0.22),
-    Ending.STATUS: (THIRD, 0.5),
-    Ending.REFUSED: (MUTED, 0.18),
-    Ending.BROKEN: (PAPER, 1.0),
+    Ending.SOLVED: (style.FOUND, 0.55),
+    Ending.WIDE: (style.FOUND, 0.22),
+    Ending.STATUS: (style.THIRD, 0.5),
+    Ending.REFUSED: (style.MUTED, 0.18),
+    Ending.BROKEN: (style.PAPER, 1.0),
 }
 _MARKS: Final = (
     ("loop settles", ("settled",), "o", 3.0),
@@ -40,11 +40,7 @@ _LEGEND: Final = 0.62
 
 
 def view(evidence: Record) -> Record:
-    """Sentences, the table of axes and the maps.
-
-    Args: `evidence`: the whole evidence.
-    Returns: `ran`, and where it is true `text`, `stamp`, `rows` and `maps`.
-    """
+    """Sentences, the table of axes and the maps."""
     case = next((c for c in evidence.get("verification", []) if c["id"] == CASE), None)
     if case is None or not case.get("tables"):
         return {"ran": False}
@@ -64,11 +60,7 @@ def map_drawings(tables: Mapping[str, Record]) -> list[Drawing]:
 
 
 def axis_rows(columns: Record) -> list[Record]:
-    """The stretches of every axis as texts.
-
-    Args: `columns`: of the table "axes" of `extremes_tables`.
-    Returns: `title` (empty but for an axis' first), `span`, `ending`, `loop` and `said` of each.
-    """
+    """The stretches of every axis as texts."""
     before = ["", *columns["axis"]]
     return [
         {
@@ -105,7 +97,7 @@ def _map(name: str, columns: Record) -> Drawing:
     endings = np.asarray(columns["ending"], dtype=object).reshape(shape)
     loops = np.asarray(columns["loop"], dtype=object).reshape(shape)
 
-    def paint(figure: Figure, axes: Axes) -> None:
+    def paint(axes: Axes) -> None:
         edges_x, edges_y = _edges(x, xs), _edges(y, ys)
         present = [ending for ending in Ending if np.any(endings == str(ending))]
         for ending in present:
@@ -125,23 +117,24 @@ def _map(name: str, columns: Record) -> Drawing:
                     xs[cols],
                     ys[rows],
                     marker,
-                    color=FOUND,
+                    color=style.FOUND,
                     markersize=size,
                     markeredgewidth=0.9,
                     label=label,
                 )
         for axis, target, edges in (("x", x, edges_x), ("y", y, edges_y)):
             if target.spacing == "log":
-                logarithmic(axes, axis)
+                style.logarithmic(axes, axis)
             getattr(axes, f"set_{axis}lim")(edges[0], edges[-1])
         axes.grid(visible=False)
-        axes.set_xlabel(_label(x))
-        axes.set_ylabel(_label(y))
-        _legend(figure, axes, present)
+        _legend(axes, present)
 
     return draw(
+        x=_label(x),
+        y=_label(y),
         name=f"extremes-{x.name}-{y.name}",
         paint=paint,
+        columns=0,
         height=3.4,
         alt=f"Where the program answers over {x.title} and {y.title}, and where it refuses with a message.",
         caption=f"{x.title[0].upper()}{x.title[1:]} and {y.title}, all else as in the scene. "
@@ -162,9 +155,10 @@ def _label(axis: Axis) -> str:
     return fill(told, _LABEL)
 
 
-def _legend(figure: Figure, axes: Axes, present: list[Ending]) -> None:
+def _legend(axes: Axes, present: list[Ending]) -> None:
     cells = [Patch(color=_COLOURS[e][0], alpha=_COLOURS[e][1], linewidth=0, label=str(e)) for e in present]
     handles = [*cells, *axes.get_legend_handles_labels()[0]]
+    figure = style.figure_of(axes)
     figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0, 1), ncols=2, borderaxespad=0.0)
     box, height = axes.get_position(), figure.get_figheight()
     axes.set_position((box.x0, box.y0, box.width, 1 - box.y0 - _LEGEND / height))

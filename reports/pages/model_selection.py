@@ -7,18 +7,9 @@ from typing import Final
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
-from ringbalance.reports.figures.style import (
-    FOUND,
-    INK,
-    MUTED,
-    PAPER,
-    Drawing,
-    draw,
-    legend_above,
-    logarithmic,
-)
+from ringbalance.reports.figures import style
+from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import MISSING, number, percent
 from ringbalance.reports.prose import typeset
 from ringbalance.reports.section import Record, Section, Work
@@ -36,11 +27,7 @@ _MOST_ROWS: Final = 8
 
 
 def collect(work: Work) -> Record | None:
-    """The trade of the scene, light: without the settling time.
-
-    Args: `work`: scene, calibration and level.
-    Returns: Record; its `times` differ from run to run and are kept apart.
-    """
+    """The trade of the scene, light: without the settling time."""
     return trade_document(_study(work.scene))
 
 
@@ -53,7 +40,6 @@ def _study(scene: Scene) -> TradeStudy:
 def view(evidence: Record) -> Record | None:
     """The section on models against tolerances, every number already text.
 
-    Args: `evidence`: the whole document.
     Returns: `quantities`, `numbers` and `tolerance`; None where nothing was measured.
     """
     found = evidence.get("trade")
@@ -125,32 +111,33 @@ def _time(value: float) -> str:
 
 
 def front_figure(found: Record) -> Drawing:
-    """Error against counted cost of every model, with the front and its trade-off point.
-
-    Args: `found`: one entry of `quantities`.
-    """
+    """Error against counted cost of every model, with the front and its trade-off point."""
     fidelities = sorted(found["rungs"], key=lambda r: r["cost_s"])
     cost = np.array([r["cost_s"] for r in fidelities])
     error = np.array([max(r["error"], _LEAST) for r in fidelities])
     front = np.array([r["on_front"] for r in fidelities])
     at_knee = np.array([r["name"] == found["knee"] for r in fidelities])
 
-    def paint(figure: Figure, axes: Axes) -> None:
+    def paint(axes: Axes) -> None:
         known = found["top_uncertainty"]
-        axes.plot(cost[~front], error[~front], "o", color=MUTED, markersize=3.5, label="beaten by another")
-        axes.plot(cost[front], error[front], "o-", color=FOUND, markersize=5, label="the front")
-        axes.plot(cost[at_knee], error[at_knee], "D", color=INK, markersize=8, fillstyle="none", label="knee")
-        axes.axhline(known, color=PAPER, linewidth=1, linestyle=":", label="known to")
-        logarithmic(axes, "x")
-        logarithmic(axes, "y")
+        axes.plot(
+            cost[~front], error[~front], "o", color=style.MUTED, markersize=3.5, label="beaten by another"
+        )
+        axes.plot(cost[front], error[front], "o-", color=style.FOUND, markersize=5, label="the front")
+        axes.plot(
+            cost[at_knee], error[at_knee], "D", color=style.INK, markersize=8, fillstyle="none", label="knee"
+        )
+        axes.axhline(known, color=style.PAPER, linewidth=1, linestyle=":", label="known to")
+        style.logarithmic(axes, "x")
+        style.logarithmic(axes, "y")
         axes.set_xlim(cost.min() / 2, cost.max() * 2)
         low = min(error.min(), found["top_uncertainty"])
         axes.set_ylim(low / 3, max(error.max() * 3, 1.0))
-        axes.set_xlabel("counted cost in s")
-        axes.set_ylabel("error against the top")
-        legend_above(figure, axes, columns=4)
 
     return draw(
+        columns=4,
+        x="counted cost in s",
+        y="error against the top",
         name=f"trade-{found['quantity'].replace('_', '-')}",
         paint=paint,
         height=2.9,

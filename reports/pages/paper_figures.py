@@ -16,9 +16,8 @@ from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperMoment, paper_model
 from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.reports.figures.paper import figure_4, figure_6, figure_7, figure_7_phase, figure_8
-from ringbalance.reports.numbers import number, percent, short
+from ringbalance.reports.numbers import given, number, percent, short, shown
 from ringbalance.reports.section import Record, Section, Work
-from ringbalance.reports.units import given, shown
 from ringbalance.scene.models import Scene
 from ringbalance.verification import paper_numbers
 from ringbalance.verification.loops import AMPLITUDES, PHASES, calibration_of, loop_scene, run_loop
@@ -165,7 +164,6 @@ def literal_moment(model: BalancerModel) -> PaperMoment:
     """Eqs. 21 and 22 as printed: lambda times the difference of the two chambers' masses.
 
     Args: `model`: the paper's.
-    Returns: The moment, twice that of lambda per transferred mass.
     Raises: ValueError: a model whose moment is not the paper's.
     Source: Eqs. 21 and 22 of the liquid-ring paper.
     """
@@ -178,7 +176,6 @@ def literal_moment(model: BalancerModel) -> PaperMoment:
 def view(evidence: Record) -> Record | None:
     """The section's tables and figures.
 
-    Args: `evidence`: the whole document.
     Returns: Record; None where the evidence has none of it.
     """
     found = evidence.get("paper_again")

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from itertools import groupby
 from typing import Final
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.pressure_profile import HumpProfile, hump_profile
-from ringbalance.reports.figures.siphon_crest import path_figure
-from ringbalance.reports.numbers import MISSING
+from ringbalance.reports.figures import style
+from ringbalance.reports.figures.style import Drawing, draw
+from ringbalance.reports.numbers import MISSING, given, shown
 from ringbalance.reports.section import Record, Section, Work
-from ringbalance.reports.units import given, shown
 from ringbalance.scene.models import Scene
 
 _POINTS: Final = 161
@@ -23,10 +25,88 @@ _FACTORS: Final = (1.0, 0.6, 0.3, 1.5, 2.0)
 _ORDER: Final = (Regime.SIPHON, Regime.SEPARATED, Regime.BLOCKED, Regime.REVERSE)
 
 
+def path_figure(found: Record) -> Drawing:
+    """Gauge pressure along the path, one line a regime, dotted where the tube is not full."""
+    states = found["states"]
+
+    def paint(axes: Axes) -> None:
+        for state in states:
+            _line(axes, state)
+        cavity = states[0]["cavity_pressure_Pa"] * 1e-6
+        axes.axhline(cavity, color=style.MUTED, linewidth=1, linestyle=(0, (5, 2)), label="cavity pressure")
+        hump = states[0]["hump_path_m"] * 1e3
+        axes.axvline(hump, color=style.MUTED, linewidth=0.8, linestyle=":")
+        _margin(axes, states, hump)
+        length = states[0]["path_m"][-1] * 1e3
+        axes.set_xlim(-0.015 * length, 1.015 * length)
+        low, high = axes.get_ylim()
+        axes.set_ylim(low - 0.04 * (high - low), high)
+        axes.annotate(
+            "hump", (hump, high), xytext=(5, -9), textcoords="offset points", color=style.MUTED, fontsize=8
+        )
+
+    told = "; ".join(f"{_told(state)}" for state in states)
+    return draw(
+        columns=3,
+        x="path along the tube from the driven chamber in mm",
+        y="gauge pressure in MPa",
+        name="hump-pressure",
+        paint=paint,
+        wide=True,
+        height=4.0,
+        alt="Pressure along the tube: it falls towards the siphon crest and rises behind it; in the "
+        "separated regime "
+        "it stays at the cavity pressure behind the siphon crest until the tube is full again.",
+        caption=f"Pressure along the path, siphon crest at a radius of {given(found['hump_radius_m'], 'm')}: "
+        f"{told}. "
+        "Dotted: where gas or a cavity fills the bore. Steps: the ends and the bends. The bends are taken as "
+        "evenly spread, the legs as straight in radius.",
+    )
+
+
+def _told(state: Record) -> str:
+    return (
+        f"{state['regime']} at a fill ratio of {state['fill_ratio']:.2f} and "
+        f"{given(state['gas_pressure_Pa'], 'Pa', digits=3)}"
+    )
+
+
+def _line(axes: Axes, state: Record) -> None:
+    path, pressure = np.asarray(state["path_m"]) * 1e3, np.asarray(state["pressure_Pa"]) * 1e-6
+    colour, start = style.REGIME_COLOURS[state["regime"]], 0
+    gas = given(state["gas_pressure_Pa"], "Pa", digits=3)
+    label: str | None = f"{state['regime']}, {gas}"
+    for full, members in groupby(state["full"]):
+        count = len(list(members))
+        part = slice(max(start - 1, 0) if not full else start, start + count + (0 if full else 1))
+        dashes = "-" if full else (0, (1, 2))
+        axes.plot(path[part], pressure[part], color=colour, linestyle=dashes, label=label if full else None)
+        label = None if full else label
+        start += count
+
+
+def _margin(axes: Axes, states: list[Record], hump: float) -> None:
+    """The siphon's margin at the crest, as an arrow with its size."""
+    siphons = [s for s in states if s["regime"] == "siphon" and s["margin_Pa"] is not None]
+    if not siphons:
+        return
+    state = siphons[0]
+    low, high = state["cavity_pressure_Pa"] * 1e-6, state["hump_pressure_Pa"] * 1e-6
+    axes.annotate(
+        f"margin {shown(state['margin_Pa'], 'Pa', digits=2)}",
+        (hump, high),
+        xytext=(10, 26),
+        textcoords="offset points",
+        color=style.FOUND,
+        fontsize=8,
+        arrowprops={"arrowstyle": "-", "color": style.FOUND, "linewidth": 0.7},
+    )
+    axes.plot([hump, hump], [low, high], color=style.FOUND, linewidth=3, alpha=0.6, solid_capstyle="butt")
+
+
 def collect(work: Work) -> Record | None:
     """One operating state of every regime that this tube can be in, with its pressures along the path.
 
-    Args: `work`: scene, calibration and level.
     Returns: Record; None for a tube without a crest.
     """
     law = work.calibration.flow_law
@@ -99,7 +179,6 @@ def _row(state: Record) -> Record:
 def view(evidence: Record) -> Record | None:
     """The section's table and figure.
 
-    Args: `evidence`: the whole document.
     Returns: Record; None where the evidence has none of it.
     """
     found = evidence.get("hump")

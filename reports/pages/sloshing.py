@@ -6,23 +6,13 @@ from typing import Final
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from ringbalance.physics.sloshing.modes import resonant_fills, sloshing_modes
 from ringbalance.physics.sloshing.response import sloshing_response
-from ringbalance.reports.figures.style import (
-    FOUND,
-    MUTED,
-    PAPER,
-    THIRD,
-    Drawing,
-    draw,
-    legend_above,
-    logarithmic,
-)
-from ringbalance.reports.numbers import number, percent, short
+from ringbalance.reports.figures import style
+from ringbalance.reports.figures.style import Drawing, draw
+from ringbalance.reports.numbers import number, percent, short, shown
 from ringbalance.reports.section import Record, Section, Work
-from ringbalance.reports.units import shown
 
 _MODES: Final = 4
 _POINTS: Final = 17
@@ -35,7 +25,6 @@ _NEAR: Final = 0.15
 def collect(work: Work) -> Record | None:
     """Frequencies and swings over the fills, as plain numbers.
 
-    Args: `work`: scene, calibration and level.
     Returns: Record; None on a vertical shaft or without gravity, which then drives no waves.
     """
     scene = work.scene
@@ -81,7 +70,6 @@ def collect(work: Work) -> Record | None:
 def view(evidence: Record) -> Record | None:
     """Sentences and figures.
 
-    Args: `evidence`: the whole evidence.
     Returns: `findings`, `frequencies` and `swing`; None where there is nothing to show.
     """
     found = evidence.get("sloshing")
@@ -138,30 +126,31 @@ def _reservation(found: Record) -> list[str]:
 def _frequencies(found: Record) -> Drawing:
     fills = np.asarray(found["fill_ratio"])
 
-    def paint(figure: Figure, axes: Axes) -> None:
+    def paint(axes: Axes) -> None:
         for index, ratios in enumerate(found["frequency_ratio"]):
             label = "natural frequencies" if index == 0 else None
-            axes.plot(fills, ratios, color=FOUND, linewidth=1.6 - 0.25 * index, label=label)
+            axes.plot(fills, ratios, color=style.FOUND, linewidth=1.6 - 0.25 * index, label=label)
             axes.annotate(
                 f"{index + 1}",
                 (fills[-1], ratios[-1]),
                 xytext=(3, 0),
                 textcoords="offset points",
-                color=FOUND,
+                color=style.FOUND,
                 va="center",
                 fontsize=7.5,
             )
-        axes.axhline(1.0, color=PAPER, linewidth=1.2, linestyle=(0, (5, 2)), label="gravity, once a turn")
+        axes.axhline(
+            1.0, color=style.PAPER, linewidth=1.2, linestyle=(0, (5, 2)), label="gravity, once a turn"
+        )
         for item in found["resonant"]:
-            axes.plot(item["fill_ratio"], 1.0, "o", color=PAPER, markersize=4)
-        axes.set_xlabel("fill ratio")
-        axes.set_ylabel("frequency over speed")
+            axes.plot(item["fill_ratio"], 1.0, "o", color=style.PAPER, markersize=4)
         axes.set_xlim(0, 1.05 * fills[-1])
         axes.set_ylim(bottom=0)
-        legend_above(figure, axes)
 
     met = ", ".join(f"mode {i['mode']} at {short(i['fill_ratio'], digits=2)}" for i in found["resonant"])
     return draw(
+        x="fill ratio",
+        y="frequency over speed",
         name="sloshing-frequencies",
         paint=paint,
         alt=f"Natural frequencies over the speed rise with the fill; they meet gravity's once a turn: {met}.",
@@ -173,21 +162,22 @@ def _frequencies(found: Record) -> Drawing:
 def _swing(found: Record) -> Drawing:
     fills = np.asarray(found["fill_ratio"])
 
-    def paint(figure: Figure, axes: Axes) -> None:
-        axes.plot(fills, found["amplification"], color=FOUND, label="moment")
-        axes.plot(fills, found["pressure_amplification"], color=THIRD, label="wall pressure")
-        axes.axhline(1.0, color=MUTED, linewidth=1.2, linestyle=(0, (5, 2)), label="surface follows at once")
+    def paint(axes: Axes) -> None:
+        axes.plot(fills, found["amplification"], color=style.FOUND, label="moment")
+        axes.plot(fills, found["pressure_amplification"], color=style.THIRD, label="wall pressure")
+        axes.axhline(
+            1.0, color=style.MUTED, linewidth=1.2, linestyle=(0, (5, 2)), label="surface follows at once"
+        )
         for item in found["resonant"]:
-            axes.axvline(item["fill_ratio"], color=MUTED, linewidth=0.8, linestyle=":")
-        logarithmic(axes, "y", ticks=[a * 10.0**b for b in range(-3, 4) for a in (1, 2, 5)])
+            axes.axvline(item["fill_ratio"], color=style.MUTED, linewidth=0.8, linestyle=":")
+        style.logarithmic(axes, "y", ticks=[a * 10.0**b for b in range(-3, 4) for a in (1, 2, 5)])
         values = np.asarray([*found["amplification"], *found["pressure_amplification"]])
         axes.set_ylim(0.7 * values.min(), 1.5 * max(values.max(), 1.0))
         axes.set_xlim(0, 1.05 * fills[-1])
-        axes.set_xlabel("fill ratio")
-        axes.set_ylabel("swing")
-        legend_above(figure, axes, columns=2)
 
     return draw(
+        x="fill ratio",
+        y="swing",
         name="sloshing-swing",
         paint=paint,
         alt="Swing of a chamber's moment and of its wall pressure under gravity over those of a surface "

@@ -6,6 +6,10 @@ from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle, Rectangle
+from matplotlib.ticker import FuncFormatter
+from matplotlib.tri import Triangulation
 
 from ringbalance.physics.navier_stokes.flow_fields import (
     EndFlow,
@@ -15,21 +19,170 @@ from ringbalance.physics.navier_stokes.flow_fields import (
     section_flow,
 )
 from ringbalance.physics.tube.loss import FlowState, tube_loss
-from ringbalance.reports.figures.tube_flow import end_figure, section_figure
-from ringbalance.reports.numbers import number
+from ringbalance.reports.figures import style
+from ringbalance.reports.figures.style import Drawing, draw
+from ringbalance.reports.numbers import number, percent
 from ringbalance.reports.pages.cases import anchor, case_view
 from ringbalance.reports.section import Record, Section, Work
+from ringbalance.scene.arrays import FloatArray
 
 _LARGEST: Final = 500.0
 """Re up to which a flow is drawn: beyond, a laminar one is thin layers that no picture shows."""
 _CHECK: Final = "bent_tube_3d"
 _DIGITS: Final = 4
 
+_SHARES: Final = (0.1, 0.3, 0.5, 0.7, 0.9)
+_FLOW_THROUGH: Final = 1 / 8
+"""Stream function at the tube's wall, over U d^2."""
+_LINES: Final = 6
+_BAR: Final = 0.11
+"""Height of the colour bar, in."""
+_TOP: Final = 0.5
+_BOTTOM: Final = 0.42
+_LEFT: Final = 0.62
+
+
+def _unpacked(record: Record, name: str) -> FloatArray:
+    return np.array(record[name].split(), dtype=np.float64)
+
+
+def _triangulation(record: Record, *, order: tuple[int, int] = (0, 1), sign: float = 1.0) -> Triangulation:
+    points = _unpacked(record, "points").reshape(2, -1)
+    triangles = np.array(record["triangles"].split(), dtype=np.int64).reshape(-1, 3)
+    return Triangulation(points[order[0]], sign * points[order[1]], triangles)
+
+
+def _place(axes: Axes, width: float, height: float) -> None:
+    """Gives the axes equal scales in the room below the colour bar."""
+    total = style.figure_of(axes).get_figheight()
+    room, tall = style.NARROW - _LEFT - 0.1, total - _BOTTOM - _TOP
+    scale = min(room / width, tall / height)
+    axes.set_position(
+        (_LEFT / style.NARROW, _BOTTOM / total, scale * width / style.NARROW, scale * height / total)
+    )
+    axes.grid(visible=False)
+
+
+def _colour_bar(axes: Axes, levels: FloatArray, title: str) -> None:
+    figure = style.figure_of(axes)
+    total = figure.get_figheight()
+    bar = figure.add_axes((_LEFT / style.NARROW, 1 - 0.3 / total, 0.46, _BAR / total))
+    width = levels[1] - levels[0]
+    for low, shade in zip(levels, style.MAP, strict=False):
+        bar.add_patch(Rectangle((low, 0), width, 1, color=shade, linewidth=0))
+    bar.set_xlim(levels[0], levels[-1])
+    bar.set_ylim(0, 1)
+    bar.set_yticks([])
+    bar.set_xticks(levels[::4])
+    bar.xaxis.set_major_formatter(FuncFormatter(style.plain_number))
+    bar.tick_params(length=2, pad=1.5, labelsize=7.5)
+    bar.grid(visible=False)
+    for spine in bar.spines.values():
+        spine.set_visible(False)
+    figure.text(
+        _LEFT / style.NARROW + 0.49, 1 - 0.25 / total, title, fontsize=8, va="center", color=style.INK
+    )
+
+
+def _levels(values: FloatArray) -> FloatArray:
+    """Thirteen even levels from zero to a round number."""
+    top = float(values.max())
+    step = next(s for s in (0.05, 0.1, 0.125, 0.15, 0.175, 0.2, 0.25, 0.3, 0.5, 1.0, 2.0) if 12 * s >= top)
+    return np.asarray(step * np.arange(13), dtype=np.float64)
+
+
+def section_figure(record: Record) -> Drawing:
+    """Axial velocity in colour and in-plane streamlines in the section of the turning tube.
+
+    Args: `record`: `section` of the evidence's `inside`.
+    """
+    field, psi = _unpacked(record, "colour"), _unpacked(record, "stream_function")
+    drift = _unpacked(record, "velocity").reshape(2, -1)
+    mesh = _triangulation(record, order=(1, 0))
+    strongest = float(np.hypot(*drift).max())
+
+    def paint(axes: Axes) -> None:
+        levels = _levels(field)
+        axes.tricontourf(mesh, np.clip(field, 0, levels[-1]), levels=levels, colors=list(style.MAP))
+        top = float(np.abs(psi).max())
+        if top > 0:
+            rising = sorted([-s * top for s in _SHARES] + [s * top for s in _SHARES])
+            axes.tricontour(mesh, psi, levels=rising, colors=[style.INK], linewidths=0.8, linestyles=["-"])
+            way = float(np.sign(drift[0, np.argmin(np.hypot(*_unpacked(record, "points").reshape(2, -1)))]))
+            axes.annotate(
+                "",
+                (0, 0.17 * way),
+                xytext=(0, -0.17 * way),
+                arrowprops={"arrowstyle": "->", "color": style.INK, "linewidth": 1.4},
+            )
+        axes.add_patch(Circle((0, 0), 0.5, fill=False, color=style.MUTED, linewidth=1.4))
+        axes.set_xlim(-0.53, 0.53)
+        axes.set_ylim(-0.53, 0.53)
+        _place(axes, 1.0, 1.0)
+        _colour_bar(axes, levels, "axial velocity over its mean")
+
+    re, rotation = (number(record[key], digits=3) for key in ("reynolds", "rotation_reynolds"))
+    more = percent(record["friction_ratio"] - 1, signed=True, digits=2)
+    return draw(
+        x="z/d, along the axis of rotation",
+        y="y/d",
+        name="flow-section",
+        columns=0,
+        paint=paint,
+        height=4.6,
+        alt="Section of the turning tube: two mirrored vortices across the axial flow, whose peak they move "
+        "towards one wall.",
+        caption=f"Developed laminar flow in the turning tube’s section, Re {re}, ωd²/ν {rotation}: axial "
+        "velocity in colour, in-plane streamlines; arrow: the way of the core. In-plane it is at most "
+        f"{percent(strongest, digits=2)} of the mean velocity, yet friction changes by {more}.",
+    )
+
+
+def end_figure(record: Record, end: str) -> Drawing:
+    """Speed in colour and streamlines where liquid enters or leaves the tube."""
+    field, psi = _unpacked(record, "colour"), _unpacked(record, "stream_function")
+    points = _unpacked(record, "points").reshape(2, -1)
+    low, high = float(points[0].min()), float(points[0].max())
+    reach = 1.5
+    left, right = (max(low, -1.5), min(high, 3.5)) if end == "entrance" else (-1.5, min(high, 5.0))
+    inner = {"entrance": (0.0, right), "exit": (left, 0.0)}[end]
+
+    def paint(axes: Axes) -> None:
+        levels = _levels(field)
+        lines = _FLOW_THROUGH * (np.arange(1, _LINES) / _LINES) ** 2
+        for sign in (1.0, -1.0):
+            mesh = _triangulation(record, sign=sign)
+            axes.tricontourf(mesh, np.clip(field, 0, levels[-1]), levels=levels, colors=list(style.MAP))
+            axes.tricontour(mesh, psi, levels=lines, colors=[style.INK], linewidths=0.7, linestyles=["-"])
+            corner = (inner[0], 0.5 if sign > 0 else -reach)
+            axes.add_patch(
+                Rectangle(corner, inner[1] - inner[0], reach - 0.5, color=style.MUTED, alpha=0.3, linewidth=0)
+            )
+        axes.set_xlim(left, right)
+        axes.set_ylim(-reach, reach)
+        _place(axes, right - left, 2 * reach)
+        _colour_bar(axes, levels, "speed over the mean")
+
+    re = number(record["reynolds"], digits=3)
+    what = {
+        "entrance": "Streamlines converge from all sides at the sharp edge",
+        "exit": "The stream leaves as a jet that takes its kinetic energy along",
+    }[end]
+    return draw(
+        x="x/d, along the flow",
+        y="r/d",
+        name=f"flow-{end}",
+        columns=0,
+        paint=paint,
+        height=_BOTTOM + _TOP + (style.NARROW - _LEFT - 0.1) * 2 * reach / (right - left),
+        alt=f"Laminar flow at the tube’s {end}: speed and streamlines. {what}.",
+        caption=f"The tube’s {end}, laminar at Re {re}: speed in colour, streamlines. {what}.",
+    )
+
 
 def collect(work: Work) -> Record | None:
     """Laminar flow fields at the operating point, or at the nearest one that can be drawn.
 
-    Args: `work`: scene, calibration and level.
     Returns: Record; None where nothing flows.
     """
     scene, speed = work.scene, work.calibration.operating_point.loss_velocity
@@ -59,7 +212,6 @@ def packed(values: npt.ArrayLike) -> str:
     """Numbers as one line of text: a field of a thousand nodes is nothing to read number by number.
 
     Args: `values`: any shape; written flat.
-    Returns: Text, four significant digits.
     """
     return " ".join(f"{value:.{_DIGITS}g}" for value in np.asarray(values).ravel())
 
@@ -90,7 +242,6 @@ def _end_record(flow: EndFlow) -> Record:
 def view(evidence: Record) -> Record | None:
     """The section's texts and figures.
 
-    Args: `evidence`: the whole document.
     Returns: Record; None where the evidence has none of it.
     """
     found = evidence.get("inside")
@@ -123,7 +274,6 @@ def _rotation(found: Record) -> str:
 def three_dimensional_check(evidence: Record) -> Record | None:
     """The bent tube solved in three dimensions, against the sum of the terms of k: run when, on what, how.
 
-    Args: `evidence`: the whole document.
     Returns: Verdict, texts and the place of the case on the page; None where there is no such case.
     """
     cases = [case for case in evidence["verification"] if case["id"] == _CHECK]

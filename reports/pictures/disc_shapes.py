@@ -21,11 +21,7 @@ _LATTICE: Final = (
 
 
 def split_hexahedra(grid: Any) -> Any:
-    """Eight linear hexahedra for each triquadratic one, on the same nodes: VTK cuts only linear cells well.
-
-    Args: `grid`: pyvista grid of triquadratic hexahedra.
-    Returns: pyvista grid with the same points and point data.
-    """
+    """Eight linear hexahedra for each triquadratic one, on its nodes: VTK cuts only linear cells well."""
     index = {place: number for number, place in enumerate(_LATTICE)}
     starts = [(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)]
     local = [[index[(i + a // 2, j + b // 2, k + c // 2)] for a, b, c in _LATTICE[:8]] for i, j, k in starts]
@@ -41,8 +37,7 @@ def ring(*, inner: float, outer: float, bottom: float, top: float) -> Any:
     """A closed ring of rectangular section about the shaft.
 
     Args: `inner`: radius, mm. `outer`: radius, mm. `bottom`: lower axial coordinate, mm. `top`: upper axial
-        coordinate, mm.
-    Returns: pyvista surface.
+    coordinate, mm.
     """
     angle = np.linspace(0, 2 * np.pi, _STEPS)
     section = np.array([(inner, bottom), (outer, bottom), (outer, top), (inner, top), (inner, bottom)])
@@ -57,10 +52,8 @@ def web(
 ) -> Any:
     """The solid between two chambers, its middle along the x axis; turn it into place.
 
-    Args: `start`: radius within the hub, mm. `end`: radius within the wall, mm. `half_angle`: of the solid at
-        each radius, rad, shape (n,). `radius`: mm, shape (n,), rising. `bottom`: lower axial coordinate, mm.
-        `top`: upper axial coordinate, mm.
-    Returns: pyvista surface.
+    Args: `start`: radius within the hub, mm. `end`: radius within the wall, mm. `radius`: mm, shape (n,),
+    rising. `bottom`: lower axial coordinate, mm. `top`: upper axial coordinate, mm.
     """
     reach = np.linspace(start, end, 41)
     across = np.linspace(-1, 1, 17)
@@ -78,8 +71,7 @@ def chamber_outline(
     """Edges of a whole chamber, its gas space included.
 
     Args: `inner`: radius, mm. `outer`: radius, mm. `half_thickness`: strip that a plate takes of each
-        chamber, mm. `half_angle`: half of the central angle, rad. `width`: axial, mm.
-    Returns: pyvista lines.
+    chamber, mm. `half_angle`: half of the central angle, rad. `width`: axial, mm.
     """
     ends = (-width / 2, width / 2)
     edges, corners = [], {}
@@ -101,7 +93,7 @@ def tube_path(*, port: float, hump: float | None, height: float, bend: float) ->
     Out of the chamber, inward to the crest's radius, along that radius half-way round, outward and in again;
     without a crest straight across.
     Args: `port`: radius of both ports, mm. `hump`: smallest radius on the path, mm; None: a straight tube.
-        `height`: of the tube above the cut, mm. `bend`: radius of its corners, mm.
+    `bend`: radius of its corners, mm.
     Returns: Points, mm, shape (n, 3).
     """
     low = -height

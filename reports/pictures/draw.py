@@ -51,11 +51,7 @@ _WATER: Final = ListedColormap(colormaps["Blues"](np.linspace(0.28, 1.0, 256)))
 
 
 def main(arguments: list[str]) -> int:
-    """Draw every picture of a job in every theme.
-
-    Args: `arguments`: path of the job file.
-    Returns: 0.
-    """
+    """Draw every picture of a job in every theme."""
     # Not through sys.stdin, whose lock would be held when the interpreter ends.
     end_with(partial(os.read, 0, 1))
     job = json.loads(Path(arguments[0]).read_text(encoding="utf-8"))

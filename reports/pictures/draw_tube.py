@@ -27,12 +27,7 @@ _SIDES: Final = 40
 def draw_tube(
     plotter: Any, job: Record, _liquid: Any, theme: Theme
 ) -> tuple[list[tuple[FloatArray, Label]], Bar]:
-    """The tube's half turn over the crest, liquid in colour, gas or cavity as bare wall.
-
-    Args: `plotter`: pyvista plotter. `job`: `tube` of `tube_field`, `lengths` in millimetres, `letters` of
-        the chambers.
-    Returns: Labels with their places, and the colour bar.
-    """
+    """The tube's half turn over the crest, liquid in colour, gas or cavity as bare wall."""
     told, disc = job["tube"], job["lengths"]
     outer = disc["outer_radius"]
     points = 1e3 * np.array(told["points"]) + np.array([0.0, 0.0, 1.5 * _THICK * outer])

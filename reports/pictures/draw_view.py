@@ -21,9 +21,7 @@ def look(
 ) -> None:
     """Points the camera at a box from a direction; the box stands a little right, the bar has the left.
 
-    Args: `plotter`: pyvista plotter. `direction`: from the box to the camera, mm. `up`: direction that is up
-        in the picture. `zoom`: factor on the fitted view. `bounds`: of the box, mm. `lift`: of the box in the
-        picture, share of half its height.
+    Args: `direction`: from the box to the camera, mm.
     """
     middle = np.array(bounds).reshape(3, 2).mean(axis=1)
     plotter.camera_position = [tuple(middle + np.array(direction)), tuple(middle), up]
@@ -38,7 +36,6 @@ def label_at(
 ) -> tuple[FloatArray, Label]:
     """A label at a place of the scene; its place in the picture is found once the camera stands.
 
-    Args: `place`: mm, shape (3,). `shift`: of the text's middle from the place, px; a leader is drawn when it
-        is not zero. `size`: px.
+    Args: `place`: mm, shape (3,). `size`: px.
     """
     return place, Label(text=text, place=(0, 0), shift=shift, size=size)

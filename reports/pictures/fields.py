@@ -43,7 +43,6 @@ def chamber_field(scene: Scene, *, fill_ratio: float) -> ChamberField:
     """Solve the pressure of the liquid in one chamber in three dimensions, gravity left out.
 
     Args: `fill_ratio`: x, within (0, 1).
-    Returns: The field; its solution carries the status.
     Source: Eqs. 9 to 11 of the liquid-ring paper as a boundary-value problem.
     """
     disc = scene.disc
@@ -57,7 +56,6 @@ def chamber_field(scene: Scene, *, fill_ratio: float) -> ChamberField:
 def write_field(*, field: ChamberField, path: Path) -> Path:
     """Write a field to a VTU file: gauge pressure in Pa and depth below the free surface in m.
 
-    Args: `path`: of the file, ending in .vtu.
     Raises: OSError: the file cannot be written.
     """
     chamber = field.solution.chamber
@@ -73,7 +71,6 @@ def pressure_profile(*, scene: Scene, field: ChamberField) -> Record:
     """Nodal pressure along the middle of the chamber, and the profile that Eq. 12 implies.
 
     Eq. 12's wall pressure is that of a ring whose surface lies at sqrt(R2^2 - 2 V'/(B theta)).
-    Args: `field`: the solved field.
     Returns: JSON-able record, SI.
     Source: Eq. 12 of the liquid-ring paper.
     """
@@ -96,11 +93,7 @@ def pressure_profile(*, scene: Scene, field: ChamberField) -> Record:
 
 
 def mesh_record(field: ChamberField) -> Record:
-    """Sizes and quality of the mesh, and how the solve ended.
-
-    Args: `field`: the solved field.
-    Returns: JSON-able record.
-    """
+    """Sizes and quality of the mesh, and how the solve ended."""
     chamber, solution = field.solution.chamber, field.solution
     quality = mesh_quality(chamber.mesh)
     return {

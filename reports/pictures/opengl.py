@@ -84,7 +84,6 @@ def probe(*, egl: str, osmesa: str) -> OpenGL:
     """Tries EGL, then OSMesa, in this very process; a broken driver may end it.
 
     Args: `egl`: file name of the EGL library. `osmesa`: file name of the OSMesa library.
-    Returns: What was found.
     """
     fault = _egl_fault(egl)
     if not fault:
@@ -105,7 +104,6 @@ def find_opengl(*, egl: str = EGL_LIBRARY, osmesa: str = OSMESA_LIBRARY) -> Open
     """Whether pictures can be drawn off-screen, asked in a child process.
 
     Args: `egl`: file name of the EGL library. `osmesa`: file name of the OSMesa library, tried second.
-    Returns: What was found; a child that crashes or hangs counts as nothing found, and its end is told.
     """
     command = [sys.executable, str(Path(__file__).resolve()), egl, osmesa]
     try:

@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any, Final
 
 from ringbalance.controller.rotor import chamber_letters
+from ringbalance.reports.numbers import given, shown
 from ringbalance.reports.pictures.fields import chamber_field, shown_fill, write_field
 from ringbalance.reports.pictures.opengl import OpenGL, find_opengl
 from ringbalance.reports.pictures.theme import PICTURE
 from ringbalance.reports.pictures.tube import tube_field
-from ringbalance.reports.units import given, shown
 from ringbalance.scene import Scene
 
 Record = dict[str, Any]
@@ -44,8 +44,6 @@ class Drawing3D:
 def write_fields(*, scene: Scene, folder: Path) -> dict[str, Path]:
     """Solve and write the pressure fields that the pictures show.
 
-    Args: `folder`: of the report; the files go into its `fields`.
-    Returns: VTU files: "pressure" at the largest fill, "disc" at the fill of the start.
     Raises: OSError: a file cannot be written.
     """
     fills = {"pressure": scene.disc.max_fill_ratio, "disc": shown_fill(scene)}
@@ -61,9 +59,6 @@ def start_drawing(
 ) -> Drawing3D:
     """Begin to draw in a process of its own, or say why nothing can be drawn.
 
-    Args: `fields`: VTU files of `write_fields`. `folder`: of the report; the pictures go into its `figures`.
-        `opengl`: what this machine can draw with; None: it is asked.
-    Returns: The drawing under way, for `finish_drawing`.
     Raises: OSError: the folder cannot be written.
     """
     found = find_opengl() if opengl is None else opengl
@@ -88,12 +83,7 @@ def start_drawing(
 
 
 def finish_drawing(drawing: Drawing3D) -> Record:
-    """Wait for the pictures and list them for the evidence.
-
-    Args: `drawing`: of `start_drawing`.
-    Returns: `drawn`, `text` and `files`: each with name, light and dark file, size, alternative text and
-        caption.
-    """
+    """Wait for the pictures and list them for the evidence."""
     log = drawing.folder.parent / _LOG
     fault = "" if drawing.process is None else _fault(drawing.process, log)
     stop_drawing(drawing)
@@ -117,7 +107,7 @@ def finish_drawing(drawing: Drawing3D) -> Record:
 
 
 def stop_drawing(drawing: Drawing3D) -> None:
-    """End a drawing that nobody waits for any more. Args: `drawing`: of `start_drawing`."""
+    """End a drawing that nobody waits for any more."""
     if drawing.process is not None:
         # All that is left of it: the pipe is closed, and the process waited for.
         drawing.process.kill()

@@ -44,7 +44,7 @@ class Bar:
 def font(size: int, *, bold: bool = False) -> ImageFont.FreeTypeFont:
     """The sans-serif font that comes with matplotlib, so that every machine draws the same letters.
 
-    Args: `size`: px. `bold`: whether in bold.
+    Args: `size`: px.
     """
     name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
     return ImageFont.truetype(str(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / name), size)
@@ -53,13 +53,7 @@ def font(size: int, *, bold: bool = False) -> ImageFont.FreeTypeFont:
 def letter(
     image: Image.Image, *, labels: Sequence[Label], bar: Bar | None, ink: str, ground: str, scale: int
 ) -> Image.Image:
-    """Draws labels and a colour bar onto a picture.
-
-    Args: `image`: the picture, `scale` times as large as it will be. `labels`: in any order. `ink`: colour of
-        letters and leaders. `ground`: colour behind the letters. `scale`: by which the picture will be
-        reduced, so that all edges come out smooth.
-    Returns: A new picture of the size of `image`.
-    """
+    """Draws labels and a colour bar onto a picture."""
     result = image.copy()
     pen = ImageDraw.Draw(result)
     for label in labels:
@@ -100,7 +94,6 @@ def shade_bar(image: Image.Image, bar: Bar) -> Image.Image:
     """Fills the frame of the colour bar, in few shades, once the rest has been brought to a palette.
 
     Args: `image`: finished picture with the bar's frame.
-    Returns: A new picture.
     """
     result = image.copy()
     pen = ImageDraw.Draw(result)
@@ -115,8 +108,6 @@ def shade_bar(image: Image.Image, bar: Bar) -> Image.Image:
 def with_palette(image: Image.Image) -> Image.Image:
     """The same picture with a palette, which takes a third of the bytes.
 
-    Args: `image`: RGB, of at most 256 colours.
-    Returns: A picture with exactly those colours.
     Raises: ValueError: more than 256 colours.
     """
     pixels = np.asarray(image.convert("RGB"), dtype=np.uint32)

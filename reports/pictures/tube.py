@@ -8,7 +8,7 @@ import numpy as np
 
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.pressure_profile import hump_profile
-from ringbalance.reports.units import given
+from ringbalance.reports.numbers import given
 from ringbalance.scene import Scene
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.loops import calibration_of
@@ -27,7 +27,7 @@ def tube_field(scene: Scene) -> Record | None:
     """Centre line and pressure of the tube at equal fills under the scene's gas.
 
     Returns: Points of the centre line (m, shape (n, 3) as lists), pressure (Pa), whether liquid fills the
-        bore there, and the picture's text; None for a tube without a crest.
+    bore there, and the picture's text; None for a tube without a crest.
     Raises: SceneError: a scene that cannot be calibrated.
     """
     if scene.tube.hump_radius is None:

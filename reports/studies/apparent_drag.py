@@ -32,12 +32,11 @@ class ApparentDrag:
 def apparent_drag(*, law: CalibratedLaw, velocity: npt.ArrayLike, opposite_fill_ratio: float) -> ApparentDrag:
     """Read Eq. 18 off a separated siphon.
 
-    Separated, (alpha + k_up) u^2/2 = (p_A - p_c + P_A - D_m)/rho, while Eq. 18 counts the head
-    H_A - H_C = (p_A - p_C + P_A - P_C)/rho.  Their difference C = (D_m + p_c - P_C - p_C)/rho does not depend
-    on what drives the flow, so k = alpha + k_up - 1 + 2 C/u^2: at one fill of the opposite chamber the
-    excess falls exactly as 1/u^2, whatever the gas pressure and the driven chamber's fill.
-    Args: `law`: the flow law, with a crest. `velocity`: u, m/s, any shape, positive. `opposite_fill_ratio`: x
-        of the opposite chamber, which is vented.
+    Separated, (alpha + k_up) u^2/2 = (p_A - p_c + P_A - D_m)/rho, while Eq. 18 counts the head H_A - H_C =
+    (p_A - p_C + P_A - P_C)/rho. Their difference C = (D_m + p_c - P_C - p_C)/rho does not depend on what
+    drives the flow, so k = alpha + k_up - 1 + 2 C/u^2: at one fill of the opposite chamber the excess falls
+    exactly as 1/u^2, whatever the gas pressure and the driven chamber's fill.
+    Args: `velocity`: u, m/s, any shape, positive.
     Raises: ValueError: a law without a crest, or a velocity that is not positive and finite.
     Source: Eq. 18 of the liquid-ring paper and the crest's energy balance.
     """

@@ -71,9 +71,8 @@ def find_consequences(
 
     The re-tuned gain gives the calibrated loop the gain per operation that the scene's gain has under the
     paper's law, Kc' = Kc (dA/dt)_paper/(dA/dt)_calibrated, or 0.5 where that is none or would overshoot.
-    Args: `scene`: the scene; its controller's `kind` is not looked at. `calibrated`: the balancer by the
-        calibrated law, such as `calibrate(scene).model`. `paper`: by the paper's law; default
-        `paper_model(scene)`. `members`: of each ensemble.
+    Args: `scene`: the scene; its controller's `kind` is not looked at. `paper`: by the paper's law; default
+    `paper_model(scene)`.
     Raises: SceneError: a rotor too slow to form a ring, or a model made for another disc.
     Source: sections 5 and 6 of the liquid-ring paper; the comparison is this program's.
     """
@@ -201,10 +200,7 @@ def _ending(simulation: Simulation) -> str:
 
 
 def consequences_document(found: Consequences) -> dict[str, Any]:
-    """Turn the consequences into plain numbers, lists and text, all in SI, arrays of at most 50 entries.
-
-    Returns: Document that `json.dumps(..., allow_nan=False)` accepts; null where an onset was not found.
-    """
+    """Turn the consequences into plain numbers, lists and text, all in SI, arrays of at most 50 entries."""
     return {
         "scene": found.scene,
         "findings": list(found.findings),

@@ -84,11 +84,9 @@ class LoopGain:
 def loop_gain(scene: Scene, model: BalancerModel, *, transfer: PairTransfer) -> LoopGain | None:
     """Linearise the loop about level chambers, and find its margins by simulation as well.
 
-    e_(n+1) = (1 - h) e_n with h = Kc dA/dt and dA/dt = kappa |dM/dx| u S/V, so a residual turns round from
-    h = 1 and grows from h = 2.  With k and lambda h varies as lambda/sqrt(k + 1); for a law whose k depends
-    on the velocity that is the curve for a constant k that gives the same velocity at equal fills.
-    Args: `scene`: the scene; integral and derivative parts are left out. `transfer`: its operations, of
-        `ensemble_transfer`.
+    e_(n+1) = (1 - h) e_n with h = Kc dA/dt and dA/dt = kappa |dM/dx| u S/V, so a residual turns round from h
+    = 1 and grows from h = 2. With k and lambda h varies as lambda/sqrt(k + 1); for a law whose k depends on
+    the velocity that is the curve for a constant k that gives the same velocity at equal fills.
     Returns: LoopGain; None when the gas does not drive a flow at equal fills.
     Source: sections 4.2 and 5 of the liquid-ring paper; a discrete first-order loop.
     """

@@ -87,7 +87,7 @@ def velocity_errors(*, verdicts: LiquidVerdicts) -> tuple[FloatArray, FloatArray
     """How far Eq. 19 with k = 50 is off for each liquid, relative to the operating point's velocity.
 
     Returns: u_paper/u - 1 under the scene's gas pressure and at equal heads, shape (m,); zero where nothing
-        flows.
+    flows.
     Source: Eq. 19 of the liquid-ring paper.
     """
     return (
@@ -106,11 +106,10 @@ def drag_map(
 
     Every point solves the flow at equal fills under the scene's gas pressure: siphon or separated, and, where
     that gas does not prime the tube, the flow of a primed one.
-    Args: `calibration`: of the scene; its level, its gas and all of its tube but the bore are taken. `bore`:
-        d, m, rising, shape (n,); default 41 from 0.2 to 5 mm. `kinematic_viscosity`: nu, m^2/s, rising, shape
-        (m,); default 49 from 0.2 to 500 mm^2/s.
+    Args: `bore`: d, m, rising, shape (n,); default 41 from 0.2 to 5 mm. `kinematic_viscosity`: nu, m^2/s,
+    rising, shape (m,); default 49 from 0.2 to 500 mm^2/s.
     Raises: ValueError: values that are not positive, finite and rising, or arcs of bends longer than the
-        tube.
+    tube.
     Range: as `tube_loss`; `point.in_range` says where a correlation is stretched.
     Source: `drag_point` at every point.
     """
@@ -148,8 +147,7 @@ def drag_contour(
 ) -> tuple[FloatArray, FloatArray]:
     """Where on the map k has one value, for each of the map's viscosities.
 
-    Args: `k`: the value, positive. `apparent`: whether the k that Eq. 18 reads off the velocity is meant; at
-        50 Eq. 19 is right.
+    Args: `k`: the value, positive.
     Returns: Viscosities, m^2/s, and bores, m, of one shape; empty where the map does not reach the value.
     Raises: ValueError: a k that is not positive and finite.
     Source: monotone cubic interpolation of ln k over ln d between the map's bores.

@@ -102,9 +102,7 @@ def drag_point(*, scene: Scene, law: CalibratedLaw, tube: Tube, batch: LiquidBat
     """Find the tube's operating point at equal fills for each liquid.
 
     siphon: (k + 1) u^2/2 = p/rho; separated: (alpha + k_up) u^2/2 = (p - p_c + P - D_m)/rho, the smaller u.
-    Args: `scene`: the disc, the speed and the uncertain inputs. `law`: the calibrated law; its wall pressure
-        at equal fills and its path are taken, per density. `tube`: the tube, which need not be the scene's.
-        `batch`: liquids and gas pressures, shape (m,).
+    Args: `tube`: the tube, which need not be the scene's. `batch`: liquids and gas pressures, shape (m,).
     Returns: DragPoint, arrays of shape (m,).
     Raises: ValueError: arcs of bends longer than the tube.
     Source: Eqs. 13 to 18 of the liquid-ring paper, extended to the tube's crest; as `column_flow`.

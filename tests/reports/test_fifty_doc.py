@@ -6,8 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-
-from ringbalance.reports.pages.drag_coefficient_doc import document_tables
+from drag_coefficient_doc import document_tables
 
 PAGE = Path(__file__).parents[2] / "docs" / "is-k-50-right.md"
 NAMES = ("liquids", "bores", "rule", "hidden")
@@ -29,5 +28,5 @@ def test_the_page_says_what_the_program_finds(name: str, tables: dict[str, str])
         rf"<!-- {name} -->\n(.*?)\n<!-- /{name} -->", PAGE.read_text(encoding="utf-8"), re.DOTALL
     )
     assert found, name
-    told = "run: python -m ringbalance.reports.pages.drag_coefficient_doc docs/is-k-50-right.md"
+    told = "run: python tools/drag_coefficient_doc.py docs/is-k-50-right.md"
     assert found[1].strip() == tables[name].strip(), told

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.reports.units import display_unit, shown, shown_apart
-from ringbalance.reports.units import given as as_given
+from ringbalance.reports.numbers import display_unit, shown, shown_apart
+from ringbalance.reports.numbers import given as as_given
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,6 @@
 """The tables of docs/is-k-50-right.md as Markdown, straight from the map; as a program, rewrites the page.
 
-python -m ringbalance.reports.pages.drag_coefficient_doc docs/is-k-50-right.md
+python tools/drag_coefficient_doc.py docs/is-k-50-right.md
 """
 
 from __future__ import annotations
@@ -15,11 +15,10 @@ import numpy as np
 
 from ringbalance.reduced_model.calibration import Calibration, calibrate
 from ringbalance.reduced_model.paper import formulas as paper
-from ringbalance.reports.numbers import number, percent
+from ringbalance.reports.numbers import number, percent, shown
 from ringbalance.reports.pages.drag_coefficient import collect, liquid_row
 from ringbalance.reports.section import Record, Work
 from ringbalance.reports.studies.drag_map import DragMap, drag_contour, drag_map
-from ringbalance.reports.units import shown
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.platform.files import write_whole
 from ringbalance.verification.runner import paper_scene
@@ -29,10 +28,7 @@ _BORES: Final = np.geomspace(0.2e-3, 5e-3, 61)
 
 
 def document_tables() -> dict[str, str]:
-    """The generated parts of the page, for the liquid-ring paper's disc with its assumed tube.
-
-    Returns: Markdown by the names that mark their places in the page.
-    """
+    """The generated parts of the page, for the liquid-ring paper's disc with its assumed tube."""
     scene = paper_scene()
     calibration = calibrate(scene)
     found = collect(Work(scene=scene, calibration=calibration, level="light"))
@@ -50,11 +46,7 @@ def _table(heads: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
 
 
 def liquids_table(liquids: list[Record]) -> str:
-    """One row a liquid.
-
-    Args: `liquids`: of the section's evidence.
-    Returns: Markdown.
-    """
+    """One row a liquid."""
     heads = ("liquid", "viscosity", "kg/m³", "gas", "tube runs", "velocity", "k")
     more = ("Eq. 18 reads", "Eq. 19 is off by", "50 is")
     rows = []
@@ -66,11 +58,7 @@ def liquids_table(liquids: list[Record]) -> str:
 
 
 def bores_table(calibration: Calibration) -> str:
-    """The bore at which k is the paper's, and the bores at which it may be, over the viscosity.
-
-    Args: `calibration`: of the paper's disc.
-    Returns: Markdown.
-    """
+    """The bore at which k is the paper's, and the bores at which it may be, over the viscosity."""
     found = drag_map(calibration=calibration, bore=_BORES, kinematic_viscosity=list(_VISCOSITIES))
     point = found.point
     columns = [
@@ -85,11 +73,7 @@ def bores_table(calibration: Calibration) -> str:
 
 
 def rule(calibration: Calibration) -> str:
-    """Where k = 50 lies, as one number for laminar flow in this tube.
-
-    Args: `calibration`: of the paper's disc.
-    Returns: A sentence.
-    """
+    """Where k = 50 lies, as one number for laminar flow in this tube."""
     laminar = [nu for nu in _VISCOSITIES if 5e-6 <= nu <= 1e-4]
     viscosity, bore = drag_contour(
         drag_map=drag_map(calibration=calibration, bore=_BORES, kinematic_viscosity=laminar)
@@ -124,8 +108,7 @@ def _bore(value: float | None) -> str:
 def hidden_table(apparent: Record, calibration: Calibration) -> str:
     """What Eq. 18 reads off a column separated at the crest, over the velocity.
 
-    Args: `apparent`: `apparent` of the section's evidence. `calibration`: of the paper's disc.
-    Returns: Markdown.
+    Args: `apparent`: `apparent` of the section's evidence.
     """
     speed, siphon, separated = (np.asarray(apparent[key]) for key in ("velocity_m_s", "siphon", "separated"))
     density = calibration.flow_law.density
@@ -148,11 +131,7 @@ def hidden_table(apparent: Record, calibration: Calibration) -> str:
 
 
 def filled(page: str) -> str:
-    """The page with its generated parts renewed.
-
-    Args: `page`: Markdown with the marks `<!-- name -->` and `<!-- /name -->`.
-    Returns: Markdown.
-    """
+    """The page with its generated parts renewed."""
     for name, text in document_tables().items():
         start, end = f"<!-- {name} -->\n", f"\n<!-- /{name} -->"
         before, _, rest = page.partition(start)
@@ -161,11 +140,7 @@ def filled(page: str) -> str:
 
 
 def main(arguments: list[str]) -> int:
-    """Rewrite the page in place.
-
-    Args: `arguments`: path of docs/is-k-50-right.md.
-    Returns: 0.
-    """
+    """Rewrite the page in place."""
     path = Path(arguments[0])
     write_whole(path, filled(path.read_text(encoding="utf-8")))
     return 0

@@ -34,10 +34,10 @@ def with_tolerance(
                 "one of the two options",
             )
         return replace(scene, tolerance=FINEST)
-    return scene if tolerance is None else replace(scene, tolerance=read_tolerance(tolerance))
+    return scene if tolerance is None else replace(scene, tolerance=_read_tolerance(tolerance))
 
 
-def read_tolerance(text: str) -> float:
+def _read_tolerance(text: str) -> float:
     """Relative tolerance from the text of an option.
 
     Raises: SceneError: no fraction above 0 and below 1.

@@ -2,23 +2,12 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Protocol
 
 from ringbalance.scene.keys.declaration import derived, standard
-from ringbalance.scene.keys.derivations import (
-    a_tenth,
-    amplitude_limit,
-    assumed_position_noise,
-    assumed_rate_noise,
-    assumed_velocity_noise,
-    capacity,
-    capacity_travel,
-    critical_velocity,
-    same,
-    settling,
-    two_turns,
-)
 from ringbalance.scene.keys.fields import NOT_NEGATIVE, POSITIVE, angle_of_turn, each_of, quantity
 from ringbalance.scene.keys.quantities import (
     Damping,
@@ -43,14 +32,73 @@ Discretisation = Literal["exact", "euler"]
 FrictionCompensation = Literal["break_away", "printed", "none"]
 Strategy = Literal["whole", "locked"]
 
+_FINEST_POSITION = 1e-6
+_FINEST_VELOCITY = 1e-5
+_FINEST_RATE = 1e-3
+_LONGEST_WAIT = 30.0
+
+
+class _Corner(Protocol):
+    """One corner of a speed profile."""
+
+    @property
+    def speed(self) -> float: ...
+
+
+def _a_tenth(radius: float) -> float:
+    return radius / 10
+
+
+def _assumed_position_noise(noise: float) -> float:
+    return max(noise, _FINEST_POSITION)
+
+
+def _assumed_velocity_noise(noise: float) -> float:
+    return max(noise, _FINEST_VELOCITY)
+
+
+def _assumed_rate_noise(noise: float) -> float:
+    return max(noise, _FINEST_RATE)
+
+
+def _capacity(mass: float, radius: float) -> float:
+    """Greatest static moment of the eccentric masses, kg m."""
+    return 2 * mass * radius
+
+
+def _capacity_travel(mass: float, radius: float, rotor: float) -> float:
+    """Greatest static moment of the eccentric masses over the whole mass, m."""
+    return _capacity(mass, radius) / (rotor + 2 * mass)
+
+
+def _critical_velocity(travel: float, stiffness: float, rotor: float, mass: float) -> float:
+    """Velocity amplitude of a displacement at the critical speed, m/s."""
+    return travel * math.sqrt(stiffness / (rotor + 2 * mass))
+
+
+def _settling(damping: float, rotor: float, mass: float) -> float:
+    """Eight time constants of the free whirl, at most half a minute, s."""
+    whole = 2 * (rotor + 2 * mass)
+    return _LONGEST_WAIT if damping * _LONGEST_WAIT <= 8 * whole else 8 * whole / damping
+
+
+def _two_turns(profile: Sequence[_Corner]) -> float:
+    """Time of two turns of the rotor at the start, s."""
+    speeds = [abs(corner.speed) for corner in profile]
+    fastest = speeds[0] or max(speeds) if speeds else 0.0
+    return 4 * math.pi / fastest if fastest else 1.0
+
+
+def _amplitude_limit(mass: float, radius: float, rotor: float, noise: float) -> float:
+    """Amplitude below which no fine tuning is needed, m."""
+    return max(0.02 * _capacity_travel(mass, radius, rotor), 3 * noise)
+
 
 @dataclass(frozen=True, kw_only=True)
 class ImbalanceFilter:
     """The Kalman filter of rotor and unbalance."""
 
-    step: Annotated[
-        PositiveTime, derived("step of [sensor]", "time between two updates", same, "sensor.step")
-    ]
+    step: Annotated[PositiveTime, derived("step of [sensor]", "time between two updates", "sensor.step")]
     discretisation: Annotated[
         Discretisation,
         standard(
@@ -63,8 +111,8 @@ class ImbalanceFilter:
         derived(
             "position_noise of [sensor], at least 1 um",
             "standard deviation that the filter assumes",
-            assumed_position_noise,
             "sensor.position_noise",
+            rule=_assumed_position_noise,
         ),
     ]
     velocity_noise: Annotated[
@@ -72,8 +120,8 @@ class ImbalanceFilter:
         derived(
             "velocity_noise of [sensor], at least 10 um/s",
             "standard deviation that the filter assumes",
-            assumed_velocity_noise,
             "sensor.velocity_noise",
+            rule=_assumed_velocity_noise,
         ),
     ]
     velocity_walk: Annotated[
@@ -89,10 +137,10 @@ class ImbalanceFilter:
         derived(
             "2 m_b r_b / M, the balancing capacity over the whole mass",
             "standard deviation of each coordinate before the first update",
-            capacity_travel,
             "masses.mass",
             "masses.guide_radius",
             "rotor.mass",
+            rule=_capacity_travel,
         ),
     ]
     initial_velocity: Annotated[
@@ -100,11 +148,11 @@ class ImbalanceFilter:
         derived(
             "initial_position times the critical speed",
             "standard deviation of each velocity before the first update",
-            critical_velocity,
             "imbalance_filter.initial_position",
             "rotor.stiffness",
             "rotor.mass",
             "masses.mass",
+            rule=_critical_velocity,
         ),
     ]
     initial_unbalance: Annotated[
@@ -112,9 +160,9 @@ class ImbalanceFilter:
         derived(
             "2 m_b r_b, the balancing capacity",
             "standard deviation of each component of the unbalance before the first update",
-            capacity,
             "masses.mass",
             "masses.guide_radius",
+            rule=_capacity,
         ),
     ]
     gate: Annotated[
@@ -125,17 +173,15 @@ class ImbalanceFilter:
     ]
     assumed_mass: Annotated[
         PositiveMass,
-        derived("mass of [rotor]", "value used by the filter and the controller", same, "rotor.mass"),
+        derived("mass of [rotor]", "value used by the filter and the controller", "rotor.mass"),
     ]
     assumed_stiffness: Annotated[
         Stiffness,
-        derived(
-            "stiffness of [rotor]", "value used by the filter and the controller", same, "rotor.stiffness"
-        ),
+        derived("stiffness of [rotor]", "value used by the filter and the controller", "rotor.stiffness"),
     ]
     assumed_damping: Annotated[
         Damping,
-        derived("damping of [rotor]", "value used by the filter and the controller", same, "rotor.damping"),
+        derived("damping of [rotor]", "value used by the filter and the controller", "rotor.damping"),
     ]
 
 
@@ -143,9 +189,7 @@ class ImbalanceFilter:
 class FrictionFilter:
     """The extended Kalman filter of the friction arms, and the drive meanwhile."""
 
-    step: Annotated[
-        PositiveTime, derived("step of [sensor]", "time between two updates", same, "sensor.step")
-    ]
+    step: Annotated[PositiveTime, derived("step of [sensor]", "time between two updates", "sensor.step")]
     discretisation: Annotated[
         Discretisation, standard("exact", "of the drive's equations, as in [imbalance_filter]")
     ]
@@ -154,8 +198,8 @@ class FrictionFilter:
         derived(
             "encoder_rate_noise of [sensor], at least 0.001 rad/s",
             "standard deviation that the filter assumes",
-            assumed_rate_noise,
             "sensor.encoder_rate_noise",
+            rule=_assumed_rate_noise,
         ),
     ]
     rate_walk: Annotated[Rate, standard("0.01 rad/s", "random walk of the speed of a mass within 1 s")]
@@ -165,7 +209,6 @@ class FrictionFilter:
         derived(
             "drive_speed",
             "standard deviation of the speed of a mass before the first update",
-            same,
             "friction_filter.drive_speed",
         ),
     ]
@@ -174,8 +217,8 @@ class FrictionFilter:
         derived(
             "a tenth of guide_radius",
             "standard deviation of the friction arm before the first update",
-            a_tenth,
             "masses.guide_radius",
+            rule=_a_tenth,
         ),
     ]
     drive_speed: Annotated[
@@ -215,7 +258,7 @@ class Lqr:
     input_weight: Annotated[Weight, standard(1.0, "r in R = r diag(0.1, 0.1), of torques in SI")]
     step: Annotated[
         PositiveTime,
-        derived("step of [sensor]", "time for which the motors' voltages are held", same, "sensor.step"),
+        derived("step of [sensor]", "time for which the motors' voltages are held", "sensor.step"),
     ]
     friction_compensation: Annotated[
         FrictionCompensation,
@@ -241,10 +284,10 @@ class FineTuning:
         derived(
             "8 / decay rate C_B / (2 M) of the rotor, at most 30 s",
             "after a move, for the rotor to settle",
-            settling,
             "rotor.damping",
             "rotor.mass",
             "masses.mass",
+            rule=_settling,
         ),
     ]
     average: Annotated[
@@ -252,8 +295,8 @@ class FineTuning:
         derived(
             "two turns of the rotor at the start",
             "time over which the amplitude is averaged",
-            two_turns,
             "rotor.speed_profile",
+            rule=_two_turns,
         ),
     ]
 
@@ -271,11 +314,11 @@ class Supervisor:
         derived(
             "2 % of 2 m_b r_b / M, at least three times position_noise",
             "amplitude (zero-to-peak) below which no fine tuning is needed",
-            amplitude_limit,
             "masses.mass",
             "masses.guide_radius",
             "rotor.mass",
             "sensor.position_noise",
+            rule=_amplitude_limit,
         ),
     ]
     lowest_speed: Annotated[

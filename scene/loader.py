@@ -5,19 +5,22 @@ from __future__ import annotations
 import hashlib
 import tomllib
 from collections.abc import Iterable, Mapping
+from dataclasses import fields
 from importlib import resources
 from os import PathLike
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any
 
-from ringbalance.scene.build import built
+from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.faults import Fault, SceneError, closest, did_you_mean, toml_text
-from ringbalance.scene.keys.defaults import completed
+from ringbalance.scene.keys.completion import completed, missing_faults
 from ringbalance.scene.keys.reading import Reading, read_document
-from ringbalance.scene.keys.requirements import missing_faults
 from ringbalance.scene.keys.schema import BALANCERS, ECCENTRIC_MASS, LIQUID_RING, Schema
+from ringbalance.scene.models import InputUncertainty, Scene
 from ringbalance.scene.narrowing import AnyScene
-from ringbalance.scene.rules.checks import ECCENTRIC_CHECKS, cross_faults, failed_checks
+from ringbalance.scene.rules import eccentric, shape, working
+from ringbalance.scene.rules.check import failed_checks
+from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 from ringbalance.scene.working_liquid import with_liquid
 
 _LARGEST_FILE = 2**20
@@ -55,20 +58,66 @@ def scene_from(*, content: bytes, file: str) -> AnyScene:
     reading, found = _READ[_kind(document)](document, file=file)
     if found:
         raise SceneError(_sorted(found, reading.schema))
-    sha256 = hashlib.sha256(content).hexdigest()
-    return built(reading, file=file, sha256=sha256)
+    parts: dict[str, Any] = {
+        **_records(reading),
+        "name": reading.values["name"],
+        "tolerance": reading.values["accuracy.tolerance"],
+        "source": PurePath(file).name,
+        "file": file,
+        "sha256": hashlib.sha256(content).hexdigest(),
+        "defaulted": _defaulted(reading),
+    }
+    if reading.schema is ECCENTRIC_MASS:
+        return EccentricScene(**parts)
+    return Scene(**parts, uncertainty=_uncertainty(reading))
+
+
+def _records(reading: Reading) -> dict[str, Any]:
+    """A record of each table; its fields are named after keys, and an absent key is None."""
+    values: dict[str, Any] = dict(reading.values)
+    vibration = values.get("rotor.initial_vibration")
+    if vibration is not None:
+        values["rotor.initial_amplitude"] = vibration.amplitude
+        values["rotor.initial_phase"] = vibration.phase
+    return {
+        name: table.record(
+            **{field.name: values.get(f"{name}.{field.name}") for field in fields(table.record)}
+        )
+        for name, table in reading.schema.tables.items()
+        if table.record is not None
+    }
+
+
+def _uncertainty(reading: Reading) -> tuple[InputUncertainty, ...]:
+    given = ((key, reading.values.get(f"uncertainty.{key}")) for key in UNCERTAIN_QUANTITIES)
+    return tuple(
+        InputUncertainty(quantity=key, half_width=spread[0], relative=spread[1])
+        for key, spread in given
+        if spread is not None
+    )
+
+
+def _defaulted(reading: Reading) -> tuple[str, ...]:
+    """Paths "table.key" whose value is a default; what was looked up for a known liquid is none."""
+    return tuple(
+        path
+        for path in reading.values
+        if not reading.given(path) and (not path.startswith("liquid.") or path == "liquid.dissolved_gas")
+    )
 
 
 def _read_liquid_ring(document: Mapping[str, Any], *, file: str) -> tuple[Reading, tuple[Fault, ...]]:
     reading, faults = read_document(document, file=file, schema=LIQUID_RING)
     reading, liquid_faults = with_liquid(completed(reading))
-    return reading, (*faults, *missing_faults(reading), *liquid_faults, *cross_faults(reading))
+    failed = failed_checks(reading, (*shape.CHECKS, *working.CHECKS))
+    uncertain = working.uncertainty_faults(reading)
+    return reading, (*faults, *missing_faults(reading), *liquid_faults, *failed, *uncertain)
 
 
 def _read_eccentric_mass(document: Mapping[str, Any], *, file: str) -> tuple[Reading, tuple[Fault, ...]]:
     reading, faults = read_document(document, file=file, schema=ECCENTRIC_MASS)
     reading = completed(reading)
-    return reading, (*faults, *missing_faults(reading), *failed_checks(reading, ECCENTRIC_CHECKS))
+    return reading, (*faults, *missing_faults(reading), *failed_checks(reading, eccentric.CHECKS))
 
 
 _READ = {"liquid_ring": _read_liquid_ring, "eccentric_mass": _read_eccentric_mass}

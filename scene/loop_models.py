@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from ringbalance.scene.keys.declaration import UNCERTAIN, derived, needed, shown, standard, unused
-from ringbalance.scene.keys.derivations import same, ten_times, trial_sequence
+from ringbalance.scene.keys.derivations import trial_sequence
 from ringbalance.scene.keys.fields import POSITIVE, chamber_letters, quantity, whole
 from ringbalance.scene.keys.quantities import (
     Angle,
@@ -19,6 +19,11 @@ from ringbalance.scene.keys.quantities import (
 )
 
 ControllerKind = Literal["target_vector", "trial", "law_based"]
+
+
+def _hold_time(period: float) -> float:
+    """Of samples below a limit half of the time by chance, ten in a row are so once in a thousand."""
+    return 10 * period
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,8 +109,8 @@ class ControllerSettings:
         derived(
             "10 times period",
             "the run is settled once the amplitude has stayed at or below limit for this long",
-            ten_times,
             "controller.period",
+            rule=_hold_time,
         ),
         shown("hold time", "s"),
     ]
@@ -136,14 +141,13 @@ class ControllerSettings:
         derived(
             "influence_coefficient of [rotor]",
             "value used by the controller",
-            same,
             "rotor.influence_coefficient",
         ),
         shown("influence coefficient assumed", "um/(g*mm)"),
     ]
     assumed_lag_angle: Annotated[
         Turn,
-        derived("lag_angle of [rotor]", "value used by the controller", same, "rotor.lag_angle"),
+        derived("lag_angle of [rotor]", "value used by the controller", "rotor.lag_angle"),
         shown("lag angle assumed", "deg"),
     ]
     sequence: Annotated[
@@ -152,8 +156,8 @@ class ControllerSettings:
         derived(
             "each chamber followed by its opposite: A, C, B, D for four",
             "trial algorithm: order of the chambers",
-            trial_sequence,
             "disc.chambers",
+            rule=trial_sequence,
         ),
         shown("order of trials", only_for="trial"),
     ]

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 from ringbalance.scene.keys.declaration import UNCERTAIN, derived, listed, needed, shown, standard, unused
-from ringbalance.scene.keys.derivations import even_number_of_chambers, half, radius_of_edge, same
+from ringbalance.scene.keys.derivations import even_number_of_chambers
 from ringbalance.scene.keys.fields import (
     NOT_NEGATIVE,
     POSITIVE,
@@ -42,6 +42,15 @@ PressurePlace = Literal["chamber", "shaft"]
 Entrance = Literal["sharp", "rounded", "projecting"]
 Shaft = Literal["horizontal", "vertical"]
 GasProcess = Literal["isothermal", "adiabatic"]
+
+
+def _half(fill_ratio: float) -> float:
+    return fill_ratio / 2
+
+
+def _radius_of_edge(entrance: str) -> float | None:
+    """Radius of an entrance's edge, m; None for a rounded one, whose radius must be given."""
+    return None if entrance == "rounded" else 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,8 +84,8 @@ class Disc:
         derived(
             "360 deg / central_angle, when that is an even number",
             "number of chambers",
-            even_number_of_chambers,
             "disc.central_angle",
+            rule=even_number_of_chambers,
         ),
         shown("chambers"),
     ]
@@ -101,8 +110,8 @@ class Disc:
         derived(
             "half of max_fill_ratio, the only value allowed",
             "fill ratio of every chamber at the start",
-            half,
             "disc.max_fill_ratio",
+            rule=_half,
         ),
         shown("fill ratio at the start"),
     ]
@@ -184,7 +193,6 @@ class Tube:
         derived(
             "outer_radius",
             "radius at which both ends of the tube open into their chambers",
-            same,
             "disc.outer_radius",
         ),
         UNCERTAIN,
@@ -245,8 +253,8 @@ class Tube:
         derived(
             "needed with a rounded entrance, not allowed otherwise",
             "radius of the rounded edge",
-            radius_of_edge,
             "tube.entrance",
+            rule=_radius_of_edge,
         ),
     ]
     bends: Annotated[

@@ -33,9 +33,13 @@ class Presence:
     otherwise: str = ""
     """What holds when it is left out, in words."""
     rule: Callable[..., Any] | None = None
-    """Value that follows from those of `needs`; None when there is none in this case."""
+    """Value that follows from those of `needs`, or None; without a rule it is theirs."""
     needs: tuple[str, ...] = ()
-    """Paths of the rule's arguments, "table.key"."""
+    """Paths "table.key" of what the value follows from; empty when other code fills it in."""
+
+    def value(self, *given: Any) -> Any:
+        """Value that follows from those of `needs`; None when there is none in this case."""
+        return given[0] if self.rule is None else self.rule(*given)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,18 +89,18 @@ class Shown:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Listed:
+class _Listed:
     """Marks a list of tables."""
 
     example: str
 
 
 @dataclass(frozen=True)
-class Uncertain:
+class _Uncertain:
     """Marks a quantity whose uncertainty may be given."""
 
 
-UNCERTAIN = Uncertain()
+UNCERTAIN = _Uncertain()
 
 
 def needed(meaning: str) -> Presence:
@@ -105,27 +109,26 @@ def needed(meaning: str) -> Presence:
 
 
 def standard(default: object, meaning: str) -> Presence:
-    """Declare a key with a default. Args: `default`: as a user would write it."""
+    """Declare a key with a default, given as a user would write it."""
     return Presence(kind="standard", meaning=meaning, default=default)
 
 
-def derived(otherwise: str, meaning: str, rule: Callable[..., Any] | None = None, *needs: str) -> Presence:
-    """Declare a key whose default follows from other keys.
+def derived(otherwise: str, meaning: str, *needs: str, rule: Callable[..., Any] | None = None) -> Presence:
+    """Declare a key whose default follows from those at the paths `needs`, as `otherwise` says in words.
 
-    Args: `otherwise`: how it follows, in words. `rule`: from the values at the paths `needs`; None when other
-        code fills it in.
+    `rule` is a function with a name: a lambda in an annotation does not see its module.
     """
     return Presence(kind="derived", meaning=meaning, otherwise=otherwise, rule=rule, needs=needs)
 
 
 def unused(otherwise: str, meaning: str) -> Presence:
-    """Declare a key without which a term is left out. Args: `otherwise`: what holds without it, in words."""
+    """Declare a key without which a term is left out; `otherwise` says what holds then."""
     return Presence(kind="unused", meaning=meaning, otherwise=otherwise)
 
 
-def listed(example: str) -> Listed:
-    """Declare that a key takes a list of tables. Args: `example`: the list as one would write it."""
-    return Listed(example=example)
+def listed(example: str) -> _Listed:
+    """Declare that a key takes a list of tables, such as `example`."""
+    return _Listed(example=example)
 
 
 def shown(
@@ -150,7 +153,7 @@ def keys_of(record: type) -> Mapping[str, Key]:
             name: Key(
                 takes=_takes(hint),
                 presence=presence,
-                uncertain=_part(hint, Uncertain) is not None,
+                uncertain=_part(hint, _Uncertain) is not None,
             )
             for name, hint in hints.items()
             if (presence := _part(hint, Presence)) is not None
@@ -184,6 +187,6 @@ def _takes(hint: Any) -> Reader | Entries:
         if get_origin(part) is Literal:
             return choice(part)
         if isinstance(part, type) and is_dataclass(part):
-            listed = _part(hint, Listed)
+            listed = _part(hint, _Listed)
             return Entries(record=part, keys=keys_of(part), example=listed.example if listed else "")
     raise TypeError(f"{hint} does not declare what its key takes")

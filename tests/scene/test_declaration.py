@@ -10,6 +10,7 @@ import pytest
 import scene_reference
 
 from ringbalance.scene import Fault, bundled_scene, liquid_ring_scene, load_scene, scene_table
+from ringbalance.scene.keys.completion import completed, missing_faults
 from ringbalance.scene.keys.declaration import (
     UNCERTAIN,
     derived,
@@ -21,10 +22,8 @@ from ringbalance.scene.keys.declaration import (
     standard,
     unused,
 )
-from ringbalance.scene.keys.defaults import completed
 from ringbalance.scene.keys.quantities import Length, PositiveLength
 from ringbalance.scene.keys.reading import Reading, read_document
-from ringbalance.scene.keys.requirements import missing_faults
 from ringbalance.scene.keys.schema import LIQUID_RING, Schema, Table
 
 
@@ -42,7 +41,7 @@ class Plate:
     width: Annotated[PositiveLength, needed("along the shaft"), UNCERTAIN, shown("width w", "mm")]
     kind: Annotated[Literal["flat", "bent"], standard("flat", "shape")]
     rim: Annotated[Length | None, unused("no rim", "height of the rim"), shown("rim", "mm", absent="none")]
-    depth: Annotated[Length, derived("twice the width", "depth", lambda width: 2 * width, "plate.width")]
+    depth: Annotated[Length, derived("twice the width", "depth", "plate.width", rule=lambda width: 2 * width)]
     holes: Annotated[tuple[Hole, ...], standard([], "list of { radius }"), listed('[{ radius = "1 mm" }]')]
     mass: float
     """No key, kg."""

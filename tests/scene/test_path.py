@@ -9,7 +9,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from ringbalance.scene.path import shortest_path
+from ringbalance.scene.keys.derivations import shortest_path
 
 PROPERTY = settings(max_examples=100, deadline=None, derandomize=True)
 SHAPES = {

@@ -13,7 +13,8 @@ import scene_reference
 
 from ringbalance.scene import Scene, loop_models, models
 from ringbalance.scene.keys.schema import ECCENTRIC_MASS, LIQUID_RING, Schema
-from ringbalance.scene.rules.checks import CHECKS, ECCENTRIC_CHECKS, Check
+from ringbalance.scene.rules import eccentric, shape, working
+from ringbalance.scene.rules.check import Check
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 
 TABLES = tuple(LIQUID_RING.tables)
@@ -73,7 +74,10 @@ def test_uncertain_quantities() -> None:
     assert all(key in _keys(table) for key, table in UNCERTAIN_QUANTITIES.items())
 
 
-@pytest.mark.parametrize(("schema", "checks"), [(LIQUID_RING, CHECKS), (ECCENTRIC_MASS, ECCENTRIC_CHECKS)])
+@pytest.mark.parametrize(
+    ("schema", "checks"),
+    [(LIQUID_RING, (*shape.CHECKS, *working.CHECKS)), (ECCENTRIC_MASS, eccentric.CHECKS)],
+)
 def test_checks_need_keys_that_exist(schema: Schema, checks: tuple[Check, ...]) -> None:
     for check in checks:
         for path in check.needs:
@@ -88,7 +92,7 @@ def test_derived_defaults_follow_from_what_is_known_before_them(schema: Schema) 
         f"{name}.{key}"
         for name, table in schema.tables.items()
         for key, declared in table.keys.items()
-        if declared.presence.rule is not None
+        if declared.presence.needs
     }
     for name, table in schema.tables.items():
         for key, declared in table.keys.items():

@@ -1,0 +1,64 @@
+"""What a rule is: values of a scene that it compares, and what it says when they cannot be true together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from ringbalance.scene.faults import Fault
+from ringbalance.scene.keys.reading import Reading
+from ringbalance.scene.units import format_quantity
+
+_DIMENSIONS = {"mm": "length", "um": "length", "deg": "angle", "kPa": "pressure", "s": "time", "kg": "mass"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """What is wrong with a combination of values."""
+
+    problem: str
+    allowed: str
+
+
+Rule = Callable[..., Finding | None]
+
+
+def _always(_: Reading) -> bool:
+    return True
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """A rule and the values that it needs; it is left out while one of them is unknown."""
+
+    rule: Rule
+    needs: tuple[str, ...]
+    """Paths of the rule's arguments; the first is the one to be changed."""
+    when: Callable[[Reading], bool]
+    """Whether the rule applies to a scene."""
+    moot: tuple[Rule, ...]
+    """Rules before it whose failure makes this one pointless, so that one error does not raise others."""
+
+
+def check(
+    rule: Rule, *needs: str, when: Callable[[Reading], bool] = _always, moot: tuple[Rule, ...] = ()
+) -> Check:
+    """Bind a rule to paths "table.key"."""
+    return Check(rule=rule, needs=needs, when=when, moot=moot)
+
+
+def failed_checks(reading: Reading, checks: tuple[Check, ...]) -> Iterator[Fault]:
+    """One error for each check that fails; `checks` in order, each after those that make it pointless."""
+    failed: set[Rule] = set()
+    for each in checks:
+        if not reading.known(*each.needs) or not each.when(reading) or failed & set(each.moot):
+            continue
+        finding = each.rule(*(reading.values[path] for path in each.needs))
+        if finding is not None:
+            failed.add(each.rule)
+            yield reading.fault(each.needs[0], problem=finding.problem, allowed=finding.allowed)
+
+
+def written(value: float, unit: str) -> str:
+    """An SI value in a unit, such as "44.5 mm"."""
+    return format_quantity(value, _DIMENSIONS[unit], unit)

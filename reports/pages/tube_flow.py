@@ -7,18 +7,18 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.physics.navier_stokes.flow_fields import (
+from ringbalance.physics.tube.loss import FlowState, tube_loss
+from ringbalance.reports.figures.tube_flow import end_figure, section_figure
+from ringbalance.reports.numbers import number
+from ringbalance.reports.pages.cases import anchor, case_view
+from ringbalance.reports.section import Record, Section, Work
+from ringbalance.verification.navier_stokes.flow_fields import (
     EndFlow,
     SectionFlow,
     entrance_flow,
     exit_flow,
     section_flow,
 )
-from ringbalance.physics.tube.loss import FlowState, tube_loss
-from ringbalance.reports.figures.tube_flow import end_figure, section_figure
-from ringbalance.reports.numbers import number
-from ringbalance.reports.pages.cases import anchor, case_view
-from ringbalance.reports.section import Record, Section, Work
 
 _LARGEST: Final = 500.0
 """Re up to which a flow is drawn: beyond, a laminar one is thin layers that no picture shows."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ringbalance.physics.navier_stokes.flow_fields import nodal_pressure, quarter_cells
 from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.verification.navier_stokes.flow_fields import nodal_pressure, quarter_cells
 from ringbalance.verification.reference.bent_tube import BentTubeFlow
 
 __all__ = ["BentTubeField", "bent_tube_field"]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -16,6 +17,7 @@ from ringbalance.scene.models import Disc, Shaft
 from ringbalance.verification.evidence import Axis, Convergence, Curve, Evidence, Found, Series
 from ringbalance.verification.orders import OrderStudy, order_study
 from ringbalance.verification.reference.gravity_exact import ExactRing, exact_ring
+from ringbalance.verification.reference.mutated_pressure import mutated_pressure
 
 _TILT: Final = 0.1
 """Largest g/(omega^2 R1): a surface so tilted that a concentric one would be visibly wrong."""
@@ -24,6 +26,11 @@ _ROOM: Final = 0.3
 _DIRECTION: Final = 0.6
 """Of gravity from the chamber's centre line, rad: no axis of symmetry."""
 _GRAVITY: Final = 9.80665
+_GRAVITY_FLIPPED: Final = "gravity_sign_flipped"
+_FACTORS: Final[Mapping[str | None, Mapping[str, float]]] = MappingProxyType(
+    {"source_off_by_a_percent": {"source": 1.01}, "wall_condition_off_by_a_percent": {"wall": 1.01}}
+)
+"""Mutations of the pressure problem."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,8 +73,11 @@ def gravity_study(
         across=(true.gravity[0], true.gravity[1]),
         along=-sum(true.gravity[2:]),
     )
-    liquid = _spoiled(true, defect)
-    solutions = [solve_with_gravity(disc=disc, liquid=liquid, fill_ratio=fill_ratio, cells=c) for c in cells]
+    liquid = replace(true, gravity=tuple(-g for g in true.gravity)) if defect == _GRAVITY_FLIPPED else true
+    with mutated_pressure(**_FACTORS.get(defect, {})):
+        solutions = [
+            solve_with_gravity(disc=disc, liquid=liquid, fill_ratio=fill_ratio, cells=c) for c in cells
+        ]
     failed = [solution.status for solution in solutions if not solution.status.ok]
     if failed:
         raise ValueError(failed[0].text)
@@ -104,18 +114,6 @@ def _offset(disc: Disc, middle: float, shaft: Shaft) -> float:
 
 def _across() -> tuple[float, float]:
     return _GRAVITY * float(np.cos(_DIRECTION)), _GRAVITY * float(np.sin(_DIRECTION))
-
-
-def _spoiled(liquid: RotatingLiquid, defect: str | None) -> RotatingLiquid:
-    if defect == "gravity_sign_flipped":
-        return replace(liquid, gravity=tuple(-component for component in liquid.gravity))
-    if defect == "source_off_by_a_percent":
-        return replace(liquid, source_factor=1.01)
-    if defect == "wall_condition_off_by_a_percent":
-        return replace(liquid, wall_factor=1.01)
-    if defect is not None:
-        raise ValueError(f"unknown defect {defect}")
-    return liquid
 
 
 def _surface_error(disc: Disc, solution: PressureSolution, exact: ExactRing) -> float:

@@ -8,14 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from ringbalance.physics.navier_stokes.meshes import (
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.verification.navier_stokes.meshes import (
     geometric_vertices,
     patch_mesh,
     ruled_patch,
     tensor_patch,
     with_midpoints,
 )
-from ringbalance.physics.navier_stokes.newton import (
+from ringbalance.verification.navier_stokes.newton import (
     Coefficients,
     Dirichlet,
     FlowSolution,
@@ -25,8 +26,7 @@ from ringbalance.physics.navier_stokes.newton import (
     wall_force,
     wall_torque,
 )
-from ringbalance.physics.navier_stokes.space import at_points, taylor_hood
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.verification.navier_stokes.space import at_points, taylor_hood
 
 Field = Callable[[FloatArray], FloatArray]
 

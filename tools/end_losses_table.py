@@ -19,17 +19,17 @@ from rich.console import Console
 from rich.progress import Progress
 
 from ringbalance.physics.convergence.grid import gci
-from ringbalance.physics.navier_stokes.continuation import StepRule, follow
-from ringbalance.physics.navier_stokes.end_losses import (
+from ringbalance.scene.platform.files import write_whole
+from ringbalance.scene.platform.processes import Workers
+from ringbalance.verification.navier_stokes.continuation import StepRule, follow
+from ringbalance.verification.navier_stokes.end_losses import (
     End,
     EndMesh,
     end_loss_times_reynolds,
     end_system,
     solve_end,
 )
-from ringbalance.physics.navier_stokes.newton import FlowSolution, FlowSystem, NewtonSettings
-from ringbalance.scene.platform.files import write_whole
-from ringbalance.scene.platform.processes import Workers
+from ringbalance.verification.navier_stokes.newton import FlowSolution, FlowSystem, NewtonSettings
 
 ENDS: tuple[End, End] = ("entrance", "exit")
 REYNOLDS_SCALE, REYNOLDS_LIMIT = 5.0, 2000.0

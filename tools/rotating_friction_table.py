@@ -22,19 +22,19 @@ from rich.console import Console
 from rich.progress import MofNCompleteColumn, Progress, TimeElapsedColumn
 
 from ringbalance.physics.convergence.grid import gci
-from ringbalance.physics.navier_stokes.continuation import StepRule, follow
-from ringbalance.physics.navier_stokes.newton import FlowSolution, FlowSystem, NewtonSettings
-from ringbalance.physics.navier_stokes.rotating_section import (
+from ringbalance.physics.tube.rotation_grid import TableSettings, fast_pair, slow_pair, table_settings
+from ringbalance.scene.platform.files import write_whole
+from ringbalance.scene.platform.processes import Workers
+from ringbalance.verification.navier_stokes.continuation import StepRule, follow
+from ringbalance.verification.navier_stokes.newton import FlowSolution, FlowSystem, NewtonSettings
+from ringbalance.verification.navier_stokes.rotating_section import (
     SectionMesh,
     friction_ratio,
     section_system,
     solve_section,
     solve_section_without_inertia,
 )
-from ringbalance.physics.navier_stokes.transfer import transfer
-from ringbalance.physics.tube.rotation_grid import TableSettings, fast_pair, slow_pair, table_settings
-from ringbalance.scene.platform.files import write_whole
-from ringbalance.scene.platform.processes import Workers
+from ringbalance.verification.navier_stokes.transfer import transfer
 
 COLUMNS = ("table", "a", "b", "coarse", "medium", "fine", "uncertainty")
 

@@ -105,8 +105,6 @@ def ring_quantities(
     dimension: int | None = None,
     cells: Sequence[tuple[int, ...]] | None = None,
     turn_samples: int | None = None,
-    source_factor: float = 1.0,
-    wall_factor: float = 1.0,
 ) -> RingQuantities:
     """Finite-element totals of one chamber's liquid over fill ratios, each with its uncertainty.
 
@@ -123,8 +121,6 @@ def ring_quantities(
         cells: meshes, finest first, each with half the cells of the one before; default `default_cells` and
             two coarser ones; they decide the dimension when given.
         turn_samples: even number of angles of gravity over a turn; default enough for a mean within 1e-8.
-        source_factor: multiplies the source term; anything but 1 is a deliberate error.
-        wall_factor: multiplies the walls' condition; anything but 1 is a deliberate error.
     Returns: The totals. Where gravity leaves no closed ring, or its surface is not found, status says so,
         `closed` is False and the values are those without gravity, their half-widths widened by all that
         gravity could do to the liquid there.
@@ -144,8 +140,6 @@ def ring_quantities(
     liquid = RotatingLiquid(
         density=density,
         angular_velocity=angular_velocity,
-        source_factor=source_factor,
-        wall_factor=wall_factor,
     )
     turn = Turn(gravity=gravity, shaft=shaft, samples=_turn_samples(disc, liquid, gravity, turn_samples))
     case = Case(disc=disc, liquid=liquid, fills=fills, meshes=meshes, turn=turn)

@@ -59,10 +59,6 @@ class RotatingLiquid:
     """g in the chamber's axes at this instant, m/s^2, two or three components; empty: left out."""
     gas_pressure: float = 0.0
     """On the free surface, Pa, gauge."""
-    source_factor: float = 1.0
-    """Multiplies the source term; anything but 1 is a deliberate error, to show that checks notice."""
-    wall_factor: float = 1.0
-    """Multiplies the walls' condition; anything but 1 is a deliberate error."""
 
     def body_force(self, places: FloatArray) -> FloatArray:
         """Force per volume, rho (omega^2 r e_r + g).
@@ -80,15 +76,12 @@ class RotatingLiquid:
     def problem(self) -> PressureProblem:
         """The right-hand sides of this liquid's pressure problem.
 
-        Returns: f = 2 rho omega^2, q = rho (omega^2 r e_r + g) . n and the gas pressure, each with its
-            factor.
+        Returns: f = 2 rho omega^2, q = rho (omega^2 r e_r + g) . n and the gas pressure.
         """
-        source = 2 * self.density * self.angular_velocity**2 * self.source_factor
+        source = 2 * self.density * self.angular_velocity**2
         return PressureProblem(
             source=lambda places: np.full(places.shape[1:], source),
-            wall_flux=lambda places, normals: (
-                self.wall_factor * np.einsum("i...,i...->...", self.body_force(places), normals)
-            ),
+            wall_flux=lambda places, normals: np.einsum("i...,i...->...", self.body_force(places), normals),
             surface_pressure=lambda places: np.full(places.shape[1:], self.gas_pressure),
         )
 

@@ -47,7 +47,6 @@ def sloshing_modes(
     fill_ratio: npt.ArrayLike,
     modes: int = 4,
     cells: tuple[tuple[int, int], ...] | None = None,
-    coriolis_factor: float = 1.0,
 ) -> SloshingModes:
     """Lowest natural frequencies of the liquid in one chamber, over the angular velocity.
 
@@ -58,8 +57,6 @@ def sloshing_modes(
         modes: how many, at least 1.
         cells: three meshes or more, finest first; default twice `default_cells` and two coarser ones, with
             more cells along the angle for many modes.
-        coriolis_factor: multiplies the Coriolis force; 0 gives waves in a chamber that does not turn, under
-            the same gravity; anything else but 1 is a deliberate error.
     Raises: ValueError: fill ratios outside (0, 1], no modes, or fewer than three meshes.
     Validity: small planar waves without viscosity on a circular surface, that is g much smaller than
     omega^2 a; the ends are flat, so gravity across the shaft drives no others.
@@ -72,9 +69,7 @@ def sloshing_modes(
     if len(meshes) < 3:
         raise ValueError("cells must list at least three meshes, finest first")
     radii = np.atleast_1d(surface_radius(disc=disc, fill_ratio=fills))
-    found = np.array(
-        [[_lowest(disc, float(a), counts, modes, coriolis_factor) for counts in meshes] for a in radii]
-    )
+    found = np.array([[_lowest(disc, float(a), counts, modes) for counts in meshes] for a in radii])
     widths = np.apply_along_axis(_half_width, 1, found, meshes)
     return SloshingModes(
         fill_ratio=fills,
@@ -116,7 +111,7 @@ def resonant_fills(
 
     def excess(logarithm: float, mode: int) -> float:
         a = float(surface_radius(disc=disc, fill_ratio=np.exp(logarithm)))
-        return float(_lowest(disc, a, middle, modes, 1.0)[mode - 1] - 1)
+        return float(_lowest(disc, a, middle, modes)[mode - 1] - 1)
 
     found = []
     low, high = np.log(1e-4 * top), float(np.log(top))
@@ -127,12 +122,11 @@ def resonant_fills(
     return tuple(found)
 
 
-def natural_frequencies(*, system: SloshingSystem, coriolis_factor: float = 1.0) -> FloatArray:
+def natural_frequencies(system: SloshingSystem) -> FloatArray:
     """All positive s of one mesh's system, ascending.
 
     With S = L L^T and y = L^T psi the oscillator y'' + 2 C y' + A y = 0 is d/dt (y', A^(1/2) y) = B (...)
     with a real antisymmetric B, whose eigenvalues are +- i s.
-    Args: `system`: the condensed problem. `coriolis_factor`: multiplies the Coriolis force.
     Returns: s, shape (n,).
     Source: linear algebra of gyroscopic systems.
     """
@@ -142,7 +136,7 @@ def natural_frequencies(*, system: SloshingSystem, coriolis_factor: float = 1.0)
         half = solve_triangular(lower, matrix, lower=True)
         return np.asarray(solve_triangular(lower, half.T, lower=True).T, dtype=np.float64)
 
-    turning, stiff = coriolis_factor * reduced(system.coriolis), reduced(system.centrifugal)
+    turning, stiff = reduced(system.coriolis), reduced(system.centrifugal)
     squares, shapes = np.linalg.eigh((stiff + stiff.T) / 2)
     root = (shapes * np.sqrt(np.maximum(squares, 0.0))) @ shapes.T
     first_order = np.block([[turning.T - turning, -root], [root, np.zeros_like(root)]])
@@ -150,9 +144,9 @@ def natural_frequencies(*, system: SloshingSystem, coriolis_factor: float = 1.0)
     return np.asarray(ratios[squares.size :], dtype=np.float64)
 
 
-def _lowest(disc: Disc, a: float, cells: tuple[int, int], modes: int, coriolis_factor: float) -> FloatArray:
+def _lowest(disc: Disc, a: float, cells: tuple[int, int], modes: int) -> FloatArray:
     system = sloshing_system(disc=disc, surface_radius=a, cells=cells)
-    ratios = natural_frequencies(system=system, coriolis_factor=coriolis_factor)
+    ratios = natural_frequencies(system)
     if ratios.size < modes:
         raise ValueError(f"a mesh of {cells} cells has {ratios.size} modes, not {modes}")
     return ratios[:modes]

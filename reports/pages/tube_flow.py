@@ -11,13 +11,6 @@ from matplotlib.patches import Circle, Rectangle
 from matplotlib.ticker import FuncFormatter
 from matplotlib.tri import Triangulation
 
-from ringbalance.physics.navier_stokes.flow_fields import (
-    EndFlow,
-    SectionFlow,
-    entrance_flow,
-    exit_flow,
-    section_flow,
-)
 from ringbalance.physics.tube.loss import FlowState, tube_loss
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
@@ -25,6 +18,13 @@ from ringbalance.reports.numbers import number, percent
 from ringbalance.reports.pages.cases import anchor, case_view
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.verification.navier_stokes.flow_fields import (
+    EndFlow,
+    SectionFlow,
+    entrance_flow,
+    exit_flow,
+    section_flow,
+)
 
 _LARGEST: Final = 500.0
 """Re up to which a flow is drawn: beyond, a laminar one is thin layers that no picture shows."""

@@ -7,7 +7,7 @@ import pytest
 from skfem import Basis, ElementHex2, FacetBasis
 
 from ringbalance.mesh.bent_tube import Segment, SweptTube, path_points, stations, swept_tube
-from ringbalance.physics.navier_stokes.rotating_section import SectionMesh, section_mesh
+from ringbalance.verification.navier_stokes.rotating_section import SectionMesh, section_mesh
 
 BEND = Segment(length=np.pi, turn=-np.pi / 2, cells=4)
 PATH = (Segment(length=1.5, cells=2, ratio=0.5), BEND, Segment(length=2.0, cells=2))

@@ -13,7 +13,9 @@ from fluids.fittings import entrance_sharp, exit_normal
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.physics.navier_stokes.end_losses import (
+from ringbalance.physics.results import StatusCode
+from ringbalance.physics.tube.end_losses_table import end_table, laminar_entrance_loss, laminar_exit_loss
+from ringbalance.verification.navier_stokes.end_losses import (
     End,
     EndMesh,
     end_loss_times_reynolds,
@@ -21,9 +23,7 @@ from ringbalance.physics.navier_stokes.end_losses import (
     entry_length,
     solve_end,
 )
-from ringbalance.physics.navier_stokes.newton import FlowSolution, FlowSystem
-from ringbalance.physics.results import StatusCode
-from ringbalance.physics.tube.end_losses_table import end_table, laminar_entrance_loss, laminar_exit_loss
+from ringbalance.verification.navier_stokes.newton import FlowSolution, FlowSystem
 
 
 def _cells(end: End) -> EndMesh:

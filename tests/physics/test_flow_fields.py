@@ -7,7 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ringbalance.physics.navier_stokes.flow_fields import (
+from ringbalance.physics.results import StatusCode
+from ringbalance.physics.tube.end_losses_table import laminar_entrance_loss, laminar_exit_loss
+from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
+from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.verification.navier_stokes.flow_fields import (
     LARGEST_KL,
     LARGEST_ROTATION,
     EndFlow,
@@ -16,10 +20,6 @@ from ringbalance.physics.navier_stokes.flow_fields import (
     exit_flow,
     section_flow,
 )
-from ringbalance.physics.results import StatusCode
-from ringbalance.physics.tube.end_losses_table import laminar_entrance_loss, laminar_exit_loss
-from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
-from ringbalance.scene.arrays import BoolArray, FloatArray
 
 
 def _areas(flow: SectionFlow | EndFlow) -> FloatArray:

@@ -21,8 +21,9 @@ from published_flows import (
 )
 from skfem import MeshHex, MeshTet
 
-from ringbalance.physics.navier_stokes.meshes import patch_mesh, tensor_patch
-from ringbalance.physics.navier_stokes.newton import (
+from ringbalance.physics.results import StatusCode
+from ringbalance.verification.navier_stokes.meshes import patch_mesh, tensor_patch
+from ringbalance.verification.navier_stokes.newton import (
     Coefficients,
     Dirichlet,
     FlowSolution,
@@ -31,16 +32,15 @@ from ringbalance.physics.navier_stokes.newton import (
     flow_system,
     solve_flow,
 )
-from ringbalance.physics.navier_stokes.space import taylor_hood
-from ringbalance.physics.navier_stokes.system import (
+from ringbalance.verification.navier_stokes.space import taylor_hood
+from ringbalance.verification.navier_stokes.system import (
     convection_entries,
     convection_vector,
     free_matrix,
     linear_entries,
     linear_product,
 )
-from ringbalance.physics.navier_stokes.transfer import probe
-from ringbalance.physics.results import StatusCode
+from ringbalance.verification.navier_stokes.transfer import probe
 
 DATA = Path(__file__).parent / "data"
 

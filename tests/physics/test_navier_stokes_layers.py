@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from ringbalance.physics.navier_stokes.layers import factorize_layers, layers_of
-from ringbalance.physics.navier_stokes.linear import factorize
+from ringbalance.verification.navier_stokes.layers import factorize_layers, layers_of
+from ringbalance.verification.navier_stokes.linear import factorize
 
 
 def _matrix(slabs: int, seed: int) -> tuple[sparse.csc_matrix, np.ndarray]:

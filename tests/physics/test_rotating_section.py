@@ -15,15 +15,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rotating_friction_table import columns, run_column, settings_hash
 
-from ringbalance.physics.navier_stokes.continuation import StepRule, follow
-from ringbalance.physics.navier_stokes.newton import FlowSolution, FlowSystem, NewtonSettings
-from ringbalance.physics.navier_stokes.rotating_section import (
-    SectionMesh,
-    friction_ratio,
-    section_system,
-    solve_section,
-    solve_section_without_inertia,
-)
 from ringbalance.physics.results import Status, StatusCode
 from ringbalance.physics.tube.rotation_grid import slow_first, table_settings
 from ringbalance.physics.tube.rotation_table import (
@@ -31,6 +22,15 @@ from ringbalance.physics.tube.rotation_table import (
     ito_nanbu_laminar,
     rotating_friction_ratio,
     rotation_table_covers,
+)
+from ringbalance.verification.navier_stokes.continuation import StepRule, follow
+from ringbalance.verification.navier_stokes.newton import FlowSolution, FlowSystem, NewtonSettings
+from ringbalance.verification.navier_stokes.rotating_section import (
+    SectionMesh,
+    friction_ratio,
+    section_system,
+    solve_section,
+    solve_section_without_inertia,
 )
 
 

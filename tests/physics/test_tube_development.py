@@ -13,20 +13,6 @@ from scipy.optimize import root
 from scipy.special import jv, roots_jacobi
 
 from ringbalance.mesh.bent_tube import Segment, swept_tube
-from ringbalance.physics.navier_stokes.newton import (
-    Coefficients,
-    FlowSolution,
-    FlowSystem,
-    NewtonSettings,
-    solve_flow,
-)
-from ringbalance.physics.navier_stokes.rotating_section import (
-    SectionMesh,
-    section_mesh,
-    section_system,
-    solve_section_without_inertia,
-)
-from ringbalance.physics.navier_stokes.space import at_points
 from ringbalance.physics.tube.development import (
     DEVELOPMENT_SHARE,
     developing_length,
@@ -34,6 +20,20 @@ from ringbalance.physics.tube.development import (
 )
 from ringbalance.physics.tube.ends import ROTATING_PROFILE_UNCERTAINTY, kinetic_factor
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
+from ringbalance.verification.navier_stokes.newton import (
+    Coefficients,
+    FlowSolution,
+    FlowSystem,
+    NewtonSettings,
+    solve_flow,
+)
+from ringbalance.verification.navier_stokes.rotating_section import (
+    SectionMesh,
+    section_mesh,
+    section_system,
+    solve_section_without_inertia,
+)
+from ringbalance.verification.navier_stokes.space import at_points
 from ringbalance.verification.reference import bent_tube
 from ringbalance.verification.reference.entry_length import slowest_decay
 

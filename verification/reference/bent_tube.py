@@ -20,8 +20,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ringbalance.mesh.bent_tube import Segment, SweptTube, swept_tube
-from ringbalance.physics.navier_stokes.continuation import StepRule, follow
-from ringbalance.physics.navier_stokes.newton import (
+from ringbalance.physics.results import Statistics, Status
+from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.verification.navier_stokes.continuation import StepRule, follow
+from ringbalance.verification.navier_stokes.newton import (
     Coefficients,
     Dirichlet,
     FlowSolution,
@@ -30,16 +32,14 @@ from ringbalance.physics.navier_stokes.newton import (
     flow_system,
     solve_flow,
 )
-from ringbalance.physics.navier_stokes.rotating_section import (
+from ringbalance.verification.navier_stokes.rotating_section import (
     SectionMesh,
     section_mesh,
     section_system,
     solve_section,
 )
-from ringbalance.physics.navier_stokes.space import FlowSpace, taylor_hood
-from ringbalance.physics.navier_stokes.system import split
-from ringbalance.physics.results import Statistics, Status
-from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.verification.navier_stokes.space import FlowSpace, taylor_hood
+from ringbalance.verification.navier_stokes.system import split
 
 __all__ = ["BentTubeFlow", "bent_tube_flow", "developed_section", "pressure_loss"]
 

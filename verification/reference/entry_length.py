@@ -20,15 +20,20 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, eigs
 
-from ringbalance.physics.navier_stokes.linear import factorize
-from ringbalance.physics.navier_stokes.newton import Coefficients, FlowSolution, FlowSystem
-from ringbalance.physics.navier_stokes.rotating_section import solve_section_without_inertia
-from ringbalance.physics.navier_stokes.space import FlowSpace, at_points, mass_entries, pressure_mass_entries
-from ringbalance.physics.navier_stokes.system import convection_entries, linear_entries
 from ringbalance.physics.results import Status, StatusCode
 from ringbalance.physics.tube.development import developing_length
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.scene.arrays import ComplexArray, FloatArray
+from ringbalance.verification.navier_stokes.linear import factorize
+from ringbalance.verification.navier_stokes.newton import Coefficients, FlowSolution, FlowSystem
+from ringbalance.verification.navier_stokes.rotating_section import solve_section_without_inertia
+from ringbalance.verification.navier_stokes.space import (
+    FlowSpace,
+    at_points,
+    mass_entries,
+    pressure_mass_entries,
+)
+from ringbalance.verification.navier_stokes.system import convection_entries, linear_entries
 from ringbalance.verification.reference.bent_tube import developed_section
 
 __all__ = ["Decay", "slowest_decay"]

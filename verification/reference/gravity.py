@@ -8,9 +8,10 @@ c from the liquid's volume, by quadrature of the closed-form area.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -25,6 +26,7 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene, Shaft
 from ringbalance.verification.evidence import Evidence, Found
 from ringbalance.verification.orders import order_figure, order_study, order_table
+from ringbalance.verification.reference.mutated_pressure import mutated_pressure
 
 _GAUSS: Final = 60
 _TILT: Final = 0.1
@@ -34,6 +36,11 @@ _ROOM: Final = 0.3
 _DIRECTION: Final = 0.6
 """Of gravity from the chamber's centre line, rad: no axis of symmetry."""
 _GRAVITY: Final = 9.80665
+_GRAVITY_FLIPPED: Final = "gravity_sign_flipped"
+_FACTORS: Final[Mapping[str | None, Mapping[str, float]]] = MappingProxyType(
+    {"source_off_by_a_percent": {"source": 1.01}, "wall_condition_off_by_a_percent": {"wall": 1.01}}
+)
+"""Mutations of the pressure problem."""
 _FILL_SHARE: Final = 0.8
 """Of the largest fill, in the study."""
 
@@ -161,8 +168,9 @@ def gravity_evidence(
         across=(true.gravity[0], true.gravity[1]),
         along=-sum(true.gravity[2:]),
     )
-    liquid = _spoiled(true, defect)
-    solutions = [solve_with_gravity(disc=disc, liquid=liquid, fill_ratio=fill, cells=c) for c in cells]
+    liquid = replace(true, gravity=tuple(-g for g in true.gravity)) if defect == _GRAVITY_FLIPPED else true
+    with mutated_pressure(**_FACTORS.get(defect, {})):
+        solutions = [solve_with_gravity(disc=disc, liquid=liquid, fill_ratio=fill, cells=c) for c in cells]
     for solution in solutions:
         if not solution.status.ok:
             raise ValueError(solution.status.text)
@@ -213,18 +221,6 @@ def _offset(disc: Disc, middle: float, shaft: Shaft) -> float:
 
 def _across() -> tuple[float, float]:
     return _GRAVITY * float(np.cos(_DIRECTION)), _GRAVITY * float(np.sin(_DIRECTION))
-
-
-def _spoiled(liquid: RotatingLiquid, defect: str | None) -> RotatingLiquid:
-    if defect == "gravity_sign_flipped":
-        return replace(liquid, gravity=tuple(-component for component in liquid.gravity))
-    if defect == "source_off_by_a_percent":
-        return replace(liquid, source_factor=1.01)
-    if defect == "wall_condition_off_by_a_percent":
-        return replace(liquid, wall_factor=1.01)
-    if defect is not None:
-        raise ValueError(f"unknown defect {defect}")
-    return liquid
 
 
 def _surface_error(disc: Disc, solution: PressureSolution, exact: ExactRing) -> float:

@@ -17,16 +17,16 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.physics.navier_stokes.newton import (
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.verification.navier_stokes.newton import (
     Coefficients,
     Dirichlet,
     FlowSolution,
     flow_system,
     solve_flow,
 )
-from ringbalance.physics.navier_stokes.rotating_section import CORIOLIS, SectionMesh, section_mesh
-from ringbalance.physics.navier_stokes.space import FlowSpace, at_points, taylor_hood
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.verification.navier_stokes.rotating_section import CORIOLIS, SectionMesh, section_mesh
+from ringbalance.verification.navier_stokes.space import FlowSpace, at_points, taylor_hood
 from ringbalance.verification.orders import OrderStudy, order_study
 
 TRUE: Final = Coefficients(inertia=3.0, viscosity=0.7, rotation=5.0)

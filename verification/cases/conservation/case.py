@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -17,6 +17,7 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Found, Level
 from ringbalance.verification.reference.gravity import tilted_liquid
+from ringbalance.verification.reference.mutated_pressure import mutated_pressure
 from ringbalance.verification.rings import ring_of
 
 _FILL_SHARE: Final = 0.8
@@ -51,8 +52,8 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 
 def _section_balance(scene: Scene, fill: float, cells: tuple[int, ...], defect: str | None) -> _Balance:
     true = tilted_liquid(disc=scene.disc, density=scene.liquid.density, fill_ratio=fill, shaft="horizontal")
-    used = replace(true, wall_factor=1.01) if defect == "wall_condition_off_by_a_percent" else true
-    solution = _solved(scene, used, fill, cells)
+    with mutated_pressure(wall=1.01 if defect == "wall_condition_off_by_a_percent" else 1.0):
+        solution = _solved(scene, true, fill, cells)
     loads = section_integrals(solution=solution, density=true.density)
     forces = dict(loads.force_per_depth)
     if defect == "plate_force_dropped":

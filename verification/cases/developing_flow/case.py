@@ -7,12 +7,12 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.physics.navier_stokes.newton import FlowSystem
-from ringbalance.physics.navier_stokes.rotating_section import SectionMesh, section_system
 from ringbalance.physics.tube.development import developing_length
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table
+from ringbalance.verification.navier_stokes.newton import FlowSystem
+from ringbalance.verification.navier_stokes.rotating_section import SectionMesh, section_system
 from ringbalance.verification.reference.entry_length import slowest_decay
 
 _CREEPING: Final = 2 * (4.46629832 + 1.46746761j)

@@ -10,6 +10,7 @@ from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, Reference
 from ringbalance.verification.paper_numbers import with_plate
 from ringbalance.verification.reference.exact_chamber import central_lambda, exact_moment, wall_pressure_of
+from ringbalance.verification.reference.mutated_pressure import mutated_pressure
 from ringbalance.verification.rings import found_of, mesh_table, scaled
 
 _SCALARS = {"wall_pressure": "Pa", "moment": "kg m", "liquid_volume": "m^3"}
@@ -49,11 +50,11 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 
 def _ring(scene: Scene, dimension: int, defect: str | None, share: float = 1.0) -> RingQuantities:
     disc = with_plate(scene.disc, 0.0) if defect == "plates_left_out" else scene.disc
-    return ring_quantities(
-        disc=disc,
-        density=scene.liquid.density,
-        angular_velocity=scene.rotor.speed,
-        fill_ratio=share * scene.disc.max_fill_ratio,
-        dimension=dimension,
-        source_factor=1.00001 if defect == "source_off" else 1.0,
-    )
+    with mutated_pressure(source=1.00001 if defect == "source_off" else 1.0):
+        return ring_quantities(
+            disc=disc,
+            density=scene.liquid.density,
+            angular_velocity=scene.rotor.speed,
+            fill_ratio=share * scene.disc.max_fill_ratio,
+            dimension=dimension,
+        )

@@ -6,16 +6,16 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.physics.navier_stokes.newton import FlowSystem
-from ringbalance.physics.navier_stokes.rotating_section import (
+from ringbalance.scene.models import Scene
+from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, Series, figure
+from ringbalance.verification.navier_stokes.newton import FlowSystem
+from ringbalance.verification.navier_stokes.rotating_section import (
     SectionMesh,
     friction_ratio,
     section_system,
     solve_section,
     solve_section_without_inertia,
 )
-from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, Series, figure
 
 _SERIES: Final = 9216.0
 _INERTIA_SERIES: Final = 16515072.0

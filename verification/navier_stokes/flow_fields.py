@@ -14,24 +14,24 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from ringbalance.physics.navier_stokes.continuation import StepRule, follow
-from ringbalance.physics.navier_stokes.end_losses import End, EndMesh, end_mesh, end_system, solve_end
-from ringbalance.physics.navier_stokes.newton import (
+from ringbalance.physics.results import Status, StatusCode
+from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.verification.navier_stokes.continuation import StepRule, follow
+from ringbalance.verification.navier_stokes.end_losses import End, EndMesh, end_mesh, end_system, solve_end
+from ringbalance.verification.navier_stokes.newton import (
     Dirichlet,
     FlowSolution,
     FlowSystem,
     NewtonSettings,
     flow_system,
 )
-from ringbalance.physics.navier_stokes.rotating_section import (
+from ringbalance.verification.navier_stokes.rotating_section import (
     SectionMesh,
     friction_ratio,
     section_system,
     solve_section,
 )
-from ringbalance.physics.navier_stokes.space import FlowSpace, at_points, stiffness_entries, taylor_hood
-from ringbalance.physics.results import Status, StatusCode
-from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.verification.navier_stokes.space import FlowSpace, at_points, stiffness_entries, taylor_hood
 
 __all__ = ["EndFlow", "SectionFlow", "entrance_flow", "exit_flow", "section_flow"]
 

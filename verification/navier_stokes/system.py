@@ -17,8 +17,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy import sparse
 
-from ringbalance.physics.navier_stokes.layers import layers_of
-from ringbalance.physics.navier_stokes.space import (
+from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
+from ringbalance.verification.navier_stokes.layers import layers_of
+from ringbalance.verification.navier_stokes.space import (
     FlowSpace,
     at_points,
     convection_table,
@@ -31,7 +32,6 @@ from ringbalance.physics.navier_stokes.space import (
     pressure_load,
     stiffness_entries,
 )
-from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,8 +22,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ringbalance.physics.navier_stokes.meshes import patch_mesh, tensor_patch, with_midpoints
-from ringbalance.physics.navier_stokes.newton import (
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.verification.navier_stokes.meshes import patch_mesh, tensor_patch, with_midpoints
+from ringbalance.verification.navier_stokes.newton import (
     Coefficients,
     Dirichlet,
     FlowSolution,
@@ -32,9 +33,8 @@ from ringbalance.physics.navier_stokes.newton import (
     flow_system,
     solve_flow,
 )
-from ringbalance.physics.navier_stokes.space import taylor_hood
-from ringbalance.physics.navier_stokes.transfer import probe
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.verification.navier_stokes.space import taylor_hood
+from ringbalance.verification.navier_stokes.transfer import probe
 
 __all__ = [
     "EndMesh",

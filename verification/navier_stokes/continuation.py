@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from ringbalance.physics.navier_stokes.newton import FlowSolution
 from ringbalance.physics.results import Status, StatusCode
+from ringbalance.verification.navier_stokes.newton import FlowSolution
 
 Solve = Callable[[float, FlowSolution], FlowSolution]
 

@@ -12,8 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ringbalance.physics.navier_stokes.linear import Factors, factorize
-from ringbalance.physics.navier_stokes.system import (
+from ringbalance.physics.results import Statistics, Status, StatusCode
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.verification.navier_stokes.linear import Factors, factorize
+from ringbalance.verification.navier_stokes.system import (
     Coefficients,
     Dirichlet,
     FlowSystem,
@@ -25,8 +27,6 @@ from ringbalance.physics.navier_stokes.system import (
     linear_product,
     split,
 )
-from ringbalance.physics.results import Statistics, Status, StatusCode
-from ringbalance.scene.arrays import FloatArray
 
 __all__ = [
     "Coefficients",

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from scipy.sparse.linalg import splu
 
-from ringbalance.physics.navier_stokes.layers import factorize_layers
 from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.verification.navier_stokes.layers import factorize_layers
 
 _GOOD, _USABLE, _REFINEMENTS = 1e-12, 1e-8, 3
 

@@ -18,14 +18,15 @@ from typing import Any
 
 import numpy as np
 
-from ringbalance.physics.navier_stokes.meshes import (
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.verification.navier_stokes.meshes import (
     Patch,
     geometric_vertices,
     patch_mesh,
     ruled_patch,
     with_midpoints,
 )
-from ringbalance.physics.navier_stokes.newton import (
+from ringbalance.verification.navier_stokes.newton import (
     Coefficients,
     Dirichlet,
     FlowSolution,
@@ -34,8 +35,7 @@ from ringbalance.physics.navier_stokes.newton import (
     flow_system,
     solve_flow,
 )
-from ringbalance.physics.navier_stokes.space import taylor_hood
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.verification.navier_stokes.space import taylor_hood
 
 __all__ = [
     "SectionMesh",

@@ -8,11 +8,7 @@ from importlib.resources import files
 
 
 def read_rows(case_id: str, name: str) -> tuple[Mapping[str, str], ...]:
-    """Rows of a case's tabulated reference.
-
-    Args: `case_id`: whose data it is. `name`: of the file in the case's data folder.
-    Returns: One mapping per row, column name to text.
-    """
+    """Rows of a file in the case's data folder, column name to text."""
     path = files("ringbalance.verification.cases") / case_id / "data" / name
     lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
     return tuple(csv.DictReader(lines))

@@ -38,21 +38,13 @@ class Axis:
     spacing: Literal["log", "linear"] = "log"
 
     def share(self, value: float) -> float:
-        """How far along the axis a value stands.
-
-        Args: `value`: in `unit`.
-        Returns: Share within [0, 1].
-        """
+        """How far along the axis a value in `unit` stands, within [0, 1]."""
         if self.spacing == "linear":
             return (value - self.low) / (self.high - self.low)
         return math.log(value / self.low) / math.log(self.high / self.low)
 
     def at(self, share: npt.ArrayLike) -> FloatArray:
-        """Values at shares of the way along the axis.
-
-        Args: `share`: within [0, 1], any shape.
-        Returns: Values in `unit`, the shape of `share`.
-        """
+        """Values in `unit` at fractions of the way along the axis."""
         s = np.asarray(share, dtype=np.float64)
         if self.spacing == "linear":
             return np.asarray(self.low + s * (self.high - self.low), dtype=np.float64)
@@ -133,12 +125,10 @@ def axis_of(name: str) -> Axis:
 
 
 def varied(document: Mapping[str, Any], *, scene: Scene, values: Mapping[str, float]) -> Document:
-    """The document of a scene file with some axes set.
+    """The document of a scene's own file with some axes set.
 
-    Args: `document`: of the scene's own file. `scene`: the scene, for what a value is relative to. `values`:
-        by axis, in the axis' unit.
-    Returns: A new document; what hangs on a value follows it: two chambers for any central angle, bends that
-        the bore can take, and a tube that reaches over the crest.
+    What hangs on a value follows it: two chambers for any central angle, bends that the bore can take, and a
+    tube that reaches over the crest.
     """
     changed: Document = {table: {} for table in _TABLES} | deepcopy(dict(document))
     for axis in AXES:
@@ -150,14 +140,12 @@ def varied(document: Mapping[str, Any], *, scene: Scene, values: Mapping[str, fl
 def fitted(
     document: Mapping[str, Any], *, scene: Scene, made: Scene, values: Mapping[str, float]
 ) -> Document:
-    """The document with a rotor that suits what its disc can balance, and the loop's own axes set.
+    """The document of `varied` with a rotor that suits what its disc can balance, and the loop's axes set.
 
     A disc that carries less liquid is put on a lighter rotor: its influence coefficient grows so that all
-    liquid of a pair makes the same vibration, and limit, gain and noise mean what they meant before.
-    Args: `document`: of `varied`. `scene`: the scene that was varied. `made`: the scene that the document
-        makes. `values`: by axis.
-    Returns: A new document, in which the loop has as much to do for its disc as in the scene that was varied;
-        the unbalance of a disc with a single pair lies along that pair, the only direction it can balance.
+    liquid of a pair makes the same vibration, and limit, gain and noise mean what they meant before. The
+    unbalance of a disc with a single pair lies along that pair, the only direction it can balance.
+    Args: `scene`: the scene that was varied. `made`: the scene that the document makes.
     """
     changed = deepcopy(dict(document))
     lighter = _capacity(scene) / _capacity(made)
@@ -195,11 +183,7 @@ def _capacity(scene: Scene) -> float:
 
 
 def toml_bytes(document: Mapping[str, Any]) -> bytes:
-    """A document as the bytes of a scene file.
-
-    Args: `document`: tables of texts, numbers, truth values, lists and small tables.
-    Returns: TOML, UTF-8.
-    """
+    """A document of texts, numbers, truth values, lists and small tables as a scene file."""
     top = {key: value for key, value in document.items() if not isinstance(value, dict)}
     lines = [f"{key} = {_toml(value)}" for key, value in top.items()]
     for name, table in document.items():

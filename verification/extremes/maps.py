@@ -104,22 +104,14 @@ class StabilityMap:
 
 
 def answered(judgement: Judgement) -> bool:
-    """Whether a point got an answer, with or without a reservation.
-
-    Returns: False when it was refused or broke.
-    """
+    """Whether a point got an answer, with or without a reservation."""
     return judgement.ending not in (Ending.REFUSED, Ending.BROKEN)
 
 
 def sweeps(
     base: Base, *, count: int, fineness: float, workers: int = 1, progress: Progress | None = None
 ) -> tuple[Sweep, ...]:
-    """Every axis alone, from end to end, and closer where points begin to end in another way.
-
-    Args: `base`: the scene. `fineness`: share of an axis within which each change is found. `workers`:
-        processes. `progress`: of the points; None for silence.
-    Returns: Sweeps, in the order of the axes.
-    """
+    """Every axis alone, from end to end, as `swept`."""
 
     def judge_all(places: Sequence[tuple[Axis, float]]) -> Sequence[Judgement]:
         points = [{axis.name: value} for axis, value in places]
@@ -137,9 +129,8 @@ def swept(
 ) -> tuple[Sweep, ...]:
     """Axes in even steps, then halved wherever neighbours end differently, until each change is found.
 
-    Args: `count`: values on each to begin with. `fineness`: share of an axis within which each change is
-        found.
-    Returns: Sweeps, in the order of the axes. Of changes back and forth within a step some may be missed.
+    Of changes back and forth within a step some may be missed.
+    Args: `count`: values on each to begin with. `fineness`: fraction of an axis to which changes are found.
     """
     grid = np.linspace(0, 1, count)
     found = judge_all([(axis, float(value)) for axis in axes for value in axis.at(grid)])
@@ -183,11 +174,9 @@ def stability_maps(
     workers: int = 1,
     progress: Progress | None = None,
 ) -> tuple[StabilityMap, ...]:
-    """Pairs of axes together, from end to end.
+    """Pairs of axes, x first, together from end to end.
 
-    Args: `base`: the scene. `count`: values along each axis. `pairs`: names of the axes, x first. `workers`:
-        processes. `progress`: of the points; None for silence.
-    Returns: Maps, in the order of the pairs.
+    Args: `count`: values along each axis.
     """
     grid = np.linspace(0, 1, count)
     points: list[Point] = [

@@ -57,13 +57,9 @@ class Decay:
 
 
 def slowest_decay(*, system: FlowSystem, reynolds: float, rotation_reynolds: float, count: int = 4) -> Decay:
-    """Decay rates of the slowest disturbances downstream, from the section's linear eigenproblem.
+    """Rates per diameter of the slowest disturbances downstream of laminar developed flow, mirror-symmetric.
 
-    Args: `reynolds`: Re, zero or more. `rotation_reynolds`: R, zero or more. `count`: how many rates to
-        return, at least one.
-    Returns: Decay, rates per diameter.
     Raises: ArithmeticError: the developed flow was not found.
-    Range: mirror-symmetric modes about laminar developed flow.
     Source: quadratic eigenproblem by finite elements, solved by shift and invert.
     """
     flow, matrices = _pencil(system, reynolds, rotation_reynolds)

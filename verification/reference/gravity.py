@@ -54,11 +54,9 @@ class ExactRing:
     """c, m."""
 
     def radius(self, angle: npt.ArrayLike, axial_place: npt.ArrayLike = 0.0) -> FloatArray:
-        """Radius of the free surface.
+        """Radius of the free surface, m.
 
-        Args: `angle`: from the chamber's centre line, rad, any shape. `axial_place`: z, m, broadcasts.
-        Returns: r, m.
-        Source: r^2 + 2 r G.e_r + |G|^2 = c^2 with G = g/omega^2; r^2 = c^2 + 2 G z along the shaft.
+        r^2 + 2 r G.e_r + |G|^2 = c^2 with G = g/omega^2 across the shaft, r^2 = c^2 + 2 G z along it.
         """
         phi, z = np.asarray(angle, dtype=np.float64), np.asarray(axial_place, dtype=np.float64)
         along = self.offset[0] * np.cos(phi) + self.offset[1] * np.sin(phi)
@@ -66,11 +64,7 @@ class ExactRing:
         return np.asarray(-along + np.sqrt(along**2 + self.level**2 - across + 2 * self.axial * z))
 
     def pressure(self, places: FloatArray) -> FloatArray:
-        """Pressure of the liquid, the gas counted as zero.
-
-        Args: `places`: m, shape (2 or 3, ...).
-        Returns: Pa.
-        """
+        """Pressure of the liquid, Pa, the gas counted as zero, at places in m, shape (2 or 3, ...)."""
         square = (places[0] + self.offset[0]) ** 2 + (places[1] + self.offset[1]) ** 2
         depth = self.axial * places[2] if len(places) == 3 else 0.0
         scale = self.density * self.angular_velocity**2
@@ -86,10 +80,9 @@ def exact_ring(
     across: tuple[float, float] = (0.0, 0.0),
     along: float = 0.0,
 ) -> ExactRing:
-    """The ring that holds a fill ratio under gravity.
+    """The ring that holds a fill ratio under gravity, m/s^2.
 
-    Args: `density`: rho, kg/m^3. `angular_velocity`: omega, rad/s. `fill_ratio`: x. `across`: gravity across
-        the shaft in the chamber's axes, m/s^2. `along`: gravity along the negative z axis, m/s^2.
+    Args: `across`: across the shaft in the chamber's axes. `along`: along the negative z axis.
     Raises: ValueError: gravity so strong that no closed ring holds the liquid.
     """
     square = angular_velocity**2
@@ -147,8 +140,7 @@ def gravity_evidence(
     """Find the free surface on a sequence of meshes, and compare it with the exact one.
 
     Args: `cells`: of each level, coarse to fine, halving h each time. `shaft`: "horizontal" for gravity
-        across the chamber, "vertical" for gravity along the shaft. `defect`: "gravity_sign_flipped",
-        "source_off_by_a_percent" or "wall_condition_off_by_a_percent".
+        across the chamber, "vertical" for gravity along the shaft.
     Raises: ValueError: a search or solve that failed on some level.
     """
     disc, fill = scene.disc, _FILL_SHARE * scene.disc.max_fill_ratio
@@ -193,9 +185,7 @@ def gravity_evidence(
 def tilted_liquid(*, disc: Disc, density: float, fill_ratio: float, shaft: Shaft) -> RotatingLiquid:
     """Liquid that turns so slowly that gravity tilts its surface far, yet leaves the ring closed.
 
-    Args: `density`: rho, kg/m^3. `fill_ratio`: x. `shaft`: "horizontal" for gravity across the chamber, at no
-        angle of symmetry; "vertical" for gravity along the shaft.
-    Returns: RotatingLiquid with two components of gravity across the shaft, three along it.
+    Gravity has two components across a horizontal shaft, at no angle of symmetry, three along a vertical one.
     """
     middle = float(surface_radius(disc=disc, fill_ratio=fill_ratio))
     speed = float(np.sqrt(_GRAVITY / _offset(disc, middle, shaft)))

@@ -38,11 +38,7 @@ _WALL_RATIO: Final = 3.0
 
 
 def velocity(places: FloatArray) -> FloatArray:
-    """The manufactured velocity.
-
-    Args: `places`: (y, z) over the bore, shape (2, ...).
-    Returns: Components along (y, z, x), shape (3, ...).
-    """
+    """The manufactured velocity along (y, z, x), shape (3, ...), at places (y, z) over the bore."""
     y, z = places
     growth = np.exp(_B * z) / 5
     return np.stack(
@@ -79,20 +75,12 @@ def _laplacian(places: FloatArray) -> FloatArray:
 
 
 def pressure(places: FloatArray) -> FloatArray:
-    """The manufactured pressure, up to a constant.
-
-    Args: `places`: (y, z) over the bore, shape (2, ...).
-    Returns: Pressure, shape (...).
-    """
+    """The manufactured pressure, up to a constant."""
     return np.asarray(np.sin(_E * places[0]) * np.cos(_F * places[1] + 0.2))
 
 
 def body_force(places: FloatArray) -> FloatArray:
-    """The body force that makes this flow the solution.
-
-    Args: `places`: (y, z) over the bore, shape (2, ...).
-    Returns: Components along (y, z, x), shape (3, ...).
-    """
+    """The body force along (y, z, x) that makes this flow the solution."""
     y, z = places
     u = velocity(places)
     carried = np.einsum("d...,cd...->c...", u[:2], _gradient(places))
@@ -122,10 +110,8 @@ class FlowStudy:
 
 
 def flow_study(*, around: Sequence[int], defect: str | None = None) -> FlowStudy:
-    """Solve the manufactured flow on a sequence of meshes.
+    """Solve the manufactured flow on meshes of that many cells around their core.
 
-    Args: `around`: cells of each level's core, coarse to fine. `defect`: "coriolis_dropped",
-        "inertia_off_by_a_percent" or "viscosity_off_by_a_percent".
     Raises: ValueError: an unknown defect, or a solve that failed.
     """
     used = _spoiled(defect)

@@ -36,12 +36,7 @@ class CosineWaves:
 
 
 def cosine_waves(*, central_angle: float, depth: float, terms: int = 160) -> CosineWaves:
-    """Set the problem up.
-
-    Args: `central_angle`: theta, rad. `depth`: H = ln(R2/a).
-    Returns: CosineWaves; frequencies of the lowest modes converge like the third power of `terms`.
-    Source: separation of variables; derived at the head of this module.
-    """
+    """The problem at a depth H = ln(R2/a); frequencies of the lowest modes converge like `terms`^-3."""
     n = np.arange(1, terms + 1)
     k = np.asarray(np.pi * n / central_angle, dtype=np.float64)
     rows, columns = np.meshgrid(n, n, indexing="ij")
@@ -57,12 +52,7 @@ def cosine_waves(*, central_angle: float, depth: float, terms: int = 160) -> Cos
 
 
 def cosine_frequencies(waves: CosineWaves, *, modes: int) -> FloatArray:
-    """Lowest natural frequencies over the speed, (s^2 mass + 2 i s mixed - spring) B = 0.
-
-    Args: `modes`: how many.
-    Returns: s, ascending, shape (modes,).
-    Source: a quadratic eigenproblem, made linear.
-    """
+    """Lowest natural frequencies over the speed, s: (s^2 mass + 2 i s mixed - spring) B = 0, made linear."""
     n = waves.wavenumber.size
     zero, one = np.zeros((n, n)), np.eye(n)
     left = np.block([[zero, one], [waves.spring, -2j * waves.mixed]])
@@ -73,12 +63,7 @@ def cosine_frequencies(waves: CosineWaves, *, modes: int) -> FloatArray:
 
 
 def cosine_amplification(waves: CosineWaves, *, frequency_ratio: float) -> float:
-    """Swing of the first moment under G = r exp(i angle), over that of a surface that follows at once.
-
-    Args: `frequency_ratio`: s.
-    Returns: Ratio.
-    Source: as `cosine_frequencies`, forced.
-    """
+    """Swing of the first moment under G = r exp(i angle), over that of a surface that follows at once."""
     load = _load(waves)
     swing, still = (
         _potential(waves, frequency_ratio, load, still=still) * waves.wavenumber for still in (False, True)
@@ -94,10 +79,7 @@ def cosine_pressure_amplification(waves: CosineWaves, *, frequency_ratio: float,
     """Swing of the mean wall pressure under the same forcing, over that of such a surface.
 
     Cosines have no mean, so phi has the same one, none, on wall and surface, and p' is left with the
-    difference of G and with 2 psi at the surface.
-    Args: `frequency_ratio`: s. `depth`: H = ln(R2/a).
-    Returns: Ratio.
-    Source: p'/rho = G + c - i s phi - 2 psi, with psi = -sum B_n sin(k angle) at the surface.
+    difference of G and with 2 psi at the surface: p'/rho = G + c - i s phi - 2 psi.
     """
     half, radius = waves.central_angle / 2, np.exp(-depth)
     drive = (1 - radius) * np.sin(half) / half

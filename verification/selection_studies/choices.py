@@ -72,9 +72,8 @@ def judge(
 ) -> list[Judged]:
     """Choose models for a scene at every tolerance, and judge each choice by the finest model.
 
-    Args: `quantities`: names. `tolerances`: relative. `check`: whether choices are checked; without it the
-        estimates alone decide. `worth`: factor on every contribution; anything but 1 is a deliberate error.
-    Returns: One record for each quantity and tolerance.
+    Args: `check`: whether choices are checked; without it the estimates alone decide. `worth`: factor on every
+        contribution; anything but 1 is a deliberate error.
     """
     found = []
     for hierarchy in hierarchies_for(scene, quantities):

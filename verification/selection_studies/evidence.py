@@ -23,9 +23,8 @@ def choices_evidence(
 ) -> Evidence:
     """Choose models for random scenes at every tolerance, and judge the choices.
 
-    Args: `scene`: the base of the random scenes. `quantities_of`: names of the quantities that are judged on
-        a scene, by its number. `defect`: one of `DEFECTS`, with which nothing is checked; None for none.
-    Returns: Evidence: `held`, `dearest` and `said`, with a table by quantity and tolerance.
+    Args: `scene`: the base of the random scenes. `quantities_of`: judged on a scene, by its number. `defect`:
+        with one of `DEFECTS` nothing is checked.
     """
     taken = list(numbers)
     worth, check = (1.0, True) if defect is None else (DEFECTS[defect], False)

@@ -72,10 +72,7 @@ ModelPair = tuple[LawModels, TimeModels]
 
 
 def time_models(scene: Scene) -> tuple[TimeModels, ...]:
-    """Ways through an operation that a scene has, in order of increasing cost.
-
-    Returns: TimeModels; gas filling and valve lag only where the scene gives numbers for them.
-    """
+    """Ways through an injection that a scene has numbers for, in order of increasing cost."""
     given = tuple(
         term
         for term, number in ((FILLING, scene.gas.conductance), (LAG, scene.gas.valve_lag))
@@ -109,10 +106,10 @@ def _dynamic(modelled: tuple[str, ...], left: tuple[str, ...]) -> TimeModels:
 
 
 def operation_laws(scene: Scene) -> tuple[LawModels, ...]:
-    """Flow laws that the model hierarchies of an operation take, in order of increasing cost.
+    """Flow laws of an injection, in order of increasing cost.
 
-    Returns: The paper's law, and every loss with Eq. 12 and with the exact level, with the crest's regimes
-        where the scene has a crest; last the scene's finest law.
+    The paper's law, and every loss with Eq. 12 and with the exact level, with the crest's regimes where the
+    scene has a crest; last the scene's finest law.
     """
     every = flow_models(scene)
     regimes = every[-1].regimes
@@ -136,20 +133,13 @@ def _law(book: LawBook, law: LawModels, time: TimeModels) -> CompleteLaw:
 
 
 def gas_times(scene: Scene) -> tuple[float, float]:
-    """Valve-open times of an injection at which it is judged: the shortest that matters and the first, s.
-
-    Returns: s, ascending.
-    """
+    """Valve-open times of an injection at which it is judged: the shortest that matters and the first, s."""
     low, high = sorted((injection_time(scene), first_gas_time(scene)))
     return low, high
 
 
 def operation_contributions(scene: Scene) -> Mapping[str, Contribution]:
-    """What the ways through time leave out, and what their laws do.
-
-    Returns: Contributions by name, relative to the mass moved.
-    Source: stands with each.
-    """
+    """What the ways through time leave out, and what their laws do, relative to the mass moved."""
     change = _velocity_change(scene, max(gas_times(scene)))
     segments = {
         name: Contribution(
@@ -186,11 +176,7 @@ def _velocity_change(scene: Scene, duration: float) -> float:
 
 
 def mass_hierarchy(scene: Scene, *, book: LawBook) -> ModelHierarchy:
-    """The model hierarchy of the mass that one operation moves, from equal fills and an empty tube, after its
-    wait.
-
-    Source: section 5.1 of the liquid-ring paper, each part by its model.
-    """
+    """Models of the mass that one injection moves, from equal fills and an empty tube, after its wait."""
     times = gas_times(scene)
 
     def solve(point: int, *, law: LawModels, time: TimeModels) -> FloatArray:
@@ -210,12 +196,7 @@ def mass_hierarchy(scene: Scene, *, book: LawBook) -> ModelHierarchy:
 
 
 def moved_mass(scene: Scene, *, law: CompleteLaw, time: TimeModels, gas_time: float) -> float:
-    """Mass that leaves the driven chamber by one operation and the wait after it.
-
-    Args: `scene`: the scene; initial fills, an empty tube. `law`: the flow law. `time`: how the operation is
-        carried through. `gas_time`: s.
-    Returns: kg.
-    """
+    """Mass that leaves the driven chamber by one injection of `gas_time`, s, and the wait after it, kg."""
     model = balancer_model(law)
     plant = LiquidRing(
         model=model,
@@ -231,11 +212,7 @@ def moved_mass(scene: Scene, *, law: CompleteLaw, time: TimeModels, gas_time: fl
 
 
 def settling_hierarchy(scene: Scene, *, book: LawBook) -> ModelHierarchy:
-    """The model hierarchy of the settling time with the scene's controller and an exact sensor.
-
-    Returns: Model hierarchy; a value of zero stands for a run that does not settle.
-    Source: section 6 of the liquid-ring paper, each part by its model.
-    """
+    """Models of the settling time with the scene's controller and an exact sensor; zero: not settled."""
     exact = replace(
         scene,
         sensor=replace(scene.sensor, amplitude_noise=0.0, phase_noise=0.0),

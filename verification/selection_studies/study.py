@@ -59,10 +59,8 @@ class TradeStudy:
 
 
 def hierarchies_of(scene: Scene, *, level: Level = "heavy") -> tuple[ModelHierarchy, ...]:
-    """The model hierarchies of a scene.
+    """The model hierarchies of a scene; "light" leaves the settling time out.
 
-    Args: `level`: "light" leaves the settling time out.
-    Returns: Wall pressure, moment, k, velocity, transferred mass and, heavy, settling time.
     Raises: SceneError: a rotor too slow for the liquid to form a ring.
     """
     check_ring(scene)
@@ -84,12 +82,9 @@ def trade_study(
     timed: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> TradeStudy:
-    """Measure every model hierarchy of a scene and choose its models.
+    """Measure every model hierarchy of a scene and choose its models; all but times repeats on every machine.
 
-    Args: `level`: "light" leaves the settling time out. `tolerances`: for which models are chosen, beside the
-        scene's own. `timed`: whether times and memory are taken as well. `progress`: called with the name of
-        each quantity; None for silence.
-    Returns: TradeStudy; all but its times is the same on every machine.
+    Args: `timed`: whether times and memory are taken as well. `progress`: called with each quantity's name.
     Raises: SceneError: a rotor too slow for the liquid to form a ring.
     """
     costs = committed_costs()
@@ -113,12 +108,7 @@ def trade_study(
 
 
 def thinned(hierarchy: ModelHierarchy) -> ModelHierarchy:
-    """A model hierarchy of laws with every second model left out: levels and ways through time that lie close
-    together.
-
-    Args: `hierarchy`: any model hierarchy.
-    Returns: The model hierarchy; the finest model stays, and choices are made on the whole one.
-    """
+    """A model hierarchy without the models that lie close to others; choices are made on the whole one."""
 
     def kept(fidelity: Fidelity) -> bool:
         close = fidelity.models.get("level of a chamber") in (SERIES, QUADRATURE)
@@ -143,12 +133,7 @@ def _no_longer(clock: Clock | None, hierarchy: ModelHierarchy) -> Clock | None:
 
 
 def refitted(trades: Sequence[Trade], *, costs: CostModel) -> CostModel | None:
-    """Fit the cost model again to the times of measured model hierarchies.
-
-    Args: `trades`: measured; may be of several scenes. `costs`: the model that kinds of work without a time
-        of their own keep to.
-    Returns: CostModel; None where nothing was timed.
-    """
+    """Fit the cost model again to measured times; kinds of work without a time keep to `costs`."""
     works, seconds = works_and_seconds(trades)
     if not seconds:
         return None
@@ -162,20 +147,12 @@ def _wanted(scene: Scene, tolerances: Sequence[float]) -> tuple[float, ...]:
 
 
 def held_tolerance(tolerance: float) -> float:
-    """A scene's tolerance, held within the range that models are chosen for.
-
-    Args: `tolerance`: relative.
-    Returns: The same within 1e-6 and 0.1.
-    """
+    """A tolerance, held within the range that models are chosen for."""
     return min(max(tolerance, min(TOLERANCES)), max(TOLERANCES))
 
 
 def tolerance_text(tolerance: float, say: Callable[[float], str]) -> str:
-    """The tolerance that models are chosen for, beside the scene's own where that is out of range.
-
-    Args: `say`: writes a tolerance.
-    Returns: "this scene's tolerance of 1 %", or the nearest to it that models are chosen for.
-    """
+    """The tolerance that models are chosen for, beside the scene's own where that is out of range."""
     taken, told = held_tolerance(tolerance), f"this scene's tolerance of {say(tolerance)}"
     return told if taken == tolerance else f"{say(taken)}, the nearest to {told} that models are chosen for"
 
@@ -199,10 +176,7 @@ def trade_document(study: TradeStudy) -> Record:
 
 
 def terms_document(scene: Scene) -> list[Record]:
-    """Estimated contribution of every physical term of a scene, as plain numbers and texts.
-
-    Returns: For each term its name, its contribution, whether that is above the tolerance, and why.
-    """
+    """Estimated contribution of every physical term of a scene, as plain numbers and texts."""
     return [
         {"term": e.term, "estimated_contribution": e.contribution, "above": e.above, "why": e.reason}
         for e in term_estimates(scene).values()

@@ -27,7 +27,6 @@ _WRONG: Final = math.radians(120)
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Runs over amplitudes and periods under the paper's law; amplitudes under the calibrated one."""
     given = _mistaken(scene) if defect == "lag_angle_wrong" else scene
     runs = {period: _runs(given, period) for period in _PERIODS}
     slowest = [min(max(map(settling, group)), scene.run.time_limit) for group in runs.values()]

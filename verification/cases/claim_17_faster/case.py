@@ -27,7 +27,6 @@ _WRONG: Final = math.radians(120)
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Runs of both algorithms."""
     pairs = [(period, phase) for period in _PERIODS for phase in PHASES]
     aimed = _mistaken(scene) if defect == "lag_angle_wrong" else scene
     target = [_run(aimed, "target_vector", *pair) for pair in pairs]

@@ -38,7 +38,6 @@ class _Points:
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Deviations from the measurements, and the smoothness of the curve."""
     friction = partial(_friction, defect=defect)
     smooth, rough = _smooth_points(), _rough_points()
     laminar = np.geomspace(1, 1000, 200)

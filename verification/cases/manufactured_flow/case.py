@@ -14,7 +14,6 @@ _AROUND: Final = {"light": (1, 2, 4, 8), "heavy": (1, 2, 4, 8, 16)}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Errors over levels."""
     study = flow_study(around=_AROUND[level], defect=defect)
     note = f"unknowns {', '.join(map(str, study.unknowns))}"
     table = partial(order_table, geometry="quadratic", note=note)

@@ -55,7 +55,6 @@ class _Points:
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Friction by mixing length against a quadrature, the formula and the measurements."""
     closure, cells = _CLOSURES[defect], _CELLS[level]
 
     def by_length(reynolds: FloatArray, roughness: FloatArray) -> FloatArray:

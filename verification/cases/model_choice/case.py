@@ -18,7 +18,6 @@ _ALONE: Final = 2
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Judge the choices."""
     return choices_evidence(scene, numbers=range(SCENES), quantities_of=quantities_of, defect=defect)
 
 

@@ -20,7 +20,6 @@ _TENTH: Final = 10
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Judge the choices."""
     count = SCENES if defect is None else _FEW
     return choices_evidence(scene, numbers=range(count), quantities_of=quantities_of, defect=defect)
 

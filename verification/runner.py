@@ -243,7 +243,7 @@ def cases_under_way(
 ) -> Iterator[Iterator[CaseResult]]:
     """Start several cases as `run_cases` does, and do something else while they run.
 
-    This process takes its part of the work once results are asked for; leaving early leaves no process behind.
+    This process takes its part of the work once results are asked for. Leaving early leaves no process behind.
     """
     scene = liquid_ring_scene(scene)
     wanted = tuple(case_ids) or tuple(definition.id for definition in load_cases())

@@ -56,8 +56,8 @@ def judge_quantity(
 
     `validation` (claims) and `within_uncertainty`: E = S - D against 2 u_val; a comparison whose 2 u_val is
     wider than limit |D| (limit alone where D is zero) is inconclusive.  `relative`, `absolute`: |E| against
-    limit |D| or limit.  `at_most`, `at_least`: S against the limit, inconclusive in a claim when the limit lies
-    inside S's own 95 % interval.
+    limit |D| or limit.  `at_most`, `at_least`: S against the limit, inconclusive in a claim when the limit
+    lies inside S's own 95 % interval.
     Raises: ValueError: a metric that needs a reference, without one.
     """
     if metric in ("at_most", "at_least"):

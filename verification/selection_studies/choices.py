@@ -72,8 +72,8 @@ def judge(
 ) -> list[Judged]:
     """Choose models for a scene at every tolerance, and judge each choice by the finest model.
 
-    Args: `check`: whether choices are checked; without it the estimates alone decide. `worth`: factor on every
-        contribution; anything but 1 is a deliberate error.
+    Args: `check`: whether choices are checked; without it the estimates alone decide. `worth`: factor on
+        every contribution; anything but 1 is a deliberate error.
     """
     found = []
     for hierarchy in hierarchies_for(scene, quantities):

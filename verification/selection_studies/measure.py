@@ -114,8 +114,8 @@ def measure(hierarchy: ModelHierarchy, *, values: Values, costs: CostModel, cloc
 
     Args: `clock`: takes times and memory; None: neither.
     Source: Pareto front over counted cost and error; trade-off point by the largest distance from the chord
-        between the front's ends, both axes logarithmic, errors below the finest model's own uncertainty counted
-        as that.
+        between the front's ends, both axes logarithmic, errors below the finest model's own uncertainty
+        counted as that.
     """
     if not hierarchy.points:
         return Trade(hierarchy=hierarchy, fidelities=(), knee=None)

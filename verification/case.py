@@ -35,7 +35,7 @@ class _Record(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class ReferenceText(_Record):
+class _ReferenceText(_Record):
     """Where the reference comes from and how far it is to be trusted."""
 
     kind: ReferenceKind
@@ -91,7 +91,7 @@ class CaseDefinition(_Record):
     consequence: Mapping[str, Text]
     """One sentence for a designer, by verdict, or "default"."""
     equations: tuple[Text, ...]
-    reference: ReferenceText
+    reference: _ReferenceText
     judged_on: Literal["scene", "paper"] = "scene"
     """Whether the scene at hand is judged, or always the paper's own disc, or rotor with eccentric masses."""
     headline: bool = False

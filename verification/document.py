@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from ringbalance.verification.case import NEEDS_REFERENCE, CaseDefinition
 from ringbalance.verification.comparison import COVERAGE_FACTOR
-from ringbalance.verification.evidence import Axis, Convergence, Curve, Evidence, Series, Table
+from ringbalance.verification.evidence import Convergence, Curve, Evidence, Series, Table
 from ringbalance.verification.result import CaseResult, MutationResult, QuantityResult
 from ringbalance.verification.verdicts import Verdict
 
@@ -143,39 +143,23 @@ def _evidence(evidence: Evidence | None) -> Document:
 def _series(series: Series) -> Document:
     return {
         "name": series.name,
-        "x": _axis(series.x),
+        "x": {**vars(series.x), "values": _numbers(series.x.values)},
         "y": [_curve(curve) for curve in series.y],
         "log": series.log,
     }
 
 
-def _axis(axis: Axis) -> Document:
-    return {"name": axis.name, "unit": axis.unit, "values": _numbers(axis.values)}
-
-
 def _curve(curve: Curve) -> Document:
-    shown: Document = {
-        "name": curve.name,
-        "unit": curve.unit,
-        "values": _numbers(curve.values),
-        "style": curve.style,
+    given = {key: value for key, value in vars(curve).items() if value is not None}
+    return {
+        key: _numbers(value) if key in ("values", "uncertainty") else value for key, value in given.items()
     }
-    return shown if curve.uncertainty is None else shown | {"uncertainty": _numbers(curve.uncertainty)}
 
 
 def _convergence(study: Convergence) -> Document:
-    return {
-        "quantity": study.quantity,
-        "unit": study.unit,
-        "formal_order": study.formal_order,
-        "observed_order": _numbers(study.observed_order),
-        "h": _numbers(study.size),
-        "error": None if study.error is None else _numbers(study.error),
-        "value": None if study.value is None else _numbers(study.value),
-        "gci": study.gci,
-        "geometry": study.geometry,
-        "note": study.note,
-    }
+    lists = {key: getattr(study, key) for key in ("observed_order", "error", "value")}
+    shown = vars(study) | {key: None if v is None else _numbers(v) for key, v in lists.items()}
+    return {"h": _numbers(shown.pop("size")), **shown}
 
 
 def _table(table: Table) -> Document:

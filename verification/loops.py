@@ -45,6 +45,14 @@ def loop_scene(
     )
 
 
+def mistaken_lag(scene: Scene) -> Scene:
+    """A scene whose controller is configured with a lag angle that is wrong by a third of a turn."""
+    wrong = scene.rotor.lag_angle + math.radians(120)
+    return dataclasses.replace(
+        scene, controller=dataclasses.replace(scene.controller, assumed_lag_angle=wrong)
+    )
+
+
 @lru_cache(maxsize=512)
 def run_loop(scene: Scene, law: str = "paper") -> Simulation:
     """One closed-loop run. Args: `law`: "paper" or "calibrated"."""

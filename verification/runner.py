@@ -168,7 +168,7 @@ def _judge_one(
     )
 
 
-def run_mutations(case_id: str, *, scene: Scene, level: Level = "light") -> tuple[MutationResult, ...]:
+def _run_mutations(case_id: str, *, scene: Scene, level: Level = "light") -> tuple[MutationResult, ...]:
     """Run a case once with each of its mutations; "light" leaves out those that are heavy."""
     definition = load_case(case_id)
     return mutate_definition(definition, case_code(case_id), scene=_scene_of(definition, scene), level=level)
@@ -201,7 +201,7 @@ def _run_whole(case_id: str, *, scene: Scene, level: Level, mutations: bool) -> 
     result = run_case(case_id, scene=scene, level=level)
     if not mutations or result.verdict is Verdict.NOT_RUN:
         return result
-    return dataclasses.replace(result, mutations=run_mutations(case_id, scene=scene, level=level))
+    return dataclasses.replace(result, mutations=_run_mutations(case_id, scene=scene, level=level))
 
 
 def run_cases(
@@ -243,7 +243,7 @@ def cases_under_way(
 ) -> Iterator[Iterator[CaseResult]]:
     """Start several cases as `run_cases` does, and do something else while they run.
 
-    This process takes its part of the work once results are asked for. Leaving early leaves no process behind.
+    This process takes part once results are asked for. Leaving early leaves no process behind.
     """
     scene = liquid_ring_scene(scene)
     wanted = tuple(case_ids) or tuple(definition.id for definition in load_cases())

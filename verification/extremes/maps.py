@@ -26,7 +26,7 @@ PAIRS: Final = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Span:
+class _Span:
     """A stretch of one axis along which points end alike."""
 
     low: float
@@ -64,17 +64,17 @@ class Sweep:
         pairs = zip(self.judgements[:-1], self.judgements[1:], strict=True)
         return tuple(i for i, (one, other) in enumerate(pairs) if _alike(one) != _alike(other))
 
-    def spans(self) -> tuple[Span, ...]:
+    def spans(self) -> tuple[_Span, ...]:
         """The stretches along which points end alike, from one end of the axis to the other."""
         ends = [*(i + 1 for i in self.changes()), len(self.judgements)]
         starts = [0, *ends[:-1]]
         return tuple(self._span(start, end) for start, end in zip(starts, ends, strict=True))
 
-    def _span(self, start: int, end: int) -> Span:
+    def _span(self, start: int, end: int) -> _Span:
         judgement = self.judgements[start]
         # Towards the answers: what is said last below them, and first above.
         said = self.judgements[end - 1 if start == 0 else start]
-        return Span(
+        return _Span(
             low=float(self.values[start]),
             high=float(self.values[end - 1]),
             ending=judgement.ending,

@@ -20,12 +20,8 @@ from ringbalance.verification.extremes.point import ROUND_OFF, Ending, Judgement
 from ringbalance.verification.reference.exact_chamber import exact_wall_pressure
 from ringbalance.verification.reference.explicit_segments import explicit_segments
 
-ASPECT: Final = Axis(
-    name="aspect", title="aspect ratio of the cells", unit="1", low=1.0, high=1e12, usual=(1.0, 1e5)
-)
-STEP: Final = Axis(
-    name="step", title="step of the explicit segments", unit="s", low=1e-7, high=100.0, usual=(1e-4, 0.1)
-)
+ASPECT: Final = Axis("aspect", "aspect ratio of the cells", "1", 1.0, 1e12, usual=(1.0, 1e5))
+STEP: Final = Axis("step", "step of the explicit segments", "s", 1e-7, 100.0, usual=(1e-4, 0.1))
 SHORTEST: Final = 1e-3
 """s, of the operation that steps are taken through; longer steps are the whole operation."""
 

@@ -41,8 +41,6 @@ from ringbalance.physics.navier_stokes.system import split
 from ringbalance.physics.results import Statistics, Status
 from ringbalance.scene.arrays import FloatArray, IntArray
 
-__all__ = ["BentTubeFlow", "bent_tube_flow", "developed_section", "pressure_loss"]
-
 Progress = Callable[[str], None]
 
 CORIOLIS = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))

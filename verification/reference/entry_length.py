@@ -31,9 +31,6 @@ from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.verification.reference.bent_tube import developed_section
 
-__all__ = ["Decay", "slowest_decay"]
-
-
 _SHIFTS = (1.0, 0.35, 0.12)
 """Of the expected rate, about which modes are looked for."""
 _NOT_A_MODE = 0.03

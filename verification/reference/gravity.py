@@ -39,7 +39,7 @@ _FILL_SHARE: Final = 0.8
 
 
 @dataclass(frozen=True, kw_only=True)
-class ExactRing:
+class _ExactRing:
     """The free surface and the pressure below it, exactly."""
 
     density: float
@@ -79,7 +79,7 @@ def exact_ring(
     fill_ratio: float,
     across: tuple[float, float] = (0.0, 0.0),
     along: float = 0.0,
-) -> ExactRing:
+) -> _ExactRing:
     """The ring that holds a fill ratio under gravity, m/s^2.
 
     Args: `across`: across the shaft in the chamber's axes. `along`: along the negative z axis.
@@ -89,8 +89,8 @@ def exact_ring(
     target = fill_ratio * float(liquid_area(disc=disc, surface_radius=disc.inner_radius))
     middle = float(surface_radius(disc=disc, fill_ratio=fill_ratio))
 
-    def ring(level: float) -> ExactRing:
-        return ExactRing(
+    def ring(level: float) -> _ExactRing:
+        return _ExactRing(
             density=density,
             angular_velocity=angular_velocity,
             offset=(across[0] / square, across[1] / square),
@@ -122,13 +122,13 @@ def _on_rays(disc: Disc, radius: Callable[[FloatArray], FloatArray], eta: FloatA
     return r
 
 
-def _area_across(disc: Disc, ring: ExactRing) -> float:
+def _area_across(disc: Disc, ring: _ExactRing) -> float:
     """With phi = eta alpha(r) the area element is alpha r dr d eta, so each ray holds half of A(r_s)."""
     eta, weight = _rule()
     return float(weight @ liquid_area(disc=disc, surface_radius=_on_rays(disc, ring.radius, eta)) / 2)
 
 
-def _mean_area_along(disc: Disc, ring: ExactRing) -> float:
+def _mean_area_along(disc: Disc, ring: _ExactRing) -> float:
     zeta, weight = _rule()
     radius = ring.radius(np.zeros_like(zeta), disc.axial_width / 2 * zeta)
     return float(weight @ liquid_area(disc=disc, surface_radius=radius) / 2)
@@ -217,7 +217,7 @@ def _spoiled(liquid: RotatingLiquid, defect: str | None) -> RotatingLiquid:
     return liquid
 
 
-def _surface_error(disc: Disc, solution: PressureSolution, exact: ExactRing) -> float:
+def _surface_error(disc: Disc, solution: PressureSolution, exact: _ExactRing) -> float:
     nodes = places(solution.chamber)[:, solution.chamber.grid[0]]
     angle = np.arctan2(nodes[1], nodes[0])
     axial = nodes[2] if len(nodes) == 3 else np.zeros_like(angle)
@@ -226,7 +226,7 @@ def _surface_error(disc: Disc, solution: PressureSolution, exact: ExactRing) -> 
     return float(np.max(np.abs(away))) / depth
 
 
-def _field_error(solution: PressureSolution, exact: ExactRing) -> float:
+def _field_error(solution: PressureSolution, exact: _ExactRing) -> float:
     volume = volume_points(solution.chamber.mesh)
     true = exact.pressure(solution.chamber.length_scale * volume.points)
     difference = at_cells(volume, solution.pressure) - true

@@ -56,7 +56,7 @@ QUADRATURE: Final = "quadrature in time"
 
 
 @dataclass(frozen=True, kw_only=True)
-class TimeModels:
+class _TimeModels:
     """How an operation is carried through time."""
 
     name: str
@@ -68,10 +68,10 @@ class TimeModels:
     """Of one operation."""
 
 
-ModelPair = tuple[LawModels, TimeModels]
+ModelPair = tuple[LawModels, _TimeModels]
 
 
-def time_models(scene: Scene) -> tuple[TimeModels, ...]:
+def time_models(scene: Scene) -> tuple[_TimeModels, ...]:
     """Ways through an injection that a scene has numbers for, in order of increasing cost."""
     given = tuple(
         term
@@ -91,12 +91,12 @@ def time_models(scene: Scene) -> tuple[TimeModels, ...]:
     return (*quasi_steady, *dynamic)
 
 
-def _steady(name: str, integrator: Integrator, left: tuple[str, ...], **work: float) -> TimeModels:
-    return TimeModels(name=name, integrator=integrator, modelled=(), lacks=left, work=work)
+def _steady(name: str, integrator: Integrator, left: tuple[str, ...], **work: float) -> _TimeModels:
+    return _TimeModels(name=name, integrator=integrator, modelled=(), lacks=left, work=work)
 
 
-def _dynamic(modelled: tuple[str, ...], left: tuple[str, ...]) -> TimeModels:
-    return TimeModels(
+def _dynamic(modelled: tuple[str, ...], left: tuple[str, ...]) -> _TimeModels:
+    return _TimeModels(
         name="with " + ", ".join(modelled),
         integrator=None,
         modelled=modelled,
@@ -117,7 +117,7 @@ def operation_laws(scene: Scene) -> tuple[LawModels, ...]:
     return tuple(dict.fromkeys([every[0], *kept, every[-1]]))
 
 
-def _sets(times: tuple[TimeModels, ...], laws: tuple[LawModels, ...]) -> list[ModelPair]:
+def _sets(times: tuple[_TimeModels, ...], laws: tuple[LawModels, ...]) -> list[ModelPair]:
     """Every law with every way through time that suits it; the highest last."""
     return [
         (law, time)
@@ -127,7 +127,7 @@ def _sets(times: tuple[TimeModels, ...], laws: tuple[LawModels, ...]) -> list[Mo
     ]
 
 
-def _law(book: LawBook, law: LawModels, time: TimeModels) -> CompleteLaw:
+def _law(book: LawBook, law: LawModels, time: _TimeModels) -> CompleteLaw:
     """The paper's own law where the closed form in time needs its two coefficients."""
     return paper_law(book.scene) if time.name == CLOSED_FORM else book.law(law)
 
@@ -138,7 +138,7 @@ def gas_times(scene: Scene) -> tuple[float, float]:
     return low, high
 
 
-def operation_contributions(scene: Scene) -> Mapping[str, Contribution]:
+def _operation_contributions(scene: Scene) -> Mapping[str, Contribution]:
     """What the ways through time leave out, and what their laws do, relative to the mass moved."""
     change = _velocity_change(scene, max(gas_times(scene)))
     segments = {
@@ -179,7 +179,7 @@ def mass_hierarchy(scene: Scene, *, book: LawBook) -> ModelHierarchy:
     """Models of the mass that one injection moves, from equal fills and an empty tube, after its wait."""
     times = gas_times(scene)
 
-    def solve(point: int, *, law: LawModels, time: TimeModels) -> FloatArray:
+    def solve(point: int, *, law: LawModels, time: _TimeModels) -> FloatArray:
         return np.array([moved_mass(scene, law=_law(book, law, time), time=time, gas_time=times[point])])
 
     return _hierarchy(
@@ -195,7 +195,7 @@ def mass_hierarchy(scene: Scene, *, book: LawBook) -> ModelHierarchy:
     )
 
 
-def moved_mass(scene: Scene, *, law: CompleteLaw, time: TimeModels, gas_time: float) -> float:
+def moved_mass(scene: Scene, *, law: CompleteLaw, time: _TimeModels, gas_time: float) -> float:
     """Mass that leaves the driven chamber by one injection of `gas_time`, s, and the wait after it, kg."""
     model = balancer_model(law)
     plant = LiquidRing(
@@ -223,7 +223,7 @@ def settling_hierarchy(scene: Scene, *, book: LawBook) -> ModelHierarchy:
     laws = tuple(dict.fromkeys(laws))
     times = tuple(time for time in time_models(scene) if time.name != EXPLICIT[MANY])
 
-    def solve(_: int, *, law: LawModels, time: TimeModels) -> FloatArray:
+    def solve(_: int, *, law: LawModels, time: _TimeModels) -> FloatArray:
         found = simulate(
             exact,
             flow_law=_law(book, law, time),
@@ -266,7 +266,7 @@ def _hierarchy(
         points=points,
         check=tuple(range(len(points))),
         relative_to="each",
-        contributions=operation_contributions(scene),
+        contributions=_operation_contributions(scene),
         fidelities=tuple(
             Fidelity(
                 name=f"{law_name(law, hump=hump)}; {time.name}",

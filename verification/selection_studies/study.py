@@ -10,16 +10,15 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from ringbalance.reduced_model.chamber.gravity import check_ring
-from ringbalance.reduced_model.selection.chamber_models import chamber_hierarchies
 from ringbalance.reduced_model.selection.choice import Choice, Values, choose
 from ringbalance.reduced_model.selection.cost import CostModel, committed_costs, fitted_costs
 from ringbalance.reduced_model.selection.estimates import term_estimates
-from ringbalance.reduced_model.selection.law_models import QUADRATURE, SERIES, base_law
+from ringbalance.reduced_model.selection.law_models import QUADRATURE, SERIES
 from ringbalance.reduced_model.selection.models import Fidelity, ModelHierarchy
 from ringbalance.reduced_model.selection.registry import models_used
 from ringbalance.reduced_model.selection.scene_numbers import scene_numbers
-from ringbalance.reduced_model.selection.tube_models import LawBook, k_hierarchy, velocity_hierarchy
 from ringbalance.scene.models import Scene
+from ringbalance.verification.selection_studies.choices import TOLERANCES, hierarchies_for
 from ringbalance.verification.selection_studies.measure import (
     Clock,
     Measured,
@@ -27,18 +26,12 @@ from ringbalance.verification.selection_studies.measure import (
     measure,
     works_and_seconds,
 )
-from ringbalance.verification.selection_studies.operation import (
-    EXPLICIT,
-    MANY,
-    mass_hierarchy,
-    settling_hierarchy,
-)
+from ringbalance.verification.selection_studies.operation import EXPLICIT, MANY
 
 Record = dict[str, Any]
 Level = Literal["light", "heavy"]
 
-TOLERANCES: Final = (0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
-QUICK: Final = ("wall_pressure", "moment", "k", "velocity", "transferred_mass")
+_QUICK: Final = ("wall_pressure", "moment", "k", "velocity", "transferred_mass")
 """Quantities of a light trade; the settling time takes whole runs of the loop."""
 _OWN_ALONE: Final = (("light", "transferred_mass"),)
 """Where models are chosen for the scene's own tolerance alone."""
@@ -64,14 +57,7 @@ def hierarchies_of(scene: Scene, *, level: Level = "heavy") -> tuple[ModelHierar
     Raises: SceneError: a rotor too slow for the liquid to form a ring.
     """
     check_ring(scene)
-    book = LawBook(scene, base_law(scene))
-    quick = (
-        *chamber_hierarchies(scene),
-        k_hierarchy(scene),
-        velocity_hierarchy(scene, book=book),
-        mass_hierarchy(scene, book=book),
-    )
-    return quick if level == "light" else (*quick, settling_hierarchy(scene, book=book))
+    return tuple(hierarchies_for(scene, _QUICK if level == "light" else (*_QUICK, "settling_time")))
 
 
 def trade_study(
@@ -200,7 +186,7 @@ def _quantity(trade: Trade, choices: Sequence[Choice]) -> Record:
         ],
         "rungs": [_fidelity(found) for found in trade.fidelities],
         "knee": trade.knee,
-        "choices": [choice_document(choice) for choice in choices],
+        "choices": [_choice_document(choice) for choice in choices],
     }
 
 
@@ -217,7 +203,7 @@ def _fidelity(found: Measured) -> Record:
     }
 
 
-def choice_document(choice: Choice) -> Record:
+def _choice_document(choice: Choice) -> Record:
     """A choice as plain numbers and texts."""
     return {
         "tolerance": choice.tolerance,

@@ -35,7 +35,7 @@ class _Record(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class ReferenceText(_Record):
+class _ReferenceText(_Record):
     """Where the reference comes from and how far it is to be trusted."""
 
     kind: ReferenceKind
@@ -91,7 +91,7 @@ class CaseDefinition(_Record):
     consequence: Mapping[str, Text]
     """One sentence for a designer, by verdict, or "default"."""
     equations: tuple[Text, ...]
-    reference: ReferenceText
+    reference: _ReferenceText
     judged_on: Literal["scene", "paper"] = "scene"
     """Whether the scene at hand is judged, or always the paper's own disc, or rotor with eccentric masses."""
     headline: bool = False
@@ -105,11 +105,7 @@ class CaseDefinition(_Record):
         return (self.explanation, *self.consequence.values(), *self.reference.doubts)
 
     def consequence_of(self, verdict: Verdict) -> str:
-        """The sentence for a designer that goes with a verdict.
-
-        Args: `verdict`: of the case.
-        Returns: The sentence, placeholders still in it.
-        """
+        """The sentence for a designer that goes with a verdict, placeholders still in it."""
         return self.consequence.get(verdict.value, self.consequence.get("default", ""))
 
     @model_validator(mode="after")
@@ -159,11 +155,7 @@ def _unique(what: str, names: list[str]) -> None:
 
 
 def parse_case(text: str, *, source: str) -> CaseDefinition:
-    """Read a case.toml.
-
-    Args: `text`: of the file. `source`: name of the file, for messages.
-    Raises: CaseError: text that is not TOML, or not a case; all faults at once.
-    """
+    """A case.toml as a record. Raises: CaseError: not TOML, or not a case, with all faults at once."""
     try:
         return CaseDefinition.model_validate(tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:

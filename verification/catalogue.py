@@ -30,11 +30,7 @@ class UnknownCaseError(KeyError):
 
 
 def case_code(case_id: str) -> CaseCode:
-    """The two functions of a case.
-
-    Returns: Its `case.py`.
-    Raises: UnknownCaseError: no case of that id; the text names the nearest one.
-    """
+    """The `case.py` of a case. Raises: UnknownCaseError: no such id; the text names the nearest one."""
     _check_known(case_id)
     return cast(CaseCode, getattr(cases, f"{case_id}_code"))
 
@@ -55,10 +51,7 @@ def load_case(case_id: str) -> CaseDefinition:
 
 
 def load_cases() -> tuple[CaseDefinition, ...]:
-    """All cases.
-
-    Returns: Definitions in the report's order: first by `order`, then the claims by paper and number.
-    """
+    """All cases in the order of the report: first by `order`, then the claims by paper and number."""
     return tuple(sorted(map(load_case, case_ids()), key=_place))
 
 

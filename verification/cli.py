@@ -93,14 +93,7 @@ def verify(
 
 
 def exit_code(results: Sequence[CaseResult]) -> int:
-    """Exit code of a run: a refuted claim is a result, a failed code verification is an error.
-
-    Args:
-        results: of the cases.
-
-    Returns:
-        1 when a code-verification case failed or a mutation was not caught, else 0.
-    """
+    """1 when a code-verification case failed or a mutation was not caught; a refuted claim is a result."""
     failed = any(
         result.broken or (result.definition.kind == "code_verification" and result.verdict is Verdict.FAILED)
         for result in results

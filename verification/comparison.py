@@ -42,14 +42,10 @@ def compare(
     input_: float = 0.0,
     reference_uncertainty: float = 0.0,
 ) -> Comparison:
-    """Compare a found number with a reference.
+    """Compare a found number S with a reference D: E = S - D, u_val = sqrt(u_num^2 + u_input^2 + u_D^2).
 
-    E = S - D, u_val = sqrt(u_num^2 + u_input^2 + u_D^2)
-    Args: `found`: S. `reference`: D, in the unit of S. `numerical`: u_num, standard, in the unit of S.
-        `input_`: u_input, standard, in the unit of S. `reference_uncertainty`: u_D, standard, in the unit of
-        S.
-    Returns: Comparison. A few units in the last place of the larger number are added to the half-width, for
-        round-off.
+    A few units in the last place of the larger number are added for round-off.
+    Args: `numerical`, `input_` and `reference_uncertainty` are standard uncertainties in the unit of S.
     Raises: ValueError: a number that is not finite, or a negative uncertainty.
     Source: ASME V&V 20-2009, sections 1 and 6; independent uncertainties.
     """
@@ -61,11 +57,7 @@ def compare(
 
 
 def from_half_width(half_width: float) -> float:
-    """Standard uncertainty from an expanded uncertainty (95 %).
-
-    Args: `half_width`: of the 95 % interval.
-    Returns: half_width / 2.
-    """
+    """Standard uncertainty from an expanded uncertainty (95 %)."""
     return half_width / COVERAGE_FACTOR
 
 
@@ -79,25 +71,19 @@ def from_range(values: Iterable[float]) -> float:
 
 
 def from_rounding(last_digit: float) -> float:
-    """Standard uncertainty of a printed number: all within half a unit of its last digit is equally likely.
+    """Standard uncertainty of a printed number from one unit of its last digit: u = last_digit/(2 sqrt(3)).
 
-    u = last_digit / (2 sqrt(3))
-    Args: `last_digit`: value of one unit of the last digit printed, in the number's unit.
-    Returns: Standard uncertainty; its expanded uncertainty (95 %), 0.58 of the last digit, covers the whole
-    rounding interval.
+    All within half a unit is equally likely. The expanded uncertainty, 0.58 of the last digit, covers that.
     Source: rectangular distribution, GUM (JCGM 100:2008), 4.3.7.
     """
     return last_digit / (2 * math.sqrt(3))
 
 
 def input_uncertainty(contributions: Sequence[tuple[Callable[[float], float], float, float]]) -> float:
-    """Standard uncertainty of a number from those of its inputs.
+    """Standard uncertainty from independent inputs: u^2 = sum of [(f(v + u_v) - f(v - u_v))/2]^2.
 
-    u^2 = sum over inputs of [(f(v + u_v) - f(v - u_v))/2]^2
-    Args: `contributions`: for each input its function, its value v and its standard uncertainty u_v; an input
-        whose uncertainty is zero is not evaluated.
-    Returns: Standard uncertainty, in the unit of the functions' results.
-    Source: GUM (JCGM 100:2008), 5.1; independent inputs.
+    Args: `contributions`: f, v and u_v of each input; one whose uncertainty is zero is not evaluated.
+    Source: GUM (JCGM 100:2008), 5.1.
     """
     effects = [
         (function(value + standard_uncertainty) - function(value - standard_uncertainty)) / 2

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from ringbalance.verification.case import NEEDS_REFERENCE, CaseDefinition
 from ringbalance.verification.comparison import COVERAGE_FACTOR
-from ringbalance.verification.evidence import Axis, Convergence, Curve, Evidence, Series, Table
+from ringbalance.verification.evidence import Convergence, Curve, Evidence, Series, Table
 from ringbalance.verification.result import CaseResult, MutationResult, QuantityResult
 from ringbalance.verification.verdicts import Verdict
 
@@ -18,11 +18,7 @@ Document = dict[str, Any]
 
 
 def case_document(result: CaseResult) -> Document:
-    """One case's result as a JSON-able record; SI units, or the unit named beside the number.
-
-    Returns: id, kind, verdict, quantities (name, unit, value, reference, error, uncertainty, limit, verdict
-        and more) and all that a report shows of the case.
-    """
+    """One case's result, and all that a report shows of it; SI units, or the unit named beside the number."""
     definition = result.definition
     return {
         "id": definition.id,
@@ -64,10 +60,7 @@ def case_document(result: CaseResult) -> Document:
 
 
 def definition_document(definition: CaseDefinition) -> Document:
-    """What a list of cases says of one of them.
-
-    Returns: id, kind, number, title, claim, cost and the ids of its mutations.
-    """
+    """What a list of cases says of one of them."""
     return {
         "id": definition.id,
         "kind": definition.kind,
@@ -81,9 +74,9 @@ def definition_document(definition: CaseDefinition) -> Document:
 
 
 def comparison_half_width(result: QuantityResult) -> float | None:
-    """Expanded uncertainty (95 %) of the comparison that decided a quantity.
+    """Expanded uncertainty, 2 u_val, of the comparison that decided a quantity.
 
-    Returns: 2 u_val; zero where nothing uncertain entered; None where the case was not run.
+    Returns: Zero where nothing uncertain entered; None where the case was not run.
     """
     found, comparison = result.found, result.comparison
     if found is None or comparison is None:
@@ -150,39 +143,23 @@ def _evidence(evidence: Evidence | None) -> Document:
 def _series(series: Series) -> Document:
     return {
         "name": series.name,
-        "x": _axis(series.x),
+        "x": {**vars(series.x), "values": _numbers(series.x.values)},
         "y": [_curve(curve) for curve in series.y],
         "log": series.log,
     }
 
 
-def _axis(axis: Axis) -> Document:
-    return {"name": axis.name, "unit": axis.unit, "values": _numbers(axis.values)}
-
-
 def _curve(curve: Curve) -> Document:
-    shown: Document = {
-        "name": curve.name,
-        "unit": curve.unit,
-        "values": _numbers(curve.values),
-        "style": curve.style,
+    given = {key: value for key, value in vars(curve).items() if value is not None}
+    return {
+        key: _numbers(value) if key in ("values", "uncertainty") else value for key, value in given.items()
     }
-    return shown if curve.uncertainty is None else shown | {"uncertainty": _numbers(curve.uncertainty)}
 
 
 def _convergence(study: Convergence) -> Document:
-    return {
-        "quantity": study.quantity,
-        "unit": study.unit,
-        "formal_order": study.formal_order,
-        "observed_order": _numbers(study.observed_order),
-        "h": _numbers(study.size),
-        "error": None if study.error is None else _numbers(study.error),
-        "value": None if study.value is None else _numbers(study.value),
-        "gci": study.gci,
-        "geometry": study.geometry,
-        "note": study.note,
-    }
+    lists = {key: getattr(study, key) for key in ("observed_order", "error", "value")}
+    shown = vars(study) | {key: None if v is None else _numbers(v) for key, v in lists.items()}
+    return {"h": _numbers(shown.pop("size")), **shown}
 
 
 def _table(table: Table) -> Document:
@@ -199,17 +176,12 @@ def _numbers(values: npt.ArrayLike) -> list[float | None]:
 
 
 def results_document(results: Iterable[CaseResult]) -> list[Document]:
-    """Results of several cases as JSON-able records. Returns: One record per case, in order."""
+    """Results of several cases as JSON-able records."""
     return [case_document(result) for result in results]
 
 
 def merge_saved(document: Sequence[Document], saved: Sequence[Mapping[str, Any]]) -> list[Document]:
-    """Put earlier results of heavy cases where this run has none.
-
-    Args: `saved`: records of an earlier run, each with the `date` that it was stamped with.
-    Returns: The records, a heavy case that was not run replaced by the earlier result on the same scene, if
-        any.
-    """
+    """The records, with the `saved` result on the same scene for each heavy case that was not run."""
     earlier = {(case["id"], case["scene_sha256"]): dict(case) for case in saved}
     return [_merged(case, earlier.get((case["id"], case["scene_sha256"]))) for case in document]
 

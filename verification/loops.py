@@ -33,17 +33,23 @@ def loop_scene(
     phase: float = PHASES[0],
     **settings: Any,
 ) -> Scene:
-    """A scene set up for one run of section 6.
+    """A scene set up for one run of section 6, with an exact sensor: the paper names no noise.
 
-    Args: `amplitude`: of the initial vibration, m. `phase`: of the initial vibration, rad. `settings`:
-        further controller settings, SI.
-    Returns: The scene with an exact sensor: the paper's simulation names no noise.
+    Args: `amplitude`, m, and `phase`, rad: of the initial vibration. `settings`: of the controller, SI.
     """
     return dataclasses.replace(
         scene,
         controller=dataclasses.replace(scene.controller, kind=kind, **settings),
         rotor=dataclasses.replace(scene.rotor, initial_amplitude=amplitude, initial_phase=phase),
         sensor=dataclasses.replace(scene.sensor, amplitude_noise=0.0, phase_noise=0.0),
+    )
+
+
+def mistaken_lag(scene: Scene) -> Scene:
+    """A scene whose controller is configured with a lag angle that is wrong by a third of a turn."""
+    wrong = scene.rotor.lag_angle + math.radians(120)
+    return dataclasses.replace(
+        scene, controller=dataclasses.replace(scene.controller, assumed_lag_angle=wrong)
     )
 
 
@@ -73,29 +79,18 @@ def _plain(scene: Scene) -> Scene:
 
 
 def sampled_amplitudes(run: Simulation) -> np.ndarray:
-    """Amplitudes that the controller saw, in order.
-
-    Args: `run`: a closed-loop run.
-    Returns: m, shape (samples,).
-    """
+    """Amplitudes that the controller saw, m, in order."""
     seen = [sample.measurement.amplitude for sample in run.samples if sample.measurement is not None]
     return np.array(seen)
 
 
 def settling(run: Simulation) -> float:
-    """Settling time, infinite where the run did not settle.
-
-    Args: `run`: a closed-loop run.
-    Returns: s.
-    """
+    """Settling time, s, infinite where the run did not settle."""
     return math.inf if run.settling_time is None else run.settling_time
 
 
 def amplitude_series(name: str, runs: dict[str, Simulation], *, points: int = 400) -> Series:
-    """Amplitude against time of several runs, on one time axis.
-
-    Args: `name`: of the figure. `runs`: by the name of their curve.
-    """
+    """Amplitude against time of several runs, by the name of their curve, on one time axis."""
     longest = max(float(run.time[-1]) for run in runs.values())
     time = np.linspace(0.0, longest, points)
     curves = tuple(Curve(label, "m", np.interp(time, run.time, run.amplitude)) for label, run in runs.items())

@@ -37,10 +37,8 @@ class OrderStudy:
 
 
 def order_study(*, size: Sequence[float], error: Sequence[float]) -> OrderStudy:
-    """Observed orders p = ln(e_i / e_(i+1)) / ln(h_i / h_(i+1)).
+    """Observed orders p = ln(e_i/e_(i+1))/ln(h_i/h_(i+1)) of relative errors, coarse to fine.
 
-    Args: `size`: h, coarse to fine, strictly falling; at least two. `error`: magnitudes, relative, one per
-        level.
     Raises: ValueError: lengths that differ, sizes that do not fall, errors that are negative or not finite,
         or at round-off, where no order can be seen.
     """
@@ -79,11 +77,8 @@ def order_figure(studies: Mapping[str, OrderStudy]) -> Series:
 
 
 def extrapolate(*, coarse: float, fine: float, ratio: float, order: float) -> float:
-    """Richardson extrapolation, S = f + (f - c)/(ratio^order - 1).
+    """Richardson extrapolation, S = f + (f - c)/(ratio^order - 1), ratio = h_coarse/h_fine.
 
-    Args: `coarse`: c, value on the coarser level. `fine`: f, value on the finer level. `ratio`: h_coarse /
-        h_fine, above one. `order`: formal order, positive.
-    Returns: Extrapolated value.
     Raises: ValueError: a ratio that is not above one, or an order that is not positive.
     """
     if not (ratio > 1 and order > 0):

@@ -64,19 +64,15 @@ PLATE_QUANTITY: Final = "plate_thickness"
 
 
 def at_paper_density(scene: Scene) -> Scene:
-    """A scene with the density of Table 1 in place of the liquid's own.
-
-    Returns: The scene with 1000 kg/m^3.
-    """
+    """A scene with the density of Table 1, 1000 kg/m^3, in place of the liquid's own."""
     return dataclasses.replace(scene, liquid=dataclasses.replace(scene.liquid, density=DENSITY))
 
 
 def plate_uncertainty(scene: Scene) -> float:
-    """Standard uncertainty of the plate thickness.
+    """Standard uncertainty of the plate thickness, m: as the scene states it.
 
-    From the scene's own statement, where it makes one.  Otherwise a disc whose volume prints as the paper's
-    67.7 ml has its thickness inferred from that number, and inherits its rounding.
-    Returns: u(t), m; zero where the scene gives the thickness as exact.
+    A disc whose volume prints as the paper's 67.7 ml, with none stated, has its thickness inferred from that
+    number, and inherits its rounding; any other thickness is exact.
     """
     disc = scene.disc
     for stated in scene.uncertainty:
@@ -96,9 +92,5 @@ def plate_effect(scene: Scene, quantity: Callable[[Disc], float]) -> float:
 
 
 def with_plate(disc: Disc, thickness: float) -> Disc:
-    """A disc with another plate thickness.
-
-    Args: `thickness`: t, m.
-    Returns: The changed disc.
-    """
+    """A disc with another plate thickness, m."""
     return dataclasses.replace(disc, plate_thickness=thickness)

@@ -75,10 +75,8 @@ class CaseResult:
         return named | dict(self.evidence.numbers if self.evidence else {})
 
     def filled(self, text: str) -> str:
-        """A text of the case with its numbers put in.
+        """A text of the case with its numbers put in; empty when it needs numbers and the case was not run.
 
-        Args: `text`: with placeholders.
-        Returns: The text; empty when the case was not run and the text needs numbers.
         Raises: ValueError: the text asks for a number that the evidence does not hold.
         """
         if self.evidence is None and "{" in text:

@@ -31,11 +31,9 @@ def ring_of(
 
 
 def found_of(quantities: RingQuantities, name: str, index: int, *, input_: float = 0.0) -> Found:
-    """One number of a ring with its uncertainties.
+    """One total of a ring by its name and the index of its fill, with u from the inputs.
 
-    Args: `name`: "liquid_volume", "wall_pressure", "moment" or "moment_per_volume". `index`: of the fill
-        ratio. `input_`: standard uncertainty from the inputs, in the number's unit.
-    Returns: Found; not conclusive where the meshes do not converge steadily.
+    It is not conclusive where the meshes do not converge steadily.
     """
     estimate: Estimate = getattr(quantities, name)
     return Found(
@@ -52,11 +50,7 @@ def _conclusive(convergence: GridConvergence) -> bool:
 
 
 def scaled(found: Found, factor: float) -> Found:
-    """A found number times a constant.
-
-    Args: `factor`: the constant, positive.
-    Returns: The product with its uncertainties.
-    """
+    """A found number times a positive constant."""
     return dataclasses.replace(
         found, value=found.value * factor, numerical=found.numerical * factor, input=found.input * factor
     )
@@ -79,12 +73,7 @@ def bare_chamber_moment(scene: Scene, *, density: float) -> Found:
 
 
 def mesh_table(quantities: RingQuantities, name: str, unit: str, index: int) -> Convergence:
-    """Convergence of one number of a ring over its meshes.
-
-    Args: `name`: "liquid_volume", "wall_pressure", "moment" or "moment_per_volume". `unit`: SI. `index`: of
-        the fill ratio.
-    Returns: Convergence, coarse to fine.
-    """
+    """Convergence of one total of a ring over its meshes, coarse to fine."""
     record = quantities.convergence[name][index]
     values = quantities.mesh_values[name][::-1, index]
     sizes = [quantities.cells[-1][0] / cells[0] for cells in reversed(quantities.cells)]

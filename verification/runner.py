@@ -31,17 +31,15 @@ Started = dict[Group, Future[tuple[CaseResult, ...]]]
 
 @lru_cache(maxsize=1)
 def paper_scene() -> Scene:
-    """The liquid-ring paper's own disc. Returns: The bundled scene."""
+    """The liquid-ring paper's own disc."""
     return liquid_ring_scene(load_scene(bundled_scene(PAPER_SCENE)))
 
 
 def run_case(case_id: str, *, scene: Scene, level: Level = "light", defect: str | None = None) -> CaseResult:
-    """Run one case and judge it.
+    """Run one case and judge it; one that cannot be run is `not run`, with the reason in its status.
 
-    Args: `case_id`: of the catalogue. `scene`: the scene at hand; a case on the paper's own numbers takes the
-        paper's disc instead. `level`: "light" leaves heavy cases unrun. `defect`: id of one of the case's
-        mutations, to be built in on purpose.
-    Returns: CaseResult; a case that cannot be run is `not run`, with the reason in its status.
+    Args: `scene`: a case on the paper's own numbers takes the paper's disc instead. `level`: "light" leaves
+        heavy cases unrun. `defect`: id of a mutation to build in.
     Raises: KeyError: an unknown case or mutation.
     """
     definition = load_case(case_id)
@@ -60,8 +58,6 @@ def run_definition(
 ) -> CaseResult:
     """Run and judge one case given by its text and its code, on the scene exactly as given.
 
-    Args: `definition`: the case's text. `code`: its two functions. `level`: "light" leaves heavy cases unrun.
-        `defect`: id of a mutation.
     Raises: KeyError: an unknown mutation.
     """
     start = time.perf_counter()
@@ -120,9 +116,8 @@ def _mutation(definition: CaseDefinition, defect: str) -> Mutation:
 
 
 def overridden(scene: Scene, overrides: Mapping[str, float | Literal["absent"]]) -> Scene:
-    """A scene with some of its quantities changed.
+    """A scene with some SI values changed by "table.quantity"; "absent" stands for None.
 
-    Args: `overrides`: SI values by "table.quantity", such as "disc.plate_thickness"; "absent" for None.
     Raises: ValueError: a table or quantity that a scene does not have.
     """
     for path, value in overrides.items():
@@ -173,12 +168,8 @@ def _judge_one(
     )
 
 
-def run_mutations(case_id: str, *, scene: Scene, level: Level = "light") -> tuple[MutationResult, ...]:
-    """Run a case once with each of its mutations.
-
-    Args: `case_id`: of the catalogue. `level`: "light" leaves out mutations and cases that are heavy.
-    Returns: One result per mutation that was run.
-    """
+def _run_mutations(case_id: str, *, scene: Scene, level: Level = "light") -> tuple[MutationResult, ...]:
+    """Run a case once with each of its mutations; "light" leaves out those that are heavy."""
     definition = load_case(case_id)
     return mutate_definition(definition, case_code(case_id), scene=_scene_of(definition, scene), level=level)
 
@@ -186,12 +177,7 @@ def run_mutations(case_id: str, *, scene: Scene, level: Level = "light") -> tupl
 def mutate_definition(
     definition: CaseDefinition, code: CaseCode, *, scene: Scene, level: Level = "light"
 ) -> tuple[MutationResult, ...]:
-    """Run a case given by its text and its code once with each of its mutations.
-
-    Args: `definition`: the case's text. `code`: its two functions. `scene`: the scene to judge. `level`:
-        "light" leaves out mutations and cases that are heavy.
-    Returns: One result per mutation that was run.
-    """
+    """The same of a case given by its text and its code."""
     if definition.cost == "heavy" and level == "light":
         return ()
     affordable = [m for m in definition.must_fail if level == "heavy" or m.cost == "light"]
@@ -215,7 +201,7 @@ def _run_whole(case_id: str, *, scene: Scene, level: Level, mutations: bool) -> 
     result = run_case(case_id, scene=scene, level=level)
     if not mutations or result.verdict is Verdict.NOT_RUN:
         return result
-    return dataclasses.replace(result, mutations=run_mutations(case_id, scene=scene, level=level))
+    return dataclasses.replace(result, mutations=_run_mutations(case_id, scene=scene, level=level))
 
 
 def run_cases(
@@ -227,12 +213,11 @@ def run_cases(
     workers: int = 1,
     progress: Progress | None = None,
 ) -> tuple[CaseResult, ...]:
-    """Run several cases.
+    """Run several cases, or all, and return their results in the order asked for.
 
-    Args: `case_ids`: of the catalogue; none for all. `level`: "light" leaves heavy cases `not run`.
-        `mutations`: whether to run each case's mutations too. `workers`: processes, this one included; one
-        starts no other. `progress`: called with each result as it comes, in order.
-    Returns: Results, in the order asked for; an interrupt ends the run and leaves no process behind.
+    An interrupt ends the run and leaves no process behind.
+    Args: `level`: "light" leaves heavy cases `not run`. `workers`: processes, this one included. `progress`:
+        called with each result as it comes, in order.
     Raises: KeyError: an unknown case.
     Raises: SceneError: a balancer without liquid.
     """
@@ -256,14 +241,9 @@ def cases_under_way(
     mutations: bool = False,
     workers: int = 1,
 ) -> Iterator[Iterator[CaseResult]]:
-    """Start several cases, and do something else while they run.
+    """Start several cases as `run_cases` does, and do something else while they run.
 
-    Args: `case_ids`: of the catalogue; none for all. `level`: "light" leaves heavy cases `not run`.
-        `mutations`: whether to run each case's mutations too. `workers`: processes, this one included, which
-        takes its share once results are asked for; one starts no other.
-    Yields: Results, in the order asked for; leaving early leaves no process behind.
-    Raises: KeyError: an unknown case.
-    Raises: SceneError: a balancer without liquid.
+    This process takes part once results are asked for. Leaving early leaves no process behind.
     """
     scene = liquid_ring_scene(scene)
     wanted = tuple(case_ids) or tuple(definition.id for definition in load_cases())

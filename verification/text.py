@@ -35,10 +35,8 @@ _PLACEHOLDER = re.compile(r"\{([a-z][a-z0-9_]*)(?::([^:{}]*))?(?::([^{}]*))?\}")
 
 
 def placeholders(text: str) -> tuple[str, ...]:
-    """Names of the numbers that a text asks for.
+    """Names of the numbers that a text asks for, in order of appearance.
 
-    Args: `text`: of a case.
-    Returns: Names, in order of appearance.
     Raises: ValueError: a unit that is not known, or braces that are not a placeholder.
     """
     for match in _PLACEHOLDER.finditer(text):
@@ -51,11 +49,10 @@ def placeholders(text: str) -> tuple[str, ...]:
 
 
 def fill(text: str, numbers: Mapping[str, float]) -> str:
-    """Put numbers into a text.
+    """A text with SI values put in by name.
 
-    Args: `text`: with placeholders. `numbers`: SI values by name.
-    Returns: The text, each number in the unit that its placeholder names, to four significant digits unless
-        the placeholder has a format, and held to its unit by a no-break space.
+    Each is written in the unit that its placeholder names, to four significant digits unless that has a
+    format, and held to its unit by a no-break space.
     Raises: ValueError: a number that is missing or not finite.
     """
 

@@ -55,12 +55,9 @@ def judge_quantity(
     """Judge one quantity by its metric and limit.
 
     `validation` (claims) and `within_uncertainty`: E = S - D against 2 u_val; a comparison whose 2 u_val is
-    wider than limit |D| (limit alone where D is zero) is inconclusive.  `relative`,
-    `absolute`: |E| against limit |D| or limit.  `at_most`, `at_least`: S against the limit, inconclusive in a
-    claim when the limit lies inside S's own 95 % interval.
-    Args: `kind`: of the case; decides the words. `metric`: how the number is judged. `limit`: dimensionless
-        for `validation`, `within_uncertainty` and `relative`; else in the number's unit. `found`: S with
-        u_num and u_input. `reference`: D with u_D; None for `at_most` and `at_least`.
+    wider than limit |D| (limit alone where D is zero) is inconclusive.  `relative`, `absolute`: |E| against
+    limit |D| or limit.  `at_most`, `at_least`: S against the limit, inconclusive in a claim when the limit
+    lies inside S's own 95 % interval.
     Raises: ValueError: a metric that needs a reference, without one.
     """
     if metric in ("at_most", "at_least"):
@@ -117,10 +114,8 @@ def _judge_bound(kind: Kind, metric: Metric, limit: float, found: Found) -> Judg
 
 
 def combine(*, kind: Kind, verdicts: Sequence[Verdict]) -> Verdict:
-    """Verdict of a case: that of its quantity that decides, a refuted or failed one before all others.
+    """Verdict of a case: that of its quantity that decides; not run when there are none.
 
-    Args: `verdicts`: of its judged quantities.
-    Returns: The deciding verdict; not run when there are none.
     Raises: ValueError: a verdict that this kind of case does not know.
     """
     strange = [verdict for verdict in verdicts if verdict not in VOCABULARY[kind]]

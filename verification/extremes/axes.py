@@ -24,7 +24,7 @@ _TABLES: Final = ("environment", "gas", "sensor", "controller", "run", "accuracy
 """That a scene file may leave out."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Axis:
     """One input, from one end of what anyone might ask for to a step beyond the other."""
 
@@ -38,21 +38,13 @@ class Axis:
     spacing: Literal["log", "linear"] = "log"
 
     def share(self, value: float) -> float:
-        """How far along the axis a value stands.
-
-        Args: `value`: in `unit`.
-        Returns: Share within [0, 1].
-        """
+        """How far along the axis a value in `unit` stands, within [0, 1]."""
         if self.spacing == "linear":
             return (value - self.low) / (self.high - self.low)
         return math.log(value / self.low) / math.log(self.high / self.low)
 
     def at(self, share: npt.ArrayLike) -> FloatArray:
-        """Values at shares of the way along the axis.
-
-        Args: `share`: within [0, 1], any shape.
-        Returns: Values in `unit`, the shape of `share`.
-        """
+        """Values in `unit` at fractions of the way along the axis."""
         s = np.asarray(share, dtype=np.float64)
         if self.spacing == "linear":
             return np.asarray(self.low + s * (self.high - self.low), dtype=np.float64)
@@ -60,69 +52,21 @@ class Axis:
 
 
 AXES: Final = (
-    Axis(name="speed", title="speed", unit="rpm", low=1.0, high=1e5, usual=(300.0, 6e4)),
-    Axis(name="fill", title="largest fill ratio", unit="1", low=1e-6, high=1.0, usual=(0.05, 0.9)),
-    Axis(
-        name="angle",
-        title="central angle",
-        unit="deg",
-        low=5.0,
-        high=175.0,
-        usual=(20.0, 170.0),
-        spacing="linear",
-    ),
-    Axis(
-        name="plate",
-        title="plate thickness over that which closes the chamber",
-        unit="1",
-        low=0.0,
-        high=1.05,
-        usual=(0.0, 0.8),
-        spacing="linear",
-    ),
-    Axis(
-        name="viscosity", title="kinematic viscosity", unit="m^2/s", low=1e-7, high=1e-2, usual=(1e-7, 1e-3)
-    ),
-    Axis(name="bore", title="bore", unit="mm", low=0.1, high=20.0, usual=(0.3, 6.0)),
-    Axis(name="roughness", title="roughness over bore", unit="1", low=1e-7, high=0.06, usual=(1e-6, 0.02)),
-    Axis(
-        name="pressure",
-        title="gas pressure over the column to the siphon crest",
-        unit="1",
-        low=0.0,
-        high=4.0,
-        usual=(0.8, 3.0),
-        spacing="linear",
-    ),
-    Axis(
-        name="unbalance",
-        title="unbalance over what one pair can carry",
-        unit="1",
-        low=0.01,
-        high=1.5,
-        usual=(0.05, 0.9),
-    ),
-    Axis(
-        name="gain",
-        title="controller gain over the scene's",
-        unit="1",
-        low=1e-4,
-        high=1e3,
-        usual=(0.01, 10.0),
-    ),
-    Axis(name="noise", title="sensor noise over the limit", unit="1", low=1e-4, high=10.0, usual=(1e-3, 0.5)),
-    Axis(name="period", title="controller period", unit="s", low=1e-3, high=100.0, usual=(0.05, 5.0)),
-    Axis(name="tolerance", title="tolerance", unit="1", low=1e-10, high=0.1, usual=(1e-4, 0.1)),
-    Axis(
-        name="gravity",
-        title="gravity over standard gravity",
-        unit="1",
-        low=0.0,
-        high=2.0,
-        # Without gravity there is a closed form to hold the half-widths against.
-        usual=(0.0, 0.0),
-        spacing="linear",
-    ),
+    Axis("speed", "speed", "rpm", 1.0, 1e5, usual=(300.0, 6e4)),
+    Axis("fill", "largest fill ratio", "1", 1e-6, 1.0, usual=(0.05, 0.9)),
+    Axis("angle", "central angle", "deg", 5.0, 175.0, usual=(20.0, 170.0), spacing="linear"),
+    Axis("plate", "plate thickness over that which closes the chamber", "1", 0.0, 1.05, (0.0, 0.8), "linear"),
+    Axis("viscosity", "kinematic viscosity", "m^2/s", 1e-7, 1e-2, usual=(1e-7, 1e-3)),
+    Axis("bore", "bore", "mm", 0.1, 20.0, usual=(0.3, 6.0)),
+    Axis("roughness", "roughness over bore", "1", 1e-7, 0.06, usual=(1e-6, 0.02)),
+    Axis("pressure", "gas pressure over the column to the siphon crest", "1", 0.0, 4.0, (0.8, 3.0), "linear"),
+    Axis("unbalance", "unbalance over what one pair can carry", "1", 0.01, 1.5, usual=(0.05, 0.9)),
+    Axis("gain", "controller gain over the scene's", "1", 1e-4, 1e3, usual=(0.01, 10.0)),
+    Axis("noise", "sensor noise over the limit", "1", 1e-4, 10.0, usual=(1e-3, 0.5)),
+    Axis("period", "controller period", "s", 1e-3, 100.0, usual=(0.05, 5.0)),
+    Axis("tolerance", "tolerance", "1", 1e-10, 0.1, usual=(1e-4, 0.1)),
+    # Without gravity there is a closed form to compare the half-widths with.
+    Axis("gravity", "gravity over standard gravity", "1", 0.0, 2.0, usual=(0.0, 0.0), spacing="linear"),
 )
 """What a designed set varies together, each after those that it hangs on."""
 
@@ -133,31 +77,30 @@ def axis_of(name: str) -> Axis:
 
 
 def varied(document: Mapping[str, Any], *, scene: Scene, values: Mapping[str, float]) -> Document:
-    """The document of a scene file with some axes set.
+    """The document of a scene's own file with some axes set.
 
-    Args: `document`: of the scene's own file. `scene`: the scene, for what a value is relative to. `values`:
-        by axis, in the axis' unit.
-    Returns: A new document; what hangs on a value follows it: two chambers for any central angle, bends that
-        the bore can take, and a tube that reaches over the crest.
+    What hangs on a value follows it: two chambers for any central angle, bends that the bore can take, and a
+    tube that reaches over the crest.
     """
     changed: Document = {table: {} for table in _TABLES} | deepcopy(dict(document))
     for axis in AXES:
         if axis.name in values and axis.name in _SETTERS:
             _SETTERS[axis.name](changed, float(values[axis.name]), scene, values)
+    for name, (table, key, factor, unit) in _PLAIN.items():
+        if name in values:
+            changed[table][key] = f"{factor * float(values[name])!r} {unit}"
     return changed
 
 
 def fitted(
     document: Mapping[str, Any], *, scene: Scene, made: Scene, values: Mapping[str, float]
 ) -> Document:
-    """The document with a rotor that suits what its disc can balance, and the loop's own axes set.
+    """The document of `varied` with a rotor that suits what its disc can balance, and the loop's axes set.
 
     A disc that carries less liquid is put on a lighter rotor: its influence coefficient grows so that all
-    liquid of a pair makes the same vibration, and limit, gain and noise mean what they meant before.
-    Args: `document`: of `varied`. `scene`: the scene that was varied. `made`: the scene that the document
-        makes. `values`: by axis.
-    Returns: A new document, in which the loop has as much to do for its disc as in the scene that was varied;
-        the unbalance of a disc with a single pair lies along that pair, the only direction it can balance.
+    liquid of a pair makes the same vibration, and limit, gain and noise mean what they meant before. The
+    unbalance of a disc with a single pair lies along that pair, the only direction it can balance.
+    Args: `scene`: the scene that was varied. `made`: the scene that the document makes.
     """
     changed = deepcopy(dict(document))
     lighter = _capacity(scene) / _capacity(made)
@@ -195,11 +138,7 @@ def _capacity(scene: Scene) -> float:
 
 
 def toml_bytes(document: Mapping[str, Any]) -> bytes:
-    """A document as the bytes of a scene file.
-
-    Args: `document`: tables of texts, numbers, truth values, lists and small tables.
-    Returns: TOML, UTF-8.
-    """
+    """A document of texts, numbers, truth values, lists and small tables as a scene file."""
     top = {key: value for key, value in document.items() if not isinstance(value, dict)}
     lines = [f"{key} = {_toml(value)}" for key, value in top.items()]
     for name, table in document.items():
@@ -214,10 +153,6 @@ def _toml(value: Any) -> str:
     if isinstance(value, list):
         return "[" + ", ".join(_toml(item) for item in value) + "]"
     return json.dumps(value, ensure_ascii=False)
-
-
-def _set_speed(document: Document, value: float, _: Scene, __: Values) -> None:
-    document["rotor"]["speed"] = f"{value!r} rpm"
 
 
 def _set_fill(document: Document, value: float, _: Scene, __: Values) -> None:
@@ -270,20 +205,11 @@ def _set_pressure(document: Document, value: float, scene: Scene, values: Values
     document["gas"]["pressure"] = f"{value * column!r} Pa"
 
 
-def _set_period(document: Document, value: float, _: Scene, __: Values) -> None:
-    document["controller"]["period"] = f"{value!r} s"
-
-
 def _set_tolerance(document: Document, value: float, _: Scene, __: Values) -> None:
     document["accuracy"] = {"tolerance": f"{100 * value!r} %"}
 
 
-def _set_gravity(document: Document, value: float, _: Scene, __: Values) -> None:
-    document["environment"]["gravity"] = f"{9.80665 * value!r} m/s^2"
-
-
 _SETTERS: Final = {
-    "speed": _set_speed,
     "fill": _set_fill,
     "plate": _set_plate,
     "angle": _set_angle,
@@ -291,8 +217,12 @@ _SETTERS: Final = {
     "bore": _set_bore,
     "roughness": _set_roughness,
     "pressure": _set_pressure,
-    "period": _set_period,
     "tolerance": _set_tolerance,
-    "gravity": _set_gravity,
 }
 """What hangs on the whole scene, such as the unbalance, is set by `fitted` when that is made."""
+_PLAIN: Final = {
+    "speed": ("rotor", "speed", 1.0, "rpm"),
+    "period": ("controller", "period", 1.0, "s"),
+    "gravity": ("environment", "gravity", 9.80665, "m/s^2"),
+}
+"""Table, key, factor and unit of an axis on which nothing hangs."""

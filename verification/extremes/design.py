@@ -54,10 +54,8 @@ class Base:
 
 
 def design(*, count: int, seed: int) -> tuple[Point, ...]:
-    """A designed set: a scrambled Sobol sequence over all axes.
+    """A designed set over all axes; a longer one begins with a shorter one.
 
-    Args: `count`: of points; a longer set begins with a shorter one. `seed`: of the scrambling.
-    Returns: Points: values by axis, in the axis' unit.
     Source: Sobol's sequence, scrambled after Owen, as in scipy.stats.qmc.
     """
     size = 1 << max(count - 1, 0).bit_length()
@@ -75,7 +73,7 @@ def _point(shares: Sequence[float], kinds: Sequence[float]) -> Point:
 
 
 def judge(base: Base, point: Point) -> Judgement:
-    """Judge the scene at one point. Args: `point`: values by axis."""
+    """Judge the scene at one point."""
     scene = base.scene
     document = varied(base.document, scene=scene, values=point)
     period = point.get("period", scene.controller.period)
@@ -100,12 +98,10 @@ def judged(
     progress: Progress | None = None,
     kept: Path | None = None,
 ) -> tuple[Judgement, ...]:
-    """Judge many points, side by side, and keep what is done.
+    """Judge many points on several processes, in their order.
 
-    Args: `base`: the scene. `workers`: processes. `progress`: called after each chunk; None for silence.
-        `kept`: file of judgements done, from which an interrupted run resumes; a damaged one is written
-        again, with a note on standard error. None for none.
-    Returns: Judgements, in the order of the points whatever the number of workers.
+    Args: `progress`: called after each chunk. `kept`: file of judgements done, from which an interrupted run
+        resumes; a damaged one is written again, with a note on standard error.
     Raises: OSError: the kept file cannot be read or written.
     """
     done = _done(kept, base, points)

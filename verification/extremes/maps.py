@@ -26,7 +26,7 @@ PAIRS: Final = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Span:
+class _Span:
     """A stretch of one axis along which points end alike."""
 
     low: float
@@ -64,17 +64,17 @@ class Sweep:
         pairs = zip(self.judgements[:-1], self.judgements[1:], strict=True)
         return tuple(i for i, (one, other) in enumerate(pairs) if _alike(one) != _alike(other))
 
-    def spans(self) -> tuple[Span, ...]:
+    def spans(self) -> tuple[_Span, ...]:
         """The stretches along which points end alike, from one end of the axis to the other."""
         ends = [*(i + 1 for i in self.changes()), len(self.judgements)]
         starts = [0, *ends[:-1]]
         return tuple(self._span(start, end) for start, end in zip(starts, ends, strict=True))
 
-    def _span(self, start: int, end: int) -> Span:
+    def _span(self, start: int, end: int) -> _Span:
         judgement = self.judgements[start]
         # Towards the answers: what is said last below them, and first above.
         said = self.judgements[end - 1 if start == 0 else start]
-        return Span(
+        return _Span(
             low=float(self.values[start]),
             high=float(self.values[end - 1]),
             ending=judgement.ending,
@@ -104,22 +104,14 @@ class StabilityMap:
 
 
 def answered(judgement: Judgement) -> bool:
-    """Whether a point got an answer, with or without a reservation.
-
-    Returns: False when it was refused or broke.
-    """
+    """Whether a point got an answer, with or without a reservation."""
     return judgement.ending not in (Ending.REFUSED, Ending.BROKEN)
 
 
 def sweeps(
     base: Base, *, count: int, fineness: float, workers: int = 1, progress: Progress | None = None
 ) -> tuple[Sweep, ...]:
-    """Every axis alone, from end to end, and closer where points begin to end in another way.
-
-    Args: `base`: the scene. `fineness`: share of an axis within which each change is found. `workers`:
-        processes. `progress`: of the points; None for silence.
-    Returns: Sweeps, in the order of the axes.
-    """
+    """Every axis alone, from end to end, as `swept`."""
 
     def judge_all(places: Sequence[tuple[Axis, float]]) -> Sequence[Judgement]:
         points = [{axis.name: value} for axis, value in places]
@@ -137,9 +129,8 @@ def swept(
 ) -> tuple[Sweep, ...]:
     """Axes in even steps, then halved wherever neighbours end differently, until each change is found.
 
-    Args: `count`: values on each to begin with. `fineness`: share of an axis within which each change is
-        found.
-    Returns: Sweeps, in the order of the axes. Of changes back and forth within a step some may be missed.
+    Of changes back and forth within a step some may be missed.
+    Args: `count`: values on each to begin with. `fineness`: fraction of an axis to which changes are found.
     """
     grid = np.linspace(0, 1, count)
     found = judge_all([(axis, float(value)) for axis in axes for value in axis.at(grid)])
@@ -183,11 +174,9 @@ def stability_maps(
     workers: int = 1,
     progress: Progress | None = None,
 ) -> tuple[StabilityMap, ...]:
-    """Pairs of axes together, from end to end.
+    """Pairs of axes, x first, together from end to end.
 
-    Args: `base`: the scene. `count`: values along each axis. `pairs`: names of the axes, x first. `workers`:
-        processes. `progress`: of the points; None for silence.
-    Returns: Maps, in the order of the pairs.
+    Args: `count`: values along each axis.
     """
     grid = np.linspace(0, 1, count)
     points: list[Point] = [

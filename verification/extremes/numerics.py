@@ -20,23 +20,14 @@ from ringbalance.verification.extremes.point import ROUND_OFF, Ending, Judgement
 from ringbalance.verification.reference.exact_chamber import exact_wall_pressure
 from ringbalance.verification.reference.explicit_segments import explicit_segments
 
-ASPECT: Final = Axis(
-    name="aspect", title="aspect ratio of the cells", unit="1", low=1.0, high=1e12, usual=(1.0, 1e5)
-)
-STEP: Final = Axis(
-    name="step", title="step of the explicit segments", unit="s", low=1e-7, high=100.0, usual=(1e-4, 0.1)
-)
+ASPECT: Final = Axis("aspect", "aspect ratio of the cells", "1", 1.0, 1e12, usual=(1.0, 1e5))
+STEP: Final = Axis("step", "step of the explicit segments", "s", 1e-7, 100.0, usual=(1e-4, 0.1))
 SHORTEST: Final = 1e-3
 """s, of the operation that steps are taken through; longer steps are the whole operation."""
 
 
 def numerical_sweeps(scene: Scene, *, count: int, fineness: float) -> tuple[Sweep, ...]:
-    """The numerics' own axes from end to end.
-
-    Args: `scene`: whose disc, liquid and gas pressure are taken. `count`: values on each axis to begin with.
-        `fineness`: share of an axis within which each change is found.
-    Returns: Sweeps over `ASPECT` and `STEP`.
-    """
+    """The numerics' own axes, `ASPECT` and `STEP`, as `swept`."""
     judges = {ASPECT.name: at_aspect, STEP.name: at_step}
 
     def judge_all(places: Sequence[tuple[Axis, float]]) -> list[Judgement]:
@@ -46,9 +37,8 @@ def numerical_sweeps(scene: Scene, *, count: int, fineness: float) -> tuple[Swee
 
 
 def at_aspect(scene: Scene, aspect: float) -> Judgement:
-    """Wall pressure of a ring so thin that the default mesh's cells are that long, against the exact one.
+    """Wall pressure of a ring so thin that the default mesh's cells have that length over depth.
 
-    Args: `scene`: for its disc, density and speed. `aspect`: length of a cell along the wall over its depth.
     Returns: Judgement; a ring too thin for any mesh is refused with the program's own message.
     """
     disc = scene.disc
@@ -76,11 +66,10 @@ def at_aspect(scene: Scene, aspect: float) -> Judgement:
 
 
 def at_step(scene: Scene, step: float) -> Judgement:
-    """An operation under the paper's law in explicit segments of one length, against the closed form.
+    """An injection under the paper's law in explicit segments of one length, against the closed form.
 
-    The error of a segment is at most half its length times the change of the rate over it.
-    Args: `scene`: for its disc, tube and gas pressure.
-    Returns: Judgement; `worst_ratio` is the error over that bound.
+    The error of a segment is at most half its length times the change of the rate over it; `worst_ratio` is
+    the error over that bound.
     """
     law = paper_law(scene)
     drive = Drive(

@@ -75,8 +75,7 @@ def judge_point(
 ) -> Judgement:
     """Take a scene file through calibration and closed loop, and look for anything that should not be.
 
-    Args: `file`: its name, for messages. `defect`: deliberate errors.
-    Returns: Judgement; an exception other than a scene's fault counts as broken, whatever it is.
+    An exception other than a scene's error counts as broken, whatever it is.
     """
     try:
         scene = liquid_ring_scene(scene_from(content=toml_bytes(document), file=file))

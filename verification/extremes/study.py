@@ -81,11 +81,9 @@ def find_extremes(
     progress: Progress | None = None,
     kept: Path | None = None,
 ) -> Extremes:
-    """Look at a scene's extremes.
+    """Look at a scene's extremes, with the same result for any number of workers.
 
-    Args: `size`: how much to look at. `workers`: processes. `progress`: None for silence. `kept`: file from
-        which an interrupted designed set resumes; None for none.
-    Returns: Extremes; the same for any number of workers.
+    Args: `kept`: file from which an interrupted designed set resumes.
     Raises: OSError: the kept file cannot be read or written.
     """
 
@@ -107,11 +105,7 @@ def find_extremes(
 
 
 def extremes_document(extremes: Extremes) -> Record:
-    """Lay the extremes out as plain numbers, lists and texts.
-
-    Args: `extremes`: of `find_extremes`.
-    Returns: Document that `json.dumps(..., allow_nan=False)` accepts.
-    """
+    """The extremes as plain numbers, lists and texts."""
     everything = extremes.everything
     return {
         "points": len(extremes.points),
@@ -127,12 +121,7 @@ def extremes_document(extremes: Extremes) -> Record:
 
 
 def extremes_tables(extremes: Extremes) -> dict[str, dict[str, list[Any]]]:
-    """The axes and the maps as columns of equal length.
-
-    Args: `extremes`: of `find_extremes`.
-    Returns: Columns by table: "axes", the stretches of each that end alike, and "map of x and y" for each
-        map.
-    """
+    """Columns by table: "axes", the spans of each that end alike, and "map of x and y" for each map."""
     spans = [(sweep.axis, span) for sweep in extremes.sweeps for span in sweep.spans()]
     axes: dict[str, list[Any]] = {
         "axis": [axis.title for axis, _ in spans],
@@ -164,10 +153,7 @@ def counted(judgements: Sequence[Judgement]) -> dict[str, int]:
 
 
 def broken(extremes: Extremes) -> int:
-    """Number of points, of all looked at, at which anything was not as it should be.
-
-    Args: `extremes`: of `find_extremes`.
-    """
+    """Number of points, of all looked at, at which anything was not as it should be."""
     return sum(bool(j.violations) for j in extremes.everything)
 
 

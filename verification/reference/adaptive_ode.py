@@ -22,12 +22,11 @@ from ringbalance.scene.arrays import FloatArray
 
 
 def adaptive_ode(*, tolerance: float = 1e-10) -> Integrator:
-    """An integrator by Dormand-Prince of order 8 with events at the ends of the range and at a stall.
+    """An integrator by scipy's DOP853 with events at the ends of the range and at a stall.
 
     Args: `tolerance`: relative and absolute, on the fill ratio; a stall is where less than its square root of
         the initial velocity is left.
     Raises: ValueError: a tolerance outside (0, 1).
-    Source: dx/dt = -u S/V; scipy's DOP853.
     """
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance must lie within (0, 1), not {tolerance}")

@@ -41,8 +41,6 @@ from ringbalance.verification.navier_stokes.rotating_section import (
 from ringbalance.verification.navier_stokes.space import FlowSpace, taylor_hood
 from ringbalance.verification.navier_stokes.system import split
 
-__all__ = ["BentTubeFlow", "bent_tube_flow", "developed_section", "pressure_loss"]
-
 Progress = Callable[[str], None]
 
 CORIOLIS = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -76,10 +74,8 @@ class BentTubeFlow:
 
 
 def developed_section(*, system: FlowSystem, reynolds: float, rotation_reynolds: float) -> FlowSolution:
-    """Developed flow of the straight tube.
+    """Developed flow of the straight tube, in-plane velocity over nu/d, by Re and R, each zero or more.
 
-    Args: `reynolds`: Re, above zero. `rotation_reynolds`: R, zero or more.
-    Returns: The flow, in-plane velocity over nu/d.
     Raises: ArithmeticError: the flow was not found.
     """
     s = rotation_reynolds / reynolds
@@ -246,11 +242,9 @@ def _energy_flux(tube: SweptTube, section: FlowSystem, solution: FlowSolution) -
 
 
 def pressure_loss(*, flow: BentTubeFlow, start: float, end: float) -> float:
-    """Loss coefficient between two places of the path, 2 (H_1 - H_2)/U^2 with H = p/rho + alpha U^2/2.
+    """Loss coefficient between two arc lengths over d, 2 (H_1 - H_2)/U^2 with H = p/rho + alpha U^2/2.
 
-    Args: `start`: arc length of the first place, over d; between stations the values are interpolated. `end`:
-        of the second.
-    Returns: K; with developed flow at both places it is the fall of reduced pressure over rho U^2/2.
+    With developed flow at both places it is the fall of reduced pressure over rho U^2/2.
     """
     head = 2 / flow.reynolds * flow.mean_pressure + flow.energy_flux
     first, last = np.interp([start, end], flow.arc_length, head)

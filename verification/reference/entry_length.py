@@ -36,9 +36,6 @@ from ringbalance.verification.navier_stokes.space import (
 from ringbalance.verification.navier_stokes.system import convection_entries, linear_entries
 from ringbalance.verification.reference.bent_tube import developed_section
 
-__all__ = ["Decay", "slowest_decay"]
-
-
 _SHIFTS = (1.0, 0.35, 0.12)
 """Of the expected rate, about which modes are looked for."""
 _NOT_A_MODE = 0.03
@@ -62,13 +59,9 @@ class Decay:
 
 
 def slowest_decay(*, system: FlowSystem, reynolds: float, rotation_reynolds: float, count: int = 4) -> Decay:
-    """Decay rates of the slowest disturbances downstream, from the section's linear eigenproblem.
+    """Rates per diameter of the slowest disturbances downstream of laminar developed flow, mirror-symmetric.
 
-    Args: `reynolds`: Re, zero or more. `rotation_reynolds`: R, zero or more. `count`: how many rates to
-        return, at least one.
-    Returns: Decay, rates per diameter.
     Raises: ArithmeticError: the developed flow was not found.
-    Range: mirror-symmetric modes about laminar developed flow.
     Source: quadratic eigenproblem by finite elements, solved by shift and invert.
     """
     flow, matrices = _pencil(system, reynolds, rotation_reynolds)

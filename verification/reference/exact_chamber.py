@@ -14,11 +14,9 @@ _RELATIVE = 1e-13
 
 
 def exact_moment(*, disc: Disc, density: float, fill_ratio: npt.ArrayLike) -> FloatArray:
-    """Moment of one chamber's liquid, U = 2 rho B integral of r^2 sin(alpha(r)) dr from a(x) to R2.
+    """Moment of one chamber's liquid along its centre line, kg m.
 
-    Args: `density`: rho, kg/m^3. `fill_ratio`: x, any shape, within [0, 1].
-    Returns: Moment along the chamber's centre line, kg m, the shape of `fill_ratio`.
-    Source: the integral of rho r cos(phi) over the liquid, its angle done by hand; adaptive quadrature.
+    U = 2 rho B integral of r^2 sin(alpha(r)) dr from a(x) to R2, by adaptive quadrature.
     """
     inner = surface_radius(disc=disc, fill_ratio=fill_ratio)
     scale = 2 * density * disc.axial_width
@@ -36,12 +34,7 @@ def _radial_integral(disc: Disc, inner: float) -> float:
 def exact_wall_pressure(
     *, disc: Disc, density: float, angular_velocity: float, fill_ratio: npt.ArrayLike
 ) -> FloatArray:
-    """Liquid pressure on the outer wall without gravity, p = rho omega^2 (R2^2 - a(x)^2)/2.
-
-    Args: `density`: rho, kg/m^3. `angular_velocity`: omega, rad/s. `fill_ratio`: x, any shape, within [0, 1].
-    Returns: Pressure above the gas pressure, Pa, the shape of `fill_ratio`.
-    Source: integral of dp = rho omega^2 r dr from the surface to the wall.
-    """
+    """Liquid pressure on the outer wall without gravity, rho omega^2 (R2^2 - a(x)^2)/2, above the gas, Pa."""
     a = surface_radius(disc=disc, fill_ratio=fill_ratio)
     depth = (disc.outer_radius - a) * (disc.outer_radius + a) / 2
     return np.asarray(density * angular_velocity**2 * depth, dtype=np.float64)
@@ -60,10 +53,9 @@ def wall_pressure_of(
 
 
 def central_lambda(*, disc: Disc) -> float:
-    """Moment per transferred mass with a pair at its centre, 2 a sin(alpha(a))/alpha(a).
+    """Moment per transferred mass with a pair at its centre, 2 a sin(alpha(a))/alpha(a), m.
 
-    Returns: lambda, m.
-    Source: limit of [U(x) - U(x_max - x)]/(rho V (x - x_max/2)) at x = x_max/2.
+    Limit of [U(x) - U(x_max - x)]/(rho V (x - x_max/2)) at x = x_max/2.
     """
     a = surface_radius(disc=disc, fill_ratio=disc.max_fill_ratio / 2)
     alpha = half_angle(disc=disc, radius=a)

@@ -22,9 +22,7 @@ def explicit_segments(segments: int) -> Integrator:
     """An integrator with n equal explicit segments, x_i = x_(i-1) - u_(i-1) S dt/V; first order in dt.
 
     Near a stall, where u goes like the square root of the distance, a segment may step over it; the law then
-    answers with zero and the fill stays where it landed.
-    Args: `segments`: n, at least 1, over the whole stretch.
-    Returns: Integrator; fills between the ends of segments lie on the straight line.
+    answers with zero and the fill stays where it landed. Between segments fills lie on the straight line.
     Raises: ValueError: fewer than one segment.
     Source: Eq. 20 of the liquid-ring paper.
     """

@@ -46,7 +46,7 @@ _FILL_SHARE: Final = 0.8
 
 
 @dataclass(frozen=True, kw_only=True)
-class ExactRing:
+class _ExactRing:
     """The free surface and the pressure below it, exactly."""
 
     density: float
@@ -61,11 +61,9 @@ class ExactRing:
     """c, m."""
 
     def radius(self, angle: npt.ArrayLike, axial_place: npt.ArrayLike = 0.0) -> FloatArray:
-        """Radius of the free surface.
+        """Radius of the free surface, m.
 
-        Args: `angle`: from the chamber's centre line, rad, any shape. `axial_place`: z, m, broadcasts.
-        Returns: r, m.
-        Source: r^2 + 2 r G.e_r + |G|^2 = c^2 with G = g/omega^2; r^2 = c^2 + 2 G z along the shaft.
+        r^2 + 2 r G.e_r + |G|^2 = c^2 with G = g/omega^2 across the shaft, r^2 = c^2 + 2 G z along it.
         """
         phi, z = np.asarray(angle, dtype=np.float64), np.asarray(axial_place, dtype=np.float64)
         along = self.offset[0] * np.cos(phi) + self.offset[1] * np.sin(phi)
@@ -73,11 +71,7 @@ class ExactRing:
         return np.asarray(-along + np.sqrt(along**2 + self.level**2 - across + 2 * self.axial * z))
 
     def pressure(self, places: FloatArray) -> FloatArray:
-        """Pressure of the liquid, the gas counted as zero.
-
-        Args: `places`: m, shape (2 or 3, ...).
-        Returns: Pa.
-        """
+        """Pressure of the liquid, Pa, the gas counted as zero, at places in m, shape (2 or 3, ...)."""
         square = (places[0] + self.offset[0]) ** 2 + (places[1] + self.offset[1]) ** 2
         depth = self.axial * places[2] if len(places) == 3 else 0.0
         scale = self.density * self.angular_velocity**2
@@ -92,19 +86,18 @@ def exact_ring(
     fill_ratio: float,
     across: tuple[float, float] = (0.0, 0.0),
     along: float = 0.0,
-) -> ExactRing:
-    """The ring that holds a fill ratio under gravity.
+) -> _ExactRing:
+    """The ring that holds a fill ratio under gravity, m/s^2.
 
-    Args: `density`: rho, kg/m^3. `angular_velocity`: omega, rad/s. `fill_ratio`: x. `across`: gravity across
-        the shaft in the chamber's axes, m/s^2. `along`: gravity along the negative z axis, m/s^2.
+    Args: `across`: across the shaft in the chamber's axes. `along`: along the negative z axis.
     Raises: ValueError: gravity so strong that no closed ring holds the liquid.
     """
     square = angular_velocity**2
     target = fill_ratio * float(liquid_area(disc=disc, surface_radius=disc.inner_radius))
     middle = float(surface_radius(disc=disc, fill_ratio=fill_ratio))
 
-    def ring(level: float) -> ExactRing:
-        return ExactRing(
+    def ring(level: float) -> _ExactRing:
+        return _ExactRing(
             density=density,
             angular_velocity=angular_velocity,
             offset=(across[0] / square, across[1] / square),
@@ -136,13 +129,13 @@ def _on_rays(disc: Disc, radius: Callable[[FloatArray], FloatArray], eta: FloatA
     return r
 
 
-def _area_across(disc: Disc, ring: ExactRing) -> float:
+def _area_across(disc: Disc, ring: _ExactRing) -> float:
     """With phi = eta alpha(r) the area element is alpha r dr d eta, so each ray holds half of A(r_s)."""
     eta, weight = _rule()
     return float(weight @ liquid_area(disc=disc, surface_radius=_on_rays(disc, ring.radius, eta)) / 2)
 
 
-def _mean_area_along(disc: Disc, ring: ExactRing) -> float:
+def _mean_area_along(disc: Disc, ring: _ExactRing) -> float:
     zeta, weight = _rule()
     radius = ring.radius(np.zeros_like(zeta), disc.axial_width / 2 * zeta)
     return float(weight @ liquid_area(disc=disc, surface_radius=radius) / 2)
@@ -154,8 +147,7 @@ def gravity_evidence(
     """Find the free surface on a sequence of meshes, and compare it with the exact one.
 
     Args: `cells`: of each level, coarse to fine, halving h each time. `shaft`: "horizontal" for gravity
-        across the chamber, "vertical" for gravity along the shaft. `defect`: "gravity_sign_flipped",
-        "source_off_by_a_percent" or "wall_condition_off_by_a_percent".
+        across the chamber, "vertical" for gravity along the shaft.
     Raises: ValueError: a search or solve that failed on some level.
     """
     disc, fill = scene.disc, _FILL_SHARE * scene.disc.max_fill_ratio
@@ -201,9 +193,7 @@ def gravity_evidence(
 def tilted_liquid(*, disc: Disc, density: float, fill_ratio: float, shaft: Shaft) -> RotatingLiquid:
     """Liquid that turns so slowly that gravity tilts its surface far, yet leaves the ring closed.
 
-    Args: `density`: rho, kg/m^3. `fill_ratio`: x. `shaft`: "horizontal" for gravity across the chamber, at no
-        angle of symmetry; "vertical" for gravity along the shaft.
-    Returns: RotatingLiquid with two components of gravity across the shaft, three along it.
+    Gravity has two components across a horizontal shaft, at no angle of symmetry, three along a vertical one.
     """
     middle = float(surface_radius(disc=disc, fill_ratio=fill_ratio))
     speed = float(np.sqrt(_GRAVITY / _offset(disc, middle, shaft)))
@@ -223,7 +213,7 @@ def _across() -> tuple[float, float]:
     return _GRAVITY * float(np.cos(_DIRECTION)), _GRAVITY * float(np.sin(_DIRECTION))
 
 
-def _surface_error(disc: Disc, solution: PressureSolution, exact: ExactRing) -> float:
+def _surface_error(disc: Disc, solution: PressureSolution, exact: _ExactRing) -> float:
     nodes = places(solution.chamber)[:, solution.chamber.grid[0]]
     angle = np.arctan2(nodes[1], nodes[0])
     axial = nodes[2] if len(nodes) == 3 else np.zeros_like(angle)
@@ -232,7 +222,7 @@ def _surface_error(disc: Disc, solution: PressureSolution, exact: ExactRing) -> 
     return float(np.max(np.abs(away))) / depth
 
 
-def _field_error(solution: PressureSolution, exact: ExactRing) -> float:
+def _field_error(solution: PressureSolution, exact: _ExactRing) -> float:
     volume = volume_points(solution.chamber.mesh)
     true = exact.pressure(solution.chamber.length_scale * volume.points)
     difference = at_cells(volume, solution.pressure) - true

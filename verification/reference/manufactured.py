@@ -130,9 +130,8 @@ class _Study:
 
 
 def manufactured_evidence(*, disc: Disc, cells: Sequence[tuple[int, ...]], defect: str | None) -> Evidence:
-    """Orders and finest errors on curved and on straight-sided meshes.
+    """Orders and finest errors on curved and on straight-sided meshes, coarse to fine, halving h each time.
 
-    Args: `cells`: of each level, coarse to fine, halving h each time. `defect`: of the right-hand sides.
     Raises: ValueError: an unknown defect.
     """
     curved, straight = (_study(disc, cells, geometry, defect) for geometry in ("quadratic", "straight"))

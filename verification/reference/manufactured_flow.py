@@ -11,13 +11,14 @@ asks for, with velocities given all round.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Final
 
 import numpy as np
 
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.verification.evidence import Evidence, Found
 from ringbalance.verification.navier_stokes.newton import (
     Coefficients,
     Dirichlet,
@@ -27,9 +28,9 @@ from ringbalance.verification.navier_stokes.newton import (
 )
 from ringbalance.verification.navier_stokes.rotating_section import CORIOLIS, SectionMesh, section_mesh
 from ringbalance.verification.navier_stokes.space import FlowSpace, at_points, taylor_hood
-from ringbalance.verification.orders import OrderStudy, order_study
+from ringbalance.verification.orders import order_figure, order_study, order_table
 
-TRUE: Final = Coefficients(inertia=3.0, viscosity=0.7, rotation=5.0)
+_TRUE: Final = Coefficients(inertia=3.0, viscosity=0.7, rotation=5.0)
 """Chosen so that no term hides behind another."""
 _A, _B, _C, _D, _E, _F = 2.1, 1.2, 2.7, 3.1, 1.7, 1.3
 _ACROSS: Final = 1.5
@@ -38,11 +39,7 @@ _WALL_RATIO: Final = 3.0
 
 
 def velocity(places: FloatArray) -> FloatArray:
-    """The manufactured velocity.
-
-    Args: `places`: (y, z) over the bore, shape (2, ...).
-    Returns: Components along (y, z, x), shape (3, ...).
-    """
+    """The manufactured velocity along (y, z, x), shape (3, ...), at places (y, z) over the bore."""
     y, z = places
     growth = np.exp(_B * z) / 5
     return np.stack(
@@ -79,20 +76,12 @@ def _laplacian(places: FloatArray) -> FloatArray:
 
 
 def pressure(places: FloatArray) -> FloatArray:
-    """The manufactured pressure, up to a constant.
-
-    Args: `places`: (y, z) over the bore, shape (2, ...).
-    Returns: Pressure, shape (...).
-    """
+    """The manufactured pressure, up to a constant."""
     return np.asarray(np.sin(_E * places[0]) * np.cos(_F * places[1] + 0.2))
 
 
 def body_force(places: FloatArray) -> FloatArray:
-    """The body force that makes this flow the solution.
-
-    Args: `places`: (y, z) over the bore, shape (2, ...).
-    Returns: Components along (y, z, x), shape (3, ...).
-    """
+    """The body force along (y, z, x) that makes this flow the solution."""
     y, z = places
     u = velocity(places)
     carried = np.einsum("d...,cd...->c...", u[:2], _gradient(places))
@@ -104,46 +93,46 @@ def body_force(places: FloatArray) -> FloatArray:
             np.zeros_like(y),
         ]
     )
-    rotation = float(np.asarray(TRUE.rotation))
+    rotation = float(np.asarray(_TRUE.rotation))
     return np.asarray(
-        TRUE.inertia * carried + rotation * turning - TRUE.viscosity * _laplacian(places) + slope
+        _TRUE.inertia * carried + rotation * turning - _TRUE.viscosity * _laplacian(places) + slope
     )
 
 
-@dataclass(frozen=True, kw_only=True)
-class FlowStudy:
-    """Errors over levels, coarse to fine."""
+def flow_evidence(*, around: Sequence[int], defect: str | None) -> Evidence:
+    """Orders and finest errors on meshes of that many cells around their core, coarse to fine.
 
-    velocity: OrderStudy
-    """Root mean square over the section, relative."""
-    pressure: OrderStudy
-    """Root mean square over the section, relative, means taken off."""
-    unknowns: tuple[int, ...]
-
-
-def flow_study(*, around: Sequence[int], defect: str | None = None) -> FlowStudy:
-    """Solve the manufactured flow on a sequence of meshes.
-
-    Args: `around`: cells of each level's core, coarse to fine. `defect`: "coriolis_dropped",
-        "inertia_off_by_a_percent" or "viscosity_off_by_a_percent".
     Raises: ValueError: an unknown defect, or a solve that failed.
     """
     used = _spoiled(defect)
     solved = [_solve(count, used) for count in around]
     size = [around[0] / count for count in around]
-    return FlowStudy(
-        velocity=order_study(size=size, error=[_velocity_error(*pair) for pair in solved]),
-        pressure=order_study(size=size, error=[_pressure_error(*pair) for pair in solved]),
-        unknowns=tuple(space.unknowns for space, _ in solved),
+    flow = order_study(size=size, error=[_velocity_error(*pair) for pair in solved])
+    stress = order_study(size=size, error=[_pressure_error(*pair) for pair in solved])
+    unknowns = [space.unknowns for space, _ in solved]
+    table = partial(order_table, geometry="quadratic", note=f"unknowns {', '.join(map(str, unknowns))}")
+    return Evidence(
+        found={
+            "velocity_order": Found(value=flow.settled_order),
+            "velocity_error": Found(value=flow.finest_error),
+            "pressure_order": Found(value=stress.settled_order),
+            "pressure_error": Found(value=stress.finest_error),
+        },
+        numbers={"unknowns": float(unknowns[-1])},
+        series=(order_figure({"velocity": flow, "pressure": stress}),),
+        convergence=(
+            table("velocity, relative error", flow, 3.0),
+            table("pressure, relative error", stress, 2.0),
+        ),
     )
 
 
 def _spoiled(defect: str | None) -> Coefficients:
     changes = {
-        None: TRUE,
-        "coriolis_dropped": replace(TRUE, rotation=0.0),
-        "inertia_off_by_a_percent": replace(TRUE, inertia=1.01 * TRUE.inertia),
-        "viscosity_off_by_a_percent": replace(TRUE, viscosity=1.01 * TRUE.viscosity),
+        None: _TRUE,
+        "coriolis_dropped": replace(_TRUE, rotation=0.0),
+        "inertia_off_by_a_percent": replace(_TRUE, inertia=1.01 * _TRUE.inertia),
+        "viscosity_off_by_a_percent": replace(_TRUE, viscosity=1.01 * _TRUE.viscosity),
     }
     if defect not in changes:
         raise ValueError(f"unknown defect {defect}")

@@ -21,9 +21,6 @@ from skfem import Basis, BilinearForm, ElementLineP2, LinearForm, MeshLine, asm,
 from ringbalance.physics.results import Statistics, Status, StatusCode
 from ringbalance.scene.arrays import FloatArray
 
-__all__ = ["MixingLength", "MixingLengthFlow", "mixing_length", "mixing_length_flow"]
-
-
 _NIKURADSE_SLOPE = 0.4
 _UNDAMPED = 60.0
 """ks+ from which on the viscous layer is gone."""
@@ -48,7 +45,7 @@ class MixingLength:
 
 
 @dataclass(frozen=True, kw_only=True)
-class MixingLengthFlow:
+class _MixingLengthFlow:
     """One solution."""
 
     reynolds: float
@@ -164,13 +161,13 @@ def mixing_length_flow(
     relative_roughness: float = 0.0,
     closure: MixingLength | None = None,
     cells: int = 64,
-) -> MixingLengthFlow:
+) -> _MixingLengthFlow:
     """Friction factor of turbulent flow by the mixing length, for comparison with measured correlations.
 
     Re = 2 R+ U+, f = 8/U+^2; the R+ that belongs to Re is found by the secant rule.
     Args: `reynolds`: Re, above about 3000. `relative_roughness`: ks/d of sand. `closure`: constants; default
         the usual ones. `cells`: of the line.
-    Returns: MixingLengthFlow; its status says when an iteration did not converge.
+    Returns: _MixingLengthFlow; its status says when an iteration did not converge.
     Raises: ValueError: a Reynolds number that is not positive and finite, or a negative roughness.
     Range: turbulent flow. Smooth, it lies within 6 % of measurements for Re from 6e3 to 1e6 and within 3 % of
         the friction formula from 1e4, but 10 to 30 % above both near Re 3000; on sand up to 18 % off. Its
@@ -198,7 +195,7 @@ def mixing_length_flow(
         slope = (miss - before[1]) / (at - before[0])
     else:
         status = Status(code=StatusCode.NOT_CONVERGED, text="no R+ found: take Re above 3000")
-    return MixingLengthFlow(
+    return _MixingLengthFlow(
         reynolds=2 * float(np.exp(at)) * bulk,
         friction_factor=8 / bulk**2,
         friction_reynolds=float(np.exp(at)),

@@ -20,7 +20,7 @@ from ringbalance.scene.arrays import ComplexArray, FloatArray
 
 
 @dataclass(frozen=True, kw_only=True)
-class CosineWaves:
+class _CosineWaves:
     """The free surface's condition on cosines; lengths in outer radii, times in 1/omega."""
 
     central_angle: float
@@ -35,19 +35,14 @@ class CosineWaves:
     """Of -psi: integral of cos(m ...) sin(n ...), rows m."""
 
 
-def cosine_waves(*, central_angle: float, depth: float, terms: int = 160) -> CosineWaves:
-    """Set the problem up.
-
-    Args: `central_angle`: theta, rad. `depth`: H = ln(R2/a).
-    Returns: CosineWaves; frequencies of the lowest modes converge like the third power of `terms`.
-    Source: separation of variables; derived at the head of this module.
-    """
+def cosine_waves(*, central_angle: float, depth: float, terms: int = 160) -> _CosineWaves:
+    """The problem at a depth H = ln(R2/a); frequencies of the lowest modes converge like `terms`^-3."""
     n = np.arange(1, terms + 1)
     k = np.asarray(np.pi * n / central_angle, dtype=np.float64)
     rows, columns = np.meshgrid(n, n, indexing="ij")
     odd = (rows + columns) % 2 == 1
     gap = np.where(odd, columns**2 - rows**2, 1)
-    return CosineWaves(
+    return _CosineWaves(
         central_angle=central_angle,
         wavenumber=k,
         mass=np.diag(1 / np.tanh(k * depth)) * central_angle / 2,
@@ -56,13 +51,8 @@ def cosine_waves(*, central_angle: float, depth: float, terms: int = 160) -> Cos
     )
 
 
-def cosine_frequencies(waves: CosineWaves, *, modes: int) -> FloatArray:
-    """Lowest natural frequencies over the speed, (s^2 mass + 2 i s mixed - spring) B = 0.
-
-    Args: `modes`: how many.
-    Returns: s, ascending, shape (modes,).
-    Source: a quadratic eigenproblem, made linear.
-    """
+def cosine_frequencies(waves: _CosineWaves, *, modes: int) -> FloatArray:
+    """Lowest natural frequencies over the speed, s: (s^2 mass + 2 i s mixed - spring) B = 0, made linear."""
     n = waves.wavenumber.size
     zero, one = np.zeros((n, n)), np.eye(n)
     left = np.block([[zero, one], [waves.spring, -2j * waves.mixed]])
@@ -72,13 +62,8 @@ def cosine_frequencies(waves: CosineWaves, *, modes: int) -> FloatArray:
     return np.asarray(np.sort(real[real > 0])[:modes], dtype=np.float64)
 
 
-def cosine_amplification(waves: CosineWaves, *, frequency_ratio: float) -> float:
-    """Swing of the first moment under G = r exp(i angle), over that of a surface that follows at once.
-
-    Args: `frequency_ratio`: s.
-    Returns: Ratio.
-    Source: as `cosine_frequencies`, forced.
-    """
+def cosine_amplification(waves: _CosineWaves, *, frequency_ratio: float) -> float:
+    """Swing of the first moment under G = r exp(i angle), over that of a surface that follows at once."""
     load = _load(waves)
     swing, still = (
         _potential(waves, frequency_ratio, load, still=still) * waves.wavenumber for still in (False, True)
@@ -90,14 +75,11 @@ def cosine_amplification(waves: CosineWaves, *, frequency_ratio: float) -> float
     return size(swing) / size(still)
 
 
-def cosine_pressure_amplification(waves: CosineWaves, *, frequency_ratio: float, depth: float) -> float:
+def cosine_pressure_amplification(waves: _CosineWaves, *, frequency_ratio: float, depth: float) -> float:
     """Swing of the mean wall pressure under the same forcing, over that of such a surface.
 
     Cosines have no mean, so phi has the same one, none, on wall and surface, and p' is left with the
-    difference of G and with 2 psi at the surface.
-    Args: `frequency_ratio`: s. `depth`: H = ln(R2/a).
-    Returns: Ratio.
-    Source: p'/rho = G + c - i s phi - 2 psi, with psi = -sum B_n sin(k angle) at the surface.
+    difference of G and with 2 psi at the surface: p'/rho = G + c - i s phi - 2 psi.
     """
     half, radius = waves.central_angle / 2, np.exp(-depth)
     drive = (1 - radius) * np.sin(half) / half
@@ -107,7 +89,7 @@ def cosine_pressure_amplification(waves: CosineWaves, *, frequency_ratio: float,
     return float(abs(1 + 2 * stream / drive))
 
 
-def _load(waves: CosineWaves) -> ComplexArray:
+def _load(waves: _CosineWaves) -> ComplexArray:
     """Integrals of exp(i angle) with each cosine."""
     half = waves.central_angle / 2
 
@@ -118,7 +100,7 @@ def _load(waves: CosineWaves) -> ComplexArray:
 
 
 def _potential(
-    waves: CosineWaves, frequency_ratio: float, load: ComplexArray, *, still: bool
+    waves: _CosineWaves, frequency_ratio: float, load: ComplexArray, *, still: bool
 ) -> ComplexArray:
     """B, of the forced waves or of a surface that follows at once."""
     s = frequency_ratio

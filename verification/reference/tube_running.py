@@ -65,11 +65,10 @@ def running_tube(scene: Scene, *, head: float) -> Running:
 
 
 def driving_head(scene: Scene, *, share: float) -> float:
-    """Head between two chambers under the scene's gas pressure.
+    """Head between two chambers, H = [p0 + p_wall(x) - p_wall(x_max - x)]/rho, m^2/s^2.
 
-    H = [p0 + p_wall(x) - p_wall(x_max - x)]/rho
+    At least a twentieth of the gas pressure's own, short of a stall.
     Args: `share`: fill of the driven chamber in units of the largest.
-    Returns: m^2/s^2; at least a twentieth of the gas pressure's own, short of a stall.
     """
     fills = np.array([share, 1 - share]) * scene.disc.max_fill_ratio
     wall = wall_pressure_of(scene, fills)

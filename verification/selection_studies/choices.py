@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 from ringbalance.reduced_model.selection.contribution import Contribution
 from ringbalance.scene.models import Scene
+from ringbalance.verification.evidence import Evidence, Found, Table
 from ringbalance.verification.selection_studies.chamber_models import chamber_hierarchies
 from ringbalance.verification.selection_studies.choice import Values, choose, ranked_fidelities
 from ringbalance.verification.selection_studies.cost import committed_costs
 from ringbalance.verification.selection_studies.hierarchy import ModelHierarchy
 from ringbalance.verification.selection_studies.law_models import base_law
 from ringbalance.verification.selection_studies.operation import mass_hierarchy, settling_hierarchy
+from ringbalance.verification.selection_studies.scenes import random_scene
 from ringbalance.verification.selection_studies.tube_models import LawBook, k_hierarchy, velocity_hierarchy
 
 CHAMBER: Final = ("wall_pressure", "moment")
 TOLERANCES: Final = (0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+_DEFECTS: Final = {"estimate_off": 1e-3, "estimate_large": 1e3}
+"""Factors on every contribution, by the mutation's name."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +50,6 @@ def hierarchies_for(scene: Scene, quantities: Sequence[str]) -> Iterator[ModelHi
     """Model hierarchies of some quantities, made one after the other.
 
     Args: `quantities`: "wall_pressure", "moment", "k", "velocity", "transferred_mass", "settling_time".
-    Yields: Model hierarchies that have points.
     """
     chamber = chamber_hierarchies(scene) if set(quantities) & set(CHAMBER) else ()
     makers = {
@@ -55,7 +58,7 @@ def hierarchies_for(scene: Scene, quantities: Sequence[str]) -> Iterator[ModelHi
         "settling_time": settling_hierarchy,
     }
     flow = [quantity for quantity in quantities if quantity in makers]
-    yield from (hierarchy for hierarchy in chamber if hierarchy.quantity in quantities and hierarchy.points)
+    yield from (hierarchy for hierarchy in chamber if hierarchy.quantity in quantities)
     if "k" in quantities:
         yield k_hierarchy(scene)
     if flow:
@@ -73,12 +76,13 @@ def judge(
 ) -> list[Judged]:
     """Choose models for a scene at every tolerance, and judge each choice by the finest model.
 
-    Args: `quantities`: names. `tolerances`: relative. `check`: whether choices are checked; without it the
-        estimates alone decide. `worth`: factor on every contribution; anything but 1 is a deliberate error.
-    Returns: One record for each quantity and tolerance.
+    Args: `check`: whether choices are checked; without it the estimates alone decide. `worth`: factor on
+        every contribution; anything but 1 is a deliberate error.
     """
     found = []
     for hierarchy in hierarchies_for(scene, quantities):
+        if not hierarchy.points:
+            continue
         spoiled = replace(hierarchy, contributions=_spoiled(hierarchy.contributions, worth))
         values = Values(spoiled)
         found += [_judged(scene, spoiled, values, tolerance, check=check) for tolerance in tolerances]
@@ -115,4 +119,57 @@ def _judged(
         climbed=choice.climbed,
         said=tolerance >= hierarchy.top_uncertainty
         or any("is below what" in text for text in choice.reasons),
+    )
+
+
+def choices_evidence(
+    scene: Scene,
+    *,
+    numbers: Iterable[int],
+    quantities_of: Callable[[int], tuple[str, ...]],
+    defect: str | None,
+) -> Evidence:
+    """Choose models for random scenes at every tolerance, and judge the choices.
+
+    Args: `scene`: the base of the random scenes. `quantities_of`: judged on a scene, by its number. `defect`:
+        with one of `_DEFECTS` nothing is checked.
+    """
+    taken = list(numbers)
+    worth, check = (1.0, True) if defect is None else (_DEFECTS[defect], False)
+    judged = [
+        found
+        for number in taken
+        for found in judge(
+            random_scene(scene, number), quantities=quantities_of(number), check=check, worth=worth
+        )
+    ]
+    below = [j for j in judged if not j.said]
+    return Evidence(
+        found={
+            "held": Found(value=sum(j.held for j in judged) / len(judged)),
+            "dearest": Found(value=max(j.cost_ratio for j in judged)),
+            "said": Found(value=1.0 - len(below) / len(judged)),
+        },
+        numbers={
+            "choices": float(len(judged)),
+            "scenes": float(len(taken)),
+            "climbed": float(sum(j.climbed for j in judged)),
+        },
+        tables=(_table(judged),),
+    )
+
+
+def _table(judged: list[Judged]) -> Table:
+    """Shares by quantity and tolerance."""
+    rows = [(q, t) for q in dict.fromkeys(j.quantity for j in judged) for t in TOLERANCES]
+    groups = [[j for j in judged if j.quantity == q and j.tolerance == t] for q, t in rows]
+    return Table(
+        name="choices by quantity and tolerance",
+        columns={
+            "quantity": [q.replace("_", " ") for q, _ in rows],
+            "tolerance": [t for _, t in rows],
+            "choices": [float(len(group)) for group in groups],
+            "held": [sum(j.held for j in group) / max(len(group), 1) for group in groups],
+            "dearest": [max((j.cost_ratio for j in group), default=1.0) for group in groups],
+        },
     )

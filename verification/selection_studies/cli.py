@@ -69,14 +69,7 @@ def trade(
 
 
 def costs_text(study: TradeStudy) -> str:
-    """The refitted cost model as the file that the program reads.
-
-    Args:
-        study: with times.
-
-    Returns:
-        JSON text.
-    """
+    """The refitted cost model as the JSON file that the program reads."""
     costs = study.refit or study.costs
     record = {
         "fitted_on": costs.fitted_on,

@@ -34,10 +34,9 @@ class Clock:
     _known: dict[frozenset[tuple[str, float]], float] = field(default_factory=dict)
 
     def seconds_of(self, fidelity: Fidelity, points: Sequence[int]) -> float:
-        """Processor time of a model over points, with the tables it needs first.
+        """Processor time of a model over points, with the tables it needs first, s.
 
-        Args: `points`: numbers of the points.
-        Returns: s; each part the median of several runs, or of the points' single runs where these take long.
+        Each part is the median of several runs, or of the points' single runs where these take long.
         """
         before = 0.0
         if fidelity.prepare is not None:
@@ -60,11 +59,7 @@ class Clock:
         return median(times)
 
     def memory_of(self, fidelity: Fidelity) -> float | None:
-        """Peak of memory allocated while one point is computed.
-
-        Returns: Bytes, of what Python and NumPy allocate; a factorisation inside a compiled library counts
-            only by its arrays. None where memory is not traced.
-        """
+        """Peak of memory that Python and NumPy allocate at one point, bytes; None where it is not traced."""
         if not self.memory:
             return None
         work = fidelity.fresh or fidelity.solve
@@ -115,13 +110,12 @@ class Trade:
 
 
 def measure(hierarchy: ModelHierarchy, *, values: Values, costs: CostModel, clock: Clock | None) -> Trade:
-    """Measure a model hierarchy.
+    """Measure a model hierarchy; one without points has no models to measure.
 
-    Args: `costs`: the cost model for the counted cost. `clock`: takes times and
-        memory; None: neither.
-    Returns: Trade; without points no model is measured.
-    Source: Pareto front over counted cost and error; knee by the largest distance from the chord between the
-        front's ends, both axes logarithmic, errors below the finest model's own uncertainty counted as that.
+    Args: `clock`: takes times and memory; None: neither.
+    Source: Pareto front over counted cost and error; trade-off point by the largest distance from the chord
+        between the front's ends, both axes logarithmic, errors below the finest model's own uncertainty
+        counted as that.
     """
     if not hierarchy.points:
         return Trade(hierarchy=hierarchy, fidelities=(), knee=None)
@@ -149,11 +143,7 @@ def measure(hierarchy: ModelHierarchy, *, values: Values, costs: CostModel, cloc
 
 
 def pareto_front(costs: Sequence[float], errors: Sequence[float]) -> list[int]:
-    """Entries that no other one beats in both cost and error.
-
-    Returns: Their places, cheapest first; of equals the first.
-    Source: definition.
-    """
+    """Places of entries that none beats in both cost and error, cheapest first; of equals the first."""
     best, found = float("inf"), []
     for i in sorted(range(len(costs)), key=lambda i: (costs[i], errors[i])):
         if errors[i] < best:
@@ -163,12 +153,9 @@ def pareto_front(costs: Sequence[float], errors: Sequence[float]) -> list[int]:
 
 
 def knee(costs: Sequence[float], errors: Sequence[float], places: Sequence[int]) -> int:
-    """The place on a front that lies farthest below the chord between its ends, both axes logarithmic.
+    """The one of `places` on a front that lies farthest below the chord between its ends, logarithmically.
 
-    Args: `costs`: along the front, ascending. `errors`: along it, descending. `places`: what to return for
-        each.
-    Returns: One of `places`; the last of a front of one or two.
-    Source: maximum-distance rule.
+    Of a front of one or two it is the last.
     """
     if len(places) < 3:
         return places[-1]
@@ -178,10 +165,7 @@ def knee(costs: Sequence[float], errors: Sequence[float], places: Sequence[int])
 
 
 def works_and_seconds(trades: Sequence[Trade]) -> tuple[list[Work], list[float]]:
-    """Counted work and measured times of all timed models, to fit a cost model to.
-
-    Returns: Work over all points, and s, one of each per model.
-    """
+    """Counted work over all points, and s, of all timed models, to fit a cost model to."""
     works: list[Work] = []
     seconds: list[float] = []
     for trade in trades:

@@ -63,7 +63,7 @@ QUADRATURE: Final = "quadrature in time"
 
 
 @dataclass(frozen=True, kw_only=True)
-class TimeModels:
+class _TimeModels:
     """How an operation is carried through time."""
 
     name: str
@@ -75,14 +75,11 @@ class TimeModels:
     """Of one operation."""
 
 
-ModelPair = tuple[LawModels, TimeModels]
+ModelPair = tuple[LawModels, _TimeModels]
 
 
-def time_models(scene: Scene) -> tuple[TimeModels, ...]:
-    """Ways through an operation that a scene has, in order of increasing cost.
-
-    Returns: TimeModels; gas filling and valve lag only where the scene gives numbers for them.
-    """
+def time_models(scene: Scene) -> tuple[_TimeModels, ...]:
+    """Ways through an injection that a scene has numbers for, in order of increasing cost."""
     given = tuple(
         term
         for term, number in ((FILLING, scene.gas.conductance), (LAG, scene.gas.valve_lag))
@@ -101,12 +98,12 @@ def time_models(scene: Scene) -> tuple[TimeModels, ...]:
     return (*quasi_steady, *dynamic)
 
 
-def _steady(name: str, integrator: Integrator, left: tuple[str, ...], **work: float) -> TimeModels:
-    return TimeModels(name=name, integrator=integrator, modelled=(), lacks=left, work=work)
+def _steady(name: str, integrator: Integrator, left: tuple[str, ...], **work: float) -> _TimeModels:
+    return _TimeModels(name=name, integrator=integrator, modelled=(), lacks=left, work=work)
 
 
-def _dynamic(modelled: tuple[str, ...], left: tuple[str, ...]) -> TimeModels:
-    return TimeModels(
+def _dynamic(modelled: tuple[str, ...], left: tuple[str, ...]) -> _TimeModels:
+    return _TimeModels(
         name="with " + ", ".join(modelled),
         integrator=None,
         modelled=modelled,
@@ -116,10 +113,10 @@ def _dynamic(modelled: tuple[str, ...], left: tuple[str, ...]) -> TimeModels:
 
 
 def operation_laws(scene: Scene) -> tuple[LawModels, ...]:
-    """Flow laws that the model hierarchies of an operation take, in order of increasing cost.
+    """Flow laws of an injection, in order of increasing cost.
 
-    Returns: The paper's law, and every loss with Eq. 12 and with the exact level, with the crest's regimes
-        where the scene has a crest; last the scene's finest law.
+    The paper's law, and every loss with Eq. 12 and with the exact level, with the crest's regimes where the
+    scene has a crest; last the scene's finest law.
     """
     every = flow_models(scene)
     regimes = every[-1].regimes
@@ -127,7 +124,7 @@ def operation_laws(scene: Scene) -> tuple[LawModels, ...]:
     return tuple(dict.fromkeys([every[0], *kept, every[-1]]))
 
 
-def _sets(times: tuple[TimeModels, ...], laws: tuple[LawModels, ...]) -> list[ModelPair]:
+def _sets(times: tuple[_TimeModels, ...], laws: tuple[LawModels, ...]) -> list[ModelPair]:
     """Every law with every way through time that suits it; the highest last."""
     return [
         (law, time)
@@ -137,26 +134,19 @@ def _sets(times: tuple[TimeModels, ...], laws: tuple[LawModels, ...]) -> list[Mo
     ]
 
 
-def _law(book: LawBook, law: LawModels, time: TimeModels) -> CompleteLaw:
+def _law(book: LawBook, law: LawModels, time: _TimeModels) -> CompleteLaw:
     """The paper's own law where the closed form in time needs its two coefficients."""
     return paper_law(book.scene) if time.name == CLOSED_FORM else book.law(law)
 
 
 def gas_times(scene: Scene) -> tuple[float, float]:
-    """Valve-open times of an injection at which it is judged: the shortest that matters and the first, s.
-
-    Returns: s, ascending.
-    """
+    """Valve-open times of an injection at which it is judged: the shortest that matters and the first, s."""
     low, high = sorted((injection_time(scene), first_gas_time(scene)))
     return low, high
 
 
-def operation_contributions(scene: Scene) -> Mapping[str, Contribution]:
-    """What the ways through time leave out, and what their laws do.
-
-    Returns: Contributions by name, relative to the mass moved.
-    Source: stands with each.
-    """
+def _operation_contributions(scene: Scene) -> Mapping[str, Contribution]:
+    """What the ways through time leave out, and what their laws do, relative to the mass moved."""
     change = _velocity_change(scene, max(gas_times(scene)))
     segments = {
         name: Contribution(
@@ -193,14 +183,10 @@ def _velocity_change(scene: Scene, duration: float) -> float:
 
 
 def mass_hierarchy(scene: Scene, *, book: LawBook) -> ModelHierarchy:
-    """The model hierarchy of the mass that one operation moves, from equal fills and an empty tube, after its
-    wait.
-
-    Source: section 5.1 of the liquid-ring paper, each part by its model.
-    """
+    """Models of the mass that one injection moves, from equal fills and an empty tube, after its wait."""
     times = gas_times(scene)
 
-    def solve(point: int, *, law: LawModels, time: TimeModels) -> FloatArray:
+    def solve(point: int, *, law: LawModels, time: _TimeModels) -> FloatArray:
         return np.array([moved_mass(scene, law=_law(book, law, time), time=time, gas_time=times[point])])
 
     return _hierarchy(
@@ -216,13 +202,8 @@ def mass_hierarchy(scene: Scene, *, book: LawBook) -> ModelHierarchy:
     )
 
 
-def moved_mass(scene: Scene, *, law: CompleteLaw, time: TimeModels, gas_time: float) -> float:
-    """Mass that leaves the driven chamber by one operation and the wait after it.
-
-    Args: `scene`: the scene; initial fills, an empty tube. `law`: the flow law. `time`: how the operation is
-        carried through. `gas_time`: s.
-    Returns: kg.
-    """
+def moved_mass(scene: Scene, *, law: CompleteLaw, time: _TimeModels, gas_time: float) -> float:
+    """Mass that leaves the driven chamber by one injection of `gas_time`, s, and the wait after it, kg."""
     model = balancer_model(law)
     plant = LiquidRing(
         model=model,
@@ -238,11 +219,7 @@ def moved_mass(scene: Scene, *, law: CompleteLaw, time: TimeModels, gas_time: fl
 
 
 def settling_hierarchy(scene: Scene, *, book: LawBook) -> ModelHierarchy:
-    """The model hierarchy of the settling time with the scene's controller and an exact sensor.
-
-    Returns: Model hierarchy; a value of zero stands for a run that does not settle.
-    Source: section 6 of the liquid-ring paper, each part by its model.
-    """
+    """Models of the settling time with the scene's controller and an exact sensor; zero: not settled."""
     exact = replace(
         scene,
         sensor=replace(scene.sensor, amplitude_noise=0.0, phase_noise=0.0),
@@ -253,7 +230,7 @@ def settling_hierarchy(scene: Scene, *, book: LawBook) -> ModelHierarchy:
     laws = tuple(dict.fromkeys(laws))
     times = tuple(time for time in time_models(scene) if time.name != EXPLICIT[MANY])
 
-    def solve(_: int, *, law: LawModels, time: TimeModels) -> FloatArray:
+    def solve(_: int, *, law: LawModels, time: _TimeModels) -> FloatArray:
         found = simulate(
             exact,
             flow_law=_law(book, law, time),
@@ -296,7 +273,7 @@ def _hierarchy(
         points=points,
         check=tuple(range(len(points))),
         relative_to="each",
-        contributions=operation_contributions(scene),
+        contributions=_operation_contributions(scene),
         fidelities=tuple(
             Fidelity(
                 name=f"{law_name(law, hump=hump)}; {time.name}",

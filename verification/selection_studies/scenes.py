@@ -19,11 +19,9 @@ ANGLES: Final = (45.0, 60.0, 90.0)
 
 
 def random_scene(base: Scene, number: int) -> Scene:
-    """A scene with disc, liquid, tube, gas, shaft and speed drawn at random.
+    """A scene with disc, liquid, tube, gas, shaft and speed drawn at random, the rest as in `base`.
 
-    Args: `base`: what is not drawn, such as the controller. `number`: of the scene, zero or more.
-    Returns: A scene in which a ring exists; its speed lies between 1.3 times what gravity allows and 15 000
-        rpm.
+    A ring exists: the speed lies between 1.3 times what gravity allows and 15 000 rpm.
     """
     rng = np.random.default_rng([SEED, number])
     disc = _disc(base.disc, rng)

@@ -13,11 +13,11 @@ from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.selection.estimates import term_estimates
 from ringbalance.reduced_model.selection.registry import models_used
 from ringbalance.scene.models import Scene
-from ringbalance.verification.selection_studies.chamber_models import chamber_hierarchies
 from ringbalance.verification.selection_studies.choice import Choice, Values, choose
+from ringbalance.verification.selection_studies.choices import TOLERANCES, hierarchies_for
 from ringbalance.verification.selection_studies.cost import CostModel, committed_costs, fitted_costs
 from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy
-from ringbalance.verification.selection_studies.law_models import QUADRATURE, SERIES, base_law
+from ringbalance.verification.selection_studies.law_models import QUADRATURE, SERIES
 from ringbalance.verification.selection_studies.measure import (
     Clock,
     Measured,
@@ -28,17 +28,13 @@ from ringbalance.verification.selection_studies.measure import (
 from ringbalance.verification.selection_studies.operation import (
     EXPLICIT,
     MANY,
-    mass_hierarchy,
-    settling_hierarchy,
 )
 from ringbalance.verification.selection_studies.scene_numbers import scene_numbers
-from ringbalance.verification.selection_studies.tube_models import LawBook, k_hierarchy, velocity_hierarchy
 
 Record = dict[str, Any]
 Level = Literal["light", "heavy"]
 
-TOLERANCES: Final = (0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
-QUICK: Final = ("wall_pressure", "moment", "k", "velocity", "transferred_mass")
+_QUICK: Final = ("wall_pressure", "moment", "k", "velocity", "transferred_mass")
 """Quantities of a light trade; the settling time takes whole runs of the loop."""
 _OWN_ALONE: Final = (("light", "transferred_mass"),)
 """Where models are chosen for the scene's own tolerance alone."""
@@ -59,21 +55,12 @@ class TradeStudy:
 
 
 def hierarchies_of(scene: Scene, *, level: Level = "heavy") -> tuple[ModelHierarchy, ...]:
-    """The model hierarchies of a scene.
+    """The model hierarchies of a scene; "light" leaves the settling time out.
 
-    Args: `level`: "light" leaves the settling time out.
-    Returns: Wall pressure, moment, k, velocity, transferred mass and, heavy, settling time.
     Raises: SceneError: a rotor too slow for the liquid to form a ring.
     """
     check_ring(scene)
-    book = LawBook(scene, base_law(scene))
-    quick = (
-        *chamber_hierarchies(scene),
-        k_hierarchy(scene),
-        velocity_hierarchy(scene, book=book),
-        mass_hierarchy(scene, book=book),
-    )
-    return quick if level == "light" else (*quick, settling_hierarchy(scene, book=book))
+    return tuple(hierarchies_for(scene, _QUICK if level == "light" else (*_QUICK, "settling_time")))
 
 
 def trade_study(
@@ -84,12 +71,9 @@ def trade_study(
     timed: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> TradeStudy:
-    """Measure every model hierarchy of a scene and choose its models.
+    """Measure every model hierarchy of a scene and choose its models; all but times repeats on every machine.
 
-    Args: `level`: "light" leaves the settling time out. `tolerances`: for which models are chosen, beside the
-        scene's own. `timed`: whether times and memory are taken as well. `progress`: called with the name of
-        each quantity; None for silence.
-    Returns: TradeStudy; all but its times is the same on every machine.
+    Args: `timed`: whether times and memory are taken as well. `progress`: called with each quantity's name.
     Raises: SceneError: a rotor too slow for the liquid to form a ring.
     """
     costs = committed_costs()
@@ -113,12 +97,7 @@ def trade_study(
 
 
 def thinned(hierarchy: ModelHierarchy) -> ModelHierarchy:
-    """A model hierarchy of laws with every second model left out: levels and ways through time that lie close
-    together.
-
-    Args: `hierarchy`: any model hierarchy.
-    Returns: The model hierarchy; the finest model stays, and choices are made on the whole one.
-    """
+    """A model hierarchy without the models that lie close to others; choices are made on the whole one."""
 
     def kept(fidelity: Fidelity) -> bool:
         close = fidelity.models.get("level of a chamber") in (SERIES, QUADRATURE)
@@ -143,12 +122,7 @@ def _no_longer(clock: Clock | None, hierarchy: ModelHierarchy) -> Clock | None:
 
 
 def refitted(trades: Sequence[Trade], *, costs: CostModel) -> CostModel | None:
-    """Fit the cost model again to the times of measured model hierarchies.
-
-    Args: `trades`: measured; may be of several scenes. `costs`: the model that kinds of work without a time
-        of their own keep to.
-    Returns: CostModel; None where nothing was timed.
-    """
+    """Fit the cost model again to measured times; kinds of work without a time keep to `costs`."""
     works, seconds = works_and_seconds(trades)
     if not seconds:
         return None
@@ -162,20 +136,12 @@ def _wanted(scene: Scene, tolerances: Sequence[float]) -> tuple[float, ...]:
 
 
 def held_tolerance(tolerance: float) -> float:
-    """A scene's tolerance, held within the range that models are chosen for.
-
-    Args: `tolerance`: relative.
-    Returns: The same within 1e-6 and 0.1.
-    """
+    """A tolerance, held within the range that models are chosen for."""
     return min(max(tolerance, min(TOLERANCES)), max(TOLERANCES))
 
 
 def tolerance_text(tolerance: float, say: Callable[[float], str]) -> str:
-    """The tolerance that models are chosen for, beside the scene's own where that is out of range.
-
-    Args: `say`: writes a tolerance.
-    Returns: "this scene's tolerance of 1 %", or the nearest to it that models are chosen for.
-    """
+    """The tolerance that models are chosen for, beside the scene's own where that is out of range."""
     taken, told = held_tolerance(tolerance), f"this scene's tolerance of {say(tolerance)}"
     return told if taken == tolerance else f"{say(taken)}, the nearest to {told} that models are chosen for"
 
@@ -199,10 +165,7 @@ def trade_document(study: TradeStudy) -> Record:
 
 
 def terms_document(scene: Scene) -> list[Record]:
-    """Estimated contribution of every physical term of a scene, as plain numbers and texts.
-
-    Returns: For each term its name, its contribution, whether that is above the tolerance, and why.
-    """
+    """Estimated contribution of every physical term of a scene, as plain numbers and texts."""
     return [
         {"term": e.term, "estimated_contribution": e.contribution, "above": e.above, "why": e.reason}
         for e in term_estimates(scene).values()
@@ -226,7 +189,7 @@ def _quantity(trade: Trade, choices: Sequence[Choice]) -> Record:
         ],
         "rungs": [_fidelity(found) for found in trade.fidelities],
         "knee": trade.knee,
-        "choices": [choice_document(choice) for choice in choices],
+        "choices": [_choice_document(choice) for choice in choices],
     }
 
 
@@ -243,7 +206,7 @@ def _fidelity(found: Measured) -> Record:
     }
 
 
-def choice_document(choice: Choice) -> Record:
+def _choice_document(choice: Choice) -> Record:
     """A choice as plain numbers and texts."""
     return {
         "tolerance": choice.tolerance,

@@ -47,11 +47,9 @@ reference = dict.fromkeys(("straight", "explained"), Reference(value=1.0))
 
 
 def path(scene: Scene, refinement: float) -> tuple[Segment, ...]:
-    """Straight leg, bend to the right, over the crest, bend to the right, straight leg; lengths over the
-    bore.
+    """Leg, bend to the right, over the crest, bend to the right, leg; lengths over the bore.
 
-    Args: `scene`: for its first bend and its bore. `refinement`: cells along the path over those of the
-        coarsest mesh.
+    Args: `refinement`: cells along the path over those of the coarsest mesh.
     """
     bend = scene.tube.bends[0]
 
@@ -83,10 +81,8 @@ def _rotation(scene: Scene) -> float:
 
 
 def solve(scene: Scene, *, mesh: tuple[int, int, float], coriolis_factor: float = 1.0) -> BentTubeFlow:
-    """The flow on one mesh, with progress on standard error.
+    """The flow on a mesh of cells around, cells across and refinement along the path.
 
-    Args: `scene`: for bore, bend and speed. `mesh`: cells around and across, and refinement along the path.
-        `coriolis_factor`: 1, or a mutation.
     Raises: ArithmeticError: Newton's method failed.
     """
     around, across, along = mesh
@@ -144,7 +140,6 @@ def _straight(flow: BentTubeFlow, scene: Scene) -> float:
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Loss of the bent tube on three meshes against the sum of terms; with a mutation on one coarse mesh."""
     meshes = _MESHES if defect is None else _MESHES[1:2]
     flows: list[BentTubeFlow] = []
     losses: list[float] = []

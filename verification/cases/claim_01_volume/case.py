@@ -26,7 +26,6 @@ reference = dict.fromkeys(("volume", "volume_from_departure"), CHAMBER_VOLUME.re
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Volume by two routes that do not use the printed volume, and the error of Eq. 3's flat strips."""
     disc = scene.disc
     volume = _volume_without_plates if defect == "no_plates" else _volume_from_radius
     departure = Found(

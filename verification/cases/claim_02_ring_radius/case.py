@@ -30,7 +30,6 @@ reference = {
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Radius and volumes from the exact area."""
 
     def found(quantity: Callable[[Disc], float]) -> Found:
         return Found(value=quantity(scene.disc), input=plate_effect(scene, quantity))

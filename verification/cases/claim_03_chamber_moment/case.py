@@ -23,7 +23,6 @@ reference = dict.fromkeys(("moment", "arithmetic"), CHAMBER_MOMENT.reference)
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Moment by finite elements, and by Eq. 7 with and without the paper's rounding."""
     given = at_paper_density(scene)
     ring = ring_of(given, _FILLS)
     by_elements = chamber_moment(given, ring, -1, density=DENSITY)

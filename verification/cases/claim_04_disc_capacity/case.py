@@ -16,7 +16,6 @@ reference = dict.fromkeys(("capacity", "arithmetic"), DISC_MOMENT.reference)
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Two full chambers at right angles."""
     given = at_paper_density(scene)
     ring = ring_of(given, (given.disc.max_fill_ratio,))
     chamber = chamber_moment(given, ring, 0, density=DENSITY)

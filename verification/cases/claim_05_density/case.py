@@ -18,7 +18,6 @@ reference = {"ratio": Reference(value=2.0), "dense_capacity": DENSE_DISC_MOMENT.
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Moments at both densities."""
     full = (scene.disc.max_fill_ratio,)
     light, dense = (ring_of(scene, full, density=density) for density in (DENSITY, _DENSE))
     chamber = chamber_moment(scene, dense, 0, density=_DENSE)

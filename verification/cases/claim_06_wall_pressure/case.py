@@ -26,14 +26,12 @@ _SPEEDS: Final = (0.1, 0.2, 0.5, 1.0)
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
-    """Eq. 12."""
     fills = np.array(_fills(scene))
     by_eq_12 = _eq_12(scene, scene.disc, fills)
     return {name: Reference(value=float(by_eq_12[index])) for name, index in _JUDGED.items()}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Wall pressure by finite elements over the fill range."""
     fills = _fills(scene)
     ring = ring_of(scene, fills)
     x = np.array(fills)

@@ -26,7 +26,6 @@ _HUMP: Final = "hump_radius"
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Errors of one k and of '+1', and the share of conditions with a full tube."""
     share = _siphon_share(scene)
     low, high = _hump_bounds(scene)
     at_low, at_high = (_siphon_share(_with_hump(scene, radius)) for radius in (low, high))

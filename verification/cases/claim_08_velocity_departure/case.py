@@ -35,7 +35,6 @@ reference = {
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Departures by three routes."""
     given = at_paper_density(scene)
     arithmetic = {f"arithmetic_{name}": _arithmetic(given, p) for name, p in _PRESSURES.items()}
     physics = {f"departure_{name}": _physics(given, p) for name, p in _PRESSURES.items()}

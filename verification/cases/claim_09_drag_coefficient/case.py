@@ -35,7 +35,6 @@ reference = {
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """k at the velocity that every combination takes by itself."""
     own = running_tube(scene, head=driving_head(scene, share=0.5))
     fills = [running_tube(scene, head=driving_head(scene, share=s)) for s in np.linspace(0, 1, 11)]
     bores = [_with_bore(scene, factor) for factor in _BORES]

@@ -30,7 +30,6 @@ reference = {"central": Reference(value=PAPER_LAMBDA, uncertainty=_STATED)}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """lambda from the moments of both chambers, and from the slope of the moment at the centre."""
     fills = tuple(share * scene.disc.max_fill_ratio for share in _SHARES)
     ring = ring_of(scene, fills)
     per_density = 2 / scene.liquid.density

@@ -18,7 +18,6 @@ reference = {"chamber": CHAMBER_MOMENT.reference, "disc": DISC_MOMENT.reference}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Eqs. 21 and 22 with one chamber, and with two adjacent ones, at their largest fill."""
     full = scene.disc.max_fill_ratio
     mass = float(correction_mass(disc=scene.disc, density=DENSITY, fill_ratio=full))
     lever = CHAMBER_MOMENT.value / mass if defect == "lambda_from_eq_7" else PAPER_LAMBDA

@@ -64,12 +64,10 @@ class _Operation:
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
-    """The closed form."""
     return {"moved_fill": Reference(value=_long_operation(scene).exact())}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Moved fill over a sequence of segment counts."""
     operation = _long_operation(scene)
     frozen = defect == "frozen_velocity"
     exact = operation.exact()

@@ -34,7 +34,6 @@ reference = {
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Runs over Kp, and the fall of the vibration per second of gas."""
     runs = {gain: _run(scene, gain) for gain in _GAINS}
     rate = _rate(scene, paper_model(scene))
     calibrated = _rate(scene, calibration_of(scene).model)

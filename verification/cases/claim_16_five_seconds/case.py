@@ -17,18 +17,17 @@ from ringbalance.verification.loops import (
     amplitude_series,
     calibration_of,
     loop_scene,
+    mistaken_lag,
     run_loop,
     settling,
 )
 
 _PERIODS: Final = (0.25, 0.5, 1.0)
 _BOUND: Final = 5.0
-_WRONG: Final = math.radians(120)
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Runs over amplitudes and periods under the paper's law; amplitudes under the calibrated one."""
-    given = _mistaken(scene) if defect == "lag_angle_wrong" else scene
+    given = mistaken_lag(scene) if defect == "lag_angle_wrong" else scene
     runs = {period: _runs(given, period) for period in _PERIODS}
     slowest = [min(max(map(settling, group)), scene.run.time_limit) for group in runs.values()]
     rises = [max(run.misadjustments for run in group) for group in runs.values()]
@@ -55,13 +54,6 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             ),
         ),
         tables=(_table(runs),),
-    )
-
-
-def _mistaken(scene: Scene) -> Scene:
-    wrong = scene.rotor.lag_angle + _WRONG
-    return dataclasses.replace(
-        scene, controller=dataclasses.replace(scene.controller, assumed_lag_angle=wrong)
     )
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-import math
 from typing import Any, Final
 
 import numpy as np
@@ -15,6 +13,7 @@ from ringbalance.verification.loops import (
     PHASES,
     amplitude_series,
     loop_scene,
+    mistaken_lag,
     run_loop,
     sampled_amplitudes,
     settling,
@@ -23,13 +22,11 @@ from ringbalance.verification.loops import (
 _PERIODS: Final = (0.25, 0.5, 1.0)
 _TRIAL: Final = {"first_trial": 0.02, "long_step": 0.1, "short_step": 0.005}
 """Steps with which the trial algorithm settles at every phase, s."""
-_WRONG: Final = math.radians(120)
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Runs of both algorithms."""
     pairs = [(period, phase) for period in _PERIODS for phase in PHASES]
-    aimed = _mistaken(scene) if defect == "lag_angle_wrong" else scene
+    aimed = mistaken_lag(scene) if defect == "lag_angle_wrong" else scene
     target = [_run(aimed, "target_vector", *pair) for pair in pairs]
     trial = [_run(scene, "trial", *pair, **_TRIAL) for pair in pairs]
     longest = scene.run.time_limit
@@ -55,13 +52,6 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             ),
         ),
         tables=(_table(pairs, target, trial),),
-    )
-
-
-def _mistaken(scene: Scene) -> Scene:
-    wrong = scene.rotor.lag_angle + _WRONG
-    return dataclasses.replace(
-        scene, controller=dataclasses.replace(scene.controller, assumed_lag_angle=wrong)
     )
 
 

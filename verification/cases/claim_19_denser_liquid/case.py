@@ -18,7 +18,6 @@ reference = {"pressure_ratio": Reference(value=1.0), "gain": Reference(value=2.0
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Pressures and reachable abilities at the scene's density and at twice that."""
     light = scene.liquid.density
     dense = 2 * light
     felt = light if defect == "weightless" else dense

@@ -17,13 +17,11 @@ from ringbalance.verification.rings import found_of, mesh_table, ring_of
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
-    """The integral of Eq. 11, and a balance of one."""
     pressure = float(wall_pressure_of(scene, scene.disc.max_fill_ratio))
     return {"wall_pressure": Reference(value=pressure), "force_balance": Reference(value=1.0)}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Wall pressure and net force by finite elements."""
     fills = tuple((np.array([0.2, 0.4, 0.6, 0.8, 1.0]) * scene.disc.max_fill_ratio).tolist())
     ring = ring_of(scene, fills)
     pressure = found_of(ring, "wall_pressure", -1)

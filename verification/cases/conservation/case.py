@@ -34,7 +34,6 @@ class _Balance:
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Residuals of all balances."""
     fill = _FILL_SHARE * scene.disc.max_fill_ratio
     radial, angular = default_cells(disc=scene.disc)
     balances = [_section_balance(scene, fill, (radial // k, angular // k), defect) for k in (4, 2, 1)]

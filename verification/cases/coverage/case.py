@@ -57,11 +57,7 @@ class Coverage:
 
 
 def random_samples(*, count: int, seed: int) -> tuple[Sample, ...]:
-    """Discs of all proportions that the program accepts, with fills from thin to the largest.
-
-    Args: `count`: number of samples. `seed`: of the generator.
-    Returns: Samples, the same for the same seed.
-    """
+    """Discs of all proportions that the program accepts, with fills from thin to the largest."""
     generator = np.random.default_rng(seed)
     return tuple(_sample(generator) for _ in range(count))
 
@@ -92,21 +88,17 @@ def _sample(generator: np.random.Generator) -> Sample:
 
 
 def error_ratios(*, samples: tuple[Sample, ...]) -> FloatArray:
-    """Solve every sample and compare its errors with its half-widths.
+    """|error| over half-width, shape (samples, quantities); -1 where the error is at round-off.
 
-    Args: `samples`: the discs and fills.
-    Returns: |error| over half-width, shape (samples, quantities); -1 where the error is at round-off.
     Raises: RuntimeError: a sample that could not be solved.
     """
     return np.array([_ratios_of(sample) for sample in samples])
 
 
 def coverage(*, ratios: FloatArray, width_factor: float = 1.0) -> Mapping[str, Coverage]:
-    """How often half-widths hold, and how tight they are.
+    """How often half-widths hold, and how tight they are, of each of `QUANTITIES`.
 
-    Args: `ratios`: of `error_ratios`. `width_factor`: multiplies every half-width; anything but 1 is a
-        deliberate error.
-    Returns: Coverage of each of `QUANTITIES`.
+    Args: `width_factor`: multiplies every half-width; anything but 1 is a deliberate error.
     """
     scaled = np.where(ratios < 0, ratios, ratios / width_factor)
     return {name: _judge(scaled[:, index]) for index, name in enumerate(QUANTITIES)}
@@ -159,7 +151,6 @@ def _judge(ratios: FloatArray) -> Coverage:
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Shares and medians over all samples."""
     results = coverage(ratios=_ratios(), width_factor=_FACTORS[defect])
     found: dict[str, Found] = {}
     for name, quantity in zip(_NAMES, QUANTITIES, strict=True):

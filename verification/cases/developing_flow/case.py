@@ -43,7 +43,6 @@ reference = {"fast": Reference(value=_GEOSTROPHIC)}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Decay rates by finite elements against exact ones, and lengths against their bound."""
     coarse, fine = (section_system(cells=cells) for cells in _MESHES[level])
     rates = slowest_decay(system=coarse, reynolds=0.0, rotation_reynolds=0.0, count=12).rates
     exact = _CREEPING / (2 if defect == "radius_for_bore" else 1)

@@ -40,7 +40,6 @@ _NUMBERS: Final = {
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Judge every point."""
     document = tomllib.loads(bundled_scene(_PAPER).read_text(encoding="utf-8"))
     base = Base(document=document, file=f"{_PAPER}.toml", defect=_DEFECTS[defect])
     size = SIZES[level] if defect is None else _FEW

@@ -72,7 +72,6 @@ reference = {"fitted_order": Reference(value=_FITTED)}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Verdicts, orders and half-widths of all sequences."""
     sequences = _sequences()
     judged = {one.name: _judge(one, defect) for one in sequences}
     wrong = sum(judged[one.name].verdict not in one.expected for one in sequences)

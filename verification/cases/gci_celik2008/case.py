@@ -29,7 +29,6 @@ class _Column:
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Deviations from the printed results in units of their last digits."""
     columns = _columns()
     found = [_judge(column, defect) for column in columns]
     digits = {

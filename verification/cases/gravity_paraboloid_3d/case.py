@@ -13,7 +13,6 @@ _LEVELS: Final = {"light": (1, 2, 3, 4), "heavy": (1, 2, 4, 8)}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Errors of surface and pressure over levels."""
     angular = default_cells(disc=scene.disc)[1] // 8
     cells = [(n, angular * n, n) for n in _LEVELS[level]]
     return gravity_evidence(scene, cells=cells, shaft="vertical", defect=defect)

@@ -17,7 +17,6 @@ _SCALARS = {"wall_pressure": "Pa", "moment": "kg m", "liquid_volume": "m^3"}
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
-    """The closed forms."""
     disc, full = scene.disc, scene.disc.max_fill_ratio
     values = {
         "wall_pressure": float(wall_pressure_of(scene, full)),
@@ -29,7 +28,6 @@ def reference(scene: Scene) -> Mapping[str, Reference]:
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Finite elements in two and three dimensions."""
     flat, solid = (_ring(scene, dimension, defect) for dimension in (2, 3))
     found = {
         f"{name.removeprefix('liquid_')}_{d}d": found_of(ring, name, 0)

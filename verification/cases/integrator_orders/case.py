@@ -42,7 +42,6 @@ def _kinked(fill_ratio: FloatArray, largest: float) -> FloatArray:
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Errors of every integrator."""
     law = paper_law(scene)
     empties = float(
         stall_pressure(disc=scene.disc, density=scene.liquid.density, angular_velocity=scene.rotor.speed)

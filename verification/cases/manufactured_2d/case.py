@@ -13,7 +13,6 @@ _LEVELS: Final = {"light": (1, 2, 4, 8), "heavy": (1, 2, 4, 8, 16)}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Errors over levels."""
     angular = default_cells(disc=scene.disc)[1] // 4
     cells = [(2 * n, angular * n) for n in _LEVELS[level]]
     return manufactured_evidence(disc=scene.disc, cells=cells, defect=defect)

@@ -5,18 +5,16 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 from scipy.integrate import quad
 
-from ringbalance.physics.tube.friction import friction_factor, friction_uncertainty
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
-from ringbalance.verification.published import read_rows
+from ringbalance.verification.published import friction_formula, sand_rough_tubes, smooth_tube
 from ringbalance.verification.reference.mixing_length import MixingLength, mixing_length, mixing_length_flow
 
 Friction = Callable[[FloatArray, FloatArray], FloatArray]
@@ -43,19 +41,7 @@ _SHOWN: Final = 126.0
 """R/ks of the figure."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Points:
-    """Friction factors over Re and wall."""
-
-    reynolds: FloatArray
-    roughness: FloatArray
-    """ks/d."""
-    friction: FloatArray
-    """Darcy."""
-
-
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Friction by mixing length against a quadrature, the formula and the measurements."""
     closure, cells = _CLOSURES[defect], _CELLS[level]
 
     def by_length(reynolds: FloatArray, roughness: FloatArray) -> FloatArray:
@@ -66,11 +52,14 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         return np.array([flow.friction_factor for flow in flows])
 
     stride = _MEASURED[level]
-    sand, smooth = _sand(stride), _smooth(stride)
+    sand, every = sand_rough_tubes().where(slice(None, None, stride)), smooth_tube()
+    smooth = every.where(every.reynolds >= _HIGH).where(slice(None, None, -stride))
     even = np.array(_LOW + _EVEN[level])
-    apart = by_length(even, np.zeros_like(even)) / _formula(even, np.zeros_like(even)) - 1
+    apart = by_length(even, np.zeros_like(even)) / friction_formula(even, np.zeros_like(even)) - 1
     measured = by_length(smooth.reynolds, smooth.roughness) / smooth.friction - 1
-    wall, formula = (f(sand.reynolds, sand.roughness) / sand.friction - 1 for f in (by_length, _formula))
+    wall, formula = (
+        f(sand.reynolds, sand.roughness) / sand.friction - 1 for f in (by_length, friction_formula)
+    )
     grain = sand.reynolds * np.sqrt(sand.friction / 8) * sand.roughness
     between = (grain > _BETWEEN[0]) & (grain < _BETWEEN[1])
     return Evidence(
@@ -84,7 +73,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "measured": float(np.max(np.abs(measured))),
             "formula_between": float(np.mean(formula[between])),
             "formula_worst": float(np.max(formula[between])),
-            "bar": float(np.max(_bar(sand)[between])),
+            "bar": float(np.max((sand.uncertainty() / sand.friction)[between])),
             "rough": float(np.max(np.abs(wall[grain > _FULLY_ROUGH]))),
             "formula_rough": float(np.max(np.abs(formula[grain > _FULLY_ROUGH]))),
         },
@@ -108,46 +97,17 @@ def _quadrature_gap(closure: MixingLength, cells: int) -> float:
     return abs(flow.friction_factor / (8 / bulk**2) - 1)
 
 
-def _formula(reynolds: FloatArray, roughness: FloatArray) -> FloatArray:
-    pairs = zip(reynolds, roughness, strict=True)
-    return np.array([float(friction_factor(reynolds=re, relative_roughness=e)) for re, e in pairs])
-
-
-def _bar(points: _Points) -> FloatArray:
-    """The formula's half-width over the measured value."""
-    pairs = zip(points.reynolds, points.roughness, strict=True)
-    bars = [float(friction_uncertainty(reynolds=re, relative_roughness=e)) for re, e in pairs]
-    return np.array(bars) / points.friction
-
-
-def _smooth(stride: int) -> _Points:
-    rows = read_rows("mixing_length", "mckeon2004_oregon_smooth.csv")
-    rows = tuple(row for row in rows if float(row["Re"]) >= _HIGH)[::-stride]
-    reynolds = np.array([float(row["Re"]) for row in rows])
-    friction = np.array([float(row["f_darcy"]) for row in rows])
-    return _Points(reynolds=reynolds, roughness=np.zeros_like(reynolds), friction=friction)
-
-
-def _sand(stride: int) -> _Points:
-    rows = read_rows("mixing_length", "nikuradse1933_rough.csv")[::stride]
-    return _Points(
-        reynolds=np.array([float(row["Re"]) for row in rows]),
-        roughness=np.array([0.5 / float(row["R_over_ks"]) for row in rows]),
-        friction=np.array([float(row["f_darcy"]) for row in rows]),
-    )
-
-
 def _figure(by_length: Friction) -> Series:
     """One sand over Re, where formula and measurements part."""
-    sand = _sand(1)
-    shown = np.isclose(sand.roughness, 0.5 / _SHOWN)
-    reynolds, roughness = sand.reynolds[shown], sand.roughness[shown]
-    one = _Points(reynolds=reynolds, roughness=roughness, friction=_formula(reynolds, roughness))
+    sand = sand_rough_tubes()
+    shown = sand.where(np.isclose(sand.roughness, 0.5 / _SHOWN))
+    reynolds, roughness = shown.reynolds, shown.roughness
+    formula = friction_formula(reynolds, roughness)
     return figure(
         f"friction factor on sand of R/ks = {_SHOWN:.0f}",
         ("Reynolds number", "1", reynolds),
-        Curve("formula", "1", one.friction, uncertainty=_bar(one) * one.friction),
+        Curve("formula", "1", formula, uncertainty=shown.uncertainty()),
         Curve("mixing length", "1", by_length(reynolds, roughness), style="paper"),
-        Curve("Nikuradse (1933)", "1", sand.friction[shown], style="reference"),
+        Curve("Nikuradse (1933)", "1", shown.friction, style="reference"),
         log=True,
     )

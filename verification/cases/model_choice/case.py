@@ -9,19 +9,17 @@ from typing import Final
 
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level
-from ringbalance.verification.selection_studies.choices import CHAMBER
-from ringbalance.verification.selection_studies.evidence import choices_evidence
+from ringbalance.verification.selection_studies.choices import CHAMBER, choices_evidence
 
-SCENES: Final = 12
+_SCENES: Final = 12
 _ALONE: Final = 2
 """Number of the one scene whose chamber is judged."""
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Judge the choices."""
-    return choices_evidence(scene, numbers=range(SCENES), quantities_of=quantities_of, defect=defect)
+    return choices_evidence(scene, numbers=range(_SCENES), quantities_of=_quantities_of, defect=defect)
 
 
-def quantities_of(number: int) -> tuple[str, ...]:
-    """Quantities that are judged on a scene. Returns: Their names."""
+def _quantities_of(number: int) -> tuple[str, ...]:
+    """Names of the quantities that are judged on a scene."""
     return ("k", *CHAMBER) if number == _ALONE else ("k",)

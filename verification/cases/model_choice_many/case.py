@@ -10,22 +10,20 @@ from typing import Final
 
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level
-from ringbalance.verification.selection_studies.choices import CHAMBER
-from ringbalance.verification.selection_studies.evidence import choices_evidence
+from ringbalance.verification.selection_studies.choices import CHAMBER, choices_evidence
 
-SCENES: Final = 300
+_SCENES: Final = 300
 _FEW: Final = 12
 """Scenes on which a mutation shows."""
 _TENTH: Final = 10
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Judge the choices."""
-    count = SCENES if defect is None else _FEW
-    return choices_evidence(scene, numbers=range(count), quantities_of=quantities_of, defect=defect)
+    count = _SCENES if defect is None else _FEW
+    return choices_evidence(scene, numbers=range(count), quantities_of=_quantities_of, defect=defect)
 
 
-def quantities_of(number: int) -> tuple[str, ...]:
-    """Quantities that are judged on a scene. Returns: Their names."""
+def _quantities_of(number: int) -> tuple[str, ...]:
+    """Names of the quantities that are judged on a scene."""
     more = ("transferred_mass", "settling_time") if number % _TENTH == 0 else ()
     return (*CHAMBER, "k", "velocity", *more)

@@ -36,7 +36,6 @@ reference = {
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Friction ratios at rest, in slow and in fast rotation."""
     around = _AROUND[level]
     system = section_system(cells=SectionMesh(around=around, across=3 * around // 2, wall_ratio=15.0))
     factor = _FACTORS[defect]

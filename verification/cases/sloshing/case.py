@@ -34,7 +34,6 @@ _CORIOLIS: Final = {"coriolis_off_by_a_percent": 1.01}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Deviations on a bare chamber, then the frequencies and swings of the scene's own."""
     bare = replace(scene.disc, plate_thickness=0.0)
     depths = _depths(bare)
     fills = np.linspace(0.02, 1.0, _POINTS[level]) * scene.disc.max_fill_ratio

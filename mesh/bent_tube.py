@@ -54,7 +54,7 @@ class SweptTube:
     """Unit tangent there, the same shape."""
 
 
-def stations(*, segments: Sequence[Segment]) -> FloatArray:
+def _stations(*, segments: Sequence[Segment]) -> FloatArray:
     """Arc lengths of all nodes along a path, mid-nodes included. Returns: Shape (2 cells + 1,)."""
     at = [0.0]
     for segment in segments:
@@ -65,7 +65,7 @@ def stations(*, segments: Sequence[Segment]) -> FloatArray:
     return np.array(at)
 
 
-def path_points(*, segments: Sequence[Segment], arc_length: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+def _path_points(*, segments: Sequence[Segment], arc_length: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Points of a path and its unit tangents.
 
     Args: `arc_length`: shape (n,), from 0 to the path's length.
@@ -137,7 +137,7 @@ def swept_tube(*, section: Any, segments: Sequence[Segment]) -> SweptTube:
         raise ValueError("a path needs segments of positive length, cells and ratio")
     if any(abs(s.turn) * reach >= s.length for s in segments):
         raise ValueError("a bend is too tight: its radius must exceed half the bore")
-    at = stations(segments=segments)
+    at = _stations(segments=segments)
     slabs = (at.size - 1) // 2
     prism = _prism(section, slabs)
     half = np.rint(2 * prism.doflocs[2]).astype(np.int64)
@@ -145,7 +145,7 @@ def swept_tube(*, section: Any, segments: Sequence[Segment]) -> SweptTube:
     gap, node = cKDTree(_straight_section(section).T).query(np.asarray(prism.doflocs[:2]).T)
     if gap.max() > 1e-9:
         raise ValueError("the section's nodes were not found again: it must be a mesh of quadrilaterals")
-    place, direction = path_points(segments=segments, arc_length=at)
+    place, direction = _path_points(segments=segments, arc_length=at)
     y, z = np.asarray(section.doflocs)[:, node]
     left = np.stack([-direction[1], direction[0]])
     points = np.vstack([place[:, half] + y * left[:, half], z])

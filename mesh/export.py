@@ -1,9 +1,8 @@
-"""Meshes with their boundary names, and fields on them, to and from VTU files."""
+"""Meshes with their boundary names, and fields on them, as VTU files."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import meshio
@@ -12,19 +11,8 @@ import numpy.typing as npt
 from skfem import Mesh
 from skfem.io.meshio import to_meshio
 
-from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.platform.drafts import draft_folder
 from ringbalance.scene.platform.files import write_whole
-
-
-@dataclass(frozen=True, kw_only=True)
-class StoredMesh:
-    """What a VTU file holds."""
-
-    mesh: Mesh
-    """Coordinates in metres, boundaries by name."""
-    fields: Mapping[str, FloatArray]
-    """Nodal fields by name."""
 
 
 def write_vtu(
@@ -56,18 +44,3 @@ def write_vtu(
         stored.points = np.pad(stored.points, ((0, 0), (0, 3 - stored.points.shape[1])))
         meshio.write(draft, stored)
         return write_whole(path, draft.read_bytes())
-
-
-def read_vtu(path: Path) -> StoredMesh:
-    """Read a mesh and its nodal fields back from a file that `write_vtu` wrote.
-
-    Returns: The mesh, in metres, with its boundary names, and the fields.
-    Raises: OSError: the file cannot be read.
-    Raises: ValueError: it names no boundary, so it is not one of ours.
-    """
-    out: list[object] = ["point_data"]
-    mesh = Mesh.load(path, out=out)
-    if not mesh.boundaries:
-        raise ValueError(f"{path} holds no named boundaries")
-    data = out[0] if isinstance(out[0], dict) else {}
-    return StoredMesh(mesh=mesh, fields={name: np.asarray(v, dtype=np.float64) for name, v in data.items()})

@@ -79,21 +79,13 @@ def closest(word: str, known: Iterable[str]) -> str:
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """Suggest the known word that was probably meant.
-
-    Args: `word`: what was written. `known`: the words that exist.
-    Returns: ' (did you mean "x"?)' or an empty string when nothing is close.
-    """
+    """' (did you mean "x"?)' with the known word that is closest; empty when none is close."""
     found = closest(word, known)
     return f' (did you mean "{found}"?)' if found else ""
 
 
 def toml_text(value: object) -> str:
-    """Write a value as it would stand in a TOML file, shortened to fit a line.
-
-    Args: `value`: anything a TOML file can hold.
-    Returns: One line of printable text.
-    """
+    """A value as it would stand in a TOML file, printable and shortened to fit a line."""
     text = _toml_text(value, depth=0)
     return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 4] + " ..."
 
@@ -121,11 +113,7 @@ def _nested(value: Mapping[Any, Any] | Sequence[Any], *, depth: int) -> str:
 
 
 def toml_key(key: str) -> str:
-    """Write a key as it would stand in a TOML file: bare where it can be, else quoted.
-
-    Args: `key`: any key.
-    Returns: One line of printable text.
-    """
+    """A key as it would stand in a TOML file: bare where it can be, else quoted; printable, on one line."""
     bare = key.isascii() and key.replace("_", "a").replace("-", "a").isalnum()
     return key if bare and len(key) <= _LONGEST_VALUE else _quoted(key[:_LONGEST_VALUE])
 

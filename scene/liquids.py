@@ -65,36 +65,24 @@ class KnownLiquid:
         return first if len(self.temperatures) == 1 else f"{first} to {last}"
 
     def holds(self, temperature: float) -> bool:
-        """Tell whether there are data for a temperature.
-
-        Args: `temperature`: K.
-        Returns: True within the data, plus or minus 0.01 K.
-        """
+        """Whether there are data for a temperature (K), plus or minus 0.01 K."""
         low, high = self.temperatures[0], self.temperatures[-1]
         return low - _SAME_TEMPERATURE <= temperature <= high + _SAME_TEMPERATURE
 
 
 def known_liquids() -> tuple[KnownLiquid, ...]:
-    """List the liquids that a scene can name. Returns: The liquids in the order of the data file."""
+    """The liquids that a scene can name, in the order of the data file."""
     return tuple(liquid for liquid, _ in _library().values())
 
 
 def find_liquid(*, name: str) -> KnownLiquid | None:
-    """Look a liquid up by any of its names.
-
-    Args: `name`: such as "Silicone oil 100 cSt".
-    Returns: The liquid; None when no liquid has that name.
-    """
+    """The liquid of any of its names, such as "Silicone oil 100 cSt"; None when no liquid has it."""
     plain = _plain(name)
     return next((liquid for liquid in known_liquids() if plain in map(_plain, _names(liquid))), None)
 
 
 def unknown_liquid(*, name: str) -> FieldError:
-    """Say that a liquid is not known, and which ones are.
-
-    Args: `name`: what was written.
-    Returns: The error, to be raised or reported.
-    """
+    """The error that a liquid is not known, and which ones are; to be raised or reported."""
     names = [each for liquid in known_liquids() for each in _names(liquid)]
     held = ", ".join(f'"{liquid.name}"' for liquid in known_liquids())
     return FieldError(

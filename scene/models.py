@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 from ringbalance.scene.keys.declaration import UNCERTAIN, derived, listed, needed, shown, standard, unused
-from ringbalance.scene.keys.derivations import even_number_of_chambers
+from ringbalance.scene.keys.derivations import even_number_of_chambers, half_of, radius_of_edge
 from ringbalance.scene.keys.fields import (
     NOT_NEGATIVE,
     POSITIVE,
@@ -42,15 +42,6 @@ PressurePlace = Literal["chamber", "shaft"]
 Entrance = Literal["sharp", "rounded", "projecting"]
 Shaft = Literal["horizontal", "vertical"]
 GasProcess = Literal["isothermal", "adiabatic"]
-
-
-def _half(fill_ratio: float) -> float:
-    return fill_ratio / 2
-
-
-def _radius_of_edge(entrance: str) -> float | None:
-    """Radius of an entrance's edge, m; None for a rounded one, whose radius must be given."""
-    return None if entrance == "rounded" else 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,7 +102,7 @@ class Disc:
             "half of max_fill_ratio, the only value allowed",
             "fill ratio of every chamber at the start",
             "disc.max_fill_ratio",
-            rule=_half,
+            rule=half_of,
         ),
         shown("fill ratio at the start"),
     ]
@@ -254,7 +245,7 @@ class Tube:
             "needed with a rounded entrance, not allowed otherwise",
             "radius of the rounded edge",
             "tube.entrance",
-            rule=_radius_of_edge,
+            rule=radius_of_edge,
         ),
     ]
     bends: Annotated[

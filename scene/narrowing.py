@@ -12,12 +12,7 @@ AnyScene: TypeAlias = Scene | EccentricScene
 
 
 def liquid_ring_scene(scene: AnyScene) -> Scene:
-    """Take a scene whose balancer is a liquid ring.
-
-    Args: `scene`: of any kind.
-    Returns: The same scene.
-    Raises: SceneError: it has another balancer.
-    """
+    """The same scene, when its balancer is a liquid ring. Raises: SceneError: it has another."""
     if isinstance(scene, Scene):
         return scene
     problem = "this needs the disc, liquid, tube and gas of a liquid-ring balancer"
@@ -25,12 +20,7 @@ def liquid_ring_scene(scene: AnyScene) -> Scene:
 
 
 def eccentric_scene(scene: AnyScene) -> EccentricScene:
-    """Take a scene whose balancer is two eccentric masses.
-
-    Args: `scene`: of any kind.
-    Returns: The same scene.
-    Raises: SceneError: it has another balancer.
-    """
+    """The same scene, when its balancer is two eccentric masses. Raises: SceneError: it has another."""
     if isinstance(scene, EccentricScene):
         return scene
     problem = "this needs the rotor, masses and motor of driven eccentric masses"

@@ -54,11 +54,7 @@ class FieldError(ValueError):
 
 
 def unit_names(dimension: str) -> str:
-    """List the units of a dimension, as a message shows them.
-
-    Args: `dimension`: a key of `DIMENSIONS`.
-    Returns: The names with commas between.
-    """
+    """The units of a dimension with commas between, as a message shows them."""
     return ", ".join(DIMENSIONS[dimension].units)
 
 
@@ -83,11 +79,7 @@ def parse_quantity(text: object, dimension: str) -> float:
 
 
 def format_quantity(value: float, dimension: str, unit: str, *, digits: int = 6) -> str:
-    """Write an SI value in a unit, for people.
-
-    Args: `dimension`: a key of `DIMENSIONS`. `digits`: significant digits.
-    Returns: Such as "44.5 mm".
-    """
+    """An SI value in a unit of its dimension, for people, such as "44.5 mm"."""
     entry = DIMENSIONS[dimension].units[unit]
     number = value / float(entry.factor) / (math.pi if entry.pi else 1.0) - float(entry.offset)
     return f"{number:.{digits}g} {unit}"

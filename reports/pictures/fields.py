@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from ringbalance.mesh.chamber import chamber_mesh, default_cells
+from ringbalance.mesh.chamber import chamber_mesh, default_cells, mesh_quality
 from ringbalance.mesh.export import write_vtu
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
-from ringbalance.mesh.quality import mesh_quality
 from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, places, solve_pressure
 from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.scene.models import Scene

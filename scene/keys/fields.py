@@ -45,11 +45,7 @@ class Bounds:
     """Exclusive."""
 
     def holds(self, value: float) -> bool:
-        """Tell whether a value lies inside.
-
-        Args: `value`: in the same unit as the bounds.
-        Returns: True inside.
-        """
+        """Whether a value, in the unit of the bounds, lies inside."""
         return (
             (self.above is None or value > self.above)
             and (self.at_least is None or value >= self.at_least)
@@ -73,11 +69,7 @@ NOT_NEGATIVE = Bounds(at_least=0)
 
 
 def quantity(dimension: str, bounds: Bounds | None = None) -> Reader:
-    """Read a number with a unit.
-
-    Args: `dimension`: a key of `DIMENSIONS`. `bounds`: in SI; None for any sign.
-    Returns: A reader of text such as "44.5 mm"; its values are SI.
-    """
+    """Reader of text such as "44.5 mm", of a key of `DIMENSIONS`; bounds in SI, None for any sign."""
     kind = DIMENSIONS[dimension]
     limits = bounds or Bounds()
     interval = f" {limits}".replace(" at least", " of at least") if bounds else ""
@@ -96,11 +88,7 @@ def quantity(dimension: str, bounds: Bounds | None = None) -> Reader:
 
 
 def angle_of_turn() -> Reader:
-    """Read a phase or lag; beyond a full turn either way it is wrapped to within half a turn.
-
-    Returns: A reader of text such as "17 deg"; its values are rad.
-    """
-
+    """Reader of a phase or lag, rad; beyond a full turn either way it is wrapped to within half a turn."""
     allowed = f'an angle such as "{DIMENSIONS["angle"].example}", in {unit_names("angle")}'
 
     def read(value: object) -> float:
@@ -112,11 +100,7 @@ def angle_of_turn() -> Reader:
 
 
 def share(bounds: Bounds, *, example: float) -> Reader:
-    """Read a share of one: a bare number or a percentage.
-
-    Args: `bounds`: dimensionless. `example`: a value that one might write.
-    Returns: A reader of 0.01 and of "1 %".
-    """
+    """Reader of a share of one: a bare number or a percentage."""
     allowed = f'a share {bounds}, such as {example:g} or "{100 * example:g} %"'
 
     def read(value: object) -> float:
@@ -129,11 +113,7 @@ def share(bounds: Bounds, *, example: float) -> Reader:
 
 
 def number(bounds: Bounds) -> Reader:
-    """Read a number that has no unit.
-
-    Args: `bounds`: dimensionless.
-    Returns: A reader of bare numbers.
-    """
+    """Reader of a bare number that has no unit."""
     allowed = f"a bare number {bounds}".replace("number at", "number of at")
 
     def read(value: object) -> float:
@@ -166,10 +146,7 @@ def _whole(value: object, allowed: str) -> int:
 
 
 def chamber_count() -> Reader:
-    """Read the number of chambers: even, and no more than there are letters for.
-
-    Returns: A reader of whole numbers.
-    """
+    """Reader of the number of chambers: even, and no more than there are letters for."""
     allowed = f"an even whole number from 2 to {len(LETTERS)}"
 
     def read(value: object) -> int:
@@ -184,7 +161,7 @@ def chamber_count() -> Reader:
 
 
 def whole(lowest: int, highest: int, *, highest_text: str = "") -> Reader:
-    """Read a whole number. Args: `highest_text`: the highest as people write it; else its digits."""
+    """Reader of a whole number; `highest_text` is the highest as people write it."""
     interval = f"from {lowest} to {highest_text or highest}"
     allowed = f"a whole number {interval}"
 
@@ -198,11 +175,7 @@ def whole(lowest: int, highest: int, *, highest_text: str = "") -> Reader:
 
 
 def each_of(reader: Reader, *, count: int, example: str) -> Reader:
-    """Read a list of a fixed number of values of one sort.
-
-    Args: `count`: how many there must be. `example`: the list as one would write it.
-    Returns: A reader of lists; its values are tuples.
-    """
+    """Reader of a list of a fixed number of values of one sort; its values are tuples."""
     allowed = f"a list of {count} such as {example}; each {reader.allowed}"
 
     def read(value: object) -> tuple[Any, ...]:
@@ -220,7 +193,7 @@ def each_of(reader: Reader, *, count: int, example: str) -> Reader:
 
 
 def choice(words: Any) -> Reader:
-    """Read one of a few words. Args: `words`: a `Literal` of them."""
+    """Reader of one of a few words, which a `Literal` lists."""
     options: tuple[str, ...] = get_args(words)
     allowed = " or ".join(f'"{option}"' for option in options)
 
@@ -235,7 +208,7 @@ def choice(words: Any) -> Reader:
 
 
 def text() -> Reader:
-    """Read a name. Returns: A reader of text on one line."""
+    """Reader of text on one line."""
     allowed = f"text on one line, up to {_LONGEST_NAME} characters"
 
     def read(value: object) -> str:
@@ -249,7 +222,7 @@ def text() -> Reader:
 
 
 def chamber_letters() -> Reader:
-    """Read the order in which chambers are tried. Returns: A reader of lists of different capital letters."""
+    """Reader of the order in which chambers are tried: different capital letters."""
     allowed = 'a list of chamber letters, each once, such as ["A", "C", "B", "D"]'
 
     def read(value: object) -> tuple[str, ...]:
@@ -266,10 +239,9 @@ def chamber_letters() -> Reader:
 
 
 def half_width(dimension: str | None) -> Reader:
-    """Read the expanded uncertainty (95 %) of a quantity: a percentage of it, or in its own unit.
+    """Reader of an expanded uncertainty (95 %): a percentage, or in the unit of the quantity's dimension.
 
-    Args: `dimension`: a key of `DIMENSIONS`, or None for a quantity without unit.
-    Returns: A reader whose values are (half-width, whether it is relative); SI when it is not.
+    Its values are (half-width, whether it is relative); SI when it is not.
     """
     allowed = _half_width_allowed(dimension)
 

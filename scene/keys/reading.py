@@ -43,45 +43,29 @@ class Reading:
     """What such a file can hold."""
 
     def adding(self, values: Mapping[str, Any]) -> Reading:
-        """Copy with more values. Args: `values`: SI, by path."""
+        """Copy with more values, SI, by path."""
         return replace(self, values={**self.values, **values})
 
     def given(self, path: str) -> bool:
-        """Tell whether the file itself has a value at a path.
-
-        Args: `path`: "table.key" or "key".
-        Returns: True when it stands in the file, readable or not.
-        """
+        """Whether the file itself has a value at a path, readable or not."""
         table, _, key = path.rpartition(".")
         return key in self._table(table)
 
     def known(self, *paths: str) -> bool:
-        """Tell whether there are values for some paths.
-
-        Args: `paths`: "table.key" or "key".
-        Returns: True when each was read or has a default.
-        """
+        """Whether there is a value for each path, read or by default."""
         return all(path in self.values for path in paths)
 
     def lacks(self, path: str) -> bool:
-        """Tell whether a value is missing, rather than present but unreadable.
-
-        Args: `path`: "table.key".
-        Returns: True when a fault about its absence is due.
-        """
+        """Whether a value is missing, rather than present but unreadable."""
         table, _, _ = path.rpartition(".")
         return not self.known(path) and not {path, table} & self.broken
 
     def allowed(self, path: str) -> str:
-        """What a key takes, for messages. Args: `path`: "table.key"."""
+        """What a key takes, for messages."""
         return self.schema.key_at(tuple(path.split("."))).takes.allowed
 
     def fault(self, path: str, *, problem: str, allowed: str) -> Fault:
-        """Make an error about a value of this file.
-
-        Args: `path`: "table.key" or "key". `problem`: what is wrong. `allowed`: what would be accepted.
-        Returns: the error, with what the file has there or the default that is used.
-        """
+        """An error about a value, with what the file has there or the default that is used."""
         table, _, key = path.rpartition(".")
         value = toml_text(self._table(table)[key]) if self.given(path) else self._default_text(path)
         return Fault(file=self.file, table=table, key=key, value=value, problem=problem, allowed=allowed)
@@ -97,11 +81,7 @@ class Reading:
 def read_document(
     document: Mapping[str, Any], *, file: str, schema: Schema
 ) -> tuple[Reading, tuple[Fault, ...]]:
-    """Compare a document with a schema.
-
-    Args: `document`: as TOML has it. `file`: its name, for the errors.
-    Returns: What could be read, and an error for each value, key or table that could not.
-    """
+    """What could be read of a TOML document, and an error for each value, key or table that could not."""
     values, every = _read_tables(document, schema)
     rejected, uninspected = _split(every)
     broken = frozenset(_paths(rejected, document, schema))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from skfem import Basis, ElementHex2, FacetBasis
 
-from ringbalance.mesh.bent_tube import Segment, SweptTube, path_points, stations, swept_tube
+from ringbalance.mesh.bent_tube import Segment, SweptTube, swept_tube
 from ringbalance.verification.navier_stokes.rotating_section import SectionMesh, section_mesh
 
 BEND = Segment(length=np.pi, turn=-np.pi / 2, cells=4)
@@ -20,20 +20,20 @@ def _tube() -> SweptTube:
 
 
 def test_a_path_of_lines_and_a_quarter_circle_ends_where_it_must() -> None:
-    place, direction = path_points(
-        segments=PATH, arc_length=[0.0, 1.5, 1.5 + np.pi / 2, 1.5 + np.pi, 5.5 + 0.5]
-    )
+    tube = _tube()
+    # Twice the cells of what lies before: start, both ends and the middle of the bend, and the path's end.
+    place, direction = (each[:, [0, 4, 8, 12, 16]] for each in (tube.place, tube.direction))
     # To the right about (1.5, -2), radius 2.
     assert np.allclose(place[:, 1], [1.5, 0.0])
     assert np.allclose(place[:, 2], [1.5 + np.sqrt(2), -2 + np.sqrt(2)])
     assert np.allclose(place[:, 3], [3.5, -2.0])
     assert np.allclose(direction[:, 0], [1.0, 0.0])
     assert np.allclose(direction[:, 3], [0.0, -1.0])
-    assert np.allclose(place[:, 4], [3.5, -2.0 - (6.0 - 1.5 - np.pi)])
+    assert np.allclose(place[:, 4], [3.5, -4.0])
 
 
 def test_stations_are_graded_and_have_their_mid_nodes() -> None:
-    at = stations(segments=PATH)
+    at = _tube().arc_length
     assert at.size == 2 * 8 + 1
     assert at[-1] == pytest.approx(3.5 + np.pi)
     assert np.allclose(at[1::2], (at[:-1:2] + at[2::2]) / 2)

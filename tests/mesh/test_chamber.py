@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ringbalance.mesh.chamber import ChamberMesh, Geometry, chamber_mesh, default_cells
+from ringbalance.mesh.chamber import ChamberMesh, Geometry, chamber_mesh, default_cells, mesh_quality
 from ringbalance.mesh.geometry import half_angle
-from ringbalance.mesh.quality import mesh_quality
 from ringbalance.scene.models import Disc
 
 FLAT = {"free_surface", "outer_wall", "plate_left", "plate_right"}

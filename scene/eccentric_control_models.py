@@ -40,7 +40,7 @@ from ringbalance.scene.keys.quantities import (
 )
 
 Discretisation = Literal["exact", "euler"]
-FrictionCompensation = Literal["break_away", "printed", "none"]
+FrictionCompensation = Literal["break_away", "none"]
 Strategy = Literal["whole", "locked"]
 
 
@@ -221,7 +221,7 @@ class Lqr:
         FrictionCompensation,
         standard(
             "break_away",
-            "of the estimated friction: so that a mass at rest breaks away; as the paper prints it; or none",
+            "of the estimated friction: so that a mass at rest breaks away; or none",
         ),
     ]
 

@@ -29,7 +29,7 @@ from ringbalance.scene.keys.quantities import (
 )
 
 Discretisation = Literal["exact", "euler"]
-FrictionCompensation = Literal["break_away", "printed", "none"]
+FrictionCompensation = Literal["break_away", "none"]
 Strategy = Literal["whole", "locked"]
 
 _FINEST_POSITION = 1e-6
@@ -264,7 +264,7 @@ class Lqr:
         FrictionCompensation,
         standard(
             "break_away",
-            "of the estimated friction: so that a mass at rest breaks away; as the paper prints it; or none",
+            "of the estimated friction: so that a mass at rest breaks away; or none",
         ),
     ]
 

@@ -15,7 +15,7 @@ from ringbalance.scene.models import Scene
 from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification.case import NEEDS_REFERENCE, CaseDefinition, Mutation, Quantity
 from ringbalance.verification.catalogue import case_code, load_case, load_cases
-from ringbalance.verification.eccentric_mass.curves import driven_scene
+from ringbalance.verification.eccentric_mass.scenes import driven_scene
 from ringbalance.verification.evidence import CaseCode, Evidence, Level, NotRunError, Reference
 from ringbalance.verification.result import CaseResult, MutationResult, QuantityResult
 from ringbalance.verification.verdicts import Verdict, combine, judge_quantity

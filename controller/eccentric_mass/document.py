@@ -18,7 +18,6 @@ def eccentric_document(run: EccentricRun, *, rows: int = MOST_ROWS) -> dict[str,
 
     Lists run along `time_s`: instants at equal distances, with the beginning and the end of each stage and
     the largest vibration among them.
-    Args: `rows`: instants at most, about.
     Returns: Document that `json.dumps(..., allow_nan=False)` accepts.
     """
     kept = thinned(run, rows=rows)
@@ -57,7 +56,6 @@ def eccentric_document(run: EccentricRun, *, rows: int = MOST_ROWS) -> dict[str,
 def thinned(run: EccentricRun, *, rows: int = MOST_ROWS) -> IntArray:
     """Which samples of a run to show.
 
-    Args: `rows`: about how many, at least two.
     Returns: Their numbers, ascending: equally spaced, with the stages' edges and the largest vibration.
     """
     last = run.time.size - 1

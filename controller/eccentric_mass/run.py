@@ -7,10 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.divergence import meaningful, rows
 from ringbalance.controller.eccentric_mass.estimation.imbalance_model import euler_step_limit
 from ringbalance.controller.eccentric_mass.plant.friction import STUCK
-from ringbalance.controller.eccentric_mass.plant.open_loop import Progress, run_plant
+from ringbalance.controller.eccentric_mass.plant.open_loop import Progress, run_plant, stretches
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
 from ringbalance.controller.eccentric_mass.plant.plant import rest_state, stuck_flags
 from ringbalance.controller.eccentric_mass.plant.speed import profile_arrays
@@ -28,26 +27,27 @@ from ringbalance.controller.eccentric_mass.run_loop import (
 from ringbalance.controller.eccentric_mass.run_record import EccentricEstimates, EccentricRun, StageSpan
 from ringbalance.controller.eccentric_mass.run_status import RunFacts, outcome_of, status_text, warnings_of
 from ringbalance.controller.eccentric_mass.strategy.attainable import expected_deviation
-from ringbalance.controller.eccentric_mass.strategy.plan import RELEASED, Cause, Findings, Stage
+from ringbalance.controller.eccentric_mass.strategy.plan import (
+    RELEASED,
+    STAGE_NAMES,
+    Cause,
+    Findings,
+    Stage,
+)
 from ringbalance.controller.eccentric_mass.strategy.records import StrategySettings
 from ringbalance.controller.eccentric_mass.strategy.settings import believed_whirl, strategy_settings
 from ringbalance.controller.eccentric_mass.strategy.step import strategy_start
 from ringbalance.controller.eccentric_mass.strategy.targets import Targets, target_angles
-from ringbalance.controller.eccentric_mass.stretches import stretches
 from ringbalance.controller.judgement import settling_time
-from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.eccentric_models import EccentricScene
 
-STAGE_NAMES = {
-    Stage.WAITING: "waiting",
-    Stage.IMBALANCE: "imbalance estimation",
-    Stage.FRICTION: "friction estimation",
-    Stage.POSITIONING: "positioning",
-    Stage.CHECK: "check",
-    Stage.FINE_TUNING: "fine tuning",
-    Stage.REST: "rest",
-    Stage.FAILED: "failed",
-}
+_LARGEST_WHIRL = 1e3
+"""Of the masses' own track.  The plant is linear in the displacement, which no bearing is far below this."""
+_LARGEST_TURN = 1e3
+"""Of a mass within one sample, rad: more than a hundred turns, which no sampled loop controls."""
+_LARGEST = 1e100
+"""Of any number, whatever its unit, so that squares and products of what is kept are finite."""
 
 
 def simulate_eccentric(
@@ -60,9 +60,9 @@ def simulate_eccentric(
     """Run a scene from a rotor at its centre and masses at rest, to its time limit.
 
     Args: `seed`: of numpy's default generator for the sensors' noise; default the scene's. `progress`: called
-        several times a second; None for silence. `settings`: of the strategy; default those of the scene.
+    several times a second; None for silence. `settings`: of the strategy; default those of the scene.
     Returns: EccentricRun; its status says how the run ended and what to do next. A run that diverges ends at
-        the last sample that means anything.
+    the last sample that means anything.
     Raises: SceneError: a run that takes too many samples or steps.
     Source: Fig. 3 of the paper on eccentric masses.
     """
@@ -137,7 +137,7 @@ def _locked(scene: EccentricScene, record: Record, progress: Progress) -> Record
     states = run_plant(scene, locked=True, progress=progress).state
     record.state[:], record.goal[:] = states, states[:, 4:6]
     record.cause[:], record.hold[:] = int(Cause.LOCKED), RELEASED
-    return meaningful(record, scene)
+    return _meaningful(record, scene)
 
 
 def _driven(
@@ -165,7 +165,7 @@ def _driven(
             end,
         )
         progress(end * settings.step, scene.run.time_limit)
-        kept = meaningful(rows(record, end), scene, since=begin)
+        kept = _meaningful(_cut(record, slice(end)), scene, since=begin)
         if len(kept.state) < end:
             record = kept
             break
@@ -229,7 +229,7 @@ def _separations(angles: FloatArray) -> FloatArray:
 def _stages(stage: IntArray, time: FloatArray) -> tuple[StageSpan, ...]:
     edges = [0, *(np.flatnonzero(np.diff(stage)) + 1), len(stage) - 1]
     return tuple(
-        StageSpan(name=STAGE_NAMES[Stage(int(stage[a]))], start=float(time[a]), end=float(time[b]))
+        StageSpan(name=STAGE_NAMES[stage[a]], start=float(time[a]), end=float(time[b]))
         for a, b in itertools.pairwise(edges)
     )
 
@@ -247,3 +247,29 @@ def _unbalanced(scene: EccentricScene, speed: float) -> float:
     if speed == 0:
         return 0.0
     return abs(steady_whirl(plant_parameters(scene), speed, scene.masses.initial_angle))
+
+
+def _meaningful(record: Record, scene: EccentricScene, *, since: int = 0) -> Record:
+    """The rows before the first that has diverged.
+
+    Returns: The record when nothing in it has diverged; else a shorter one, of at least one row: at the start
+    everything rests.
+    """
+    bad = np.flatnonzero(_diverged(_cut(record, slice(since, None)), scene))
+    return _cut(record, slice(max(since + int(bad[0]), 1))) if bad.size else record
+
+
+def _cut(record: Record, part: slice) -> Record:
+    return Record._make(values[part] for values in record)
+
+
+def _diverged(record: Record, scene: EccentricScene) -> BoolArray:
+    state = record.state
+    whirl = np.max(np.abs(state[:, :2]), axis=1)
+    turn = np.max(np.abs(state[:, 6:8]), axis=1) * scene.sensor.step
+    # A comparison with NaN is false.
+    usual = (whirl <= _LARGEST_WHIRL * scene.masses.guide_radius) & (turn <= _LARGEST_TURN)
+    for values in record:
+        if values.dtype == np.float64:
+            usual &= np.all(np.abs(values.reshape(len(values), -1)) <= _LARGEST, axis=1)
+    return np.asarray(~usual)

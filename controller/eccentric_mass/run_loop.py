@@ -28,13 +28,9 @@ class SensorNoise(NamedTuple):
     """Standard deviations of the sensors."""
 
     position: float
-    """m."""
     velocity: float
-    """m/s."""
     angle: float
-    """rad."""
     rate: float
-    """rad/s."""
 
 
 class Profile(NamedTuple):
@@ -74,11 +70,7 @@ class Record(NamedTuple):
 
 
 def empty_record(samples: int) -> Record:
-    """Room for a run.
-
-    Args: `samples`: n.
-    Returns: Record of zeros.
-    """
+    """Room for a run. Returns: Record of zeros."""
     whole = [np.zeros(samples, dtype=np.int64) for _ in range(3)]
     return Record(
         np.zeros((samples, 8)),
@@ -106,9 +98,7 @@ def measure(
 ) -> EccentricMeasurement:
     """What the sensors show.
 
-    Args: `state`: of the plant, shape (8,). `profile`: of the rotor's speed, which is known exactly. `time`:
-        s. `laboratory`: whether the vibration is measured in the fixed frame. `noise`: standard deviations.
-        `numbers`: standard normal, shape (8,).
+    Args: `laboratory`: whether the vibration is measured in the fixed frame.
     Returns: The sample.
     """
     speed, speed_rate = speed_at(profile.times, profile.speeds, time)
@@ -147,15 +137,6 @@ def run_stretch(
 ) -> tuple[StrategyState, FloatArray, IntArray]:
     """Run samples `first` to `after - 1`, each followed by a step of the plant, into the record.
 
-    Args:
-        profile: of the rotor's speed.
-        noise: standard deviations of the sensors.
-        numbers: standard normal, for the whole run, shape (n, 8).
-        state: of the plant at sample `first`, shape (8,).
-        stuck: flags of the masses, shape (2,).
-        record: of the whole run, filled in.
-        first: number of the first sample.
-        after: number after the last one.
     Returns: Memory of the strategy, state and flags of the plant at sample `after`.
     """
     energy = 0.0 if first == 0 else record.energy[first - 1]

@@ -1,81 +1,207 @@
-"""Poles of the drives' loops as they run: a voltage held over a step, on one mass with its drive.
+"""Poles of the drives' loops as they run: a voltage held over a step, on the masses with their drives.
 
-Friction, the rotor's motion and the voltage limit are left out.  A loop is stable when all of its poles are
-within the unit circle.
+Friction, the voltage limit and the rotor's whirl are left out; the rotor gives way, which lowers a mass's
+inertia by b^2/M, and the drive law makes up for it.  A loop is stable when its poles lie within the unit
+circle.
 """
 
 from __future__ import annotations
 
+import cmath
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.linalg import expm
 
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
 from ringbalance.controller.eccentric_mass.strategy.lqr import lqr_gain
 from ringbalance.controller.eccentric_mass.strategy.settings import track_model
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import ComplexArray
 from ringbalance.scene.eccentric_models import EccentricScene
 
 GAIN_MARGIN: Final = 2.0
-"""Factor by which the gains that are recommended could be higher before a pole leaves the unit circle."""
+"""Factor by which the recommended gains could be higher before a pole leaves the unit circle."""
+TORQUE_MARGIN: Final = 1.5
+"""Of the speed control at standstill over the friction of the scene, at the recommended drive speed."""
+_SMALL: Final = 1e-4
 _HALVINGS: Final = 60
 _DECADES: Final = 30.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class SampledLoop:
-    """One loop of a drive."""
+    """One loop of the drives."""
 
-    radius: float
-    """Largest magnitude of its poles."""
+    name: str
+    key: str
+    """Of the scene, which sets its gain."""
+    value: float
+    """Of that key, in SI."""
+    unit: str
+    """Of that key; empty for the weight q, which has none."""
+    poles: ComplexArray
+    """Per step, shape (1,) or (2,)."""
     recommended: float
-    """The largest value of the loop's key with a gain margin of two: V s/rad, or q."""
+    """Largest value of the key that leaves a gain margin of two."""
+    recommended_step: float
+    """Longest hold of the voltage that leaves this margin with the scene's own gains, s; at most the
+    scene's.
+    """
+
+    @property
+    def radius(self) -> float:
+        """Largest magnitude of the poles."""
+        return float(np.max(np.abs(self.poles)))
 
     @property
     def stable(self) -> bool:
-        """Whether it is stable."""
+        """Whether all poles lie within the unit circle."""
         return self.radius < 1
 
 
-def speed_loop(scene: EccentricScene) -> SampledLoop:
-    """The speed control of the friction stage, `friction_filter.speed_gain`.
+@dataclass(frozen=True, kw_only=True)
+class RecommendedGains:
+    """Sampled poles of a scene's loops, and values of its keys that make them stable and strong enough."""
 
-    Returns: SampledLoop, with one pole a - gamma b.
+    regulator: SampledLoop
+    """Of all stages but the friction stage: `lqr.state_weight`."""
+    speed: SampledLoop
+    """Of the friction stage: `friction_filter.speed_gain`."""
+    pair: SampledLoop
+    """Of the angle between the masses in the friction stage: `friction_filter.pair_gain`."""
+    step: float
+    """Longest hold of the voltage that leaves every loop its margin with the scene's gains, s."""
+    drive_speed: float
+    """At least the scene's, rad/s: with the lower of both speed gains it overcomes friction with a margin."""
+
+    @property
+    def loops(self) -> tuple[SampledLoop, SampledLoop, SampledLoop]:
+        """Regulator, speed and pair."""
+        return self.regulator, self.speed, self.pair
+
+
+def recommended_gains(scene: EccentricScene) -> RecommendedGains:
+    """Judge the loops of a scene before it is run."""
+    regulator, speed, pair = _regulator(scene), _speed(scene), _pair(scene)
+    return RecommendedGains(
+        regulator=regulator,
+        speed=speed,
+        pair=pair,
+        step=min(loop.recommended_step for loop in (regulator, speed, pair)),
+        drive_speed=_drive_speed(scene, min(speed.value, speed.recommended)),
+    )
+
+
+def _regulator(scene: EccentricScene) -> SampledLoop:
+    weight, inputs = scene.lqr.state_weight, scene.lqr.input_weight
+
+    def poles(state_weight: float, step: float, margin: float) -> ComplexArray:
+        position, rate = lqr_gain(track_model(scene), state_weight=state_weight, input_weight=inputs)
+        return _poles(scene, step, margin * position, margin * rate)
+
+    return SampledLoop(
+        name="regulator",
+        key="lqr.state_weight",
+        value=weight,
+        unit="",
+        poles=poles(weight, scene.lqr.step, 1.0),
+        recommended=_largest(lambda q: _inside(poles(q, scene.lqr.step, GAIN_MARGIN))),
+        recommended_step=_step(scene, lambda step: _inside(poles(weight, step, GAIN_MARGIN))),
+    )
+
+
+def _speed(scene: EccentricScene) -> SampledLoop:
+    """One pole, that of the rate."""
+    gain, per_volt = scene.friction_filter.speed_gain, plant_parameters(scene).drive_gain
+
+    def poles(value: float, step: float) -> ComplexArray:
+        return _poles(scene, step, 0.0, per_volt * value, eased=True)
+
+    return SampledLoop(
+        name="speed control",
+        key="friction_filter.speed_gain",
+        value=gain,
+        unit="V*s/rad",
+        poles=poles(gain, scene.lqr.step),
+        recommended=_largest(lambda value: _inside(poles(GAIN_MARGIN * value, scene.lqr.step))),
+        recommended_step=_step(scene, lambda step: _inside(poles(GAIN_MARGIN * gain, step))),
+    )
+
+
+def _pair(scene: EccentricScene) -> SampledLoop:
+    """Each drive gets the pair's error, so that the angle between the masses gets it twice.
+
+    Recommended beside the lower of both speed gains.
     """
-    move, push = _sampled(scene)
-    pole, per_gain = float(move[1, 1]), float(push[1, 0]) * plant_parameters(scene).drive_gain
-    radius = abs(pole - per_gain * scene.friction_filter.speed_gain)
-    return SampledLoop(radius=radius, recommended=(1 + pole) / per_gain / GAIN_MARGIN)
+    told, per_volt = scene.friction_filter, plant_parameters(scene).drive_gain
+
+    def poles(pair: float, speed: float, step: float) -> ComplexArray:
+        return _poles(scene, step, 2 * per_volt * pair, per_volt * speed, eased=True)
+
+    slower = min(told.speed_gain, _speed(scene).recommended)
+    return SampledLoop(
+        name="pair control",
+        key="friction_filter.pair_gain",
+        value=told.pair_gain,
+        unit="V/rad",
+        poles=poles(told.pair_gain, told.speed_gain, scene.lqr.step),
+        recommended=_largest(lambda pair: _inside(poles(GAIN_MARGIN * pair, slower, scene.lqr.step))),
+        recommended_step=_step(
+            scene,
+            lambda step: _inside(poles(GAIN_MARGIN * told.pair_gain, GAIN_MARGIN * told.speed_gain, step)),
+        ),
+    )
 
 
-def regulator_loop(scene: EccentricScene) -> SampledLoop:
-    """The regulator of all other stages, `lqr.state_weight`."""
+def _drive_speed(scene: EccentricScene, gain: float) -> float:
+    """Where B_add gamma w is the friction's torque, with a margin."""
+    plant = plant_parameters(scene)
+    speed = scene.rotor.speed_profile[0].speed
+    friction = max(plant.friction_arm_1, plant.friction_arm_2) * plant.moment * speed**2
+    return max(scene.friction_filter.drive_speed, TORQUE_MARGIN * friction / (plant.drive_gain * gain))
+
+
+def _poles(
+    scene: EccentricScene, step: float, position: float, rate: float, *, eased: bool = False
+) -> ComplexArray:
+    """Largest first, of the angle between opposite masses, whose rotor gives way most: J (1 - 2 b^2/(M J)).
+
+    `eased`: whether the drive law makes up for the rotor, which it does not while the imbalance is unknown.
+    """
+    track, mass = track_model(scene), plant_parameters(scene).mass
+    given_way = 2 * track.moment**2 / (mass * track.inertia)
+    if eased:
+        position, rate = (1 - given_way) * position, (1 - given_way) * rate - given_way * track.damping
+    decay = track.damping / (track.inertia * (1 - given_way)) * step
+    kept = math.exp(-decay)
+    # Mean of the rate, and of its integral, that a step of one unit of torque leaves.
+    first = -math.expm1(-decay) / decay if decay > 0 else 1.0
+    second = (1 - first) / decay if decay > _SMALL else 0.5 - decay / 6
+    per_torque = step / (track.inertia * (1 - given_way))
+    if position == 0:
+        return np.array([kept - per_torque * first * rate], dtype=np.complex128)
+    trace = 1 - per_torque * step * second * position + kept - per_torque * first * rate
+    product = (1 - per_torque * step * second * position) * (kept - per_torque * first * rate)
+    product += per_torque * first * position * step * (first - per_torque * second * rate)
+    root = cmath.sqrt(0.25 * trace**2 - product)
+    far = 0.5 * trace + (root if trace * root.real >= 0 else -root)
+    return np.array([far, product / far if far != 0 else 0.0j], dtype=np.complex128)
+
+
+def _inside(poles: ComplexArray) -> bool:
+    return bool(np.max(np.abs(poles)) < 1)
+
+
+def _step(scene: EccentricScene, stable: Callable[[float], bool]) -> float:
+    return scene.lqr.step if stable(scene.lqr.step) else min(_largest(stable), scene.lqr.step)
+
+
+def _largest(stable: Callable[[float], bool]) -> float:
+    """Largest value that is stable, in case all smaller ones are as well."""
     low, high = -_DECADES, _DECADES
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        if _radius(scene, 10.0**middle, GAIN_MARGIN) < 1:
-            low = middle
-        else:
-            high = middle
-    return SampledLoop(radius=_radius(scene, scene.lqr.state_weight, 1.0), recommended=10.0**low)
-
-
-def _radius(scene: EccentricScene, state_weight: float, factor: float) -> float:
-    gain = lqr_gain(
-        track=track_model(scene), state_weight=state_weight, input_weight=scene.lqr.input_weight
-    ).gain
-    move, push = _sampled(scene)
-    feedback = factor * np.array([[gain[0, 0], gain[0, 2]]])
-    return float(np.max(np.abs(np.linalg.eigvals(move - push @ feedback))))
-
-
-def _sampled(scene: EccentricScene) -> tuple[FloatArray, FloatArray]:
-    """F, shape (2, 2), and G, shape (2, 1), of angle and rate over a step with a held torque."""
-    track = track_model(scene)
-    whole = np.array(
-        [[0.0, 1.0, 0.0], [0.0, -track.damping / track.inertia, 1 / track.inertia], [0.0, 0.0, 0.0]]
-    )
-    power = expm(whole * scene.lqr.step)
-    return power[:2, :2], power[:2, 2:]
+        low, high = (middle, high) if stable(10.0**middle) else (low, middle)
+    return float(10.0**low)

@@ -16,7 +16,7 @@ from ringbalance.controller.show import SPARK_WIDTH, sparkline
 
 
 def show_eccentric(run: EccentricRun, *, console: Console) -> None:
-    """Print a run: summary, amplitude over time, stages. Args: `console`: where to."""
+    """Print a run: summary, amplitude over time, stages."""
     console.print(Group(*_parts(run)))
 
 

@@ -36,8 +36,6 @@ def motion_bound(
     M Z'' + C_B Z' + K_B Z = F with |F| <= Y = U W^2 + 2 b (W + w)^2 + 2 b w', so |Z| <= Y int |h| dt, where
     the impulse response h of an underdamped rotor has int |h| dt = coth(pi zeta/(2 sqrt(1 - zeta^2)))/K_B,
     and |Z'| <= Y int |h'| dt, the sum of |h| at its extremes.
-    Args: `parameters`: of the plant, with damping. `speed`: W, constant, rad/s. `rate`: largest |phi'| of the
-        masses, rad/s. `acceleration`: largest |phi''|, rad/s^2.
     Raises: ValueError: no damping, which bounds nothing, or so much that the rotor does not swing.
     Source: Appendix B of the paper on eccentric masses, corrected.
     """

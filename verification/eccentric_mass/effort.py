@@ -13,9 +13,6 @@ import numpy as np
 
 from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.controller.eccentric_mass.strategy.lqr_law import (
-    BREAK_AWAY,
-    NO_COMPENSATION,
-    PRINTED,
     DriveLaw,
     friction_torque,
     regulator_torque,
@@ -58,7 +55,6 @@ class FigureSix:
     def growth(self, effort: FloatArray) -> FloatArray:
         """Effort at the highest over that at the lowest speed.
 
-        Args: `effort`: one of the arrays of this record.
         Returns: Shape (mass ratios, weight ratios).
         """
         return np.asarray(effort[..., -1] / effort[..., 0], dtype=np.float64)
@@ -74,12 +70,10 @@ def positioning_effort(
     second: float,
     step: float,
     duration: float,
+    printed: bool,
 ) -> float:
     """Integral of the norm of the regulator's torques over a move, the whirl's loads compensated.
 
-    Args: `law`: of the voltages. `arm`: true friction arm, m. `believed_arm`: the one that is compensated, m.
-        `speed`: W, rad/s. `first`: travel of the first mass, rad. `second`: travel of the second mass, rad.
-        `step`: of the integration, s.
     Returns: J, N m s.
     Source: Eqs. 40 and 55 of the paper on eccentric masses.
     """
@@ -88,12 +82,25 @@ def positioning_effort(
     for _ in range(round(duration / step)):
         for i in range(2):
             asked[i] = regulator_torque(law, angle[i], rate[i], 0.0)
-            extra = friction_torque(law, believed_arm, speed, angle[i], rate[i], -angle[i])
+            if printed:
+                extra = printed_compensation(law, believed_arm, speed, angle[i], rate[i])
+            else:
+                extra = friction_torque(law, believed_arm, speed, rate[i], -angle[i])
             net = asked[i] + extra - law.track.damping * rate[i]
             rate[i] = _later_rate(law, arm, speed, rate[i], net, step)
             angle[i] += step * rate[i]
         total += step * math.hypot(asked[0], asked[1])
     return total
+
+
+@compiled
+def printed_compensation(law: DriveLaw, arm: float, speed: float, angle: float, rate: float) -> float:
+    """Friction's torque by the paper, N m: the angle stands for the rate, and a resting mass gets none.
+
+    Source: part (b) of Eq. 39 of the paper on eccentric masses.
+    """
+    sense = 0.0 if rate == 0 else math.copysign(1.0, rate)
+    return sense * max(arm, 0.0) * law.track.moment * (speed + angle) ** 2
 
 
 @compiled
@@ -111,12 +118,10 @@ def _later_rate(law: DriveLaw, arm: float, speed: float, rate: float, net: float
 def figure_six(scene: EccentricScene, *, step: float = STEP) -> FigureSix:
     """Effort over weights and speed for both mass ratios and four compensations.
 
-    Args: `scene`: the scene; its rotor's mass is kept. `step`: of the integration, s.
     Source: Fig. 6 of the paper on eccentric masses.
     """
     share = {"exact": 1.0, "without": 0.0, "printed": 1.0, "short": 0.8}
-    kind = {"exact": BREAK_AWAY, "without": NO_COMPENSATION, "printed": PRINTED, "short": BREAK_AWAY}
-    found = {name: _efforts(scene, kind[name], part, step) for name, part in share.items()}
+    found = {name: _efforts(scene, name == "printed", part, step) for name, part in share.items()}
     return FigureSix(
         mass_ratios=np.array(MASS_RATIOS),
         weight_ratios=np.array(WEIGHT_RATIOS),
@@ -125,24 +130,24 @@ def figure_six(scene: EccentricScene, *, step: float = STEP) -> FigureSix:
     )
 
 
-def _efforts(scene: EccentricScene, kind: int, share: float, step: float) -> FloatArray:
+def _efforts(scene: EccentricScene, printed: bool, share: float, step: float) -> FloatArray:
     return np.array(
         [
-            [_over_speed(scene, mass, weight, kind, share, step) for weight in WEIGHT_RATIOS]
+            [_over_speed(scene, mass, weight, printed, share, step) for weight in WEIGHT_RATIOS]
             for mass in MASS_RATIOS
         ]
     )
 
 
 def _over_speed(
-    scene: EccentricScene, mass_ratio: float, weight_ratio: float, kind: int, share: float, step: float
+    scene: EccentricScene, mass_ratio: float, weight_ratio: float, printed: bool, share: float, step: float
 ) -> list[float]:
     heavier = changed(scene, "masses", mass=mass_ratio * scene.rotor.mass)
     weighted = changed(heavier, "lqr", state_weight=weight_ratio * scene.lqr.input_weight)
-    law = drive_law(weighted)._replace(compensation=kind, slow=0.0, near=0.0)
+    law = drive_law(weighted)._replace(breaks_away=True, slow=0.0, near=0.0)
     natural = math.sqrt(scene.rotor.stiffness / (scene.rotor.mass * (1 + 2 * mass_ratio)))
     arm = scene.masses.friction_arm[0]
     return [
-        positioning_effort(law, arm, share * arm, ratio * natural, *TRAVEL, step, DURATION)
+        positioning_effort(law, arm, share * arm, ratio * natural, *TRAVEL, step, DURATION, printed)
         for ratio in SPEED_RATIOS
     ]

@@ -42,7 +42,6 @@ class ImbalanceRecord:
     imbalance: complex
     """True, kg m."""
     speed: float
-    """rad/s."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,8 +69,7 @@ class FigureFour:
 def imbalance_record(scene: EccentricScene, *, duration: float, seed: int | None = None) -> ImbalanceRecord:
     """Measure a rotor that starts at its centre, the masses locked at their first angles.
 
-    Args: `scene`: the scene; its first speed is kept. `duration`: s. `seed`: of the noise; default the
-        scene's.
+    Args: `seed`: of the noise; default the scene's.
     Returns: ImbalanceRecord, one sample for each step of the sensor, without the instant of the start.
     """
     level = at_constant_speed(scene, time_limit=duration)
@@ -89,10 +87,7 @@ def imbalance_record(scene: EccentricScene, *, duration: float, seed: int | None
 
 
 def scene_matrices(scene: EccentricScene, *, angular_velocity: float) -> FilterMatrices:
-    """Matrices of the scene's imbalance filter for samples in the rotor's frame.
-
-    Args: `angular_velocity`: W, rad/s.
-    """
+    """Matrices of the scene's imbalance filter for samples in the rotor's frame."""
     told = scene.imbalance_filter
     noise = ProcessNoise(told.velocity_walk**2, told.unbalance_walk**2)
     euler = told.discretisation == "euler"
@@ -104,7 +99,6 @@ def estimate_imbalance(
 ) -> tuple[FloatArray, FloatArray]:
     """Run the scene's imbalance filter over a record.
 
-    Args: `record`: measured. `scale`: assumed over true sensor noise, above zero.
     Returns: States, shape (n, 6), and covariances, shape (n, 6, 6).
     """
     told = scene.imbalance_filter
@@ -124,7 +118,6 @@ def estimate_imbalance(
 def convergence_time(time: FloatArray, error: FloatArray, *, limit: float) -> float:
     """Instant from which on an error stays within a limit.
 
-    Args: `time`: s, shape (n,), ascending. `error`: shape (n,), at least zero. `limit`: of the same unit.
     Returns: s; infinite when the last error is beyond the limit.
     """
     beyond = np.flatnonzero(error > limit)
@@ -145,7 +138,6 @@ def figure_four(
 ) -> FigureFour:
     """Estimate the four imbalances of Fig. 4, and one of them under covariances ever less honest.
 
-    Args: `duration`: of each estimation, s. `scales`: assumed over true sensor noise.
     Source: Fig. 4 of the paper on eccentric masses.
     """
     turned = [changed(scene, "imbalance", phase=math.radians(phase)) for phase in PAPER_PHASES]

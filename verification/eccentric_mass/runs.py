@@ -74,11 +74,7 @@ class FigureNine:
 
 
 def figure_five(scene: EccentricScene, *, time_limit: float = 12.0) -> FigureFive:
-    """Find the friction arms of Fig. 5.
-
-    Args: `time_limit`: of each run, s.
-    Source: Fig. 5 of the paper on eccentric masses.
-    """
+    """Find the friction arms of Fig. 5. Source: Fig. 5 of the paper on eccentric masses."""
     level = at_constant_speed(scene, time_limit=time_limit)
     runs = tuple(simulate_eccentric(changed(level, "masses", friction_arm=(a, a))) for a in PAPER_ARMS)
     pairs = list(zip(runs, PAPER_ARMS, strict=True))
@@ -104,7 +100,6 @@ def _friction_time(run: EccentricRun, arm: float) -> float:
 def figure_seven(scene: EccentricScene, *, time_limit: float = 30.0) -> BalancingFigure:
     """Balance the two imbalances of Fig. 7 at constant speed.
 
-    Args: `time_limit`: of each run, s.
     Source: Fig. 7 of the paper on eccentric masses.
     """
     return _balanced(at_constant_speed(scene, time_limit=time_limit))
@@ -113,7 +108,6 @@ def figure_seven(scene: EccentricScene, *, time_limit: float = 30.0) -> Balancin
 def figure_eight(scene: EccentricScene, *, time_limit: float = 400.0) -> BalancingFigure:
     """The same with masses that stop 10 degrees beside their targets, and fine tuning.
 
-    Args: `time_limit`: of each run, s.
     Source: Fig. 8 of the paper on eccentric masses.
     """
     level = at_constant_speed(scene, time_limit=time_limit)
@@ -144,7 +138,6 @@ def _in_check(run: EccentricRun) -> float:
 def figure_nine(scene: EccentricScene) -> FigureNine:
     """Run up through the critical speed, balanced at low speed and not at all.
 
-    Args: `scene`: the scene, with its speed profile.
     Source: Fig. 9 of the paper on eccentric masses, whose critical speed leaves the eccentric masses out.
     """
     parameters = plant_parameters(scene)
@@ -163,11 +156,7 @@ def figure_nine(scene: EccentricScene) -> FigureNine:
 
 
 def run_up_peak(run: EccentricRun, *, after: float) -> tuple[float, float]:
-    """Largest amplitude from a time on, and the speed at which it falls.
-
-    Args: `after`: s.
-    Returns: m and rad/s.
-    """
+    """Largest amplitude from a time on, and the speed at which it falls. Returns: m and rad/s."""
     first = int(np.searchsorted(run.time, after))
     at = first + int(np.argmax(run.amplitude[first:]))
     return float(run.amplitude[at]), float(run.speed[at])

@@ -1,31 +1,66 @@
-"""Scenes that differ from a given one in what a figure of the paper varies."""
+"""The scene of the cases on the eccentric-mass paper, variants of it, and curves thin enough to draw."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
+from functools import lru_cache
+from typing import Any, Final
 
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.scene import bundled_scene, load_scene
+from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.eccentric_models import EccentricScene, SpeedPoint
 
-RPM = 2 * math.pi / 60
+RPM: Final = 2 * math.pi / 60
+DRIVEN_SCENE: Final = "eccentric_mass_paper"
+_DRAWN: Final = 240
+"""Points of a curve."""
+
+
+@lru_cache(maxsize=1)
+def driven_scene() -> EccentricScene:
+    """The eccentric-mass paper's own rotor.
+
+    Returns: The bundled scene.
+    Raises: TypeError: the bundled scene is of another balancer.
+    """
+    scene = load_scene(bundled_scene(DRIVEN_SCENE))
+    if not isinstance(scene, EccentricScene):
+        raise TypeError(f"{DRIVEN_SCENE} is no scene of eccentric masses")
+    return scene
+
+
+def thinned(values: npt.ArrayLike, *, count: int = _DRAWN) -> FloatArray:
+    """Evenly chosen values along the last axis, the first and last among them.
+
+    Returns: Values, shape (..., at most count).
+    """
+    array = np.asarray(values, dtype=np.float64)
+    return np.asarray(array[..., _places(array.shape[-1], count)], dtype=np.float64)
+
+
+def envelope(values: npt.ArrayLike, *, count: int = _DRAWN) -> FloatArray:
+    """Largest value in each of so many stretches, so that a thinned curve keeps its peaks."""
+    array = np.asarray(values, dtype=np.float64)
+    return np.asarray(np.maximum.reduceat(array, _places(array.size, count)), dtype=np.float64)
+
+
+def _places(size: int, count: int) -> IntArray:
+    return np.unique(np.linspace(0, size - 1, count).round().astype(np.int64))
 
 
 def changed(scene: EccentricScene, table: str, **values: Any) -> EccentricScene:
-    """The scene with some values of one table replaced.
-
-    Args: `table`: name of the table, such as "lqr". `**values`: by key, SI.
-    """
+    """The scene with some values of one table replaced."""
     return replace(scene, **{table: replace(getattr(scene, table), **values)})
 
 
 def at_constant_speed(
     scene: EccentricScene, *, time_limit: float, speed: float | None = None
 ) -> EccentricScene:
-    """The scene at one speed.
-
-    Args: `time_limit`: of the run, s. `speed`: rad/s; default the first of the scene's profile.
-    """
+    """The scene at one speed. Args: `speed`: rad/s; default the first of the scene's profile."""
     kept = scene.rotor.speed_profile[0].speed if speed is None else speed
     level = changed(scene, "rotor", speed_profile=(SpeedPoint(time=0.0, speed=kept),))
     return changed(level, "run", time_limit=time_limit)

@@ -13,10 +13,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from ringbalance.controller.compilation.compiled import compiled
-from ringbalance.scene.arrays import FloatArray
 
 
 class TrackModel(NamedTuple):
@@ -49,11 +46,9 @@ class FrictionEstimate(NamedTuple):
     arm: float
     """Friction arm mu, m."""
     rate_variance: float
-    """rad^2/s^2."""
     covariance: float
     """Of rate and arm, rad m/s."""
     arm_variance: float
-    """m^2."""
 
 
 class FrictionFlow(NamedTuple):
@@ -73,11 +68,8 @@ def friction_flow(
 ) -> FrictionFlow:
     """Carry a moving mass one step on, by the exponential Rosenbrock-Euler rule, which bears any step.
 
-    Args: `model`: inertia, damping and moment of the mass. `rate`: w, rad/s, not zero. `arm`: mu, m. `speed`:
-        W, rad/s. `torque`: tau, N m, held over the step. `step`: dt, s. `euler`: one explicit Euler step in
-        its place, as the paper has it.
     Returns: The flow and its derivatives; the printed Jacobian carries the arm once too often in d/d mu, and
-        leaves the drive's inertia and back-EMF out.
+    leaves the drive's inertia and back-EMF out.
     Source: Eqs. 31 to 36 of the paper on eccentric masses, rederived.
     """
     direction = math.copysign(1.0, rate)
@@ -104,9 +96,6 @@ def friction_step(
 ) -> FrictionEstimate:
     """Predict by the flow, its covariance by the flow's derivatives, and take in the encoder's rate.
 
-    Args: `estimate`: at the last sample. `model`: inertia, damping and moment of the mass. `noise`: of
-        encoder and motion. `measured_rate`: w, rad/s. `speed`: W, rad/s. `torque`: tau over the step, N m.
-        `step`: dt, s. `euler`: the flow by one explicit Euler step.
     Returns: The estimate after the sample.
     Source: Eqs. 32 to 38 of the paper on eccentric masses, with the flow as transition and Joseph's update.
     """
@@ -141,22 +130,5 @@ def friction_restart(
     """Take the rate from the encoder alone, and keep what is known of the arm.
 
     For a mass that sticks or turns round, where the flow does not hold.
-    Args: `estimate`: at the last sample. `noise`: of encoder and motion. `measured_rate`: w, rad/s.
     """
     return FrictionEstimate(measured_rate, estimate.arm, noise.rate_variance, 0.0, estimate.arm_variance)
-
-
-@compiled
-def friction_covariance(first: FrictionEstimate, second: FrictionEstimate) -> FloatArray:
-    """Covariance of both masses in the paper's order of states.
-
-    Args: `first`: of the first mass. `second`: of the second mass.
-    Returns: Of (w_1, w_2, mu_1, mu_2), shape (4, 4).
-    Source: Eq. 35 of the paper on eccentric masses.
-    """
-    found = np.zeros((4, 4))
-    found[0, 0], found[1, 1] = first.rate_variance, second.rate_variance
-    found[0, 2] = found[2, 0] = first.covariance
-    found[1, 3] = found[3, 1] = second.covariance
-    found[2, 2], found[3, 3] = first.arm_variance, second.arm_variance
-    return found

@@ -38,8 +38,6 @@ def predict(
 ) -> ImbalanceEstimate:
     """Carry the estimate one step on.
 
-    Args: `estimate`: at the last sample. `matrices`: at this speed. `own_imbalance`: b (cos phi_1 + cos
-        phi_2) and b (sin phi_1 + sin phi_2), kg m, shape (2,).
     Returns: The estimate before the next sample.
     Source: Eqs. 14 and 15 of the paper on eccentric masses.
     """
@@ -62,9 +60,6 @@ def correct(
     """Take in one sample, one sensor after the other, in Joseph's form.
 
     P+ = (I - k h) P (I - k h)^T + r k k^T stays symmetric and positive whatever rounding does to the gain.
-    Args: `estimate`: before the sample. `matrices`: at this speed. `sample`: x, y, x', y' in the rotor's
-        axes, shape (4,); what is not finite is passed over. `variance`: r of each, shape (4,); the noises are
-        independent.
     Source: Eqs. 16 to 21 of the paper on eccentric masses; Bucy and Joseph, "Filtering for Stochastic
     Processes with Applications to Guidance" (1968).
     """
@@ -105,10 +100,8 @@ def _joseph(p: FloatArray, total: float, h: FloatArray, cross_covariance: FloatA
 def turned_back(sample: FloatArray, rotor_angle: float) -> FloatArray:
     """A laboratory sensor's sample along the rotor's axes.
 
-    Args: `sample`: X, Y, X', Y' of the fixed frame, shape (4,). `rotor_angle`: of the rotor's first axis,
-        rad.
     Returns: The same vectors along the rotor's axes, shape (4,); the velocity is still the one seen from
-        outside.
+    outside.
     """
     c, s = math.cos(rotor_angle), math.sin(rotor_angle)
     return np.array(
@@ -125,8 +118,6 @@ def turned_back(sample: FloatArray, rotor_angle: float) -> FloatArray:
 def own_imbalance(moment: float, first: float, second: float) -> FloatArray:
     """Imbalance of the two masses themselves, from their encoders.
 
-    Args: `moment`: b = m_b r_b, kg m. `first`: angle of the first mass, rad. `second`: angle of the second
-        mass, rad.
     Returns: Along the rotor's axes, kg m, shape (2,); zero when the masses lie opposite.
     """
     along, across = math.cos(first) + math.cos(second), math.sin(first) + math.sin(second)
@@ -137,7 +128,6 @@ def own_imbalance(moment: float, first: float, second: float) -> FloatArray:
 def with_fresh_whirl(estimate: ImbalanceEstimate, start: ImbalanceEstimate) -> ImbalanceEstimate:
     """Forget the whirl and keep the imbalance, after a time in which the filter's model did not hold.
 
-    Args: `estimate`: before that time. `start`: belief before the first sample.
     Returns: The estimate with the whirl of `start`.
     """
     state, covariance = start.state.copy(), start.covariance.copy()
@@ -152,7 +142,6 @@ def with_fresh_whirl(estimate: ImbalanceEstimate, start: ImbalanceEstimate) -> I
 def imbalance_deviation(covariance: FloatArray) -> float:
     """Largest standard deviation of the imbalance in any direction.
 
-    Args: `covariance`: of the filter, shape (6, 6).
     Returns: Square root of the larger eigenvalue of the imbalance's block, kg m.
     """
     a, b, c = covariance[4, 4], covariance[4, 5], covariance[5, 5]
@@ -161,11 +150,7 @@ def imbalance_deviation(covariance: FloatArray) -> float:
 
 @compiled
 def start_estimate(position: float, velocity: float, imbalance: float) -> ImbalanceEstimate:
-    """Initial estimate, before the first sample: nothing moves and nothing is out of balance.
-
-    Args: `position`: standard deviation of x and y, m. `velocity`: of x' and y', m/s. `imbalance`: of the
-        imbalance along each axis, kg m.
-    """
+    """Initial estimate, before the first sample: nothing moves and nothing is out of balance."""
     covariance = np.zeros((6, 6))
     covariance[0, 0] = covariance[1, 1] = position * position
     covariance[2, 2] = covariance[3, 3] = velocity * velocity
@@ -183,9 +168,7 @@ def imbalance_history(
 ) -> tuple[FloatArray, FloatArray]:
     """Run the filter over a record: predict, then take in the sample, for each.
 
-    Args: `start`: one step before the first sample. `matrices`: at the record's constant speed. `samples`: x,
-        y, x', y' in the rotor's axes, shape (n, 4). `variance`: of each sensor, shape (4,). `mass_imbalance`:
-        of the locked masses, kg m along the rotor's axes.
+    Args: `start`: one step before the first sample.
     Returns: States, shape (n, 6), and covariances, shape (n, 6, 6), after each sample.
     Raises: ValueError: a rotor at rest, which shows no imbalance.
     Source: section 3.1 of the paper on eccentric masses.
@@ -228,9 +211,7 @@ def predicted_deviation(
 
     The covariance does not depend on the samples.  The steady whirl is W^2/|K_B - M W^2 + j C_B W| per
     imbalance, so that at low speed the deviation grows as 1/W^2.
-    Args: `start`: belief before the first sample. `model`: mass, damping and stiffness. `noise`: power per
-        unit time. `variance`: of each sensor, shape (4,). `angular_velocity`: W, rad/s, not zero. `step`: dt,
-        s. `duration`: of the estimation, s. `laboratory`: whether the sensor stands still.
+    Args: `laboratory`: whether the sensor stands still.
     Returns: Standard deviation of the imbalance after each step, kg m, shape (duration/step,).
     Raises: ValueError: a rotor at rest.
     """

@@ -18,11 +18,11 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.controller.compilation.compiled import compiled
-from ringbalance.scene.arrays import ComplexArray, FloatArray
+from ringbalance.scene.arrays import FloatArray
 
-GAUSS_POINTS: FloatArray
-GAUSS_WEIGHTS: FloatArray
-GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
+_GAUSS_POINTS: FloatArray
+_GAUSS_WEIGHTS: FloatArray
+_GAUSS_POINTS, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
 class WhirlModel(NamedTuple):
@@ -58,42 +58,11 @@ class FilterMatrices(NamedTuple):
     """Shape (4, 6): what the sensor would show of a state."""
 
 
-def whirl_generator(*, model: WhirlModel, angular_velocity: float) -> FloatArray:
-    """Matrix A of X' = A X at constant speed with locked masses.
-
-    Args: `model`: mass, damping and stiffness. `angular_velocity`: W, rad/s.
-    Returns: A, shape (6, 6).
-    Source: Eq. 13 of the paper on eccentric masses, with the damping matrix of Eq. 12 written off its
-    diagonal.
-    """
-    mass, damping, stiffness = model
-    w = angular_velocity
-    spring, cross = w * w - stiffness / mass, damping * w / mass
-    found = np.zeros((6, 6))
-    found[0, 2] = found[1, 3] = 1.0
-    found[2] = [spring, cross, -damping / mass, 2 * w, w * w / mass, 0.0]
-    found[3] = [-cross, spring, -2 * w, -damping / mass, 0.0, w * w / mass]
-    return found
-
-
-def dynamic_stiffness(*, model: WhirlModel, angular_velocity: npt.ArrayLike) -> ComplexArray:
-    """Stiffness that a rotor-fixed force meets at constant speed.
-
-    D = K_B - M W^2 + j C_B W; the steady whirl of an imbalance theta is W^2 theta/D.
-    Args: `model`: mass, damping and stiffness. `angular_velocity`: W, rad/s, any shape.
-    Returns: D, N/m, complex, of that shape.
-    """
-    w = np.asarray(angular_velocity, dtype=np.float64)
-    return np.asarray(model.stiffness - model.mass * w**2 + 1j * model.damping * w, dtype=np.complex128)
-
-
 def euler_step_limit(*, model: WhirlModel, angular_velocity: npt.ArrayLike) -> FloatArray:
     """Longest step at which the explicit Euler transition of the paper does not grow.
 
     Each eigenvalue p of the whirl in the rotor's frame must keep |1 + p dt| at most 1, so
     dt = min(-2 Re p / |p|^2), with p = s - j W and s the roots of M s^2 + C_B s + K_B.
-    Args: `model`: mass, damping and stiffness, each above zero but the damping, which may be zero.
-        `angular_velocity`: W, rad/s, any shape.
     Returns: Longest step, s, of that shape; zero without damping.
     Source: follows from Eq. 14 of the paper on eccentric masses.
     """
@@ -110,8 +79,6 @@ def whirl_transition(model: WhirlModel, angular_velocity: float, step: float) ->
 
     The whirl is an oscillator in the fixed frame, seen from the rotor; the imbalance adds what lies between
     the steady whirl and where the oscillator would take it.
-    Args: `model`: mass, damping and stiffness; damping above zero. `angular_velocity`: W, rad/s. `step`: dt,
-        s.
     Returns: Transition, shape (6, 6).
     Source: solution of Eq. 13 of the paper on eccentric masses.
     """
@@ -147,7 +114,6 @@ def whirl_transition(model: WhirlModel, angular_velocity: float, step: float) ->
 def euler_transition(model: WhirlModel, angular_velocity: float, step: float) -> FloatArray:
     """The paper's transition I + A dt, which keeps the steady whirl but not the way there.
 
-    Args: `model`: mass, damping and stiffness. `angular_velocity`: W, rad/s.
     Returns: Transition, shape (6, 6).
     Source: Eq. 14 of the paper on eccentric masses.
     """
@@ -166,14 +132,12 @@ def euler_transition(model: WhirlModel, angular_velocity: float, step: float) ->
 
 
 @compiled
-def process_covariance(
+def _process_covariance(
     model: WhirlModel, noise: ProcessNoise, angular_velocity: float, step: float
 ) -> FloatArray:
     """Covariance that white noise builds up within one step.
 
     Integral of E(s) diag(0, 0, q_a, q_a, q_m, q_m) E(s)^T over 0 to dt, by eight Gauss points.
-    Args: `model`: mass, damping and stiffness; damping above zero. `noise`: power per unit time.
-        `angular_velocity`: W, rad/s. `step`: dt, s.
     Returns: Covariance, shape (6, 6), positive semidefinite.
     Source: Van Loan, "Computing integrals involving the matrix exponential", IEEE Trans. Automat. Contr. 23
     (1978), whose integral this is; in place of the paper's diag(O randn), which is no covariance.
@@ -182,9 +146,9 @@ def process_covariance(
     power[2, 2] = power[3, 3] = noise.acceleration
     power[4, 4] = power[5, 5] = noise.imbalance
     found = np.zeros((6, 6))
-    for i in range(GAUSS_POINTS.size):
-        part = whirl_transition(model, angular_velocity, 0.5 * step * (1.0 + GAUSS_POINTS[i]))
-        found += 0.5 * step * GAUSS_WEIGHTS[i] * sandwich(part, power)
+    for i in range(_GAUSS_POINTS.size):
+        part = whirl_transition(model, angular_velocity, 0.5 * step * (1.0 + _GAUSS_POINTS[i]))
+        found += 0.5 * step * _GAUSS_WEIGHTS[i] * sandwich(part, power)
     return found
 
 
@@ -192,7 +156,6 @@ def process_covariance(
 def sandwich(a: FloatArray, p: FloatArray) -> FloatArray:
     """A P A^T of a symmetric P, by plain sums: the arrays are too small for a library call to pay.
 
-    Args: `a`: A, shape (6, 6). `p`: P, shape (6, 6).
     Returns: Shape (6, 6), symmetric to the last bit.
     """
     half, full = np.zeros((6, 6)), np.zeros((6, 6))
@@ -210,13 +173,12 @@ def sandwich(a: FloatArray, p: FloatArray) -> FloatArray:
 
 
 @compiled
-def sensor_matrix(angular_velocity: float, laboratory: bool) -> FloatArray:
+def _sensor_matrix(angular_velocity: float, laboratory: bool) -> FloatArray:
     """What a displacement and a velocity sensor show of the state.
 
     A laboratory sensor shows Z' = (z' + j W z) exp(j W t); turned back by the rotor's angle, which leaves the
     noise as it is, that is z' + j W z.  A rotor-fixed sensor shows z'.
-    Args: `angular_velocity`: W, rad/s. `laboratory`: whether the sensor stands still, its sample turned back
-        by the rotor's angle.
+    Args: `laboratory`: whether the sensor stands still, its sample turned back by the rotor's angle.
     Returns: H, shape (4, 6); the printed one lets the imbalance into the last row, where it is not seen.
     Source: Eq. 17 of the paper on eccentric masses, corrected.
     """
@@ -239,14 +201,12 @@ def filter_matrices(
 ) -> FilterMatrices:
     """All matrices of the imbalance filter at one speed.
 
-    Args: `model`: mass, damping and stiffness; damping above zero. `noise`: power per unit time.
-        `angular_velocity`: W, rad/s. `step`: dt, s. `laboratory`: whether the sensor stands still. `euler`:
-        the paper's transition in place of the exact one.
+    Args: `laboratory`: whether the sensor stands still.
     """
     exact = whirl_transition(model, angular_velocity, step)
     return FilterMatrices(
         angular_velocity,
         euler_transition(model, angular_velocity, step) if euler else exact,
-        process_covariance(model, noise, angular_velocity, step),
-        sensor_matrix(angular_velocity, laboratory),
+        _process_covariance(model, noise, angular_velocity, step),
+        _sensor_matrix(angular_velocity, laboratory),
     )

@@ -46,11 +46,7 @@ class Torques(NamedTuple):
 
 @compiled
 def angular_accelerations(torques: Torques, first: int, second: int) -> tuple[float, float]:
-    """Solve for phi'' of both masses in given motions.
-
-    Args: `first`: motion of the first mass: HELD, FORWARDS or BACKWARDS. `second`: motion of the second mass.
-    Returns: phi_1'' and phi_2'', rad/s^2.
-    """
+    """Solve for phi'' of both masses in given motions. Returns: phi_1'' and phi_2'', rad/s^2."""
     net_1 = torques.driving_1 - first * torques.friction_1
     net_2 = torques.driving_2 - second * torques.friction_2
     if first == HELD:
@@ -68,7 +64,6 @@ def slips(torques: Torques, mass: int, other_acceleration: float) -> bool:
     """Whether each held mass breaks loose.
 
     |g - cross phi''_other| > mu_f b W^2.
-    Args: `torques`: of both masses. `mass`: 0 or 1. `other_acceleration`: phi'' of the other mass, rad/s^2.
     Returns: True beyond the break-away torque.
     """
     driving = torques.driving_1 if mass == 0 else torques.driving_2
@@ -98,8 +93,6 @@ def _sliding(rate: float) -> int:
 def motions(torques: Torques, state: FloatArray, stuck: IntArray) -> tuple[int, int]:
     """Find which way each mass moves, or that it is held.
 
-    Args: `torques`: of both masses in this state. `state`: of the plant, shape (8,). `stuck`: SLIDING, STUCK
-        or LOCKED for each mass, shape (2,); a mass at rest is judged again unless it is locked.
     Returns: Motion of each mass: HELD, FORWARDS or BACKWARDS.
     """
     loose_1 = stuck[0] != LOCKED and state[6] == 0.0

@@ -156,7 +156,6 @@ def fastest_rate(parameters: PlantParameters, speed: float) -> float:
     """Bound on how fast anything in the plant changes.
 
     |W| + sqrt(K_B / M) + C_B / M + C_add / (J + J_add - 2 b^2 / M).
-    Args: `speed`: W, rad/s.
     Returns: rad/s.
     """
     least = parameters.inertia + parameters.drive_inertia - 2 * parameters.moment**2 / parameters.mass
@@ -166,11 +165,7 @@ def fastest_rate(parameters: PlantParameters, speed: float) -> float:
 
 @compiled
 def substeps(parameters: PlantParameters, speed: float, rate: float, step: float) -> int:
-    """Number of substeps that keeps each short against every rate of the plant.
-
-    Args: `speed`: W at the beginning, rad/s. `rate`: W', rad/s^2. `step`: s.
-    Returns: At least 1.
-    """
+    """Number of substeps that keeps each short against every rate of the plant. Returns: At least 1."""
     fastest = fastest_rate(parameters, max(abs(speed), abs(speed + rate * step)))
     return max(1, math.ceil(fastest * step / LONGEST))
 
@@ -187,13 +182,6 @@ def plant_step(
 ) -> tuple[FloatArray, IntArray]:
     """Carry the plant through one step, voltages held and the rotor's speed linear in time.
 
-    Args:
-        state: [x, y, x', y', phi_1, phi_2, phi_1', phi_2'] in the rotor's frame, m, m/s, rad, rad/s.
-        stuck: SLIDING, STUCK or LOCKED for each mass, shape (2,); a mass at rest is judged again unless it is
-            locked, and a locked mass is taken to be at rest.
-        command: motor voltages, V, shape (2,).
-        speed: W at the beginning, rad/s.
-        speed_rate: W', rad/s^2.
     Returns: State and flags at the end, as new arrays.
     Range: the masses are points on the track; that they could touch is for the caller to prevent.
     Source: Dormand and Prince (1980), the fifth-order formula.

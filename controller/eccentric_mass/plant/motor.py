@@ -21,7 +21,7 @@ from ringbalance.scene.arrays import FloatArray
 def limited(voltage: float, maximum: float) -> float:
     """Cut a voltage to what the supply can give.
 
-    Args: `voltage`: V. `maximum`: V, positive; may be infinite.
+    Args: `maximum`: V, positive; may be infinite.
     Returns: V within [-maximum, maximum].
     """
     return min(max(voltage, -maximum), maximum)
@@ -35,8 +35,6 @@ def electrical_energy(
 
     E = sum V (V h - K_m n (phi(t + h) - phi(t))) / R_m, the exact integral of V i; negative when a motor
     feeds back.
-    Args: `before`: state at the beginning of the step, shape (8,). `after`: state at its end, shape (8,).
-        `command`: voltages, V, shape (2,). `step`: h, s.
     Returns: J.
     Source: Kirchhoff's law for the motor without inductance, Eqs. (A1) to (A3) of the paper on eccentric
     masses.

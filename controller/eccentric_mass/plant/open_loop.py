@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import NamedTuple
+import time
+from collections.abc import Callable, Iterator
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -14,9 +15,15 @@ from ringbalance.controller.eccentric_mass.plant.parameters import PlantParamete
 from ringbalance.controller.eccentric_mass.plant.plant import SIZE, rest_state, stuck_flags
 from ringbalance.controller.eccentric_mass.plant.speed import profile_arrays, speed_at
 from ringbalance.controller.eccentric_mass.plant.substep_limit import check_substeps
-from ringbalance.controller.eccentric_mass.stretches import stretches
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.eccentric_models import EccentricScene
+
+_FIRST: Final = 64
+_MOST: Final = 10_000
+_SHORT: Final = 0.05
+"""A piece that took less is followed by one of twice the samples, s."""
+_LONG: Final = 0.2
+"""A piece that took more is followed by one of half the samples, s."""
 
 Progress = Callable[[float, float], None]
 """Called with the simulated time and the time limit, s."""
@@ -54,14 +61,6 @@ def run_steps(
 ) -> tuple[FloatArray, IntArray]:
     """Carry the plant through steps of equal length.
 
-    Args:
-        times: of the speed profile's corners, s, shape (corners,).
-        speeds: at the corners, rad/s, shape (corners,).
-        state: at the beginning, shape (8,).
-        stuck: SLIDING, STUCK or LOCKED, shape (2,).
-        commands: voltages held in each step, V, shape (steps, 2).
-        step: s; corners of the profile are best multiples of it.
-        first: number of the first step, counted from time zero.
     Returns: States, shape (steps + 1, 8), and flags, shape (steps + 1, 2).
     """
     count = commands.shape[0]
@@ -85,9 +84,8 @@ def run_plant(
 ) -> PlantRun:
     """Run a scene's plant from rest, with the voltages given.
 
-    Args: `scene`: speed profile, time limit and step are taken from it. `commands`: V, shape (steps, 2); None
-        for drives switched off. `locked`: whether both masses are clamped to the track. `progress`: called
-        several times a second; None for silence.
+    Args: `commands`: V, shape (steps, 2); None for drives switched off. `locked`: whether both masses are
+    clamped to the track. `progress`: called several times a second; None for silence.
     Raises: SceneError: a run that takes too many substeps.
     """
     check_substeps(scene)
@@ -106,3 +104,21 @@ def run_plant(
             progress(end * step, scene.run.time_limit)
     elapsed: FloatArray = np.arange(len(states), dtype=np.float64) * step
     return PlantRun(elapsed, np.interp(elapsed, times, speeds), states, flags)
+
+
+def stretches(samples: int) -> Iterator[tuple[int, int]]:
+    """Divide samples into pieces by the time that the caller takes for each.
+
+    Yields: Number of the first sample of a piece, and the number after its last.
+    """
+    begin, size = 0, _FIRST
+    while begin < samples:
+        end = min(begin + size, samples)
+        started = time.perf_counter()
+        yield begin, end
+        elapsed = time.perf_counter() - started
+        if elapsed > _LONG:
+            size = max(size // 2, 1)
+        elif elapsed < _SHORT:
+            size = min(2 * size, _MOST)
+        begin = end

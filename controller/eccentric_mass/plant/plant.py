@@ -62,10 +62,7 @@ class Loads(NamedTuple):
 
 @compiled
 def drive_of(parameters: PlantParameters, command: FloatArray, rate: float) -> Drive:
-    """Gather what acts on the plant from outside.
-
-    Args: `command`: motor voltages, V, shape (2,); cut to the greatest voltage. `rate`: W', rad/s^2.
-    """
+    """Gather what acts on the plant from outside."""
     most = parameters.maximum_voltage
     return Drive(
         parameters.unbalance * math.cos(parameters.phase),
@@ -82,7 +79,6 @@ def loads(parameters: PlantParameters, state: FloatArray, speed: float, drive: D
 
     A phi'' = g - friction, with A_ij = (J + J_add) delta_ij - b^2 / M cos(phi_i - phi_j) and
     g_i = u_i - J W' - b / M (-F_x sin phi_i + F_y cos phi_i).
-    Args: `state`: of the plant, shape (8,). `speed`: W, rad/s. `drive`: from outside.
     """
     b, rate = parameters.moment, drive.rate
     cos_1, sin_1 = math.cos(state[4]), math.sin(state[4])
@@ -122,11 +118,7 @@ def write_derivative(
     motion: tuple[int, int],
     out: FloatArray,
 ) -> None:
-    """Write the time derivative of the state for given motions of the masses.
-
-    Args: `state`: shape (8,). `speed`: W, rad/s. `drive`: from outside. `motion`: HELD, FORWARDS or BACKWARDS
-        for each mass. `out`: shape (8,), written.
-    """
+    """Write the time derivative of the state for given motions of the masses."""
     found = loads(parameters, state, speed, drive)
     one, two = angular_accelerations(found.torques, motion[0], motion[1])
     b, rate = parameters.moment, drive.rate
@@ -147,16 +139,11 @@ def write_derivative(
 def rest_state(angles: tuple[float, float]) -> FloatArray:
     """The state of a rotor at its centre, seen from its own frame, with masses at rest on the track.
 
-    Args: `angles`: phi of each mass, rad.
     Returns: Shape (8,).
     """
     return np.array([0.0, 0.0, 0.0, 0.0, angles[0], angles[1], 0.0, 0.0])
 
 
 def stuck_flags(flag: int) -> IntArray:
-    """The same flag for both masses.
-
-    Args: `flag`: SLIDING, STUCK or LOCKED.
-    Returns: Shape (2,).
-    """
+    """The same flag for both masses. Returns: Shape (2,)."""
     return np.full(2, flag, dtype=np.int64)

@@ -12,7 +12,6 @@ from ringbalance.scene.eccentric_models import EccentricRotor
 def profile_arrays(rotor: EccentricRotor) -> tuple[FloatArray, FloatArray]:
     """Corners of the speed profile as arrays.
 
-    Args: `rotor`: of the scene.
     Returns: Times, s, and speeds, rad/s, each of shape (corners,).
     """
     times = np.array([corner.time for corner in rotor.speed_profile])
@@ -23,8 +22,6 @@ def profile_arrays(rotor: EccentricRotor) -> tuple[FloatArray, FloatArray]:
 def speed_at(times: FloatArray, speeds: FloatArray, time: float) -> tuple[float, float]:
     """Speed and its rate just after a time.
 
-    Args: `times`: of the corners, s, increasing, shape (corners,). `speeds`: at the corners, rad/s, shape
-        (corners,). `time`: s.
     Returns: W, rad/s, and W', rad/s^2; constant before the first corner and after the last.
     """
     if time < times[0]:
@@ -38,12 +35,7 @@ def speed_at(times: FloatArray, speeds: FloatArray, time: float) -> tuple[float,
 
 @compiled
 def turned(times: FloatArray, speeds: FloatArray, time: float) -> float:
-    """Angle of the rotor, the integral of its speed from time zero.
-
-    Args: `times`: of the corners, s, increasing and not negative, shape (corners,). `speeds`: at the corners,
-        rad/s, shape (corners,). `time`: s, not negative.
-    Returns: rad, not wrapped.
-    """
+    """Angle of the rotor, the integral of its speed from time zero. Returns: rad, not wrapped."""
     angle: float = speeds[0] * min(time, times[0])
     for place in range(len(times) - 1):
         end = min(time, times[place + 1])

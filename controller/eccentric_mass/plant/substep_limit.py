@@ -25,7 +25,7 @@ def check_substeps(scene: EccentricScene) -> None:
 
     A substep lasts at most 0.1 / (|W| + sqrt(K_B / M) + C_B / M + C_add / J_least).
     Raises: SceneError: more than `MOST_SAMPLES`, or more than `MOST_SUBSTEPS`; it names the key of the
-        fastest rate and what is allowed.
+    fastest rate and what is allowed.
     """
     samples = scene.run.time_limit / scene.sensor.step + 1
     if samples > MOST_SAMPLES:

@@ -12,7 +12,6 @@ def moment_vector(parameters: PlantParameters, angles: Sequence[float]) -> compl
     """Unbalance of rotor and eccentric masses together.
 
     U exp(j phi_m) + b sum exp(j phi_i).
-    Args: `angles`: phi of each mass, rad.
     Returns: kg m, complex in the rotor's frame.
     """
     masses = sum(cmath.exp(1j * angle) for angle in angles)
@@ -23,7 +22,6 @@ def influence(parameters: PlantParameters, speed: float) -> complex:
     """Steady vibration per unbalance.
 
     alpha = W^2 / (K_B - M W^2 + j C_B W).
-    Args: `speed`: W, rad/s.
     Returns: m/(kg m), complex: the lag is minus its phase.
     Raises: ValueError: no damping, at the critical speed.
     """
@@ -36,23 +34,7 @@ def influence(parameters: PlantParameters, speed: float) -> complex:
 def steady_whirl(parameters: PlantParameters, speed: float, angles: Sequence[float]) -> complex:
     """Displacement x + j y in the rotor's frame at constant speed, masses at rest on the track.
 
-    Args: `speed`: W, rad/s. `angles`: phi of each mass, rad.
     Returns: m, complex; its magnitude is the zero-to-peak vibration.
     Raises: ValueError: no damping, at the critical speed.
     """
     return influence(parameters, speed) * moment_vector(parameters, angles)
-
-
-def holding_margin(parameters: PlantParameters, speed: float, angles: Sequence[float]) -> tuple[float, float]:
-    """How far friction is from letting a mass go in a steady whirl, its drive switched off.
-
-    mu_f - |Im(z exp(-j phi_i))|: the whirl pulls at a mass with b W^2 times the rotor's displacement across
-    the mass's radius, friction holds with up to b W^2 mu_f, so the speed cancels and the friction arm itself
-    is the displacement that it holds against.
-    Args: `speed`: W, rad/s, not zero. `angles`: phi of each mass, rad.
-    Returns: m for each mass; negative where the mass would slide.
-    Raises: ValueError: no damping, at the critical speed.
-    """
-    whirl = steady_whirl(parameters, speed, angles)
-    first, second = (abs((whirl * cmath.exp(-1j * angle)).imag) for angle in angles)
-    return parameters.friction_arm_1 - first, parameters.friction_arm_2 - second

@@ -22,7 +22,7 @@ def expected_deviation(scene: EccentricScene, *, speed: float, duration: float |
     """Standard deviation of the imbalance that an estimation at constant speed comes to.
 
     Divide by the imbalance, or by the balancing capacity 2 m_b r_b, to see whether it can be resolved at all.
-    Args: `speed`: W, rad/s. `duration`: of the estimation, s; default the longest that the scene allows.
+    Args: `duration`: of the estimation, s; default the longest that the scene allows.
     Returns: kg m; at zero speed the earlier estimate, since a resting rotor shows nothing.
     """
     told = scene.imbalance_filter

@@ -36,11 +36,7 @@ class Tuning(NamedTuple):
 
 @compiled
 def tuning_start(first: float, second: float, objective: float, step: float) -> Tuning:
-    """Begin at the present place.
-
-    Args: `first`: angle of the first mass, rad. `second`: angle of the second mass, rad. `objective`:
-        measured there, m. `step`: first move, rad.
-    """
+    """Begin at the present place."""
     return Tuning((first, second), objective, step, 0, 0, 0, False)
 
 
@@ -48,7 +44,6 @@ def tuning_start(first: float, second: float, objective: float, step: float) -> 
 def tuning_place(tuning: Tuning) -> tuple[float, float]:
     """Where the masses should go now.
 
-    Args: `tuning`: the search.
     Returns: Angles of both masses, rad; the best place when the search is done.
     """
     first, second = tuning.base
@@ -62,9 +57,7 @@ def tuning_place(tuning: Tuning) -> tuple[float, float]:
 def tuning_next(tuning: Tuning, objective: float, margin: float, stop: float) -> Tuning:
     """Take in what the present trial gave.
 
-    Args: `tuning`: the search. `objective`: at the place of the trial, m; infinite for one that cannot be
-        taken up. `margin`: by which a trial must be better than staying, m, so that noise does not move the
-        masses. `stop`: smallest move, rad.
+    Args: `objective`: at the place of the trial, m; infinite for one that cannot be taken up.
     Returns: The search with its next trial; a move that helped is tried again first.
     Source: section 3.6 of the paper on eccentric masses, with staying compared and the moves halved.
     """
@@ -79,9 +72,5 @@ def tuning_next(tuning: Tuning, objective: float, margin: float, stop: float) ->
 
 @compiled
 def separation(first: float, second: float) -> float:
-    """Angle between two masses, the shorter way round.
-
-    Args: `first`: rad. `second`: rad.
-    Returns: Within [0, pi], rad.
-    """
+    """Angle between two masses, the shorter way round. Returns: Within [0, pi], rad."""
     return abs(math.pi - (math.pi - second + first) % (2 * math.pi))

@@ -8,15 +8,11 @@ to move.  Both come from the last sample, so that no voltage depends on itself.
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.controller.eccentric_mass.estimation.friction_filter import TrackModel
 from ringbalance.controller.eccentric_mass.estimation.imbalance_model import WhirlModel
-
-NO_COMPENSATION: Final = 0
-BREAK_AWAY: Final = 1
-PRINTED: Final = 2
 
 Pair = tuple[float, float]
 
@@ -33,11 +29,9 @@ class DriveLaw(NamedTuple):
     maximum_voltage: float
     """V; infinite for no limit."""
     position_gain: float
-    """N m/rad."""
     rate_gain: float
-    """N m s/rad."""
-    compensation: int
-    """NO_COMPENSATION, BREAK_AWAY or PRINTED."""
+    breaks_away: bool
+    """Whether friction is compensated so that a mass at rest breaks away; else it is not compensated."""
     slow: float
     """Rate below which a mass counts as resting, rad/s."""
     near: float
@@ -56,9 +50,7 @@ class Motion(NamedTuple):
     velocity: complex
     """z', m/s."""
     angle: Pair
-    """rad."""
     rate: Pair
-    """rad/s."""
 
 
 @compiled
@@ -67,8 +59,6 @@ def rotor_load(law: DriveLaw, motion: Motion, imbalance: complex, wanted: Pair) 
 
     b (c_i a_y - s_i a_x) + J W' with the rotor's absolute acceleration a along its axes, from
     M a = -C_B (z' + j W z) - K_B z + theta (W^2 - j W') + b sum ((W + w_i)^2 - j (W' + w_i')) exp(j phi_i).
-    Args: `law`: of the voltages. `motion`: as measured. `imbalance`: theta along the rotor's axes, kg m.
-        `wanted`: accelerations w_i' that the masses are about to have, rad/s^2.
     Returns: Torques, N m.
     Source: parts (a) of Eqs. 30 and 39 of the paper on eccentric masses, with the terms of the speed rate.
     """
@@ -79,7 +69,7 @@ def rotor_load(law: DriveLaw, motion: Motion, imbalance: complex, wanted: Pair) 
     for i in range(2):
         pull = complex((w + motion.rate[i]) ** 2, -(rate + wanted[i]))
         force += law.track.moment * pull * complex(math.cos(motion.angle[i]), math.sin(motion.angle[i]))
-    return tangential_load(law, motion, force / law.whirl.mass)
+    return _tangential_load(law, motion, force / law.whirl.mass)
 
 
 @compiled
@@ -87,22 +77,16 @@ def steady_load(law: DriveLaw, motion: Motion) -> Pair:
     """The same while the imbalance is not yet known, from a whirl without rotor-fixed acceleration.
 
     a = -W^2 z + 2 j W z' + j W' z.
-    Args: `law`: of the voltages. `motion`: as measured.
     Returns: Torques, N m.
     """
     w = motion.speed
     pull = complex(-w * w, motion.speed_rate) * motion.position
-    return tangential_load(law, motion, pull + complex(0.0, 2 * w) * motion.velocity)
+    return _tangential_load(law, motion, pull + complex(0.0, 2 * w) * motion.velocity)
 
 
 @compiled
-def tangential_load(law: DriveLaw, motion: Motion, acceleration: complex) -> Pair:
-    """Torque that carries each mass along with an acceleration of the track.
-
-    Args: `law`: of the voltages. `motion`: as measured. `acceleration`: of the rotor's centre along the
-        rotor's axes, m/s^2.
-    Returns: Torques, N m.
-    """
+def _tangential_load(law: DriveLaw, motion: Motion, acceleration: complex) -> Pair:
+    """Torque that carries each mass along with an acceleration of the track. Returns: Torques, N m."""
     spin = law.mass_inertia * motion.speed_rate
     first, second = motion.angle
     return (
@@ -113,24 +97,18 @@ def tangential_load(law: DriveLaw, motion: Motion, acceleration: complex) -> Pai
 
 
 @compiled
-def friction_torque(
-    law: DriveLaw, arm: float, speed: float, angle: float, rate: float, distance: float
-) -> float:
+def friction_torque(law: DriveLaw, arm: float, speed: float, rate: float, distance: float) -> float:
     """Torque that makes up for friction.
 
     mu b (W + w)^2 in the sense of w; at rest, where friction opposes whatever is about to move the mass, in
     the sense of where the mass should go.
-    Args: `law`: of the voltages. `arm`: mu as estimated, m. `speed`: W, rad/s. `angle`: of the mass, rad;
-        only the printed law reads it. `rate`: w of the mass, rad/s. `distance`: from where the mass is to
-        where it should be, rad; infinite for one that should keep going.
+    Args: `distance`: from where the mass is to where it should be, rad; infinite for one that should keep
+    going.
     Returns: Torque, N m; zero for a resting mass that is near its place.
     Source: part (b) of Eq. 39 of the paper on eccentric masses, which prints the angle for the rate and gives
     no torque at rest, so that a mass which friction holds stays held.
     """
-    if law.compensation == PRINTED:
-        sense = 0.0 if rate == 0 else math.copysign(1.0, rate)
-        return sense * max(arm, 0.0) * law.track.moment * (speed + angle) ** 2
-    if law.compensation == NO_COMPENSATION:
+    if not law.breaks_away:
         return 0.0
     torque = max(arm, 0.0) * law.track.moment * (speed + rate) ** 2
     if abs(rate) > law.slow:
@@ -142,8 +120,6 @@ def friction_torque(
 def regulator_torque(law: DriveLaw, angle: float, rate: float, goal: float) -> float:
     """The regulator's torque, u = -k_p (phi - phi_d) - k_d phi'.
 
-    Args: `law`: of the voltages. `angle`: of the mass, rad. `rate`: of the mass, rad/s. `goal`: where it
-        should be, rad.
     Returns: Torque, N m.
     Source: Eq. 49 of the paper on eccentric masses.
     """
@@ -152,9 +128,5 @@ def regulator_torque(law: DriveLaw, angle: float, rate: float, goal: float) -> f
 
 @compiled
 def voltage_for(law: DriveLaw, torque: float) -> float:
-    """Voltage that gives a torque, as far as the supply allows.
-
-    Args: `torque`: N m.
-    Returns: V.
-    """
+    """Voltage that gives a torque, as far as the supply allows. Returns: V."""
     return min(max(torque / law.torque_per_volt, -law.maximum_voltage), law.maximum_voltage)

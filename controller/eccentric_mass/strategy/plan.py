@@ -41,6 +41,13 @@ class Stage(IntEnum):
     """Nothing more that can be done; the masses are held where they are."""
 
 
+STAGE_NAMES: Final = (
+    *("waiting", "imbalance estimation", "friction estimation", "positioning"),
+    *("check", "fine tuning", "rest", "failed"),
+)
+"""In the order of `Stage`."""
+
+
 class Cause(IntEnum):
     """Why the last stage was entered."""
 
@@ -64,25 +71,17 @@ class Gates(NamedTuple):
     """Limits between the stages."""
 
     start: float
-    """s."""
     limit: float
     """Amplitude that is good enough, m."""
     lowest_speed: float
-    """rad/s."""
     arrival_angle: float
-    """rad."""
     arrival_rate: float
-    """rad/s."""
     dwell: float
     """For which a mass must have arrived, s."""
     imbalance_time: float
-    """s."""
     friction_time: float
-    """s."""
     positioning_time: float
-    """s."""
     fine_tuning_time: float
-    """s."""
     imbalance_gate: float
     """Relative standard deviation."""
     friction_gate: float
@@ -96,15 +95,11 @@ class Gates(NamedTuple):
     stall_rate: float
     """Rate below which the drive nearly stalls, rad/s."""
     tuning_step: float
-    """rad."""
     tuning_stop: float
-    """rad."""
     tuning_near: float
     """Closest that a mass is brought to a place, rad."""
     wait: float
-    """s."""
     average: float
-    """s."""
     margin: float
     """By which a trial must be better, m."""
     move_time: float
@@ -114,7 +109,6 @@ class Gates(NamedTuple):
     gap: float
     """Angle that one mass takes up, rad."""
     target_error: Pair
-    """rad."""
 
 
 class Facts(NamedTuple):
@@ -133,15 +127,12 @@ class Facts(NamedTuple):
     rate: Pair
     """Smoothed, rad/s."""
     imbalance: complex
-    """kg m."""
     deviation: float
     """Standard deviation of the imbalance, kg m."""
     reach: float
     """Steady amplitude per imbalance, m/(kg m)."""
     arm: Pair
-    """m."""
     arm_deviation: Pair
-    """m."""
     load: float
     """Largest share of what friction holds for sure that holding takes; infinite when it holds nothing."""
 
@@ -181,7 +172,6 @@ class Plan(NamedTuple):
 
     stage: int
     entered: float
-    """s."""
     cause: int
     goal: Pair
     """Where the masses should be, rad, unwrapped."""
@@ -194,11 +184,7 @@ class Plan(NamedTuple):
 
 @compiled
 def first_plan(goal: Pair, time: float) -> Plan:
-    """The plan before the first sample.
-
-    Args: `goal`: where the masses are, rad. `time`: s.
-    Returns: Plan, waiting.
-    """
+    """The plan before the first sample. Returns: Plan, waiting."""
     nothing = Findings(False, 0.0, math.inf, 0, 0)
     tuning = tuning_start(goal[0], goal[1], math.inf, 1.0)
     return Plan(0, time, 0, goal, MOVING, setting_out(time), tuning, nothing)
@@ -206,26 +192,18 @@ def first_plan(goal: Pair, time: float) -> Plan:
 
 @compiled
 def setting_out(time: float) -> Progress:
-    """Progress at the beginning of a move.
-
-    Args: `time`: now, s.
-    Returns: Progress, with nothing arrived or averaged yet.
-    """
+    """Progress at the beginning of a move. Returns: Progress, with nothing arrived or averaged yet."""
     return Progress(time, NOT_YET, NOT_YET, 0.0j, 0)
 
 
 @compiled
 def enter(plan: Plan, stage: int, time: float, cause: int, goal: Pair) -> Plan:
-    """Begin a stage.
-
-    Args: `plan`: so far. `time`: now, s. `cause`: why. `goal`: where the masses should be, rad.
-    Returns: The plan, with its tuning and findings.
-    """
+    """Begin a stage. Returns: The plan, with its tuning and findings."""
     return Plan(stage, time, cause, goal, MOVING, setting_out(time), plan.tuning, plan.findings)
 
 
 @compiled
 def follow(plan: Plan, progress: Progress, findings: Findings) -> Plan:
-    """Stay in the stage. Args: `plan`: so far. `progress`: of the present move. `findings`: so far."""
+    """Stay in the stage."""
     stage, entered, cause, goal, hold, _, tuning, _ = plan
     return Plan(stage, entered, cause, goal, hold, progress, tuning, findings)

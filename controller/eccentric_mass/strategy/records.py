@@ -18,7 +18,6 @@ class EccentricMeasurement(NamedTuple):
     """One sample of everything that the strategy may look at."""
 
     time: float
-    """s."""
     speed: float
     """W, rad/s."""
     speed_rate: float
@@ -44,9 +43,7 @@ class ImbalanceSettings(NamedTuple):
     start_position: float
     """Standard deviation before the first sample, m."""
     start_velocity: float
-    """m/s."""
     start_imbalance: float
-    """kg m."""
     euler: bool
     """The paper's transition in place of the exact one."""
     every: int
@@ -63,7 +60,6 @@ class FrictionSettings(NamedTuple):
     every: int
     """Samples between two steps."""
     drive_speed: float
-    """rad/s."""
     speed_gain: float
     """gamma, V s/rad."""
     pair_gain: float
@@ -91,13 +87,9 @@ class Smoothed(NamedTuple):
     """Slow copies of what is measured, in the rotor's frame."""
 
     position: complex
-    """m."""
     velocity: complex
-    """m/s."""
     angle: Pair
-    """rad."""
     rate: Pair
-    """rad/s."""
 
 
 class Whirl(NamedTuple):
@@ -113,7 +105,6 @@ class Beliefs(NamedTuple):
     """The filters' estimates, as far as the voltages depend on them."""
 
     imbalance: complex
-    """kg m."""
     deviation: float
     """Largest standard deviation of the imbalance, kg m."""
     friction: tuple[FrictionEstimate, FrictionEstimate]
@@ -131,4 +122,3 @@ class StrategyState(NamedTuple):
     torque: Pair
     """Known torques summed over the samples since the friction filter's last step, N m."""
     voltage: Pair
-    """V."""

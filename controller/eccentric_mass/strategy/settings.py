@@ -12,12 +12,7 @@ from ringbalance.controller.eccentric_mass.estimation.friction_filter import (
 from ringbalance.controller.eccentric_mass.estimation.imbalance_model import ProcessNoise, WhirlModel
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
 from ringbalance.controller.eccentric_mass.strategy.lqr import lqr_gain
-from ringbalance.controller.eccentric_mass.strategy.lqr_law import (
-    BREAK_AWAY,
-    NO_COMPENSATION,
-    PRINTED,
-    DriveLaw,
-)
+from ringbalance.controller.eccentric_mass.strategy.lqr_law import DriveLaw
 from ringbalance.controller.eccentric_mass.strategy.plan import Gates
 from ringbalance.controller.eccentric_mass.strategy.records import (
     FrictionSettings,
@@ -43,8 +38,6 @@ SLOWEST_RATE = 1e-3
 """Below which a mass rests, however good the encoder, rad/s."""
 FRICTION_ERROR = 0.1
 """Share of the arrival angle that unknown friction may hold a mass off."""
-
-COMPENSATIONS = {"none": NO_COMPENSATION, "break_away": BREAK_AWAY, "printed": PRINTED}
 
 
 def believed_whirl(scene: EccentricScene) -> WhirlModel:
@@ -105,18 +98,18 @@ def _friction(told: FrictionFilter, step: float) -> FrictionSettings:
 def drive_law(scene: EccentricScene) -> DriveLaw:
     """What the law of the voltages knows."""
     plant, track = plant_parameters(scene), track_model(scene)
-    gain = lqr_gain(
-        track=track, state_weight=scene.lqr.state_weight, input_weight=scene.lqr.input_weight
-    ).gain
+    position_gain, rate_gain = lqr_gain(
+        track, state_weight=scene.lqr.state_weight, input_weight=scene.lqr.input_weight
+    )
     return DriveLaw(
         whirl=believed_whirl(scene),
         track=track,
         mass_inertia=plant.inertia,
         torque_per_volt=plant.drive_gain,
         maximum_voltage=plant.maximum_voltage,
-        position_gain=float(gain[0, 0]),
-        rate_gain=float(gain[0, 2]),
-        compensation=COMPENSATIONS[scene.lqr.friction_compensation],
+        position_gain=position_gain,
+        rate_gain=rate_gain,
+        breaks_away=scene.lqr.friction_compensation == "break_away",
         slow=max(3 * scene.sensor.encoder_rate_noise, SLOWEST_RATE),
         near=_near(scene),
     )

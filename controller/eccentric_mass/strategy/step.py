@@ -28,7 +28,6 @@ from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import (
 )
 from ringbalance.controller.eccentric_mass.estimation.imbalance_model import FilterMatrices, filter_matrices
 from ringbalance.controller.eccentric_mass.strategy.lqr_law import (
-    BREAK_AWAY,
     DriveLaw,
     Motion,
     friction_torque,
@@ -64,11 +63,7 @@ STEADY: Final = 1e-6
 
 @compiled
 def strategy_start(settings: StrategySettings, measurement: EccentricMeasurement) -> StrategyState:
-    """The state before the first sample.
-
-    Args: `measurement`: of which only the masses' angles, the speed and the time are read.
-    Returns: The state; the strategy waits for its start.
-    """
+    """The state before the first sample. Returns: The state; the strategy waits for its start."""
     told, friction = settings.imbalance, settings.friction.start
     estimate = start_estimate(told.start_position, told.start_velocity, told.start_imbalance)
     whirl = Whirl(estimate, _matrices(settings, measurement.speed), False)
@@ -84,8 +79,6 @@ def strategy_step(
 ) -> tuple[StrategyState, Pair]:
     """Decide on one sample; the same arguments always give the same answer.
 
-    Args: `state`: as returned by the previous step or by `strategy_start`. `measurement`: the sample; with
-        anything in it that is not finite it is passed over, the voltages kept.
     Returns: The next state and the voltages of both motors, V.
     """
     count, old, smoothed, whirl, beliefs, torque, voltage = state
@@ -318,8 +311,8 @@ def _friction_of(
     law, distance = settings.law, plan.goal[mass] - smoothed.angle[mass]
     if plan.stage == FRICTION:
         # The paper's law of the pair compensates nothing.
-        if law.compensation != BREAK_AWAY or settings.friction.pair_gain == 0:
+        if settings.friction.pair_gain == 0:
             return 0.0
         distance = math.copysign(math.inf, settings.friction.drive_speed)
     arm = beliefs.friction[mass].arm
-    return friction_torque(law, arm, motion.speed, motion.angle[mass], motion.rate[mass], distance)
+    return friction_torque(law, arm, motion.speed, motion.rate[mass], distance)

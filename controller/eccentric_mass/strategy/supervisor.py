@@ -33,28 +33,10 @@ from ringbalance.controller.eccentric_mass.strategy.plan import (
 from ringbalance.controller.eccentric_mass.strategy.targets import assign, target_angles
 
 # Plain numbers: the compiler takes enumerations, but not as fast.
-WAITING: Final = int(Stage.WAITING)
-IMBALANCE: Final = int(Stage.IMBALANCE)
-FRICTION: Final = int(Stage.FRICTION)
-POSITIONING: Final = int(Stage.POSITIONING)
-CHECK: Final = int(Stage.CHECK)
-FINE_TUNING: Final = int(Stage.FINE_TUNING)
-REST: Final = int(Stage.REST)
-FAILED: Final = int(Stage.FAILED)
-
-NONE: Final = int(Cause.NONE)
-BALANCED: Final = int(Cause.BALANCED)
-SATURATED: Final = int(Cause.SATURATED)
-RESIDUAL: Final = int(Cause.RESIDUAL)
-TUNING_TIME: Final = int(Cause.TUNING_TIME)
-SPEED_CHANGED: Final = int(Cause.SPEED_CHANGED)
-TOO_SLOW: Final = int(Cause.TOO_SLOW)
-SPEED_NOT_CONSTANT: Final = int(Cause.SPEED_NOT_CONSTANT)
-IMBALANCE_UNCERTAIN: Final = int(Cause.IMBALANCE_UNCERTAIN)
-FRICTION_UNCERTAIN: Final = int(Cause.FRICTION_UNCERTAIN)
-STALLED: Final = int(Cause.STALLED)
-NOT_ARRIVED: Final = int(Cause.NOT_ARRIVED)
-MASSES_MOVE: Final = int(Cause.MASSES_MOVE)
+WAITING, IMBALANCE, FRICTION, POSITIONING, CHECK, FINE_TUNING, REST, FAILED = map(int, Stage)
+_CAUSES: Final = tuple(map(int, Cause))
+NONE, BALANCED, SATURATED, RESIDUAL, TUNING_TIME, SPEED_CHANGED, TOO_SLOW, SPEED_NOT_CONSTANT = _CAUSES[:8]
+IMBALANCE_UNCERTAIN, FRICTION_UNCERTAIN, STALLED, NOT_ARRIVED, LOCKED, MASSES_MOVE = _CAUSES[8:]
 
 HOLDS_FOR_SURE: Final = 0.7
 """Share of the friction known to be there that the drives may be switched off on."""
@@ -66,7 +48,6 @@ STALLED_SHARE: Final = 0.5
 def supervise(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     """Decide what to do next; the same arguments always give the same answer.
 
-    Args: `gates`: limits between the stages. `plan`: as left by the last sample. `facts`: of this sample.
     Source: Fig. 3 of the paper on eccentric masses, with gates on relative uncertainty and ways out.
     """
     if plan.stage == WAITING:

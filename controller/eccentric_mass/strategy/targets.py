@@ -40,11 +40,7 @@ class Assignment(NamedTuple):
 
 @compiled
 def wrapped(angle: float) -> float:
-    """An angle within (-pi, pi].
-
-    Args: `angle`: rad.
-    Returns: The same direction, rad.
-    """
+    """An angle within (-pi, pi]. Returns: The same direction, rad."""
     return math.pi - (math.pi - angle) % (2 * math.pi)
 
 
@@ -54,8 +50,6 @@ def target_angles(imbalance: float, phase: float, moment: float, gap: float) -> 
 
     phi = phi_m +- beta, beta = arccos(-U/2b), at most pi - gap/2 so that the masses do not overlap on the far
     side of the imbalance.  Where it is cut, U - 2 b cos(gap/2) is left.
-    Args: `imbalance`: U, kg m, at least zero. `phase`: phi_m of the imbalance, rad. `moment`: b = m_b r_b of
-        one mass, kg m, above zero. `gap`: angle that one mass takes up, rad, below pi.
     Source: Eqs. 25 and 26 of the paper on eccentric masses, whose arccos lost its sign and which lets masses
     overlap.
     """
@@ -79,8 +73,6 @@ def assign(first: float, second: float, target_one: float, target_two: float) ->
     The sum of squared travels is least over both assignments and all whole turns that keep the order of the
     masses on the track.  Masses that share one law of motion then never come closer than they are at the
     start or at the end.
-    Args: `first`: angle of the first mass, rad, any number of turns. `second`: angle of the second mass, rad.
-        `target_one`: rad. `target_two`: rad.
     Returns: Assignment; of two equal ones the unswapped.
     Source: Eqs. 27 and 28 of the paper on eccentric masses, with angles wrapped.
     """

@@ -12,7 +12,7 @@ from rich.console import Console
 
 from ringbalance.controller.eccentric_mass.document import eccentric_document
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
-from ringbalance.controller.eccentric_mass.sampled_loops import regulator_loop, speed_loop
+from ringbalance.controller.eccentric_mass.sampled_loops import recommended_gains
 from ringbalance.controller.eccentric_mass.show import show_eccentric
 from ringbalance.scene import EccentricScene, SceneError, bundled_scene, load_scene
 
@@ -43,17 +43,17 @@ def test_a_diverging_run_is_a_status_with_finite_numbers(unlimited: EccentricSce
 
 
 def test_the_remedy_of_a_diverging_run_is_true(unlimited: EccentricScene) -> None:
-    weight = regulator_loop(unlimited).recommended
+    weight = recommended_gains(unlimited).regulator.recommended
     cured = replace(unlimited, lqr=replace(unlimited.lqr, state_weight=weight))
-    assert regulator_loop(cured).stable
+    assert recommended_gains(cured).regulator.stable
     assert simulate_eccentric(cured).outcome != "diverged"
 
 
 def test_sampled_poles_of_the_small_scene(unlimited: EccentricScene) -> None:
-    assert speed_loop(unlimited).radius == pytest.approx(1.34, abs=0.01)
-    gain = speed_loop(unlimited).recommended
+    assert recommended_gains(unlimited).speed.radius == pytest.approx(1.34, abs=0.01)
+    gain = recommended_gains(unlimited).speed.recommended
     half = replace(unlimited, friction_filter=replace(unlimited.friction_filter, speed_gain=2 * gain))
-    assert speed_loop(half).radius == pytest.approx(1.0)
+    assert recommended_gains(half).speed.radius == pytest.approx(1.0)
 
 
 def test_a_plant_too_stiff_is_refused_with_key_and_limit(unlimited: EccentricScene) -> None:

@@ -12,16 +12,18 @@ from scipy.integrate import quad, solve_ivp
 
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
 from ringbalance.controller.eccentric_mass.plant.whirl import steady_whirl
+from ringbalance.controller.eccentric_mass.run import simulate_eccentric
+from ringbalance.controller.eccentric_mass.strategy.lqr_law import friction_torque
+from ringbalance.controller.eccentric_mass.strategy.settings import drive_law
+from ringbalance.controller.eccentric_mass.strategy.targets import target_angles
 from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
 from ringbalance.verification.eccentric_mass.bound import motion_bound
-from ringbalance.verification.eccentric_mass.effort import figure_six
-from ringbalance.verification.eccentric_mass.extremes import (
-    euler_map,
-    noise_extremes,
-    saturation_curve,
-    wrong_belief,
+from ringbalance.verification.eccentric_mass.effort import figure_six, printed_compensation
+from ringbalance.verification.eccentric_mass.imbalance import (
+    estimate_imbalance,
+    figure_four,
+    imbalance_record,
 )
-from ringbalance.verification.eccentric_mass.imbalance import figure_four
 from ringbalance.verification.eccentric_mass.runs import (
     figure_eight,
     figure_five,
@@ -29,7 +31,7 @@ from ringbalance.verification.eccentric_mass.runs import (
     figure_seven,
     steady_peak_speed,
 )
-from ringbalance.verification.eccentric_mass.scenes import RPM, changed
+from ringbalance.verification.eccentric_mass.scenes import RPM, at_constant_speed, changed
 
 
 @pytest.fixture(scope="module")
@@ -159,34 +161,57 @@ def test_the_bound_wants_a_rotor_that_swings(scene: EccentricScene, damping: flo
         motion_bound(plant_parameters(scene)._replace(damping=damping), speed=1.0, rate=0.0)
 
 
-@pytest.mark.parametrize("belief", ["assumed_mass", "assumed_stiffness", "assumed_damping"])
-def test_wrong_beliefs_shift_the_estimate_by_the_ratio_of_stiffnesses(
-    scene: EccentricScene, belief: str
+@pytest.mark.parametrize("key", ["assumed_mass", "assumed_stiffness", "assumed_damping"])
+@pytest.mark.parametrize("change", [-0.1, 0.05])
+def test_a_wrong_assumption_shifts_the_estimate_by_the_ratio_of_stiffnesses(
+    scene: EccentricScene, key: str, change: float
 ) -> None:
-    found = wrong_belief(scene, belief=belief, relative=[-0.1, 0.05, 0.1])  # type: ignore[arg-type]
-    np.testing.assert_allclose(found.estimated, found.predicted, atol=2e-3)
-    assert np.all(np.abs(found.predicted - 1) > 5e-3)
+    """In a steady whirl z = W^2 theta/D, so that a filter which assumes another D finds theta D_assumed/D."""
+    record = imbalance_record(scene, duration=16.0)
+    # A filter that assumes wrong also misreads the transient of the start.
+    late = record.time > 12.0
+    record = replace(record, time=record.time[late], samples=record.samples[late])
+    wrong = changed(scene, "imbalance_filter", **{key: getattr(scene.imbalance_filter, key) * (1 + change)})
+    ratio = stiffness(wrong, record.speed) / stiffness(scene, record.speed)
+    x = estimate_imbalance(wrong, record)[0][-1]
+    assert abs(complex(x[4], x[5]) / record.imbalance - ratio) < 2e-3
+    assert abs(ratio - 1) > 5e-3
 
 
-def test_euler_grows_beyond_its_limit_and_the_exact_transition_never(scene: EccentricScene) -> None:
-    found = euler_map(scene, steps=[1e-3, 3e-3, 6e-3], speeds=[2.0, 10.47, 24.1, 60.0])
-    assert np.all(found.exact_growth < 1)
-    np.testing.assert_array_equal(found.growth > 1, found.step[:, None] > found.limit[None, :])
+def stiffness(scene: EccentricScene, speed: float) -> complex:
+    told = scene.imbalance_filter
+    mass = told.assumed_mass + 2 * scene.masses.mass
+    return complex(told.assumed_stiffness - mass * speed**2, told.assumed_damping * speed)
 
 
-def test_saturation_leaves_what_is_beyond_both_masses(scene: EccentricScene) -> None:
-    reach = 2 * plant_parameters(scene).moment * math.cos(0.05 / 0.23 / 2)
-    values = np.array([0.5, 0.999, 1.001, 1.5]) * reach
-    expected = np.maximum(values - reach, 0)
-    np.testing.assert_allclose(saturation_curve(scene, imbalances=values), expected, atol=1e-12)
+@pytest.mark.parametrize("share", [0.5, 0.999, 1.001, 1.5])
+def test_saturation_leaves_what_is_beyond_both_masses(scene: EccentricScene, share: float) -> None:
+    plant, gap = plant_parameters(scene), 0.05 / 0.23
+    reach = 2 * plant.moment * math.cos(gap / 2)
+    found = target_angles(share * reach, 0.0, plant.moment, gap).residual
+    assert found == pytest.approx(max(share - 1, 0) * reach, abs=1e-12)
 
 
-def test_noise_takes_time_and_then_the_gate(scene: EccentricScene) -> None:
-    calm, loud, deaf = noise_extremes(scene, noises=(1e-6, 1e-3, 5e-3), time_limit=61.0)
-    assert calm.settled
-    assert loud.settled
-    assert calm.stages[0].end < loud.stages[0].end
-    assert deaf.outcome.value == "imbalance_uncertain"
+@pytest.mark.parametrize(
+    ("noise", "outcome"), [(1e-6, "settled"), (1e-3, "settled"), (5e-3, "imbalance_uncertain")]
+)
+def test_noise_takes_time_and_then_the_gate(scene: EccentricScene, noise: float, outcome: str) -> None:
+    velocity = noise * scene.sensor.velocity_noise / scene.sensor.position_noise
+    level = at_constant_speed(scene, time_limit=61.0)
+    loud = changed(level, "sensor", position_noise=noise, velocity_noise=velocity)
+    loud = changed(loud, "imbalance_filter", position_noise=noise, velocity_noise=velocity)
+    assert simulate_eccentric(loud).outcome.value == outcome
+
+
+def test_the_printed_compensation_takes_the_angle_for_the_rate(scene: EccentricScene) -> None:
+    law = drive_law(scene)
+    arm, speed, angle, rate = 0.01, 10.47, 2.0, -1.0
+    friction = -arm * law.track.moment * (speed + rate) ** 2
+    assert friction_torque(law, arm, speed, rate, 0.0) == pytest.approx(friction)
+    assert printed_compensation(law, arm, speed, angle, rate) / friction > 1.7
+    # At rest, a radian away from the goal, only one of them pushes.
+    assert friction_torque(law, arm, speed, 0.0, 1.0) > 0
+    assert printed_compensation(law, arm, speed, angle, 0.0) == 0
 
 
 def test_changed_keeps_the_rest(scene: EccentricScene) -> None:

@@ -12,7 +12,6 @@ from ringbalance.controller.eccentric_mass.estimation.friction_filter import (
     FrictionEstimate,
     FrictionNoise,
     TrackModel,
-    friction_covariance,
     friction_flow,
     friction_restart,
     friction_step,
@@ -134,15 +133,6 @@ def test_a_resting_mass_teaches_nothing() -> None:
     old = FrictionEstimate(0.3, 0.01, 1e-4, 1e-6, 1e-6)
     found = friction_restart(old, NOISE, 0.0)
     assert (found.arm, found.arm_variance, found.covariance) == (0.01, 1e-6, 0.0)
-
-
-def test_pair_covariance_keeps_the_papers_order() -> None:
-    one, two = FrictionEstimate(1.0, 2.0, 3.0, 0.5, 4.0), FrictionEstimate(1.0, 2.0, 5.0, 0.25, 6.0)
-    found = friction_covariance(one, two)
-    np.testing.assert_array_equal(np.diag(found), [3.0, 5.0, 4.0, 6.0])
-    assert found[0, 2] == 0.5
-    assert found[1, 3] == 0.25
-    np.testing.assert_array_equal(found, found.T)
 
 
 def test_euler_is_close_for_short_steps_and_unstable_for_long_ones() -> None:

@@ -23,12 +23,10 @@ from ringbalance.controller.eccentric_mass.estimation.imbalance_model import (
     FilterMatrices,
     ProcessNoise,
     WhirlModel,
-    dynamic_stiffness,
+    _process_covariance,
     euler_step_limit,
     euler_transition,
     filter_matrices,
-    process_covariance,
-    whirl_generator,
     whirl_transition,
 )
 from ringbalance.scene.arrays import ComplexArray, FloatArray
@@ -40,6 +38,25 @@ NOISE = ProcessNoise(1e-6, 1e-10)
 VARIANCE = np.array([1e-8, 1e-8, 1e-6, 1e-6])
 TRUE = np.array([0.03, -0.02])
 MODELS = [MODEL, WhirlModel(26.2, 180.0, 12e3), WhirlModel(2.0, 400.0, 50.0), WhirlModel(1.0, 20.0, 100.0)]
+
+
+def whirl_generator(*, model: WhirlModel, angular_velocity: float) -> FloatArray:
+    """A of X' = A X, Eq. 13 of the paper on eccentric masses, with Eq. 12's damping matrix off its
+    diagonal.
+    """
+    mass, damping, stiffness = model
+    w = angular_velocity
+    spring, cross = w * w - stiffness / mass, damping * w / mass
+    found = np.zeros((6, 6))
+    found[0, 2] = found[1, 3] = 1.0
+    found[2] = [spring, cross, -damping / mass, 2 * w, w * w / mass, 0.0]
+    found[3] = [-cross, spring, -2 * w, -damping / mass, 0.0, w * w / mass]
+    return found
+
+
+def dynamic_stiffness(*, model: WhirlModel, angular_velocity: float) -> complex:
+    w = angular_velocity
+    return complex(model.stiffness - model.mass * w**2, model.damping * w)
 
 
 def start() -> ImbalanceEstimate:
@@ -94,7 +111,7 @@ def test_process_covariance_is_van_loans() -> None:
     power = np.diag([0, 0, 1e-3, 1e-3, 1e-8, 1e-8])
     block = expm(np.block([[-generator, power], [np.zeros((6, 6)), generator.T]]) * 0.02)
     expected = block[6:, 6:].T @ block[:6, 6:]
-    found = process_covariance(MODEL, ProcessNoise(1e-3, 1e-8), SPEED, 0.02)
+    found = _process_covariance(MODEL, ProcessNoise(1e-3, 1e-8), SPEED, 0.02)
     np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-16)
 
 

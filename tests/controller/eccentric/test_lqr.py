@@ -1,4 +1,4 @@
-"""Regulator gains against Hamiltonian eigenvectors, closed forms, and simulated costs."""
+"""Regulator gains in closed form against scipy's Riccati solver, and their poles."""
 
 from __future__ import annotations
 
@@ -6,89 +6,102 @@ import math
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
+from scipy.linalg import expm, solve_continuous_are
 
 from ringbalance.controller.eccentric_mass.estimation.friction_filter import TrackModel
-from ringbalance.controller.eccentric_mass.strategy.lqr import (
-    lqr_gain,
-    lqr_gain_discrete,
-    paper_weights,
-    track_matrices,
-)
+from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
+from ringbalance.controller.eccentric_mass.sampled_loops import GAIN_MARGIN, recommended_gains
+from ringbalance.controller.eccentric_mass.strategy.lqr import lqr_gain
+from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
+from ringbalance.scene.arrays import ComplexArray, FloatArray
+from ringbalance.verification.eccentric_mass.scenes import changed
 
 TRACKS = [TrackModel(0.0112, 0.16, 0.0414), TrackModel(0.5, 0.0, 0.1), TrackModel(0.01, 2.0, 0.03)]
 PAPER = TRACKS[0]
 
 
+def riccati_gain(track: TrackModel, weight: float, inputs: float) -> FloatArray:
+    """Eqs. 42 to 49: one mass, Q = q diag(0.1, 0.01), R = 0.1 r."""
+    a = np.array([[0.0, 1.0], [0.0, -track.damping / track.inertia]])
+    b = np.array([[0.0], [1 / track.inertia]])
+    cost, price = weight * np.diag([0.1, 0.01]), np.array([[0.1 * inputs]])
+    gain: FloatArray = np.linalg.solve(price, b.T @ solve_continuous_are(a, b, cost, price))[0]
+    return gain
+
+
 @pytest.mark.parametrize("track", TRACKS)
 @pytest.mark.parametrize("weight", [0.5, 3.5, 40.0])
-def test_gain_is_that_of_the_hamiltonians_stable_eigenvectors(track: TrackModel, weight: float) -> None:
-    a, b = track_matrices(track)
-    q, r = paper_weights(state_weight=weight, input_weight=2.0)
-    hamiltonian = np.block([[a, -b @ np.linalg.inv(r) @ b.T], [-q, -a.T]])
-    values, vectors = np.linalg.eig(hamiltonian)
-    stable = vectors[:, values.real < 0]
-    riccati = (stable[4:] @ np.linalg.inv(stable[:4])).real
-    found = lqr_gain(track=track, state_weight=weight, input_weight=2.0)
-    np.testing.assert_allclose(found.riccati, riccati, rtol=1e-8, atol=1e-12)
-    np.testing.assert_allclose(found.gain, np.linalg.inv(r) @ b.T @ riccati, rtol=1e-8, atol=1e-10)
-    assert np.all(found.poles.real < 0)
-
-
-def test_gain_in_closed_form() -> None:
-    """One mass: k_p = sqrt(q/r), k_d = -C + sqrt(C^2 + 2 J k_p + 0.1 q/r)."""
-    found = lqr_gain(track=PAPER, state_weight=3.5, input_weight=1.0).gain
-    k_p = math.sqrt(3.5)
-    k_d = -PAPER.damping + math.sqrt(PAPER.damping**2 + 2 * PAPER.inertia * k_p + 0.35)
-    expected = np.array([[k_p, 0, k_d, 0], [0, k_p, 0, k_d]])
-    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
-
-
-def cost(gain: np.ndarray, step: float) -> float:
-    """Integral cost of a held input from a fixed start, by fine steps of the exact motion."""
-    a, b = track_matrices(PAPER)
-    q, r = paper_weights(state_weight=3.5, input_weight=1.0)
-    parts = 20
-    fine = expm(np.block([[a, b], [np.zeros((2, 6))]]) * step / parts)
-    state, total = np.array([1.0, -0.5, 0.0, 0.3]), 0.0
-    for _ in range(int(6.0 / step)):
-        held = -gain @ state
-        for part in range(parts + 1):
-            share = step / parts * (0.5 if part in {0, parts} else 1.0)
-            total += share * (state @ q @ state + held @ r @ held)
-            if part < parts:
-                state = fine[:4, :4] @ state + fine[:4, 4:] @ held
-    return total
-
-
-def test_a_held_input_wants_the_discrete_gain() -> None:
-    """Which costs less than the continuous one when held for long, and is the same when held briefly."""
-    step = 0.03
-    continuous = lqr_gain(track=PAPER, state_weight=3.5, input_weight=1.0)
-    discrete = lqr_gain_discrete(track=PAPER, state_weight=3.5, input_weight=1.0, step=step)
-    best = cost(discrete.gain, step)
-    assert best < cost(continuous.gain, step)
-    for change in (0.97, 1.03):
-        assert best < cost(discrete.gain * change, step)
-    short = lqr_gain_discrete(track=PAPER, state_weight=3.5, input_weight=1.0, step=1e-6)
-    np.testing.assert_allclose(short.gain, continuous.gain, rtol=1e-3, atol=1e-9)
-    np.testing.assert_allclose(short.poles, continuous.poles, rtol=1e-3)
+def test_gain_is_that_of_the_riccati_equation(track: TrackModel, weight: float) -> None:
+    found = lqr_gain(track, state_weight=weight, input_weight=2.0)
+    np.testing.assert_allclose(found, riccati_gain(track, weight, 2.0), rtol=1e-9)
 
 
 def test_the_back_emf_printed_without_its_sign_is_another_plant() -> None:
     """Eq. 10 lost its minus signs: a mass that its own motor drives on has another gain."""
-    wrong = PAPER._replace(damping=-PAPER.damping)
-    right = lqr_gain(track=PAPER, state_weight=3.5, input_weight=1.0).gain
-    other = lqr_gain(track=wrong, state_weight=3.5, input_weight=1.0).gain
-    assert other[0, 2] > right[0, 2] + 0.3
+    right = lqr_gain(PAPER, state_weight=3.5, input_weight=1.0)
+    other = lqr_gain(PAPER._replace(damping=-PAPER.damping), state_weight=3.5, input_weight=1.0)
+    assert other[1] > right[1] + 0.3
 
 
-@pytest.mark.parametrize("weights", [(0.0, 1.0), (1.0, 0.0), (-1.0, 1.0), (1.0, math.nan)])
-def test_weights_must_be_above_zero(weights: tuple[float, float]) -> None:
-    with pytest.raises(ValueError, match="above zero"):
-        lqr_gain(track=PAPER, state_weight=weights[0], input_weight=weights[1])
+@pytest.fixture(scope="module", params=["eccentric_mass_paper", "driven_masses_small", "washing_machine"])
+def scene(request: pytest.FixtureRequest) -> EccentricScene:
+    return eccentric_scene(load_scene(bundled_scene(request.param)))
 
 
-def test_a_step_must_be_above_zero() -> None:
-    with pytest.raises(ValueError, match="step"):
-        lqr_gain_discrete(track=PAPER, state_weight=1.0, input_weight=1.0, step=0.0)
+def held(scene: EccentricScene, position: float, rate: float, *, helped: bool) -> ComplexArray:
+    """Sampled poles of two opposite masses with their rotor's inertia, all torques held over a step.
+
+    The drive law adds the load of the rotor under the accelerations it wants when `helped`.
+    """
+    plant = plant_parameters(scene)
+    total, given = plant.inertia + plant.drive_inertia, plant.moment**2 / plant.mass
+    mass = np.array([[total - given, given], [given, total - given]])
+    whole = np.zeros((6, 6))
+    whole[:2, 2:4] = np.eye(2)
+    whole[2:4, 2:4] = -plant.drive_damping * np.linalg.inv(mass)
+    whole[2:4, 4:] = np.linalg.inv(mass)
+    power = expm(whole * scene.lqr.step)
+    apart = np.array([[0.5, -0.5], [-0.5, 0.5]]) if helped else np.eye(2)
+    law = np.hstack([position * apart, rate * np.eye(2)])
+    if helped:
+        wanted = (law + np.hstack([np.zeros((2, 2)), plant.drive_damping * np.eye(2)])) / total
+        law = law + (mass - total * np.eye(2)) @ wanted
+    return np.asarray(np.linalg.eigvals(power[:4, :4] - power[:4, 4:] @ law), dtype=np.complex128)
+
+
+def test_sampled_poles_are_those_of_both_masses_on_their_rotor(scene: EccentricScene) -> None:
+    gains, plant = recommended_gains(scene), plant_parameters(scene)
+    track = TrackModel(plant.inertia + plant.drive_inertia, plant.drive_damping, plant.moment)
+    position, rate = lqr_gain(track, state_weight=scene.lqr.state_weight, input_weight=scene.lqr.input_weight)
+    both = held(scene, position, rate, helped=False)
+    for pole in gains.regulator.poles:
+        assert np.min(np.abs(both - pole)) < 1e-9
+    told = scene.friction_filter
+    pair, speed = 2 * plant.drive_gain * told.pair_gain, plant.drive_gain * told.speed_gain
+    both = held(scene, pair, speed, helped=True)
+    for pole in gains.pair.poles:
+        assert np.min(np.abs(both - pole)) < 1e-9
+
+
+def test_recommended_gains_leave_their_margin(scene: EccentricScene) -> None:
+    gains = recommended_gains(scene)
+    speed = changed(scene, "friction_filter", speed_gain=GAIN_MARGIN * gains.speed.recommended)
+    assert recommended_gains(speed).speed.radius == pytest.approx(1.0, abs=1e-9)
+    advised = changed(scene, "lqr", state_weight=gains.regulator.recommended)
+    advised = changed(
+        advised, "friction_filter", speed_gain=gains.speed.recommended, pair_gain=gains.pair.recommended
+    )
+    assert all(loop.stable for loop in recommended_gains(advised).loops)
+    shorter = changed(scene, "lqr", step=gains.step)
+    assert all(loop.stable for loop in recommended_gains(shorter).loops)
+
+
+def test_the_drive_speed_overcomes_friction_and_a_free_mass_needs_none(scene: EccentricScene) -> None:
+    gains, plant = recommended_gains(scene), plant_parameters(scene)
+    gain = min(scene.friction_filter.speed_gain, gains.speed.recommended)
+    speed = scene.rotor.speed_profile[0].speed
+    friction = max(scene.masses.friction_arm) * plant.moment * speed**2
+    assert plant.drive_gain * gain * gains.drive_speed > 1.49 * friction
+    free = changed(scene, "masses", friction_arm=(0.0, 0.0))
+    assert recommended_gains(free).drive_speed == scene.friction_filter.drive_speed
+    assert math.isfinite(gains.drive_speed)

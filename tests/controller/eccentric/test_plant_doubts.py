@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 from ringbalance.controller.eccentric_mass.plant.open_loop import PlantRun, run_plant
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
-from ringbalance.controller.eccentric_mass.plant.whirl import holding_margin, steady_whirl
+from ringbalance.controller.eccentric_mass.plant.whirl import steady_whirl
 from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray
 from ringbalance.scene.eccentric_models import SpeedPoint
@@ -153,7 +153,8 @@ def test_friction_holds_a_balanced_rotor_through_its_critical_speed(
     assert np.ptp(loose.state[:, 4]) > 1.0
     assert loose.amplitude.max() > 3 * close.amplitude.max()
     before = (2.0, 5.0)
-    margins = [holding_margin(p, rpm * RPM, before)[0] for rpm in (60, 131, 1000)]
+    across = [abs((steady_whirl(p, rpm * RPM, before) * cmath.exp(-2j)).imag) for rpm in (60, 131, 1000)]
+    margins = [p.friction_arm_1 - displacement for displacement in across]
     assert margins[0] > 0 > margins[1]
     assert margins[2] > 0
 

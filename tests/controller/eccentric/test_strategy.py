@@ -22,9 +22,8 @@ from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, EccentricRun
 from ringbalance.controller.eccentric_mass.show import show_eccentric
 from ringbalance.controller.eccentric_mass.strategy.attainable import expected_deviation
-from ringbalance.controller.eccentric_mass.strategy.lqr_law import PRINTED, friction_torque
 from ringbalance.controller.eccentric_mass.strategy.records import EccentricMeasurement
-from ringbalance.controller.eccentric_mass.strategy.settings import drive_law, strategy_settings
+from ringbalance.controller.eccentric_mass.strategy.settings import strategy_settings
 from ringbalance.controller.eccentric_mass.strategy.step import strategy_start, strategy_step
 from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.eccentric_models import SpeedPoint
@@ -249,15 +248,6 @@ def test_masses_need_not_start_opposite(scene: EccentricScene) -> None:
     assert found.residual_ratio < 2e-3
 
 
-def test_the_printed_compensation_leaves_stuck_masses_stuck(scene: EccentricScene) -> None:
-    """sgn of a rate of zero is zero: nothing breaks the masses away once they rest beside their targets."""
-    still = changed(changed(scene, "lqr", friction_compensation="printed"), "sensor", encoder_rate_noise=0.0)
-    near = changed(still, "supervisor", arrival_angle=math.radians(0.05), positioning_time=6.0)
-    assert simulate_eccentric(near).outcome is EccentricOutcome.NOT_ARRIVED
-    mended = changed(near, "lqr", friction_compensation="break_away")
-    assert simulate_eccentric(mended).settled
-
-
 def test_a_run_that_ends_early_tells_why_it_would_have_failed(scene: EccentricScene) -> None:
     still = at_constant_speed(scene, time_limit=2.0, speed=0.0)
     assert outcome(still) == (EccentricOutcome.TOO_SLOW, Having("lowest_speed"))
@@ -294,18 +284,6 @@ def test_what_can_be_known_is_reported_beforehand(run: EccentricRun, scene: Ecce
     slow = expected_deviation(scene, speed=2 * RPM)
     assert slow > 50 * expected_deviation(scene, speed=100 * RPM)
     assert expected_deviation(scene, speed=0.0) == scene.imbalance_filter.initial_unbalance
-
-
-def test_the_printed_compensation_takes_the_angle_for_the_rate(scene: EccentricScene) -> None:
-    law = drive_law(scene)
-    arm, speed, angle, rate = 0.01, 10.47, 2.0, -1.0
-    friction = -arm * law.track.moment * (speed + rate) ** 2
-    printed = law._replace(compensation=PRINTED)
-    assert friction_torque(law, arm, speed, angle, rate, 0.0) == pytest.approx(friction)
-    assert friction_torque(printed, arm, speed, angle, rate, 0.0) / friction > 1.7
-    # At rest, a radian away from the goal, only one of them pushes.
-    assert friction_torque(law, arm, speed, angle, 0.0, 1.0) > 0
-    assert friction_torque(printed, arm, speed, angle, 0.0, 1.0) == 0
 
 
 def test_the_documented_keys_are_there(run: EccentricRun) -> None:

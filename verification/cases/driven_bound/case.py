@@ -5,8 +5,8 @@ from __future__ import annotations
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
 from ringbalance.scene.models import Scene
 from ringbalance.verification.eccentric_mass.bound import motion_bound
-from ringbalance.verification.eccentric_mass.curves import driven_scene
 from ringbalance.verification.eccentric_mass.runs import figure_seven
+from ringbalance.verification.eccentric_mass.scenes import driven_scene
 from ringbalance.verification.evidence import Evidence, Found, Level, no_reference
 
 _RATE = 1.0

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ringbalance.scene.models import Scene
-from ringbalance.verification.eccentric_mass.curves import driven_scene, thinned
 from ringbalance.verification.eccentric_mass.runs import FigureFive, figure_five
+from ringbalance.verification.eccentric_mass.scenes import driven_scene, thinned
 from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series, no_reference
 
 _BEFORE, _AFTER = 0.1, 0.6

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ringbalance.scene.models import Scene
-from ringbalance.verification.eccentric_mass.curves import driven_scene
 from ringbalance.verification.eccentric_mass.effort import FigureSix, figure_six
+from ringbalance.verification.eccentric_mass.scenes import driven_scene
 from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series, no_reference
 
 _STEP = {"light": 4e-4, "heavy": 1e-4}

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ringbalance.scene.models import Scene
-from ringbalance.verification.eccentric_mass.curves import driven_scene, envelope, thinned
 from ringbalance.verification.eccentric_mass.runs import BalancingFigure, figure_eight, figure_seven
+from ringbalance.verification.eccentric_mass.scenes import driven_scene, envelope, thinned
 from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series, no_reference
 
 _SHOWN = 12.0

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from ringbalance.scene.models import Scene
-from ringbalance.verification.eccentric_mass.curves import driven_scene, envelope, thinned
 from ringbalance.verification.eccentric_mass.runs import FigureNine, figure_nine
+from ringbalance.verification.eccentric_mass.scenes import driven_scene, envelope, thinned
 from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
 
 _RPM = 30 / np.pi

@@ -23,9 +23,16 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         "integrator": simulation.integrator,
         "settled": simulation.settled,
         "settling_time_s": simulation.settling_time,
+        "verdict": simulation.verdict.value,
         "outcome": simulation.outcome.value,
         "status": simulation.status,
         "limit_m": simulation.limit,
+        "hold_time_s": simulation.hold_time,
+        "loop_factor": simulation.loop.value,
+        "loop_factor_limit": simulation.loop.limit,
+        "largest_staying_loop_factor": simulation.loop.largest_staying,
+        "vibration_rate_m_per_s": simulation.loop.rate,
+        "stationary_deviation_m": _finite(simulation.loop.deviation),
         "time_s": simulation.time.tolist(),
         "amplitude_m": simulation.amplitude.tolist(),
         "phase_rad": simulation.phase.tolist(),
@@ -63,11 +70,11 @@ def _samples(samples: tuple[Sample, ...]) -> dict[str, Any]:
     seen = [sample.measurement for sample in samples]
     return {
         "time_s": [sample.time for sample in samples],
-        "amplitude_m": [None if m is None else _number(m.amplitude) for m in seen],
-        "phase_rad": [None if m is None else _number(m.phase) for m in seen],
+        "amplitude_m": [None if m is None else _finite(m.amplitude) for m in seen],
+        "phase_rad": [None if m is None else _finite(m.phase) for m in seen],
         "resting": [sample.command.resting for sample in samples],
     }
 
 
-def _number(value: float) -> float | None:
-    return value if np.isfinite(value) else None
+def _finite(value: float | None) -> float | None:
+    return value if value is not None and np.isfinite(value) else None

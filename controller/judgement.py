@@ -73,11 +73,7 @@ def misadjustments(samples: Sequence[Sample], *, floor: float) -> int:
 
 
 def settling_time(*, time: FloatArray, amplitude: FloatArray, limit: float) -> float | None:
-    """Instant from which on the amplitude stays at or below the limit.
-
-    Args: `time`: s, shape (m,), ascending. `amplitude`: m, shape (m,). `limit`: m.
-    Returns: s, one of the recorded instants; None when the last amplitude is above the limit.
-    """
+    """Recorded instant from which on the amplitude is not above the limit to the end; None: it ends above."""
     above = np.flatnonzero(amplitude > limit)
     if above.size == 0:
         return float(time[0])

@@ -12,22 +12,23 @@ import numpy as np
 from ringbalance.controller.algorithms.algorithm import Command, Controller, Measurement, usable
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.checks import check_fit, check_settings
-from ringbalance.controller.formulas.stopping import Cause, stop_cause
-from ringbalance.controller.judgement import misadjustments, noise_floor, overshoots, rose, settling_time
+from ringbalance.controller.formulas.stopping import Cause, has_held, stop_cause
+from ringbalance.controller.judgement import misadjustments, noise_floor, overshoots, rose
 from ringbalance.controller.liquid_ring.closed_form import closed_form, has_closed_form
 from ringbalance.controller.liquid_ring.plant import Advance, DiscState, LiquidRing, initial_state, longest
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Integrator
-from ringbalance.controller.outcome import Facts, outcome_of, status_text
+from ringbalance.controller.outcome import VERDICTS, Facts, outcome_of, status_text
 from ringbalance.controller.rotor import chamber_letters, disc_unbalance, vibration
 from ringbalance.controller.sensor import Sensor, noisy_sensor
 from ringbalance.controller.simulation import Injection, Outcome, Sample, Simulation
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
+from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw, balancer_model
 from ringbalance.reduced_model.selection.chamber_range import chamber_status
 from ringbalance.reduced_model.selection.registry import ModelUsed
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
 
 Progress = Callable[[float, float], None]
@@ -56,23 +57,21 @@ def simulate(
     sensor: Sensor | None = None,
     progress: Progress | None = None,
     modelled: Collection[str] | None = None,
+    to_time_limit: bool = False,
 ) -> Simulation:
     """One closed-loop run of a scene under a balancer model.
 
     Sample, step of the controller, gas into the commanded chambers (all pairs in parallel), gas off, wait of
-    one period, next sample; until nothing can change any more, the run cannot succeed, or the time is up.
+    one period, next sample; until the amplitude has held and is expected to stay, nothing can change any
+    more, the run cannot succeed, or the time is up.  `to_time_limit`: a run that has settled continues, with
+    the same answer, to its time limit.
     Args:
-        scene: rotor, sensor, controller settings, gas pressure, seed and time limit.
-        model: flow law and moments of the balancer.
         flow_law: in place of `model`, a law that carries its own moments and volumes.
-        controller: the algorithm; default the one that the scene names.
         integrator: how operations are carried through time by the flow law alone; default the closed form
             when the law has one, else the quadrature. With one given no further term is modelled.
-        sensor: what the controller sees; default the scene's noise from the scene's seed.
-        progress: called once per sample; None for silence.
+        sensor: default the scene's noise from the scene's seed.
         modelled: of "tube inertia", "gas filling" and "valve lag" those to model; default those whose
             estimated contribution is above the scene's tolerance.
-    Returns: Simulation; its status says how the run ended and what to do next.
     Raises: SceneError: an algorithm that this program does not have, settings without a meaning, a rotor too
         slow to form a ring, or a model made for another disc.
     Raises: ValueError: both a model and a flow law, or neither; terms to model beside an integrator, or ones
@@ -89,8 +88,11 @@ def simulate(
     asked = () if integrator is not None else modelled
     used = run_models(scene=scene, model=balancer, asked=asked)
     dynamics = dynamics_of(scene=scene, model=balancer, modelled=terms_modelled(used))
+    used_controller = controller or controller_of(scene, balancer)
     run = _Run(
         scene=scene,
+        loop=loop_factor(scene, balancer, used_controller),
+        to_time_limit=to_time_limit,
         plant=LiquidRing(
             model=balancer,
             chambers=scene.disc.chambers,
@@ -98,7 +100,7 @@ def simulate(
             integrator=quasi_steady,
             dynamics=dynamics,
         ),
-        controller=controller or controller_of(scene, balancer),
+        controller=used_controller,
         sensor=sensor or noisy_sensor(sensor=scene.sensor, seed=scene.run.seed),
         exact=sensor is None and scene.sensor.amplitude_noise == scene.sensor.phase_noise == 0,
         state=initial_state(disc=scene.disc),
@@ -125,6 +127,8 @@ class _Run:
     """What changes during one run; lives inside one call of `simulate`."""
 
     scene: Scene
+    loop: LoopFactor
+    to_time_limit: bool
     plant: LiquidRing
     controller: Controller[Any]
     sensor: Sensor
@@ -133,6 +137,7 @@ class _Run:
     time: float = 0.0
     times: list[FloatArray] = field(default_factory=list)
     fills: list[FloatArray] = field(default_factory=list)
+    vibrations: list[ComplexArray] = field(default_factory=list)
     samples: list[Sample] = field(default_factory=list)
     injections: list[Injection] = field(default_factory=list)
     last_usable: Measurement | None = None
@@ -140,6 +145,12 @@ class _Run:
     rises: int = 0
     idle: int = 0
     drift: float = 0.0
+    since: float = math.inf
+    """s, from which on the true amplitude has not been above the limit; infinite while it is."""
+    held_since: float = math.inf
+    """The same of the first time that it held."""
+    cut: bool = False
+    """Whether the time limit has shortened a valve-open time or a wait."""
 
     @property
     def remaining(self) -> float:
@@ -172,6 +183,14 @@ class _Run:
         moment = disc_unbalance(moment=self.plant.model.moment, fill_ratio=self.state.fills())
         return complex(vibration(rotor=self.scene.rotor, moment=moment))
 
+    @property
+    def _held(self) -> bool:
+        """Whether the amplitude has held; what the time limit has cut short would have ended otherwise."""
+        held = not self.cut and has_held(self.time, self.since, self.scene.controller.hold_time)
+        if held and self.held_since == math.inf:
+            self.held_since = self.since
+        return held
+
     def _watch(self, measurement: Measurement | None) -> None:
         """Count the rises in a row; a sample without a usable amplitude is passed over."""
         if measurement is None or not usable(measurement, needs_phase=False):
@@ -185,12 +204,13 @@ class _Run:
         first, last = self.samples[0].measurement, self.last_usable
         return Cause(
             stop_cause(
+                self._held and self.loop.stays and not self.to_time_limit,
                 self.rises,
                 self.controller.rises_tolerated,
                 first is not None and last is not None and rose(first, last, floor=self.floor),
                 self.idle,
                 IDLE_OPERATIONS + self.plant.chambers,
-                command.resting and self.exact and self.state.rests,
+                command.resting and self.exact and self.state.rests and not (self.cut or self.to_time_limit),
                 self.remaining,
             )
         )
@@ -201,6 +221,7 @@ class _Run:
             self._wait()
             return
         gas_times = {valve.chamber: min(valve.duration, self.remaining) for valve in command.valves}
+        self.cut = any(valve.duration > self.remaining for valve in command.valves)
         advance = self.plant.advance(
             self.state, gas_times=gas_times, duration=max(gas_times.values()), points=GAS_POINTS
         )
@@ -232,6 +253,7 @@ class _Run:
 
     def _wait(self) -> None:
         duration = min(self.scene.controller.period, self.remaining)
+        self.cut = self.cut or duration < self.scene.controller.period
         if duration > 0:
             points = 1 if self.state.rests else DRIFT_POINTS
             points = points if self.plant.dynamics is None else TAIL_POINTS
@@ -247,16 +269,24 @@ class _Run:
         self.time = float(time[-1])
 
     def _keep(self, time: FloatArray, fill_ratio: FloatArray) -> None:
+        moment = disc_unbalance(moment=self.plant.model.moment, fill_ratio=fill_ratio)
+        seen = vibration(rotor=self.scene.rotor, moment=moment)
         self.times.append(time)
         self.fills.append(fill_ratio)
+        self.vibrations.append(seen)
+        above = np.flatnonzero(np.abs(seen) > self.scene.controller.limit)
+        if above.size:
+            later = int(above[-1]) + 1
+            self.since = float(time[later]) if later < time.size else math.inf
+        elif time.size:
+            self.since = min(self.since, float(time[0]))
 
 
 def _record(run: _Run, cause: Cause, *, integrator: str, used: tuple[ModelUsed, ...]) -> Simulation:
     """Judge a finished run and freeze it."""
     time, fills = np.concatenate(run.times), np.concatenate(run.fills, axis=1)
-    moment = disc_unbalance(moment=run.plant.model.moment, fill_ratio=fills)
-    seen = vibration(rotor=run.scene.rotor, moment=moment)
-    facts = _facts(run, cause, time, np.abs(seen))
+    seen = np.concatenate(run.vibrations)
+    facts = _facts(run, cause, np.abs(seen))
     outcome = outcome_of(facts)
     settled = outcome is Outcome.SETTLED
     return Simulation(
@@ -264,8 +294,11 @@ def _record(run: _Run, cause: Cause, *, integrator: str, used: tuple[ModelUsed, 
         law=run.plant.model.name,
         integrator=integrator,
         outcome=outcome,
+        verdict=VERDICTS[outcome],
         settled=settled,
         settling_time=facts.settling_time if settled else None,
+        hold_time=run.scene.controller.hold_time,
+        loop=run.loop,
         status=status_text(facts, outcome),
         time=time,
         amplitude=np.abs(seen),
@@ -285,7 +318,7 @@ def _record(run: _Run, cause: Cause, *, integrator: str, used: tuple[ModelUsed, 
     )
 
 
-def _facts(run: _Run, cause: Cause, time: FloatArray, amplitude: FloatArray) -> Facts:
+def _facts(run: _Run, cause: Cause, amplitude: FloatArray) -> Facts:
     limit = run.scene.controller.limit
     return Facts(
         scene=run.scene,
@@ -295,7 +328,9 @@ def _facts(run: _Run, cause: Cause, time: FloatArray, amplitude: FloatArray) -> 
         time=run.time,
         initial_amplitude=float(amplitude[0]),
         final_amplitude=float(amplitude[-1]),
-        settling_time=settling_time(time=time, amplitude=amplitude, limit=limit),
+        loop=run.loop,
+        since=run.since,
+        held_since=run.held_since,
         noise_floor=run.floor,
         drift=run.drift,
         overshoots=overshoots(run.samples, limit=limit),

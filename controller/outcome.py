@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final
@@ -16,13 +17,13 @@ from ringbalance.controller.liquid_ring.reach import (
 )
 from ringbalance.controller.liquid_ring.transfer import Event
 from ringbalance.controller.rotor import influence, initial_vibration
-from ringbalance.controller.simulation import Injection, Outcome, Sample
+from ringbalance.controller.simulation import Injection, Outcome, Sample, Verdict
+from ringbalance.controller.tuning.loop_factor import STAYING_DEVIATIONS, LoopFactor
+from ringbalance.controller.tuning.recommendation import recommended_gain
 from ringbalance.scene.models import Scene
 
 MICROMETRE: Final = 1e-6
 GRAM_MILLIMETRE: Final = 1e-6
-CONFIRMING_SAMPLES: Final = 5
-"""Samples over which the amplitude must have stayed when something could still change it."""
 MANY_OVERSHOOTS: Final = 2
 MANY_CHAMBERS: Final = 4
 """Beyond these more than two pairs share the work."""
@@ -49,8 +50,11 @@ class Facts:
     """m."""
     final_amplitude: float
     """m."""
-    settling_time: float | None
-    """s, from which on the amplitude was not above the limit; None when it ends above."""
+    loop: LoopFactor
+    since: float
+    """s, from which on the true amplitude was not above the limit; infinite when it ends above."""
+    held_since: float
+    """The same of the first time that it held for the hold time."""
     noise_floor: float
     """m."""
     drift: float
@@ -73,11 +77,11 @@ class Facts:
         return missing * self.scene.rotor.influence_coefficient
 
     @property
-    def confirmed_from(self) -> float:
-        """Latest settling time that counts as staying, s."""
-        if self.cause is Cause.AT_REST:
-            return self.time
-        return self.samples[-min(CONFIRMING_SAMPLES, len(self.samples))].time
+    def settling_time(self) -> float | None:
+        """s, from which on the amplitude first held; None when it has not, or is not expected to stay."""
+        if self.loop.stays and self.held_since < math.inf:
+            return self.held_since
+        return self.since if self.cause is Cause.AT_REST and self.since < math.inf else None
 
     @property
     def last_command(self) -> tuple[Injection, ...]:
@@ -88,17 +92,22 @@ class Facts:
 def outcome_of(facts: Facts) -> Outcome:
     """Classify how a run ended.
 
-    Returns: Outcome; SETTLED only when the true amplitude ends at or below the limit and stays there: because
-        nothing can change any more, or over at least the last five samples (over all, if there are fewer).
+    SETTLED takes a true amplitude that held within the limit for the hold time in a loop that is expected to
+    stay there, or a run in which nothing can change any more.  Both are known when they happen, so that a
+    later time limit gives the same answer.
     """
     limit = facts.scene.controller.limit
-    if facts.settling_time is not None and facts.settling_time <= facts.confirmed_from:
+    if facts.settling_time is not None:
         return Outcome.SETTLED
     higher = facts.final_amplitude > facts.initial_amplitude + facts.noise_floor
     if has_grown(facts.cause, higher):
         return Outcome.DRIFTING if facts.drift > NOTICEABLE else Outcome.DIVERGING
     if facts.unreachable_amplitude > limit:
         return Outcome.CAPACITY_EXCEEDED
+    if facts.loop.unstable:
+        return Outcome.UNSTABLE
+    if min(facts.since, facts.held_since) < math.inf:
+        return Outcome.HOVERING
     if facts.last_command and not _longest(facts).operation.moved:
         if _longest(facts).operation.event in {Event.EMPTY, Event.FULL}:
             return Outcome.CHAMBER_EMPTY
@@ -155,13 +164,52 @@ def _um(length: float) -> str:
 def _settled(facts: Facts) -> str:
     many = facts.overshoots > MANY_OVERSHOOTS
     cure = (
-        f"{facts.overshoots} overshoots: lower controller.proportional"
+        f"{facts.overshoots} overshoots: lower controller.proportional{_to_gain(facts)}"
         if many
         else "no further correction needed"
     )
     return (
         f"settled: not above the limit of {_um(facts.scene.controller.limit)} from "
-        f"{facts.settling_time:.4g} s on, {_um(facts.final_amplitude)} at the end; {cure}"
+        f"{facts.settling_time:.4g} s on, for the hold time of {facts.scene.controller.hold_time:.4g} s, "
+        f"{_um(facts.final_amplitude)} at the end; {cure}"
+    )
+
+
+def _to_gain(facts: Facts) -> str:
+    """The gain that would be recommended, where there is one and it is lower."""
+    settings = facts.scene.controller
+    gain = recommended_gain(facts.scene, facts.plant.model, loop=facts.loop)
+    if facts.loop.value is None or settings.kind == "law_based" or not 0 < gain < settings.proportional:
+        return ""
+    return f" to {gain * MICROMETRE:.3g} s/um"
+
+
+def _hovering(facts: Facts) -> str:
+    """Within the limit at the end or for a while: what is missing for a settled run."""
+    settings, loop = facts.scene.controller, facts.loop
+    head = (
+        f"hovering: {_um(facts.final_amplitude)} at {facts.time:.4g} s, limit {_um(settings.limit)}, "
+        f"hold time {settings.hold_time:.4g} s; "
+    )
+    if loop.stays:
+        return head + "time is up before the amplitude has held: raise run.time_limit"
+    sigma = facts.scene.sensor.amplitude_noise
+    if NOISE_DEVIATIONS * sigma > settings.limit:
+        cure = f"the sensor's own is {_um(sigma)}: raise controller.limit or average the sensor"
+    else:
+        cure = f"lower controller.proportional{_to_gain(facts)}, raise controller.limit or average the sensor"
+    left = "" if loop.deviation is None else f" of {_um(loop.deviation)}"
+    return head + (
+        f"it is not expected to stay: noise keeps up a standard deviation{left}, and the limit must hold "
+        f"{STAYING_DEVIATIONS:g} of them; {cure}"
+    )
+
+
+def _unstable(facts: Facts) -> str:
+    return (
+        f"unstable: the loop factor is {facts.loop.value:.3g}, and a residual grows from "
+        f"{facts.loop.limit:.3g} on; {_um(facts.final_amplitude)} at {facts.time:.4g} s: lower "
+        f"controller.proportional{_to_gain(facts)}"
     )
 
 
@@ -174,7 +222,10 @@ def _not_settled(facts: Facts) -> str:
 
 def _time_limit(facts: Facts) -> str:
     if facts.overshoots > MANY_OVERSHOOTS:
-        cure = f"{facts.overshoots} overshoots: lower controller.proportional, or shorten the trial steps"
+        cure = (
+            f"{facts.overshoots} overshoots: lower controller.proportional{_to_gain(facts)}, or shorten the "
+            "trial steps"
+        )
     else:
         cure = "raise controller.proportional or run.time_limit"
     return f"{_not_settled(facts)}; time is up ({facts.scene.run.time_limit:.4g} s): {cure}"
@@ -226,8 +277,9 @@ def _empty(facts: Facts) -> str:
 def _diverging(facts: Facts) -> str:
     if facts.overshoots >= 2:
         cure = (
-            f"the residual turned round {facts.overshoots} times: lower controller.proportional; if it still "
-            "grows, check influence coefficient, lag angle and sense of rotation"
+            f"the residual turned round {facts.overshoots} times: lower controller.proportional"
+            f"{_to_gain(facts)}; if it still grows, check influence coefficient, lag angle and sense of "
+            "rotation"
         )
     else:
         cure = (
@@ -235,7 +287,7 @@ def _diverging(facts: Facts) -> str:
             "degrees off drives the liquid the wrong way) and the sense of rotation"
         )
     return (
-        f"diverging, stopped at {facts.time:.4g} s: the amplitude rose from "
+        f"unstable: diverging, stopped at {facts.time:.4g} s: the amplitude rose from "
         f"{_um(facts.initial_amplitude)} to {_um(facts.final_amplitude)}: {cure}"
     )
 
@@ -287,6 +339,8 @@ def _too_many(facts: Facts) -> str:
 
 _TEXTS: Final[Mapping[Outcome, Callable[[Facts], str]]] = {
     Outcome.SETTLED: _settled,
+    Outcome.HOVERING: _hovering,
+    Outcome.UNSTABLE: _unstable,
     Outcome.TIME_LIMIT: _time_limit,
     Outcome.STALLED: _stalled,
     Outcome.CAPACITY_EXCEEDED: _capacity,
@@ -298,3 +352,10 @@ _TEXTS: Final[Mapping[Outcome, Callable[[Facts], str]]] = {
     Outcome.NO_SAMPLES: _no_samples,
     Outcome.TOO_MANY_SAMPLES: _too_many,
 }
+VERDICTS: Final[Mapping[Outcome, Verdict]] = dict.fromkeys(Outcome, Verdict.NOT_SETTLED) | {
+    Outcome.SETTLED: Verdict.SETTLED,
+    Outcome.HOVERING: Verdict.HOVERING,
+    Outcome.UNSTABLE: Verdict.UNSTABLE,
+    Outcome.DIVERGING: Verdict.UNSTABLE,
+}
+"""What each outcome says of the loop."""

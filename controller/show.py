@@ -60,7 +60,8 @@ def _summary(simulation: Simulation) -> Table:
         ("flow law", f"{simulation.law} ({simulation.integrator.replace('_', ' ')})"),
         ("settling time", when),
         ("amplitude", f"{_um(simulation.amplitude[0])} -> {_um(simulation.amplitude[-1])}"),
-        ("limit", _um(simulation.limit)),
+        ("limit", f"{_um(simulation.limit)} for {simulation.hold_time:.4g} s"),
+        ("loop factor", _loop(simulation)),
         ("valve-open time", f"{_gas_time(simulation):.3f} s in {len(simulation.injections)} injections"),
         ("gas energy", f"{simulation.energy:.4g} J"),
         ("overshoots", str(simulation.overshoots)),
@@ -69,6 +70,14 @@ def _summary(simulation: Simulation) -> Table:
     ):
         table.add_row(name, value)
     return table
+
+
+def _loop(simulation: Simulation) -> str:
+    loop = simulation.loop
+    if loop.value is None or loop.deviation is None:
+        return "none: this algorithm has no gain"
+    left = f"noise leaves {_um(loop.deviation)}" if math.isfinite(loop.deviation) else "nothing holds it"
+    return f"{loop.value:.3g} of at most {loop.limit:.3g}, {left}"
 
 
 def _gas_time(simulation: Simulation) -> float:

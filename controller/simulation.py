@@ -8,6 +8,7 @@ from enum import StrEnum
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
 from ringbalance.controller.liquid_ring.plant import Operation
+from ringbalance.controller.tuning.loop_factor import LoopFactor
 from ringbalance.physics.results import Status
 from ringbalance.reduced_model.selection.registry import ModelUsed
 from ringbalance.scene.arrays import FloatArray
@@ -17,6 +18,8 @@ class Outcome(StrEnum):
     """How a run ended."""
 
     SETTLED = "settled"
+    HOVERING = "hovering"
+    UNSTABLE = "unstable"
     TIME_LIMIT = "time_limit"
     STALLED = "stalled"
     CAPACITY_EXCEEDED = "capacity_exceeded"
@@ -27,6 +30,18 @@ class Outcome(StrEnum):
     NOISE = "noise"
     NO_SAMPLES = "no_samples"
     TOO_MANY_SAMPLES = "too_many_samples"
+
+
+class Verdict(StrEnum):
+    """What a run says of the loop."""
+
+    SETTLED = "settled"
+    """The amplitude has held within its limit and is expected to stay, or nothing can change any more."""
+    HOVERING = "hovering"
+    """It ends within the limit, or has held, without that."""
+    NOT_SETTLED = "not settled"
+    UNSTABLE = "unstable"
+    """A small residual grows, or the amplitude did."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,12 +77,17 @@ class Simulation:
     integrator: str
     """How operations were carried through time."""
     outcome: Outcome
+    verdict: Verdict
     settled: bool
-    """Whether the amplitude ends at or below the limit and stays there."""
+    """Whether the amplitude held within the limit for the hold time and is expected to stay."""
     settling_time: float | None
-    """s, from which on the amplitude stays at or below the limit; None when not settled."""
+    """s, from which on it first held, whatever the time limit; None when not settled."""
+    hold_time: float
+    """s."""
+    loop: LoopFactor
+    """The loop about the balanced state."""
     status: str
-    """How the run ended and what to do next."""
+    """The verdict, how the run ended, and what to do next."""
     time: FloatArray
     """s, shape (m,): samples, and instants within operations and waits."""
     amplitude: FloatArray

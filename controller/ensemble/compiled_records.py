@@ -30,6 +30,7 @@ _REAL: Final = (
     "start_imaginary",
     "limit",  # m
     "period",  # s
+    "hold_time",  # s
     "time_limit",  # s
     "amplitude_noise",  # standard deviation, m
     "phase_noise",  # standard deviation, rad
@@ -47,7 +48,6 @@ _WHOLE: Final = (
     "chambers",
     "rises_tolerated",
     "idle_tolerated",
-    "confirming",
     "gas_points",
     "drift_points",
     "most_samples",
@@ -115,6 +115,8 @@ _RUN_WHOLE: Final = (
     "first",  # whether it drives the positive side
     "other_pair",
     "other_first",
+    "stays",  # whether an amplitude within its limit is expected to stay there
+    "cut",  # whether the time limit has shortened a valve-open time or a wait
     "operated",  # whether a valve has opened since the last sample
     "stale",  # whether the vibration has changed since its phase was taken
     "calm",  # whether nothing has moved since the last sample and nothing can

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
-import numpy as np
-
 from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.controller.ensemble.compiled_disc import any_wet, move, note_settling, reset, vibration
 from ringbalance.controller.ensemble.compiled_noise import noise_pair, uniform_radii
@@ -14,15 +12,16 @@ from ringbalance.controller.ensemble.compiled_records import Record
 from ringbalance.controller.formulas.control_law import valve_time, vector_gas_time, vector_shares
 from ringbalance.controller.formulas.stopping import (
     AT_REST,
+    HELD,
     NONE,
     NOTICEABLE,
     TIME,
     has_grown,
+    has_held,
     has_risen,
     has_turned,
     stop_cause,
 )
-from ringbalance.scene.arrays import FloatArray
 
 _CERTAIN: Final = 1 + 1e-9
 _vector_gas_time: Final = compiled(vector_gas_time)
@@ -30,6 +29,7 @@ _vector_shares: Final = compiled(vector_shares)
 _valve_time: Final = compiled(valve_time)
 _stop_cause: Final = compiled(stop_cause)
 _has_grown: Final = compiled(has_grown)
+_has_held: Final = compiled(has_held)
 _has_risen: Final = compiled(has_risen)
 _has_turned: Final = compiled(has_turned)
 
@@ -37,41 +37,41 @@ _has_turned: Final = compiled(has_turned)
 @compiled
 def run_members(shared: Record, runs: Any) -> None:
     """Run members one after the other; `runs`, of type `RUN`, holds what differs and is filled."""
-    clock = np.zeros(shared.confirming)
     for i in range(runs.size):
         run = runs[i]
         _start(shared, run)
         while run.cause == NONE and run.samples < shared.most_samples:
             if run.calm:
-                _pass_calm(shared, run, clock)
+                _pass_calm(shared, run)
             if run.cause == NONE and run.samples < shared.most_samples:
-                clock[run.samples % shared.confirming] = run.time
                 run.samples += 1
                 _sample(shared, run)
                 if run.cause == NONE:
                     if run.pair >= 0:
                         _gas(shared, run)
                     _wait(shared, run)
-        _judge(shared, run, clock[max(run.samples - shared.confirming, 0) % shared.confirming])
+        _judge(shared, run)
 
 
 @compiled
-def _pass_calm(shared: Record, run: Record, clock: FloatArray) -> None:
+def _pass_calm(shared: Record, run: Record) -> None:
     """Pass over samples that are below the limit however their noise turns out, while nothing moves.
 
     A normal pair of radius r moves the amplitude by sigma r at the most, whatever its angle, and r follows
     from one of two uniform numbers alone.
     """
-    time, samples, slot = run.time, run.samples, run.samples % shared.confirming
+    time, samples = run.time, run.samples
     even, odd = uniform_radii(shared, run.number, samples // 2)
     while samples < shared.most_samples and (odd if samples & 1 else even) >= run.certain:
-        clock[slot] = time
         samples += 1
-        slot = slot + 1 if slot + 1 < shared.confirming else 0
+        if _holds(shared, run, time):
+            run.cause = HELD
+            break
         left = shared.time_limit - time
         if left <= 0.0:
             run.cause = TIME
             break
+        run.cut = 1 if left < shared.period else run.cut
         time += min(shared.period, left)
         if samples & 1 == 0:
             even, odd = uniform_radii(shared, run.number, samples // 2)
@@ -80,6 +80,12 @@ def _pass_calm(shared: Record, run: Record, clock: FloatArray) -> None:
         _forget(run)
         run.phase_before = run.phase
     run.time, run.samples = time, samples
+
+
+@compiled
+def _holds(shared: Record, run: Record, time: float) -> bool:
+    """Whether the run has settled by a time, s, as `simulate` finds it."""
+    return bool(run.stays and not run.cut and _has_held(time, run.since, shared.hold_time))
 
 
 @compiled
@@ -163,12 +169,13 @@ def _cause(shared: Record, run: Record) -> int:
     exact = shared.amplitude_noise == 0.0 and shared.phase_noise == 0.0
     return int(
         _stop_cause(
+            _holds(shared, run, run.time),
             run.rises,
             shared.rises_tolerated,
             _has_risen(run.first_seen, run.last_seen, shared.noise_floor),
             run.idle,
             shared.idle_tolerated,
-            exact and run.seen_amplitude <= shared.limit and not any_wet(shared, run),
+            exact and run.seen_amplitude <= shared.limit and not (any_wet(shared, run) or run.cut),
             shared.time_limit - run.time,
         )
     )
@@ -179,6 +186,7 @@ def _wait(shared: Record, run: Record) -> None:
     """Until the next sample, or the end; liquid moves where a tube is full."""
     length = max(min(shared.period, shared.time_limit - run.time), 0.0)
     run.pair, run.other_pair = -1, -1
+    run.cut = 1 if length < shared.period else run.cut
     if length > 0.0 and any_wet(shared, run):
         move(shared, run, length)
         _look(shared, run)
@@ -207,16 +215,11 @@ def _gas(shared: Record, run: Record) -> None:
 
 
 @compiled
-def _judge(shared: Record, run: Record, confirmed: float) -> None:
-    """As `outcome_of` does.
-
-    Args: `shared`: of type `SHARED`. `run`: at its end; its verdict is filled in. `confirmed`: time of the
-        sample from which on the amplitude must have stayed, s.
-    """
-    if run.cause == AT_REST:
-        confirmed = run.time
-    run.settled = 1 if run.since <= confirmed else 0
-    run.settling_time = run.since if run.settled else math.inf
+def _judge(shared: Record, run: Record) -> None:
+    """As `outcome_of` does."""
+    settled = run.cause == HELD or (run.cause == AT_REST and run.since < math.inf)
+    run.settled = 1 if settled else 0
+    run.settling_time = run.since if settled else math.inf
     run.drifted = 1 if run.drift > NOTICEABLE and not run.settled else 0
     grown = _has_grown(run.cause, run.amplitude > run.start + shared.noise_floor)
     run.diverged = 1 if grown and not run.settled and not run.drifted else 0
@@ -266,7 +269,8 @@ def _open(shared: Record, run: Record, chamber: int, share: float) -> None:
     time = _valve_time(share, shared.minimum_gas_time, shared.maximum_gas_time)
     if time == 0.0:
         return
-    half, duration = shared.chambers // 2, min(time, shared.time_limit - run.time)
+    half, left = shared.chambers // 2, shared.time_limit - run.time
+    duration, run.cut = min(time, left), 1 if time > left else run.cut
     if run.pair < 0:
         run.pair, run.first, run.duration = chamber % half, int(chamber < half), duration
     else:

@@ -70,10 +70,8 @@ class Ensemble:
     """Not settled, and liquid ran back with the gas off."""
     left_out: tuple[str, ...]
     """Terms that `simulate` models for this scene and an ensemble does not."""
-    settling_quantiles: tuple[float, ...]
-    """s, at `QUANTILES` of the members that settled; empty when none did."""
-    mean_settling_time: float | None
-    """s, of the members that settled."""
+    settling_quantiles: tuple[float | None, ...]
+    """s, by which the fractions `QUANTILES` of all members have settled; None: fewer have in their time."""
     bin_width: float
     """s."""
     time_counts: IntArray
@@ -193,7 +191,6 @@ class _Tally:
 
     def __init__(self, *, time_limit: float) -> None:
         self.members = self.settled = self.diverged = self.drifted = 0
-        self.time_sum = 0.0
         self.width = time_limit / TIME_BINS
         self.times = np.zeros(TIME_BINS, dtype=np.int64)
         self.overshoots, self.misadjustments = (np.zeros(MOST_COUNTED + 1, dtype=np.int64) for _ in range(2))
@@ -205,7 +202,6 @@ class _Tally:
         self.settled += times.size
         self.diverged += int(runs.diverged.sum())
         self.drifted += int(runs.drifted.sum())
-        self.time_sum += math.fsum(times)
         bins = np.minimum((times / self.width).astype(np.int64), TIME_BINS - 1)
         self.times += np.bincount(bins, minlength=TIME_BINS)
         for counts, found in ((self.overshoots, runs.overshoots), (self.misadjustments, runs.misadjustments)):
@@ -232,19 +228,16 @@ class _Tally:
             drifted=share(self.drifted),
             left_out=left_out,
             settling_quantiles=self._quantiles(),
-            mean_settling_time=self.time_sum / self.settled if self.settled else None,
             bin_width=self.width,
             time_counts=self.times,
             overshoot_counts=self.overshoots,
             misadjustment_counts=self.misadjustments,
         )
 
-    def _quantiles(self) -> tuple[float, ...]:
-        if not self.settled:
-            return ()
-        reached = np.concatenate([[0], np.cumsum(self.times)]) / self.settled
+    def _quantiles(self) -> tuple[float | None, ...]:
+        reached = np.concatenate([[0], np.cumsum(self.times)]) / self.members
         edges = self.width * np.arange(TIME_BINS + 1)
-        return tuple(float(np.interp(q, reached, edges)) for q in QUANTILES)
+        return tuple(float(np.interp(q, reached, edges)) if q <= reached[-1] else None for q in QUANTILES)
 
 
 def binomial_share(*, count: int, of: int) -> Probability:
@@ -265,6 +258,7 @@ def ensemble_document(ensemble: Ensemble) -> dict[str, Any]:
     per_bin = -(-last // SHOWN_BINS)
     padded = np.zeros(per_bin * SHOWN_BINS, dtype=np.int64)
     padded[:last] = ensemble.time_counts[:last]
+    counts = padded.reshape(SHOWN_BINS, per_bin).sum(axis=1)
     edges = ensemble.bin_width * per_bin * np.arange(SHOWN_BINS + 1)
     return {
         "law": ensemble.law,
@@ -274,11 +268,11 @@ def ensemble_document(ensemble: Ensemble) -> dict[str, Any]:
         "left_out": list(ensemble.left_out),
         "probability": {name: asdict(getattr(ensemble, name)) for name in shares},
         "settling_time_s": {
-            "quantiles": dict(zip(map(str, QUANTILES), ensemble.settling_quantiles, strict=False)),
-            "mean": ensemble.mean_settling_time,
+            "quantiles": dict(zip(map(str, QUANTILES), ensemble.settling_quantiles, strict=True)),
             "resolution": ensemble.bin_width,
             "edges": edges.tolist(),
-            "counts": padded.reshape(SHOWN_BINS, per_bin).sum(axis=1).tolist(),
+            "counts": counts.tolist(),
+            "settled_fraction": (np.cumsum(counts) / ensemble.members).tolist(),
         },
         "overshoots": ensemble.overshoot_counts.tolist(),
         "misadjustments": ensemble.misadjustment_counts.tolist(),

@@ -18,10 +18,11 @@ from ringbalance.controller.ensemble.samples import Members
 from ringbalance.controller.ensemble.transfer import PairTransfer
 from ringbalance.controller.judgement import noise_floor
 from ringbalance.controller.loop import DRIFT_POINTS, GAS_POINTS, IDLE_OPERATIONS
-from ringbalance.controller.outcome import CONFIRMING_SAMPLES
 from ringbalance.controller.rotor import chamber_directions, initial_vibration
+from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
+from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene
 
 MOST_SAMPLES: Final = 100_000
@@ -51,6 +52,9 @@ class EnsemblePlan:
 
     shared: npt.NDArray[np.void]
     """Type `SHARED`, shape (1,)."""
+    loop: LoopFactor
+    """Of a member with the scene's own values."""
+    rotor: Rotor
 
     def run(self, members: Members, *, seed: int, number: int = 0) -> MemberRuns:
         """Run some members; `number`, of the first of them in the ensemble, identifies its noise."""
@@ -59,6 +63,7 @@ class EnsemblePlan:
         runs["number"] = number + np.arange(runs.size)
         runs["speed"], runs["proportional"] = members.velocity_factor, members.proportional
         runs["gain_real"], runs["gain_imaginary"] = gain.real, gain.imag
+        runs["stays"] = self._stay(members)
         shared = self.shared.copy()
         shared["key_0"], shared["key_1"] = noise_key(seed=seed)
         run_members(shared[0], runs)
@@ -73,6 +78,14 @@ class EnsemblePlan:
             final_amplitude=runs["amplitude"],
         )
 
+    def _stay(self, members: Members) -> BoolArray:
+        """Whether each member's loop is expected to stay within the limit, as `LoopFactor.stays`."""
+        nominal = self.rotor.influence_coefficient
+        faster = members.velocity_factor * members.moment_factor * members.influence_coefficient / nominal
+        error = np.cos(members.lag_angle - self.shared["assumed_lag"][0])
+        largest = self.loop.largest_staying / max(self.loop.limit / 2.0, 1e-300)
+        return np.asarray(members.proportional * self.loop.rate * faster <= largest * np.maximum(error, 0.0))
+
 
 def ensemble_plan(*, scene: Scene, model: BalancerModel, transfer: PairTransfer) -> EnsemblePlan:
     """Prepare the runs of an ensemble."""
@@ -83,7 +96,8 @@ def ensemble_plan(*, scene: Scene, model: BalancerModel, transfer: PairTransfer)
     shared["axis"][0, : axes.size] = np.stack([axes.real, axes.imag], axis=1)
     for name, value in (_loop(scene) | _controller(scene)).items():
         shared[name] = value
-    return EnsemblePlan(shared=shared)
+    loop = loop_factor(scene, model, target_vector_of(scene))
+    return EnsemblePlan(shared=shared, loop=loop, rotor=scene.rotor)
 
 
 def _loop(scene: Scene) -> dict[str, float]:
@@ -101,7 +115,6 @@ def _loop(scene: Scene) -> dict[str, float]:
         ),
         "rises_tolerated": target_vector_of(scene).rises_tolerated,
         "idle_tolerated": IDLE_OPERATIONS + scene.disc.chambers,
-        "confirming": CONFIRMING_SAMPLES,
         "gas_points": GAS_POINTS,
         "drift_points": DRIFT_POINTS,
         "most_samples": MOST_SAMPLES,
@@ -114,6 +127,7 @@ def _controller(scene: Scene) -> dict[str, float]:
     return {
         "chambers": scene.disc.chambers,
         "period": settings.period,
+        "hold_time": settings.hold_time,
         "limit": settings.limit,
         "assumed_lag": settings.assumed_lag_angle,
         "integral_time": math.inf if settings.integral_time is None else settings.integral_time,

@@ -24,6 +24,8 @@ class Cause(IntEnum):
     TIME = 4
     SAMPLES = 5
     """The bound on the number of samples."""
+    HELD = 6
+    """The amplitude has been within its limit for the hold time and is expected to stay."""
 
 
 NONE: Final = int(Cause.NONE)
@@ -31,10 +33,12 @@ RISING: Final = int(Cause.RISING)
 IDLE: Final = int(Cause.IDLE)
 AT_REST: Final = int(Cause.AT_REST)
 TIME: Final = int(Cause.TIME)
+HELD: Final = int(Cause.HELD)
 """The same as whole numbers, which is what compiled code knows."""
 
 
 def stop_cause(
+    held: bool,
     rises: int,
     rises_tolerated: int,
     above_first: bool,
@@ -44,6 +48,8 @@ def stop_cause(
     time_left: float,
 ) -> int:
     """Number of the cause for which a loop ends after a sample; zero: it continues."""
+    if held:
+        return HELD
     if rises > rises_tolerated or (rises == rises_tolerated and above_first):
         return RISING
     if idle >= idle_tolerated:
@@ -51,6 +57,11 @@ def stop_cause(
     if final:
         return AT_REST
     return TIME if time_left <= 0.0 else NONE
+
+
+def has_held(time: float, since: float, hold_time: float) -> bool:
+    """Whether an amplitude within its limit since an instant, infinite for none, has held, all in s."""
+    return time - since >= hold_time * (1.0 - 1e-9)
 
 
 def has_grown(cause: int, higher: bool) -> bool:

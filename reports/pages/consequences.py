@@ -99,8 +99,11 @@ def _chance(share: Record) -> str:
 
 def _times(quantiles: Record | None) -> str:
     if not quantiles or quantiles.get("0.5") is None:
-        return MISSING
-    low, middle, high = (shown(quantiles[key], "s", digits=3) for key in ("0.05", "0.5", "0.95"))
+        return MISSING if quantiles is None else "not reached"
+    low, middle, high = (
+        "not reached" if quantiles[key] is None else shown(quantiles[key], "s", digits=3)
+        for key in ("0.05", "0.5", "0.95")
+    )
     return f"{middle} ({low} to {high})"
 
 

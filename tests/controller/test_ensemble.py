@@ -18,6 +18,7 @@ from ringbalance.controller.algorithms.algorithm import Measurement
 from ringbalance.controller.ensemble.compiled_noise import member_noise
 from ringbalance.controller.ensemble.moment import moment_table
 from ringbalance.controller.ensemble.monte_carlo import (
+    QUANTILES,
     binomial_share,
     ensemble_document,
     simulate_ensemble,
@@ -48,7 +49,7 @@ EXACT = MemberUncertainty(velocity=0.0, moment=0.0, influence_coefficient=0.0, l
 def noisy(scene: Scene, *, time_limit: float = 12.0, **controller: Any) -> Scene:
     return replace(
         scene,
-        sensor=replace(scene.sensor, amplitude_noise=2e-8, phase_noise=0.02),
+        sensor=replace(scene.sensor, amplitude_noise=1e-8, phase_noise=0.02),
         controller=replace(scene.controller, **controller),
         run=replace(scene.run, time_limit=time_limit),
     )
@@ -246,10 +247,10 @@ def test_a_larger_ensemble_begins_with_the_smaller(scene: Scene, model: Balancer
     counted = simulate_ensemble(asked, model, 50, 1)
     assert counted.settled.value == pytest.approx(b.settled.mean())
     assert counted.overshoot.value == pytest.approx((b.overshoots > 0).mean())
-    assert counted.mean_settling_time == pytest.approx(float(b.settling_time[b.settled].mean()))
-    assert counted.settling_quantiles[2] == pytest.approx(
-        float(np.median(b.settling_time[b.settled])), abs=0.03
-    )
+    # Of all members, those that have not settled at the end: a quantile that they reach into is not known.
+    for q, found in zip(QUANTILES, counted.settling_quantiles, strict=True):
+        known = np.quantile(b.settling_time, q, method="inverted_cdf")
+        assert found == (None if math.isinf(known) else pytest.approx(float(known), abs=0.03))
 
 
 def test_an_interrupt_ends_an_ensemble_at_once(scene: Scene, model: BalancerModel) -> None:
@@ -283,12 +284,16 @@ def test_memory_does_not_grow_with_the_members(scene: Scene, model: BalancerMode
 
 
 def test_more_uncertainty_more_overshoot(scene: Scene, model: BalancerModel) -> None:
-    asked = noisy(scene, time_limit=9.0)
+    asked = noisy(scene, time_limit=30.0)
     asked = replace(asked, sensor=replace(asked.sensor, amplitude_noise=2e-9))
     wide = replace(EXACT, velocity=0.3, influence_coefficient=0.3)
     calm, wild = (simulate_ensemble(asked, model, 2000, 0, uncertainty_95=s) for s in (EXACT, wide))
     assert wild.overshoot.low > calm.overshoot.high
-    assert wild.settling_quantiles[4] > calm.settling_quantiles[4]
+    late = [
+        math.inf if found.settling_quantiles[4] is None else found.settling_quantiles[4]
+        for found in (calm, wild)
+    ]
+    assert late[1] > late[0]
 
 
 def test_members_are_drawn_with_the_half_widths(scene: Scene) -> None:
@@ -326,7 +331,7 @@ def test_the_document_is_small_clean_json(scene: Scene, model: BalancerModel) ->
         simulate_ensemble(asked, model, 300, 0, progress=lambda done, of: seen.append((done, of)))
     )
     text = json.dumps(found, allow_nan=False)
-    assert len(text) < 5000
+    assert len(text) < 6500
     assert seen == [(300, 300)]
     times = found["settling_time_s"]
     assert sum(times["counts"]) == round(300 * found["probability"]["settled"]["value"])

@@ -1,0 +1,210 @@
+"""The loop about the balanced state: what one injection removes of a small residual, and what noise leaves.
+
+Gas for a time T into a chamber of fill x moves (S/V) u T of fill to the opposite one, so the vibration
+changes by b T with b = kappa |dM/dx| (S/V) u, M the moment of the pair along x + x_opposite = const: that is
+kappa lambda rho S u.  The controller asks for T = Kc e along the residual, so a residual e becomes
+e (1 - h exp(j d)) with h = Kc b and d the error of the assumed lag angle.  It shrinks for h < 2 cos d and
+turns round from h = 1 / cos d on.  b differs from pair to pair, and with the chamber of a pair that is
+driven.  A residual that turns round is driven by both in turn, and (1 - h1)(1 - h2) <= (1 - (h1 + h2)/2)^2,
+so the mean of both counts; of all pairs the largest.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from ringbalance.controller.algorithms.algorithm import Controller
+from ringbalance.controller.algorithms.law_based import LawBased
+from ringbalance.controller.algorithms.law_based_times import fill_for_moment, pair_changes
+from ringbalance.controller.algorithms.target_vector import TargetVector
+from ringbalance.controller.rotor import influence, initial_vibration
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Scene
+
+STAYING_DEVIATIONS: Final = 3.0
+"""Stationary standard deviations that the limit must hold: a sample then is within it with 99.7 %."""
+_FILL_STEP: Final = 1e-4
+"""Half the distance over which the slope of a moment is taken, as a fraction of the range of fills."""
+_HALVINGS: Final = 40
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopFactor:
+    """The loop of one controller about the balanced state."""
+
+    rate: float
+    """b, change of the vibration per valve-open time, m/s; zero where nothing flows."""
+    value: float | None
+    """h, part of a small residual that one injection removes; None for an algorithm without a gain."""
+    fixed: bool
+    """Whether h keeps its value; an algorithm that learns comes to one."""
+    limit: float
+    """2 cos d, from which a small residual grows."""
+    largest_staying: float
+    """Largest h whose stationary deviation is a third of the amplitude limit."""
+    deviation: float | None
+    """Stationary standard deviation of the amplitude under the sensor's noise, m; None: it has none."""
+
+    @property
+    def unstable(self) -> bool:
+        """Whether a small residual grows."""
+        return self.fixed and self.value is not None and self.value >= self.limit
+
+    @property
+    def stays(self) -> bool:
+        """Whether an amplitude that is within its limit is expected to stay there."""
+        return (self.value if self.fixed and self.value is not None else 1.0) <= self.largest_staying
+
+    @property
+    def lag_margin(self) -> float | None:
+        """Error of the assumed lag angle at which the residual no longer falls, acos(h/2), rad."""
+        return None if self.value is None else math.acos(min(self.value / 2.0, 1.0))
+
+
+def loop_factor(scene: Scene, model: BalancerModel, controller: Controller[Any]) -> LoopFactor:
+    """The loop of a scene under a law and a controller.
+
+    The law-based algorithm removes kappa/kappa' of a residual, kappa' its assumed influence coefficient, and
+    learns the true one: what noise leaves is taken at a loop factor of one.  A trial has no linear loop, and
+    the same bound on the noise is used for it.
+    """
+    rate, noise = float(np.max(np.mean(vibration_rates(scene, model), axis=1))), noise_at_limit(scene)
+    error = 0.0
+    value: float | None = None
+    integral = derivative = 0.0
+    if isinstance(controller, TargetVector):
+        value = controller.proportional * rate
+        error = controller.lag_angle - scene.rotor.lag_angle
+        integral = scene.controller.period / (controller.integral_time or math.inf)
+        derivative = controller.derivative_time / scene.controller.period
+    if isinstance(controller, LawBased):
+        value = scene.rotor.influence_coefficient / abs(controller.influence)
+    largest = largest_staying(
+        limit=scene.controller.limit, noise=noise, integral=integral, derivative=derivative
+    )
+    deviation = stationary_deviation(
+        loop_factor=1.0 if value is None or isinstance(controller, LawBased) else value,
+        noise=noise,
+        integral=integral,
+        derivative=derivative,
+        lag_error=error,
+    )
+    return LoopFactor(
+        rate=rate,
+        value=value,
+        fixed=isinstance(controller, TargetVector),
+        limit=2.0 * max(math.cos(error), 0.0),
+        largest_staying=largest * max(math.cos(error), 0.0),
+        deviation=None if value is None else deviation,
+    )
+
+
+def noise_at_limit(scene: Scene) -> float:
+    """Standard deviation of the measured vibration where its amplitude is at the limit, m."""
+    sensor = scene.sensor
+    return math.hypot(sensor.amplitude_noise, scene.controller.limit * sensor.phase_noise)
+
+
+def balanced_fills(scene: Scene, model: BalancerModel) -> FloatArray:
+    """Fills of the positive chambers with which the disc cancels the unbalance, or comes nearest to it."""
+    rotor, total = scene.rotor, 2.0 * scene.disc.initial_fill
+    lowest, highest = _range(scene, model)
+    ends = np.array([scene.disc.initial_fill, lowest, highest])
+    now, low, high = model.moment.pair_moment(fill_ratio=ends, opposite_fill_ratio=total - ends)
+    k = influence(coefficient=rotor.influence_coefficient, lag_angle=rotor.lag_angle)
+    pairs = scene.disc.chambers // 2
+    changes = pair_changes(
+        wanted=-initial_vibration(rotor=rotor) / k, bounds=[(float(low - now), float(high - now))] * pairs
+    )
+    fills = [
+        fill_for_moment(
+            moment=model.moment, wanted=float(now) + change, total=total, lowest=lowest, highest=highest
+        )
+        for change in changes
+    ]
+    return np.asarray(np.clip(np.array(fills), lowest, highest), dtype=np.float64)
+
+
+def vibration_rates(scene: Scene, model: BalancerModel) -> FloatArray:
+    """b at the balanced fills, m/s, shape (pairs, 2): gas into the positive chamber, into the other one."""
+    total, (lowest, highest) = 2.0 * scene.disc.initial_fill, _range(scene, model)
+    fills = balanced_fills(scene, model)
+    step = _FILL_STEP * (highest - lowest)
+    after, before = np.minimum(fills + step, highest), np.maximum(fills - step, lowest)
+    up, down = (
+        model.moment.pair_moment(fill_ratio=x, opposite_fill_ratio=total - x) for x in (after, before)
+    )
+    slope = np.abs(up - down) / (after - before)
+    driven = np.stack([fills, total - fills], axis=-1)
+    flow = model.flow.evaluate(
+        fill_ratio=driven,
+        opposite_fill_ratio=np.clip(total - driven, lowest, highest),
+        gas_pressure=scene.gas.pressure,
+        primed=True,
+    )
+    per_fill = scene.rotor.influence_coefficient * model.tube_area / model.chamber_volume
+    return np.asarray(per_fill * slope[:, None] * np.maximum(flow.velocity, 0.0))
+
+
+def _range(scene: Scene, model: BalancerModel) -> tuple[float, float]:
+    total, largest = 2.0 * scene.disc.initial_fill, model.flow.max_fill_ratio
+    return max(0.0, total - largest), min(total, largest)
+
+
+def stationary_deviation(
+    *,
+    loop_factor: float,
+    noise: float,
+    integral: float = 0.0,
+    derivative: float = 0.0,
+    lag_error: float = 0.0,
+) -> float:
+    """Standard deviation of the residual that noise of the sensor keeps up in the sampled loop.
+
+    With the measured m = x + n, i = dt/Ti (`integral`) and q = Td/dt (`derivative`) a step is
+    w' = w + i (m + m_before)/2,  x' = x - h exp(j d) (m + w' + q (m - m_before)).
+    A residual that turns round at every sample (h cos d > 1) has its integral dropped each time, and its
+    amplitude has no sign: in y = (-1)^k x the same law with i = 0 reads
+    y' = h exp(j d) (m + q (m - m_before)) - y.
+    With P alone both give noise sqrt(h/(2 cos d - h)).  An amplitude within the limit rests, and the first
+    step after it is P alone.
+    Returns: The unit of `noise`; infinite for an unstable loop.
+    """
+    h, turns = cmath.rect(loop_factor, lag_error), loop_factor * math.cos(lag_error) > 1.0
+    i, sign = (0.0, -1.0) if turns else (integral, 1.0)
+    now, before = 1.0 + i / 2.0 + derivative, i / 2.0 - derivative
+    step = np.array(
+        [[sign * (1.0 - h * now), -sign * h * before, -sign * h], [1.0, 0.0, 0.0], [i / 2.0, i / 2.0, 1.0]],
+        dtype=np.complex128,
+    )
+    push = np.array([[-sign * h * now], [1.0], [i / 2.0]], dtype=np.complex128)
+    if i == 0.0:
+        step, push = step[:2, :2], push[:2]
+    if np.max(np.abs(np.linalg.eigvals(step))) >= 1.0:
+        return math.inf
+    if noise == 0.0:
+        return 0.0
+    # P = A P A^H + B B^H, row by row.
+    size = step.shape[0]
+    whole = np.eye(size**2) - np.kron(step, step.conj())
+    variance = np.linalg.solve(whole, (push @ push.conj().T).ravel())[0]
+    return noise * math.sqrt(max(float(variance.real), 0.0))
+
+
+def largest_staying(*, limit: float, noise: float, integral: float = 0.0, derivative: float = 0.0) -> float:
+    """Largest loop factor, at most 2, with which the limit holds three stationary standard deviations."""
+
+    low, high = 0.0, math.nextafter(2.0, 0.0)
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2.0
+        found = stationary_deviation(
+            loop_factor=middle, noise=noise, integral=integral, derivative=derivative
+        )
+        low, high = (middle, high) if STAYING_DEVIATIONS * found <= limit else (low, middle)
+    return low

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from ringbalance.face import compare as compare
     from ringbalance.face import simulate as simulate
+    from ringbalance.face import tune as tune
     from ringbalance.reduced_model.calibration import calibrate as calibrate
     from ringbalance.reduced_model.law.loading import load_law as load_law
     from ringbalance.reduced_model.law.paper_law import paper_law as paper_law
@@ -32,6 +33,7 @@ _HOME = {
     "paper_law": "ringbalance.reduced_model.law.paper_law",
     "run_cases": "ringbalance.verification.runner",
     "simulate": "ringbalance.face",
+    "tune": "ringbalance.face",
     "write_report": "ringbalance.reports.report",
 }
 

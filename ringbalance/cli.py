@@ -35,6 +35,10 @@ COMMANDS = {
         "lambda, k and the flow law of a disc, with uncertainties.",
     ),
     "simulate": ("ringbalance.controller.cli:simulate", "One closed-loop balancing run."),
+    "tune": (
+        "ringbalance.controller.tuning.cli:tune",
+        "Recommended gain, its margins, and the settling times under it.",
+    ),
     "verify": (
         "ringbalance.verification.cli:verify",
         "The verification cases and the paper's claims, judged.",

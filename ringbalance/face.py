@@ -11,9 +11,12 @@ from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.loop import simulate as run_closed_loop
 from ringbalance.controller.simulation import Simulation
+from ringbalance.controller.tuning.tune import Tuning
+from ringbalance.controller.tuning.tune import tune as tune_scene
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.law.model import CompleteLaw, balancer_model
 from ringbalance.scene import AnyScene, EccentricScene, Scene
+from ringbalance.scene.narrowing import liquid_ring_scene
 
 
 @overload
@@ -65,3 +68,15 @@ def compare(first: AnyScene, second: AnyScene) -> Comparison:
     Raises: SceneError: a balancer that cannot work on that rotor.
     """
     return run_comparison(first, second, model_of=lambda scene: calibrate(scene).model)
+
+
+def tune(scene: AnyScene, *, flow_law: CompleteLaw | None = None) -> Tuning:
+    """Recommend the controller's gain, with its margins and the settling times under it.
+
+    Under a given law, inputs that the scene states as uncertain do not change the law itself.
+    Raises: SceneError: a scene with eccentric masses, or a rotor too slow for the liquid to form a ring.
+    """
+    given = None if flow_law is None else balancer_model(flow_law)
+    return tune_scene(
+        liquid_ring_scene(scene), model_of=lambda asked: calibrate(asked).model if given is None else given
+    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from typing import Any, Final
@@ -71,7 +71,7 @@ class Ensemble:
     left_out: tuple[str, ...]
     """Terms that `simulate` models for this scene and an ensemble does not."""
     settling_quantiles: tuple[float | None, ...]
-    """s, by which the fractions `QUANTILES` of all members have settled; None: fewer have in their time."""
+    """s, by which fractions of all members have settled, `QUANTILES` by default; None: fewer have."""
     bin_width: float
     """s."""
     time_counts: IntArray
@@ -90,6 +90,7 @@ def simulate_ensemble(
     *,
     uncertainty_95: MemberUncertainty | None = None,
     transfer: PairTransfer | None = None,
+    quantiles: Sequence[float] = QUANTILES,
     workers: int = 2,
     progress: Progress | None = None,
 ) -> Ensemble:
@@ -110,7 +111,7 @@ def simulate_ensemble(
     followed = ensemble_transfer(scene, model) if transfer is None else transfer
     widths = member_uncertainty(scene, model) if uncertainty_95 is None else uncertainty_95
     plan = ensemble_plan(scene=scene, model=model, transfer=followed)
-    tally = _Tally(time_limit=scene.run.time_limit)
+    tally = _Tally(time_limit=scene.run.time_limit, quantiles=quantiles)
 
     def run(block: int) -> MemberRuns:
         return _block(scene, plan, widths, seed=seed, block=block, size=n - block * BLOCK)
@@ -189,7 +190,8 @@ def _in_order(run: Callable[[int], MemberRuns], *, blocks: int, workers: int) ->
 class _Tally:
     """Counts that grow with the members while the memory does not."""
 
-    def __init__(self, *, time_limit: float) -> None:
+    def __init__(self, *, time_limit: float, quantiles: Sequence[float]) -> None:
+        self.quantiles = quantiles
         self.members = self.settled = self.diverged = self.drifted = 0
         self.width = time_limit / TIME_BINS
         self.times = np.zeros(TIME_BINS, dtype=np.int64)
@@ -237,7 +239,9 @@ class _Tally:
     def _quantiles(self) -> tuple[float | None, ...]:
         reached = np.concatenate([[0], np.cumsum(self.times)]) / self.members
         edges = self.width * np.arange(TIME_BINS + 1)
-        return tuple(float(np.interp(q, reached, edges)) if q <= reached[-1] else None for q in QUANTILES)
+        return tuple(
+            float(np.interp(q, reached, edges)) if q <= reached[-1] else None for q in self.quantiles
+        )
 
 
 def binomial_share(*, count: int, of: int) -> Probability:

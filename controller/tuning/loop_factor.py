@@ -142,11 +142,14 @@ def vibration_rates(scene: Scene, model: BalancerModel) -> FloatArray:
     )
     slope = np.abs(up - down) / (after - before)
     driven = np.stack([fills, total - fills], axis=-1)
+    opposite = np.clip(total - driven, lowest, highest)
+    # An injection starts with what the tube holds while the gas is off.
+    rest = model.flow.evaluate(fill_ratio=driven, opposite_fill_ratio=opposite, gas_pressure=0.0, primed=True)
     flow = model.flow.evaluate(
         fill_ratio=driven,
-        opposite_fill_ratio=np.clip(total - driven, lowest, highest),
+        opposite_fill_ratio=opposite,
         gas_pressure=scene.gas.pressure,
-        primed=True,
+        primed=rest.primed,
     )
     per_fill = scene.rotor.influence_coefficient * model.tube_area / model.chamber_volume
     return np.asarray(per_fill * slope[:, None] * np.maximum(flow.velocity, 0.0))

@@ -1,0 +1,130 @@
+"""The command `ringbalance tune`."""
+
+from __future__ import annotations
+
+import json as json_format
+import math
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from ringbalance.controller.tuning.tune import Tuning, tuning_document
+from ringbalance.controller.tuning.tune import tune as tune_scene
+from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.law.loading import load_model
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.paper_law import paper_model
+from ringbalance.scene.accuracy import Models, with_tolerance
+from ringbalance.scene.loader import load_scene
+from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.scene.platform.progress import activity
+from ringbalance.scene.platform.terminal import results_console
+
+TUNED = 0
+NOT_TUNED = 1
+_UM = 1e6
+
+
+def tune(
+    scene: Path,
+    *,
+    law: str = "calibrated",
+    json: bool = False,
+    tolerance: str | None = None,
+    models: Models | None = None,
+) -> int:
+    """Recommend the controller's gain, with its margins and the settling times under it.
+
+    Args:
+        scene: the scene file.
+        law: "calibrated", "paper", or a file written by `ringbalance calibrate --save`.
+        json: print one JSON document instead of tables.
+        tolerance: in place of the scene's, such as "0.5 %" or 0.005.
+        models: "finest" models every term that has a model, whatever the tolerance.
+
+    Returns:
+        Exit code: 0 a gain is recommended and settles 95 % of the runs, 1 otherwise; the result is printed
+        either way.
+
+    Raises:
+        SceneError: a scene or a law that cannot be used.
+    """
+
+    def model_of(asked: Scene) -> BalancerModel:
+        if law == "calibrated":
+            return calibrate(asked).model
+        return paper_model(asked) if law == "paper" else load_model(Path(law))
+
+    given = with_tolerance(load_scene(scene), tolerance=tolerance, models=models)
+    with activity("tune", f"flow law: {law} ...") as shown:
+        found = tune_scene(liquid_ring_scene(given), model_of=model_of, progress=shown.show)
+    if json:
+        print(json_format.dumps(tuning_document(found), allow_nan=False))
+    else:
+        _show(found, results_console())
+    return TUNED if found.succeeded else NOT_TUNED
+
+
+def _show(tuning: Tuning, console: Console) -> None:
+    console.print(Text(tuning.status, style=f"bold {'green' if tuning.succeeded else 'yellow'}"))
+    table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
+    table.add_column(style="dim")
+    table.add_column()
+    for name, value in _rows(tuning).items():
+        table.add_row(name, value)
+    console.print(table)
+    parts = Table(title="uncertainty of the loop factor (95 %)", title_justify="left")
+    for name in ("part", "relative", "from"):
+        parts.add_column(name)
+    for part in tuning.contributions:
+        parts.add_row(part.name, f"{part.uncertainty:.2%}", part.source)
+    console.print(parts)
+
+
+def _rows(tuning: Tuning) -> dict[str, str]:
+    settings, loop, margins = tuning.scene.controller, tuning.loop, tuning.margins
+    rows = {"flow law": tuning.law, "algorithm": settings.kind.replace("_", " ")}
+    if tuning.gain is not None:
+        rows["recommended gain"] = f"{tuning.gain / _UM:.4g} s/um (controller.proportional)"
+    if loop.value is not None:
+        rows["loop factor"] = f"{loop.value:.3g} of at most {loop.limit:.3g}"
+    if tuning.present.value is not None:
+        rows["loop factor of the scene"] = f"{tuning.present.value:.3g}"
+    if loop.deviation is not None:
+        rows["noise leaves"] = f"{loop.deviation * _UM:.4g} um, limit {settings.limit * _UM:.4g} um"
+    if margins is not None:
+        rows["margins"] = (
+            f"gain x {margins.gain_factor:.3g}, phase {math.degrees(margins.phase):.3g} deg; together (disk) "
+            f"gain x {margins.disk_gain_factor:.3g}, phase {math.degrees(margins.disk_phase):.3g} deg"
+        )
+        rows["left at the edge of the uncertainty"] = (
+            f"gain x {margins.left_gain_factor:.3g}, phase {math.degrees(margins.left_phase):.3g} deg"
+        )
+    if tuning.first_gas_time is not None and tuning.last_gas_time is not None:
+        rows["valve-open times"] = (
+            f"{tuning.first_gas_time:.3g} s at first, {tuning.last_gas_time * 1e3:.3g} ms at the limit; the "
+            f"valve's shortest is {settings.minimum_gas_time * 1e3:.3g} ms"
+        )
+    rows["smallest correction"] = f"{tuning.smallest_correction * _UM:.4g} um"
+    return rows | _settling(tuning)
+
+
+def _settling(tuning: Tuning) -> dict[str, str]:
+    settling = tuning.settling
+    if settling is None:
+        return {}
+    times = ", ".join(
+        f"{name[1:]} % within {f'{time:.3g} s' if time is not None else 'not reached'}"
+        for name, time in settling.quantiles.items()
+    )
+    limit = tuning.scene.run.time_limit
+    rows = {
+        "settling time": times,
+        "settled": f"{settling.settled.value:.2%} of {settling.runs} runs within {limit:.4g} s",
+    }
+    if settling.left_out:
+        rows["left out of these runs"] = ", ".join(settling.left_out)
+    return rows

@@ -1,0 +1,181 @@
+"""`ringbalance tune`: the gain, its margins, what the valve can do, and the settling times."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import ringbalance as rb
+from ringbalance.cli import main
+from ringbalance.controller.loop import simulate
+from ringbalance.controller.tuning.loop_factor import vibration_rates
+from ringbalance.controller.tuning.margins import loop_margins
+from ringbalance.controller.tuning.tune import Tuning, tune, tuning_document
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.paper_law import paper_model
+from ringbalance.scene.models import InputUncertainty, Scene
+
+MEMBERS = 300
+
+
+def tuned(scene: Scene, **more: Any) -> Tuning:
+    asked = replace(scene, sensor=replace(scene.sensor, amplitude_noise=1e-8, phase_noise=0.005))
+    return tune(asked, model_of=paper_model, members=MEMBERS, runs=3, **more)
+
+
+@pytest.fixture(scope="module")
+def found(scene: Scene) -> Tuning:
+    return tuned(scene)
+
+
+def with_settings(scene: Scene, **settings: Any) -> Scene:
+    return replace(scene, controller=replace(scene.controller, **settings))
+
+
+# --- margins ---
+
+
+@pytest.mark.parametrize("h", [0.2, 0.8, 1.5])
+def test_margins_of_a_proportional_loop_are_known(h: float) -> None:
+    # S = (z - 1)/(z - 1 + h): (S - T)/2 is largest at z = -1.
+    margins = loop_margins(loop_factor=h, gain_uncertainty=0.0, phase_uncertainty=0.0)
+    assert margins.disk == pytest.approx(2 * (2 - h) / (2 + h), rel=1e-9)
+    assert margins.disk_gain_factor == pytest.approx(2 / h) == margins.gain_factor
+    assert margins.phase == pytest.approx(math.acos(h / 2))
+    assert margins.disk_phase < margins.phase
+    assert margins.left_gain_factor == pytest.approx(2 / h)
+
+
+def test_any_gain_and_phase_within_the_disk_leave_the_loop_stable() -> None:
+    h, i, q = 0.8, 0.01, 0.12
+    margins = loop_margins(
+        loop_factor=h, integral=i, derivative=q, gain_uncertainty=0.0, phase_uncertainty=0.0
+    )
+    span = 0.999 * margins.disk / 2
+
+    def radius(factor: complex) -> float:
+        c = h * factor
+        loop = [1.0, -2 + c * (1 + i / 2 + q), 1 - c * (1 - i / 2 + 2 * q), c * q]
+        return float(np.max(np.abs(np.roots(loop))))
+
+    for angle in np.linspace(0, 2 * math.pi, 60):
+        turned = span * np.exp(1j * angle)
+        assert radius((1 + turned) / (1 - turned)) < 1
+    over = (1 + 1.01 * margins.disk / 2) / (1 - 1.01 * margins.disk / 2)
+    assert radius(over) > 1
+
+
+def test_uncertainty_takes_from_both_margins() -> None:
+    # |1 - h (1 + U) exp(j d)| = 1 at h (1 + U) = 2 cos d.
+    margins = loop_margins(loop_factor=0.8, gain_uncertainty=0.25, phase_uncertainty=0.3)
+    assert margins.left_gain_factor == pytest.approx(2 * math.cos(0.3) / 1.0)
+    assert margins.left_phase == pytest.approx(math.acos(0.5) - 0.3)
+
+
+# --- the gain ---
+
+
+def test_no_residual_turns_round_at_the_edge_of_the_uncertainty(scene: Scene, found: Tuning) -> None:
+    assert found.gain is not None
+    assert found.margins is not None
+    fastest = float(np.max(vibration_rates(scene, paper_model(scene))))
+    assert found.gain * fastest * (1 + found.margins.gain_uncertainty) == pytest.approx(1.0)
+    assert found.present.value == pytest.approx(found.present.rate * scene.controller.proportional)
+
+
+def test_an_uncertain_input_counts_by_what_it_does_to_the_rate(scene: Scene, found: Tuning) -> None:
+    bore = InputUncertainty(quantity="bore", half_width=0.03, relative=True)
+    wider = tuned(replace(scene, uncertainty=(bore,)))
+    parts = {part.name: part.uncertainty for part in wider.contributions}
+    # Under Eq. 19 with its constant k the rate goes with the tube's area.
+    assert parts["bore"] == pytest.approx(1.03**2 - 1, rel=1e-6)
+    assert wider.gain is not None
+    assert found.gain is not None
+    assert wider.gain < found.gain
+
+
+def test_the_recommended_gain_settles_its_runs(found: Tuning) -> None:
+    assert found.succeeded
+    assert found.settling is not None
+    assert found.settling.runs == MEMBERS
+    p50, p95 = found.settling.quantiles["p50"], found.settling.quantiles["p95"]
+    assert p50 is not None
+    assert p95 is not None
+    assert p50 <= p95 < 5.0
+    run = simulate(found.scene, paper_model(found.scene))
+    assert run.settling_time == pytest.approx(p50, rel=0.5)
+
+
+def test_the_same_scene_gives_the_same_document(scene: Scene, found: Tuning) -> None:
+    assert tuning_document(tuned(scene)) == tuning_document(found)
+    json.dumps(tuning_document(found), allow_nan=False)
+
+
+def test_a_law_based_controller_has_margins_and_no_gain(scene: Scene) -> None:
+    answer = tuned(with_settings(scene, kind="law_based"))
+    assert answer.gain is None
+    assert answer.loop.value == pytest.approx(1.0)
+    assert answer.margins is not None
+    assert answer.margins.gain_factor == pytest.approx(2.0)
+    assert answer.settling is not None
+    assert answer.settling.runs == 3
+
+
+# --- what cannot be ---
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [({"minimum_gas_time": 0.05}, "valve is too slow"), ({"limit": 1e-10}, "no gain keeps")],
+)
+def test_a_limit_that_cannot_be_reached_is_said(scene: Scene, settings: dict[str, float], words: str) -> None:
+    answer = tuned(with_settings(scene, **settings))
+    assert words in answer.status
+    assert not answer.succeeded
+    assert not answer.reachable
+
+
+def test_gas_that_drives_nothing_gives_no_gain(scene: Scene, calibrated: BalancerModel) -> None:
+    # 0.1 MPa lifts no liquid over the crest.
+    weak = replace(scene, gas=replace(scene.gas, pressure=0.1e6))
+    answer = tune(weak, model_of=lambda _: calibrated)
+    assert answer.gain is None
+    assert "drives no liquid" in answer.status
+    json.dumps(tuning_document(answer), allow_nan=False)
+
+
+def test_a_short_time_limit_leaves_quantiles_open(scene: Scene) -> None:
+    answer = tuned(replace(scene, run=replace(scene.run, time_limit=4.0)))
+    assert answer.settling is not None
+    assert answer.settling.quantiles == {"p50": None, "p95": None}
+    assert answer.settling.settled.value == 0.0
+    assert "not reached" in answer.status
+
+
+# --- as a user calls it ---
+
+
+def test_the_command_prints_one_document(capsys: pytest.CaptureFixture[str]) -> None:
+    scene = str(Path(rb.__file__).parent.parent / "scenes" / "liquid_ring_paper.toml")
+    assert main(["tune", scene, "--law", "paper", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["gain"] > 0
+    assert set(answer["settling_time_s"]) == {"p50", "p95"}
+    assert main(["tune", scene, "--law", "paper"]) == 0
+    assert "recommended gain" in capsys.readouterr().out
+
+
+def test_bad_input_is_exit_code_two(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    broken = tmp_path / "broken.toml"
+    broken.write_text('[disc]\nouter_radius = "4 s"\n')
+    assert main(["tune", str(broken)]) == 2
+    assert "Traceback" not in capsys.readouterr().err
+    eccentric = Path(rb.__file__).parent.parent / "scenes" / "eccentric_mass_paper.toml"
+    assert main(["tune", str(eccentric)]) == 2
+    assert capsys.readouterr().err

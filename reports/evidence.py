@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from datetime import date
 from importlib.metadata import PackageNotFoundError, version
-from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -25,36 +24,21 @@ from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.reports.pages.cases import typeset_equations
 from ringbalance.reports.pictures.fields import chamber_field, mesh_record, pressure_profile
-from ringbalance.reports.section import Level, Work
+from ringbalance.reports.section import Level, Record, Work
 from ringbalance.reports.sections import collected
-from ringbalance.reports.studies.consequences import consequences_document, find_consequences
 from ringbalance.scene import Scene, scene_table
 from ringbalance.verification import paper_numbers
 from ringbalance.verification.document import merge_saved, results_document
 from ringbalance.verification.result import CaseResult
 from ringbalance.verification.runner import cases_under_way
 
-Record = dict[str, Any]
 Progress = Callable[[str], None]
 
 FORMAT: Final = 1
 PACKAGES: Final = (
-    "numpy",
-    "scipy",
-    "scikit-fem",
-    "pyamg",
-    "fluids",
-    "chemicals",
-    "meshio",
-    "pydantic",
-    "matplotlib",
-    "pyvista",
-    "vtk",
-    "jinja2",
-    "ziamath",
+    *("numpy", "scipy", "scikit-fem", "pyamg", "fluids", "chemicals", "meshio", "pydantic"),
+    *("matplotlib", "pyvista", "vtk", "jinja2", "ziamath"),
 )
-MEMBERS: Final = MappingProxyType({"light": 500, "heavy": 20_000})
-"""Runs of each ensemble, by level: at 500 a probability is known to about four per cent."""
 LAW_POINTS: Final = 51
 """Fill ratios at which the flow law is drawn."""
 
@@ -81,9 +65,6 @@ def collect_evidence(
         calibration = calibrate(scene)
         tell("closed loop")
         runs = _closed_loop(scene, calibration)
-        tell("consequences")
-        members = MEMBERS[level]
-        consequences = consequences_document(find_consequences(scene, calibration.model, members=members))
         tell("sections")
         work = Work(scene=scene, calibration=calibration, level=level)
         sections = collected(work, last=False)
@@ -108,7 +89,6 @@ def collect_evidence(
         "calibration": calibration_document(calibration),
         "flow_law": _flow_law(scene, calibration),
         "closed_loop": runs,
-        "consequences": consequences,
         **sections,
         "verification": cases,
         "pictures": {"drawn": False, "text": "The 3-D pictures were not asked for.", "files": []},

@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import groupby
-from typing import Any, Final
+from typing import Final
 
 from ringbalance.reports import summary
 from ringbalance.reports.equations import equation_svg, equations
@@ -15,18 +15,19 @@ from ringbalance.reports.figures.chamber import moment, pressure_error, pressure
 from ringbalance.reports.figures.loop import amplitude, early_amplitude, early_time, fill_ratios, regimes
 from ringbalance.reports.figures.style import Drawing
 from ringbalance.reports.figures.tube import drag, drag_terms, flow_laws
-from ringbalance.reports.numbers import MISSING, display_unit, fixed, measured, number, percent, short, shown
+from ringbalance.reports.numbers import display_unit, fixed, measured, number, percent, short, shown
 from ringbalance.reports.pages.cases import case_view
-from ringbalance.reports.prose import typeset
+from ringbalance.reports.section import Cells, Record, Table
 from ringbalance.reports.sections import drawings_in, viewed
 
-Record = dict[str, Any]
+Facts = tuple[tuple[str, str], ...]
+"""Labels and texts."""
 
 FIRST_OPERATIONS: Final = 12
 """Gas operations that are listed without being asked for."""
 
 
-def page_figures(evidence: Record) -> Record:
+def _page_figures(evidence: Record) -> Record:
     """The figures of the sections, by name; one whose evidence is missing is None."""
     calibration, paper, runs = evidence["calibration"], evidence["paper"], evidence["closed_loop"]
     return {
@@ -56,107 +57,104 @@ def _relative(values: list[float], reference: list[float]) -> list[float | None]
     return [value / base if base else None for value, base in zip(values, reference, strict=True)]
 
 
-def chamber_table(chamber: Record) -> Record:
+def _chamber_table(chamber: Record) -> Table:
     """The chamber over its fill: heads carry the units, so that the cells are bare numbers."""
     pressure, moment = chamber["wall_pressure_Pa"], chamber["moment_kg_m"]
     paper, paper_moment = chamber["wall_pressure_paper_Pa"], chamber["moment_paper_kg_m"]
-    errors = [
-        [None if ratio is None else ratio - 1 for ratio in _relative(*pair)]
-        for pair in ((paper, pressure), (paper_moment, moment))
-    ]
     columns = [
         [short(fill) for fill in chamber["fill_ratio"]],
         _column(chamber["free_surface_radius_m"], "m", digits=5),
         _column(pressure, "Pa"),
         [number(u, digits=1) for u in _relative(chamber["wall_pressure_uncertainty"], pressure)],
         _column(paper, "Pa", digits=4),
-        [percent(error, signed=True) for error in errors[0]],
+        _errors(paper, pressure),
         _column(moment, "kg m"),
         [number(u, digits=1) for u in _relative(chamber["moment_uncertainty"], moment)],
         _column(paper_moment, "kg m", digits=4),
-        [percent(error, signed=True) for error in errors[1]],
+        _errors(paper_moment, moment),
     ]
-    units = {"pressure": display_unit("Pa", *pressure).symbol, "moment": display_unit("kg m", *moment).symbol}
-    return {"units": units, "rows": [list(row) for row in zip(*columns, strict=True)]}
+    pa, kg_m = display_unit("Pa", *pressure).symbol, display_unit("kg m", *moment).symbol
+    return Table(
+        caption="One chamber over its fill: mean pressure of the liquid on the outer wall, and balancing "
+        "moment. ± is the expanded uncertainty (95 %) relative to the value, from grid convergence.",
+        heads=(
+            *("Fill ratio", "Free surface\nmm"),
+            *(f"Wall pressure\n{pa}", "±\nrelative", f"by Eq. 12\n{pa}", "error of\nEq. 12"),
+            *(f"Moment\n{kg_m}", "±\nrelative", f"by Eq. 7\n{kg_m}", "error of\nEq. 7"),
+        ),
+        rows=list(zip(*columns, strict=True)),
+        style="dense",
+    )
 
 
-def drag_table(tube: Record, point: Record) -> Record:
+def _errors(paper: list[float], found: list[float]) -> list[str]:
+    ratios = _relative(paper, found)
+    return [percent(None if ratio is None else ratio - 1, signed=True) for ratio in ratios]
+
+
+def _drag_table(tube: Record, point: Record) -> Table:
     """The terms of k at the tabulated velocity nearest to the operating point."""
-    wanted = point["k_at_velocity_m_s"] or tube["velocity_m_s"][-1]
-    nearest = min(range(len(tube["k"])), key=lambda i: abs(math.log(tube["velocity_m_s"][i] / wanted)))
-    rows = [
-        {"term": name.replace("_", " "), "value": number(values[nearest], digits=3)}
-        for name, values in tube["terms"].items()
-    ]
-    rows.append({"term": "k", "value": measured(tube["k"][nearest], tube["k_uncertainty"][nearest])})
-    speed = shown(tube["velocity_m_s"][nearest], "m/s", digits=3)
-    reynolds = number(tube["reynolds"][nearest], digits=3)
-    state = tube["flow_state"][nearest]
-    return {"caption": f"Terms of k at {speed}, Re {reynolds}, {state}.", "rows": rows}
+    velocity = point["k_at_velocity_m_s"] or tube["velocity_m_s"][-1]
+    i = min(range(len(tube["k"])), key=lambda i: abs(math.log(tube["velocity_m_s"][i] / velocity)))
+    speed, reynolds = shown(tube["velocity_m_s"][i], "m/s", digits=3), number(tube["reynolds"][i], digits=3)
+    terms = [(name.replace("_", " "), number(v[i], digits=3)) for name, v in tube["terms"].items()]
+    return Table(
+        caption=f"Terms of k at {speed}, Re {reynolds}, {tube['flow_state'][i]}.",
+        heads=("Term", "Contribution to k"),
+        rows=[*terms, ("k", measured(tube["k"][i], tube["k_uncertainty"][i]))],
+    )
 
 
-def operation_tables(run: Record | None) -> Record:
+def _operation_tables(run: Record | None) -> dict[str, Table]:
     """The operations of a run: the first ones, and the rest for whoever wants them."""
     rows = [_injection(row) for row in (run or {"injections": []})["injections"]]
-    return {"first": rows[:FIRST_OPERATIONS], "rest": rows[FIRST_OPERATIONS:]}
-
-
-def _injection(row: Record) -> Record:
-    regimes = dict.fromkeys((row["regime"], row.get("regime_end") or row["regime"]))
+    heads = ("Time", "Chamber", "Gas on for", "Regime", "Fill before", "after")
+    title = "Gas operations under the calibrated law"
     return {
-        "time": shown(row["time_s"], "s", digits=3),
-        "chamber": row["chamber"],
-        "duration": shown(row["duration_s"], "s", digits=3),
-        "regime": " to ".join(regimes),
-        "before": fixed(row["fill_before"], 4),
-        "after": fixed(row["fill_after"], 4),
+        "first": Table(caption=f"{title}.", heads=heads, rows=rows[:FIRST_OPERATIONS]),
+        "rest": Table(caption=f"{title}, continued.", heads=heads, rows=rows[FIRST_OPERATIONS:]),
     }
 
 
-def loop_notes(runs: Record) -> list[Record]:
+def _injection(row: Record) -> Cells:
+    regimes = dict.fromkeys((row["regime"], row.get("regime_end") or row["regime"]))
+    times = [shown(row[key], "s", digits=3) for key in ("time_s", "duration_s")]
+    fills = [fixed(row[key], 4) for key in ("fill_before", "fill_after")]
+    return times[0], row["chamber"], times[1], " to ".join(regimes), *fills
+
+
+def _loop_notes(runs: Record) -> list[tuple[str, str]]:
     """How each run ended, in its own words."""
     names = {"calibrated": "Calibrated law", "paper": "The paper’s law"}
-    return [{"law": names[law], "text": typeset(runs[law]["status"])} for law in names if law in runs]
+    return [(names[law], runs[law]["status"]) for law in names if law in runs]
 
 
-def model_row(row: Record) -> Record:
-    """One line of the models that were used."""
-    estimate = row.get("estimated_contribution")
-    texts = {key: typeset(row[key]) for key in ("term", "model", "why")}
-    return {**texts, "contribution": MISSING if estimate is None else percent(estimate)}
+def _models(rows: list[Record]) -> Table:
+    return Table(
+        heads=("Term", "Model", "Why", "Estimated contribution"),
+        rows=[(r["term"], r["model"], r["why"], percent(r.get("estimated_contribution"))) for r in rows],
+        style="",
+    )
 
 
-def scene_groups(rows: list[Record]) -> list[Record]:
-    """The scene's table in its groups."""
-    texts = [{key: typeset(text) for key, text in row.items()} for row in rows]
-    return [
-        {"name": name, "rows": list(members)}
-        for name, members in groupby(texts, key=lambda row: row["group"])
-    ]
+def _scene_groups(rows: list[Record]) -> list[tuple[str, list[Record]]]:
+    return [(name, list(group)) for name, group in groupby(rows, key=lambda row: row["group"])]
 
 
-def mesh_facts(evidence: Record) -> list[Record]:
-    """Sizes and quality of the pressure mesh."""
-    mesh = evidence["pressure"]["mesh"]
-    entries = (
+def _mesh_facts(mesh: Record) -> Facts:
+    return (
         ("Cells of the 3-D pressure mesh", " × ".join(str(count) for count in mesh["cells"])),
         ("Unknowns", number(mesh["unknowns"], digits=6)),
         ("Smallest scaled Jacobian", number(mesh["minimum_scaled_jacobian"], digits=3)),
         ("Largest aspect ratio", number(mesh["largest_aspect"], digits=3)),
         ("Solver", mesh["status"]),
     )
-    return [{"label": label, "text": text} for label, text in entries]
 
 
-def version_facts(evidence: Record) -> list[Record]:
-    """Hash of the scene, seeds and versions."""
+def _version_facts(evidence: Record) -> Facts:
     seeds = ", ".join(f"{name} {value}" for name, value in evidence["seeds"].items())
-    entries = [
-        ("Scene hash (SHA-256)", evidence["scene"]["sha256"]),
-        ("Seeds", seeds),
-        *evidence["versions"].items(),
-    ]
-    return [{"label": label, "text": text} for label, text in entries]
+    hashes = (("Scene hash (SHA-256)", evidence["scene"]["sha256"]), ("Seeds", seeds))
+    return (*hashes, *evidence["versions"].items())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -180,7 +178,7 @@ def page_content(evidence: Record, *, pictures: Mapping[str, bytes] | None = Non
         for case in summary.claims(evidence)
     ]
     checks = [case_view(case) for case in summary.checks(evidence)]
-    figures = page_figures(evidence)
+    figures = _page_figures(evidence)
     sections = viewed(evidence)
     calibration, runs = evidence["calibration"], evidence["closed_loop"]
     context = {
@@ -191,17 +189,17 @@ def page_content(evidence: Record, *, pictures: Mapping[str, bytes] | None = Non
         "equations": _equations(),
         "figures": figures,
         "pictures": _pictures(evidence["pictures"], pictures or {}),
-        "chamber": chamber_table(calibration["chamber"]),
-        "drag_at": drag_table(calibration["tube"], evidence["operating_point"]),
-        "injections": operation_tables(runs.get("calibrated")),
-        "loop_notes": loop_notes(runs),
+        "chamber": _chamber_table(calibration["chamber"]),
+        "drag_at": _drag_table(calibration["tube"], evidence["operating_point"]),
+        "injections": _operation_tables(runs.get("calibrated")),
+        "loop_notes": _loop_notes(runs),
         "claims": claims,
         "checks": checks,
         "order_plots": [case["order_plot"] for case in checks if case["order_plot"]],
-        "models": [model_row(row) for row in calibration["models_used"]],
-        "scene_groups": scene_groups(evidence["scene"]["table"]),
-        "mesh_facts": mesh_facts(evidence),
-        "version_facts": version_facts(evidence),
+        "models": _models(calibration["models_used"]),
+        "scene_groups": _scene_groups(evidence["scene"]["table"]),
+        "mesh_facts": _mesh_facts(evidence["pressure"]["mesh"]),
+        "version_facts": _version_facts(evidence),
         "product": f"ringbalance {evidence['versions']['ringbalance']}",
     }
     drawings = drawings_in([figures, sections, *(_own_drawings(case) for case in (*claims, *checks))])
@@ -212,15 +210,14 @@ def _own_drawings(case: Record) -> list[Record]:
     return [case["order_plot"], *case["drawings"]]
 
 
-def _stamp(evidence: Record) -> list[Record]:
-    entries = (
+def _stamp(evidence: Record) -> Facts:
+    return (
         ("Scene", evidence["scene"]["file"]),
         ("Hash", evidence["scene"]["sha256"][:12]),
         ("Level", evidence["level"]),
         ("Date", evidence["times"]["date"]),
         ("ringbalance", evidence["versions"]["ringbalance"]),
     )
-    return [{"label": label, "text": text} for label, text in entries]
 
 
 def _summary(evidence: Record, claims: list[Record]) -> Record:
@@ -232,7 +229,7 @@ def _summary(evidence: Record, claims: list[Record]) -> Record:
         "numbers": summary.key_numbers(evidence),
         "headlines": [case for case in claims if case["id"] in chosen],
         "loop_sentence": summary.loop_sentence(evidence),
-        "loop": summary.loop_rows(evidence),
+        "loop": summary.loop_table(evidence),
     }
 
 

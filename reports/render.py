@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from importlib.resources import files
-from typing import Any
 
 import jinja2
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from ringbalance.reports import summary
 from ringbalance.reports.equations import GLYPHS, share_glyphs
 from ringbalance.reports.figures.style import DARK, LIGHT
 from ringbalance.reports.page import PageContent, page_content
-
-Record = dict[str, Any]
+from ringbalance.reports.prose import typeset
+from ringbalance.reports.section import Record
 
 
 def render(evidence: Record, *, pictures: Mapping[str, bytes] | None = None) -> str:
@@ -34,12 +33,18 @@ def render_page(content: PageContent) -> str:
         autoescape=True,
         trim_blocks=True,
         undefined=jinja2.StrictUndefined,
+        finalize=_finished,
     )
-    environment.filters["tone"] = summary.tone
+    environment.filters |= {"tone": summary.tone, "verbatim": escape}
     page = environment.get_template("report.html").render(
         content.context, style=Markup(_style()), glyphs=Markup(GLYPHS)
     )
     return share_glyphs(page) + "\n"
+
+
+def _finished(value: object) -> object:
+    """Text is typeset as it goes onto the page, but for markup and what is marked `verbatim`."""
+    return typeset(value) if isinstance(value, str) and not isinstance(value, Markup) else value
 
 
 def _template(name: str) -> str:

@@ -6,7 +6,7 @@ import json
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from ringbalance.reports.evidence import Progress, collect_evidence
 from ringbalance.reports.figures.style import standalone
@@ -21,11 +21,9 @@ from ringbalance.reports.pictures.process import (
 )
 from ringbalance.reports.render import render_page
 from ringbalance.reports.saved import saved_cases
-from ringbalance.reports.section import Level
+from ringbalance.reports.section import Level, Record
 from ringbalance.scene import AnyScene, liquid_ring_scene
 from ringbalance.scene.platform.files import staged
-
-Record = dict[str, Any]
 
 FILES: Final = ("evidence.json", "report.html")
 """Of a report, the page last: where it is, all else is."""

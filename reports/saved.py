@@ -44,15 +44,6 @@ def heavy_cases(document: Mapping[str, Any]) -> list[Record]:
     ]
 
 
-def kept_document(document: Mapping[str, Any]) -> Record:
-    """What is worth keeping of an evidence document for later reports."""
-    return {
-        "format": document["format"],
-        "versions": document["versions"],
-        "verification": heavy_cases(document),
-    }
-
-
 def saved_cases(folder: Path | None = None) -> list[Record]:
     """All heavy results at hand, the oldest first: those of the program, and those of a report's folder.
 

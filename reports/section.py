@@ -2,15 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from ringbalance.reduced_model.calibration import Calibration
+from ringbalance.reports.numbers import MISSING
 from ringbalance.scene import Scene
 
 Record = dict[str, Any]
+Cells = Sequence[str]
 Level = Literal["light", "heavy"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """Texts in rows and columns; a column is set as numbers when most of its cells begin like one."""
+
+    caption: str = ""
+    heads: Cells
+    """A line break divides a head."""
+    rows: Sequence[Cells]
+    style: str = "narrow"
+    """Class of the page's style sheet: "narrow", "dense" or none."""
+
+    @property
+    def numeric(self) -> list[bool]:
+        """By column."""
+        columns = zip(*self.rows, strict=True) if self.rows else [()] * len(self.heads)
+        return [_numeric([cell for cell in column if cell.strip(MISSING)]) for column in columns]
+
+
+def _numeric(cells: Cells) -> bool:
+    return 2 * sum(bool(re.match(r"[(+−]?\d", cell)) for cell in cells) > len(cells)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -22,12 +47,12 @@ class Work:
     level: Level
 
 
-def nothing(_work: Work) -> None:
+def _nothing(_work: Work) -> None:
     """Collects no evidence of its own."""
 
 
-def everything(_evidence: Record) -> Record:
-    """Needs nothing but what every template sees."""
+def _everything(_own: Record, _evidence: Record) -> Record:
+    """Shows nothing but what every template sees."""
     return {}
 
 
@@ -39,14 +64,23 @@ class Section:
     """Its id on the page, its key in the evidence, and the stem of its template."""
     title: str
     """In the contents."""
-    collect: Callable[[Work], Record | None] = nothing
+    collect: Callable[[Work], Record | None] = _nothing
     """Plain numbers and texts for the evidence, under the section's name; None: nothing there."""
     last: bool = False
     """Whether it is collected after the cases have run, which then have compiled what it needs."""
-    view: Callable[[Record], Record | None] = everything
-    """From the whole evidence to what the template calls `view`: texts, `Drawing`s; None: no such section."""
+    show: Callable[[Record, Record], Record | None] = _everything
+    """From its own evidence and the whole to what the template calls `view`: texts, `Drawing`s, or None."""
+    always: bool = False
+    """Whether it is shown without evidence of its own, which is then empty."""
 
     @property
     def template(self) -> str:
         """File in `templates`."""
         return f"{self.name}.html"
+
+    def view(self, evidence: Record) -> Record | None:
+        """What the template shows of the whole evidence; None: no such section."""
+        own = evidence.get(self.name)
+        if not own and not self.always and self.collect is not _nothing:
+            return None
+        return self.show(own or {}, evidence)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from ringbalance.reports.numbers import (
     MISSING,
@@ -19,8 +18,7 @@ from ringbalance.reports.numbers import (
     shown,
     shown_apart,
 )
-
-Record = dict[str, Any]
+from ringbalance.reports.section import Cells, Record, Table
 
 CLAIM_VERDICTS: Final = ("confirmed", "confirmed with correction", "refuted", "inconclusive", "not run")
 CHECK_VERDICTS: Final = ("passed", "failed", "inconclusive", "not run")
@@ -40,38 +38,6 @@ _RUNS: Final = {
     "separated": "runs separated",
     "reverse": "runs in reverse",
 }
-
-
-@dataclass(frozen=True, kw_only=True)
-class Count:
-    """How many cases share a verdict."""
-
-    verdict: str
-    tone: str
-    count: int
-
-
-@dataclass(frozen=True, kw_only=True)
-class KeyNumber:
-    """One calibrated number, beside the paper's."""
-
-    label: str
-    value: str
-    half_width: str
-    """95 %, as text; empty when there is none."""
-    unit: str
-    paper: str
-    """The paper's value as text; empty when it has none."""
-    note: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class LoopRow:
-    """One line of the comparison of the closed loop under both laws."""
-
-    label: str
-    calibrated: str
-    paper: str
 
 
 def tone(verdict: str) -> str:
@@ -94,16 +60,21 @@ def checks(evidence: Record) -> list[Record]:
     return [case for case in evidence["verification"] if case["kind"] != "claim"]
 
 
-def verdict_counts(cases: list[Record], verdicts: tuple[str, ...]) -> list[Count]:
+def verdict_counts(cases: list[Record], verdicts: tuple[str, ...]) -> list[Record]:
     """Number of cases under each verdict, in a fixed order, without the empty ones."""
     tally = Counter(case["verdict"] for case in cases)
-    return [Count(verdict=v, tone=tone(v), count=tally[v]) for v in verdicts if tally[v]]
+    return [{"verdict": v, "tone": tone(v), "count": tally[v]} for v in verdicts if tally[v]]
+
+
+def counted(cases: list[Record]) -> list[str]:
+    """How many claims have each verdict, as words."""
+    counts = verdict_counts(cases, CLAIM_VERDICTS)
+    return [f"{c['count']} {'is' if c['count'] == 1 else 'are'} {c['verdict']}" for c in counts]
 
 
 def lead_sentence(evidence: Record) -> str:
     """The whole result in two sentences, counted from the verdicts."""
-    counts = verdict_counts(claims(evidence), CLAIM_VERDICTS)
-    parts = [f"{item.count} {'is' if item.count == 1 else 'are'} {item.verdict}" for item in counts]
+    parts = counted(claims(evidence))
     own = checks(evidence)
     run = [case for case in own if case["verdict"] != "not run"]
     passed = sum(case["verdict"] == "passed" for case in run)
@@ -138,7 +109,7 @@ def headlines(evidence: Record) -> list[Record]:
     return marked or [case for case in every if tone(case["verdict"]) in {"bad", "fair"}]
 
 
-def key_numbers(evidence: Record) -> list[KeyNumber]:
+def key_numbers(evidence: Record) -> list[Record]:
     """The calibrated numbers with their expanded uncertainties (95 %)."""
     point, paper, calibration = evidence["operating_point"], evidence["paper"], evidence["calibration"]
     return [
@@ -151,21 +122,21 @@ def key_numbers(evidence: Record) -> list[KeyNumber]:
     ]
 
 
-def _key(label: str, parts: tuple[str, str], paper: str, note: str) -> KeyNumber:
+def _key(label: str, parts: tuple[str, str], paper: str, note: str) -> Record:
     value, sign, half_width = parts[0].partition(PLUS_MINUS)
     # A power of ten stands behind both numbers, so such a text is left in one piece.
     whole = value.startswith("(")
-    return KeyNumber(
-        label=label,
-        value=parts[0] if whole else value,
-        half_width=f"±{THIN_SPACE}{half_width}" if sign and not whole else "",
-        unit=parts[1],
-        paper=paper,
-        note=note,
-    )
+    return {
+        "label": label,
+        "value": parts[0] if whole else value,
+        "half_width": f"±{THIN_SPACE}{half_width}" if sign and not whole else "",
+        "unit": parts[1],
+        "paper": paper,
+        "note": note,
+    }
 
 
-def _lambda_number(record: Record, paper: Record) -> KeyNumber:
+def _lambda_number(record: Record, paper: Record) -> Record:
     half_width = math.hypot(record["uncertainty_m"], record["input_uncertainty_m"])
     parts = shown_apart(record["per_transferred_mass_m"], "m", half_width)
     varies = percent(record["variation_over_range"])
@@ -174,7 +145,7 @@ def _lambda_number(record: Record, paper: Record) -> KeyNumber:
     return _key("Lever arm λ", parts, said, note)
 
 
-def _drag_number(point: Record, paper: Record) -> KeyNumber:
+def _drag_number(point: Record, paper: Record) -> Record:
     parts = shown_apart(point["k"], "1", point["k_uncertainty"])
     said = f"about {short(paper['drag_coefficient'])}"
     if point["k"] is None:
@@ -185,7 +156,7 @@ def _drag_number(point: Record, paper: Record) -> KeyNumber:
     return _key("Drag coefficient k", parts, said, note + f"{point['flow_state']}.")
 
 
-def _pressure_number(chamber: Record) -> KeyNumber:
+def _pressure_number(chamber: Record) -> Record:
     half_width = math.hypot(
         chamber["wall_pressure_uncertainty"][-1], chamber["wall_pressure_input_uncertainty"][-1]
     )
@@ -195,14 +166,14 @@ def _pressure_number(chamber: Record) -> KeyNumber:
     return _key("Wall pressure", parts, said, note)
 
 
-def _velocity_number(point: Record) -> KeyNumber:
+def _velocity_number(point: Record) -> Record:
     parts = shown_apart(point["velocity_m_s"], "m/s", point["velocity_uncertainty"], digits=3)
     said = f"{shown(point['velocity_paper_m_s'], 'm/s', digits=3)} by Eq. 19"
     note = f"At {given(point['gas_pressure_Pa'], 'Pa')} and equal fills; the tube {_RUNS[point['regime']]}."
     return _key("Velocity in the tube", parts, said, note)
 
 
-def _priming_number(point: Record, paper: Record) -> list[KeyNumber]:
+def _priming_number(point: Record, paper: Record) -> list[Record]:
     if point["priming_pressure_vented_Pa"] is None:
         return []
     parts = shown_apart(point["priming_pressure_vented_Pa"], "Pa", point["priming_uncertainty"])
@@ -212,7 +183,7 @@ def _priming_number(point: Record, paper: Record) -> list[KeyNumber]:
     return [_key("Priming pressure", parts, f"works from {low}", note)]
 
 
-def _stall_number(point: Record) -> KeyNumber:
+def _stall_number(point: Record) -> Record:
     parts = shown_apart(point["stall_pressure_Pa"], "Pa", point["stall_uncertainty"])
     said = f"{shown(point['stall_pressure_paper_Pa'], 'Pa')} by Eq. 19"
     return _key("Stall pressure", parts, said, "Below it a full siphon stops before the chamber is empty.")
@@ -230,15 +201,14 @@ def _gas_time(run: Record) -> str:
     return shown(math.fsum(item["duration_s"] for item in run["injections"]), "s", digits=3)
 
 
-def loop_rows(evidence: Record) -> list[LoopRow]:
-    """The closed loop under both laws, line by line."""
+def loop_table(evidence: Record) -> Table:
+    """The closed loop under both laws, line by line; a law that was not run shows a dash."""
     runs = evidence["closed_loop"]
 
-    def row(label: str, read: Callable[[Record], str]) -> LoopRow:
-        calibrated, paper = (read(runs[law]) if law in runs else MISSING for law in _LAWS)
-        return LoopRow(label=label, calibrated=calibrated, paper=paper)
+    def row(label: str, read: Callable[[Record], str]) -> Cells:
+        return label, *(read(runs[law]) if law in runs else MISSING for law in _LAWS)
 
-    return [
+    rows = [
         row("Settling time", _settling),
         row("Gas operations", lambda run: str(len(run["injections"]))),
         row("Valve-open time in all", _gas_time),
@@ -247,6 +217,7 @@ def loop_rows(evidence: Record) -> list[LoopRow]:
         row("Misadjustments", lambda run: str(run["misadjustments"])),
         row("Regime of the tube", _regimes),
     ]
+    return Table(heads=("", "Calibrated law", "The paper’s law"), rows=rows)
 
 
 def loop_sentence(evidence: Record) -> str:

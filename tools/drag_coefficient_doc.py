@@ -16,7 +16,7 @@ import numpy as np
 from ringbalance.reduced_model.calibration import Calibration, calibrate
 from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.reports.numbers import number, percent, shown
-from ringbalance.reports.pages.drag_coefficient import collect, liquid_row
+from ringbalance.reports.pages.drag_coefficient import SECTION, liquid_cells
 from ringbalance.reports.section import Record, Work
 from ringbalance.reports.studies.drag_map import DragMap, drag_contour, drag_map
 from ringbalance.scene.arrays import FloatArray
@@ -31,12 +31,13 @@ def document_tables() -> dict[str, str]:
     """The generated parts of the page, for the liquid-ring paper's disc with its assumed tube."""
     scene = paper_scene()
     calibration = calibrate(scene)
-    found = collect(Work(scene=scene, calibration=calibration, level="light"))
+    found = SECTION.collect(Work(scene=scene, calibration=calibration, level="light"))
+    assert found is not None
     return {
-        "liquids": liquids_table(found["liquids"]),
-        "bores": bores_table(calibration),
+        "liquids": _liquids_table(found["liquids"]),
+        "bores": _bores_table(calibration),
         "rule": rule(calibration),
-        "hidden": hidden_table(found["apparent"], calibration),
+        "hidden": _hidden_table(found["apparent"], calibration),
     }
 
 
@@ -45,19 +46,14 @@ def _table(heads: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
     return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
 
 
-def liquids_table(liquids: list[Record]) -> str:
+def _liquids_table(liquids: list[Record]) -> str:
     """One row a liquid."""
     heads = ("liquid", "viscosity", "kg/m³", "gas", "tube runs", "velocity", "k")
     more = ("Eq. 18 reads", "Eq. 19 is off by", "50 is")
-    rows = []
-    for row in (liquid_row(record) for record in liquids):
-        gas = f"{row['pressure']}*" if row["needs"] else row["pressure"]
-        cells = (row["name"], row["viscosity"], row["density"], gas, row["runs"], row["velocity"], row["k"])
-        rows.append((*cells, row["apparent"], row["error"], row["verdict"]))
-    return _table((*heads, *more), rows)
+    return _table((*heads, *more), [tuple(liquid_cells(record)) for record in liquids])
 
 
-def bores_table(calibration: Calibration) -> str:
+def _bores_table(calibration: Calibration) -> str:
     """The bore at which k is the paper's, and the bores at which it may be, over the viscosity."""
     found = drag_map(calibration=calibration, bore=_BORES, kinematic_viscosity=list(_VISCOSITIES))
     point = found.point
@@ -105,7 +101,7 @@ def _bore(value: float | None) -> str:
     return "beyond the map" if value is None else shown(value, "m", digits=3)
 
 
-def hidden_table(apparent: Record, calibration: Calibration) -> str:
+def _hidden_table(apparent: Record, calibration: Calibration) -> str:
     """What Eq. 18 reads off a column separated at the crest, over the velocity.
 
     Args: `apparent`: `apparent` of the section's evidence.

@@ -11,15 +11,25 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Mapping
 from datetime import date
 from pathlib import Path
 from typing import Any
 
 from ringbalance.reports.evidence import FORMAT, versions
-from ringbalance.reports.saved import PACKAGED, heavy_cases, kept_document
+from ringbalance.reports.saved import PACKAGED, Record, heavy_cases
 from ringbalance.scene import write_whole
 
 TARGET = Path(__file__).resolve().parents[1] / "reports" / "data" / PACKAGED
+
+
+def kept_document(document: Mapping[str, Any]) -> Record:
+    """What is worth keeping of an evidence document for later reports."""
+    return {
+        "format": document["format"],
+        "versions": document["versions"],
+        "verification": heavy_cases(document),
+    }
 
 
 def document_of(path: Path) -> dict[str, Any]:

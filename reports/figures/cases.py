@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,9 +11,8 @@ from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import DisplayUnit, display_unit, number
 from ringbalance.reports.prose import typeset
+from ringbalance.reports.section import Record
 from ringbalance.scene.arrays import FloatArray
-
-Record = dict[str, Any]
 
 _COLOURS: Final = (style.FOUND, style.THIRD, style.FOURTH, style.FIFTH, style.MUTED, style.INK)
 _LONGEST_LABEL: Final = 36

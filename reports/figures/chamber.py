@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from matplotlib.axes import Axes
 
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import percent, short, shown
-
-Record = dict[str, Any]
+from ringbalance.reports.section import Record
 
 
 def pressure_profile(profile: Record) -> Drawing:

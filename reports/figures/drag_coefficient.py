@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,9 +12,8 @@ from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import given, number, short
 from ringbalance.reports.prose import typeset
+from ringbalance.reports.section import Record
 from ringbalance.scene.arrays import FloatArray
-
-Record = dict[str, Any]
 
 _LEVELS: Final = (3, 5, 10, 20, 100, 200, 500, 1000, 10_000, 100_000, 1_000_000)
 _HEIGHT: Final = 4.9
@@ -22,7 +21,6 @@ _LIST: Final = 2.35
 """Inches to the right of the map for the names of the liquids."""
 _APART: Final = 0.155
 """Inches between two names."""
-_TICKS: Final = [step * 10.0**power for power in range(-2, 6) for step in (1, 2, 5)]
 _PAPER: Final = 50.0
 
 
@@ -34,7 +32,7 @@ def map_figure(found: Record) -> Drawing:
 
     def paint(axes: Axes) -> None:
         for name, values in (("x", bore), ("y", nu)):
-            style.logarithmic(axes, name, ticks=[t for t in _TICKS if values[0] <= t <= values[-1]])
+            style.logarithmic(axes, name, within=(values[0], values[-1]))
         _shade(axes, told, bore, nu)
         _lines(axes, told, bore, nu)
         _mark_liquids(axes, found)
@@ -199,8 +197,8 @@ def apparent_figure(read: Record) -> Drawing:
         )
         bottom = max(0.5 * min(siphon.min(), floor.min(), 2.0), 0.3)
         top = 2 * max(float(every.max()), _PAPER)
-        style.logarithmic(axes, "x", ticks=[t for t in _TICKS if speed[0] <= t <= speed[-1]])
-        style.logarithmic(axes, "y", ticks=[t for t in _TICKS if bottom <= t <= top and f"{t:e}"[0] in "15"])
+        style.logarithmic(axes, "x", within=(speed[0], speed[-1]))
+        style.logarithmic(axes, "y", within=(bottom, top))
         axes.set_xlim(speed[0], speed[-1])
         axes.set_ylim(bottom, top)
 

@@ -11,16 +11,13 @@ from matplotlib.axes import Axes
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import shown
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.reports.section import Record
 
-Record = dict[str, Any]
-
-_LAWS: Final = (
-    ("calibrated", style.FOUND, "-", "the calibrated law"),
-    ("paper", style.PAPER, (0, (5, 2)), "the paper’s law"),
-)
+_LAWS: Final[dict[str, dict[str, Any]]] = {
+    "calibrated": {"color": style.FOUND, "label": "the calibrated law"},
+    "paper": {**style.AS_PAPER, "label": "the paper’s law"},
+}
 _CHAMBER_COLOURS: Final = (style.FOUND, style.PAPER, style.THIRD, style.FOURTH, style.FIFTH, style.MUTED)
-_TICKS: Final = [step * 10.0**exponent for exponent in range(-4, 4) for step in (1, 2, 5)]
 
 
 def early_time(runs: Record) -> float:
@@ -37,56 +34,26 @@ def early_time(runs: Record) -> float:
     return float(min(run["time_s"][-1], 1.4 * (last["time_s"] + last["duration_s"])))
 
 
-def _decade_limits(values: FloatArray, limit: float) -> tuple[float, float]:
-    positive = values[values > 0]
-    bottom = min(positive.min(), limit) if positive.size else limit
-    return bottom * 0.7, max(values.max(), limit) * 1.4
-
-
-def _amplitude_axes(axes: Axes, values: FloatArray, limit: float) -> None:
-    bottom, top = _decade_limits(values, limit)
-    axes.axhline(limit, color=style.MUTED, linewidth=1, linestyle=":", label="limit")
-    style.logarithmic(axes, "y", ticks=[tick for tick in _TICKS if bottom <= tick <= top])
-    axes.set_ylim(bottom, top)
-    axes.set_xlabel("time in s")
-    axes.set_ylabel("amplitude in µm, zero to peak")
-
-
 def amplitude(runs: Record, limit: float) -> Drawing:
-    """Vibration amplitude at the controller's samples under the calibrated law and under the paper's.
+    """Vibration amplitude at the controller's samples, m, under the laws that were run."""
+    marks = {"linewidth": 1.2, "marker": "o", "markersize": 3}
+    laws = {name: line for name, line in _LAWS.items() if name in runs}
 
-    Args: `runs`: simulation documents by law, SI. `limit`: amplitude below which the controller rests, m.
-    """
-    present = [entry for entry in _LAWS if entry[0] in runs]
-    sampled = {name: np.asarray(runs[name]["samples"]["time_s"]) for name, *_ in present}
-    values = {
-        name: np.interp(sampled[name], runs[name]["time_s"], runs[name]["amplitude_m"]) * 1e6
-        for name, *_ in present
-    }
+    def curve(run: Record, line: dict[str, Any]) -> style.Curve:
+        time = np.asarray(run["samples"]["time_s"])
+        return time, np.interp(time, run["time_s"], run["amplitude_m"]), {**line, **marks}
 
     def paint(axes: Axes) -> None:
-        for name, colour, dashes, label in present:
-            axes.plot(
-                sampled[name],
-                values[name],
-                color=colour,
-                linestyle=dashes,
-                linewidth=1.2,
-                marker="o",
-                markersize=3,
-                label=label,
-            )
-        _amplitude_axes(axes, np.concatenate(list(values.values())), limit * 1e6)
-        axes.set_xlim(left=0)
+        style.amplitudes(axes, [curve(runs[name], line) for name, line in laws.items()], limit)
 
     ends = ", ".join(
-        f"{shown(runs[name]['amplitude_m'][-1], 'm', digits=2)} under {label}"
-        for name, _, _, label in present
+        f"{shown(runs[name]['amplitude_m'][-1], 'm', digits=2)} under {line['label']}"
+        for name, line in laws.items()
     )
     return draw(
-        columns=3,
         name="amplitude",
         paint=paint,
+        columns=3,
         wide=True,
         height=3.5,
         alt=f"Vibration amplitude against time on a logarithmic scale; it ends at {ends}.",
@@ -95,26 +62,22 @@ def amplitude(runs: Record, limit: float) -> Drawing:
 
 
 def early_amplitude(runs: Record, limit: float) -> Drawing:
-    """Vibration amplitude within the first operations, liquid flowing, under both laws.
-
-    Args: `runs`: simulation documents by law, SI. `limit`: amplitude below which the controller rests, m.
-    """
-    present = [entry for entry in _LAWS if entry[0] in runs]
+    """Vibration amplitude within the first operations, m, liquid flowing, under the laws that were run."""
     until = early_time(runs)
 
+    def curve(run: Record, line: dict[str, Any]) -> style.Curve:
+        time, values = np.asarray(run["time_s"]), np.asarray(run["amplitude_m"])
+        return time[time <= until], values[time <= until], {**line, "linewidth": 1.3}
+
     def paint(axes: Axes) -> None:
-        seen = []
-        for name, colour, dashes, label in present:
-            time, values = np.asarray(runs[name]["time_s"]), np.asarray(runs[name]["amplitude_m"]) * 1e6
-            axes.plot(time, values, color=colour, linestyle=dashes, linewidth=1.3, label=label)
-            seen.append(values[time <= until])
-        _amplitude_axes(axes, np.concatenate(seen), limit * 1e6)
+        laws = ((runs[name], line) for name, line in _LAWS.items() if name in runs)
+        style.amplitudes(axes, [curve(run, line) for run, line in laws], limit)
         axes.set_xlim(0, until)
 
     return draw(
-        columns=3,
         name="amplitude-early",
         paint=paint,
+        columns=3,
         alt=f"Vibration amplitude in the first {shown(until, 's', digits=2)}, under both laws.",
         caption=f"The first {shown(until, 's', digits=2)}, while liquid moves. A line that falls "
         "and rises again within one operation has passed its target.",

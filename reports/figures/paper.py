@@ -11,12 +11,10 @@ from matplotlib.axes import Axes
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import given, percent, short, shown
-
-Record = dict[str, Any]
+from ringbalance.reports.section import Record
 
 _COLOURS: Final = (style.FOUND, style.THIRD, style.FOURTH, style.PAPER, style.FIFTH)
 _MARKERS: Final = ("o", "s", "^", "D", "v")
-_TICKS: Final = [step * 10.0**power for power in range(-3, 3) for step in (1, 2, 5)]
 _FLOOR: Final = 5e-9
 """m: smaller amplitudes are drawn here."""
 
@@ -96,27 +94,20 @@ def _fall(told: Record) -> str:
     )
 
 
+def _line(index: int, label: str) -> dict[str, Any]:
+    marks = {"marker": _MARKERS[index], "markersize": 2.6, "linewidth": 1.2}
+    return {"color": _COLOURS[index], "label": label, **marks}
+
+
 def _amplitudes(axes: Axes, runs: list[Record], labels: list[str], limit: float) -> None:
-    top, bottom = limit, limit
-    for index, (run, label) in enumerate(zip(runs, labels, strict=True)):
-        values = np.maximum(np.asarray(run["amplitude_m"]), _FLOOR) * 1e6
-        top, bottom = max(top, values.max() * 1e-6), min(bottom, values.min() * 1e-6)
-        axes.plot(
-            run["time_s"],
-            values,
-            color=_COLOURS[index],
-            marker=_MARKERS[index],
-            markersize=2.6,
-            linewidth=1.2,
-            label=label,
-        )
-    axes.axhline(limit * 1e6, color=style.MUTED, linewidth=1, linestyle=":", label="limit")
-    low, high = bottom * 0.7e6, top * 1.5e6
-    style.logarithmic(axes, "y", ticks=[tick for tick in _TICKS if low <= tick <= high])
-    axes.set_ylim(low, high)
-    axes.set_xlim(left=0)
-    axes.set_xlabel("time in s")
-    axes.set_ylabel("amplitude in µm, zero to peak")
+    style.amplitudes(
+        axes,
+        [
+            (run["time_s"], np.maximum(run["amplitude_m"], _FLOOR), _line(index, label))
+            for index, (run, label) in enumerate(zip(runs, labels, strict=True))
+        ],
+        limit,
+    )
 
 
 def _settled(run: Record) -> str:
@@ -124,7 +115,7 @@ def _settled(run: Record) -> str:
 
 
 def figure_6(runs: list[Record], limit: float) -> Drawing:
-    """The trial algorithm from four phases. Args: `runs`: the evidence's `paper_again.trial`. `limit`: m."""
+    """The trial algorithm from four phases; limit in m."""
     names = [f"{math.degrees(run['of']):.0f}°" for run in runs]
 
     def paint(axes: Axes) -> None:
@@ -145,10 +136,7 @@ def figure_6(runs: list[Record], limit: float) -> Drawing:
 
 
 def figure_7(runs: list[Record], limit: float) -> Drawing:
-    """The target-vector algorithm with five gains: amplitude.
-
-    Args: `limit`: m.
-    """
+    """The target-vector algorithm with five gains: amplitude; limit in m."""
     names = [f"Kp = {run['of'] * 1e-6:.2f}" for run in runs]
 
     def paint(axes: Axes) -> None:
@@ -171,15 +159,8 @@ def figure_7_phase(runs: list[Record]) -> Drawing:
 
     def paint(axes: Axes) -> None:
         for index, run in enumerate(runs):
-            axes.plot(
-                run["time_s"],
-                np.degrees(run["phase_rad"]),
-                color=_COLOURS[index],
-                marker=_MARKERS[index],
-                markersize=2.6,
-                linewidth=1.2,
-                label=f"Kp = {run['of'] * 1e-6:.2f}",
-            )
+            line = _line(index, f"Kp = {run['of'] * 1e-6:.2f}")
+            axes.plot(run["time_s"], np.degrees(run["phase_rad"]), **line)
         axes.set_ylim(-190, 190)
         axes.set_yticks([-180, -90, 0, 90, 180])
         axes.set_xlim(left=0)
@@ -200,10 +181,7 @@ def figure_7_phase(runs: list[Record]) -> Drawing:
 
 
 def figure_8(runs: list[Record], limit: float) -> Drawing:
-    """The target-vector algorithm with the paper's parameters from five amplitudes.
-
-    Args: `limit`: m.
-    """
+    """The target-vector algorithm with the paper's parameters from five amplitudes; limit in m."""
     names = [given(run["of"], "m") for run in runs]
 
     def paint(axes: Axes) -> None:

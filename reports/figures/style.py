@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from html import escape
 from typing import Any, Final, cast
 
 import matplotlib
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap, to_hex
 from matplotlib.figure import Figure
@@ -128,6 +129,8 @@ _RC: Final = {
 }
 
 Draw = Callable[[Axes], None]
+Curve = tuple[ArrayLike, FloatArray, dict[str, Any]]
+"""Time, s, amplitude, m, and the line's properties."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -173,14 +176,34 @@ def decade(value: float, _position: object = None) -> str:
     return power_of_ten(int(exponent[1])) if exponent[0] == "1" else ""
 
 
-def logarithmic(axes: Axes, axis: str, *, ticks: list[float] | None = None) -> None:
-    """Makes one axis logarithmic, with labels in plain text."""
+def logarithmic(
+    axes: Axes, axis: str, *, ticks: list[float] | None = None, within: tuple[float, float] | None = None
+) -> None:
+    """Makes one axis logarithmic, labels in plain text: at ticks, at 1, 2, 5 within limits, or decades."""
     getattr(axes, f"set_{axis}scale")("log")
     target = getattr(axes, f"{axis}axis")
+    if within is not None:
+        steps = (step * 10.0**exponent for exponent in range(-9, 10) for step in (1, 2, 5))
+        ticks = [step for step in steps if within[0] <= step <= within[1]]
     if ticks is not None:
         target.set_ticks(ticks)
     target.set_major_formatter(FuncFormatter(decade if ticks is None else plain_number))
     target.set_minor_locator(NullLocator())
+
+
+def amplitudes(
+    axes: Axes, curves: Iterable[tuple[ArrayLike, FloatArray, dict[str, Any]]], limit: float
+) -> None:
+    """Vibration amplitudes over time and the limit, m, on a logarithmic axis in um."""
+    drawn = [(time, 1e6 * amplitude, line) for time, amplitude, line in curves]
+    for time, values, line in drawn:
+        axes.plot(time, values, **line)
+    axes.axhline(limit * 1e6, color=MUTED, linewidth=1, linestyle=":", label="limit")
+    every = np.append(np.concatenate([values for _, values, _ in drawn]), limit * 1e6)
+    low, high = 0.7 * every[every > 0].min(), 1.4 * every.max()
+    logarithmic(axes, "y", within=(low, high))
+    axes.set_ylim(low, high)
+    axes.set(xlabel="time in s", ylabel="amplitude in µm, zero to peak", xlim=(0, None))
 
 
 def _to_page(text: str, name: str, alt: str) -> str:

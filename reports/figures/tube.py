@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import groupby
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -13,9 +13,8 @@ from matplotlib.ticker import FuncFormatter, NullLocator
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import given, measured, short
+from ringbalance.reports.section import Record
 from ringbalance.scene.arrays import FloatArray
-
-Record = dict[str, Any]
 
 _VELOCITY_TICKS: Final = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0]
 _TERM_COLOURS: Final = (style.FOUND, style.THIRD, style.FOURTH, style.FIFTH, style.PAPER, style.MUTED)

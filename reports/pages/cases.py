@@ -18,10 +18,8 @@ from ringbalance.reports.numbers import (
     shown,
     with_unit,
 )
-from ringbalance.reports.prose import typeset
+from ringbalance.reports.section import Record, Table
 from ringbalance.verification.catalogue import load_cases
-
-Record = dict[str, Any]
 
 _FACTS: Final = (
     ("claim", "Claim"),
@@ -49,14 +47,11 @@ def _sentence(value: Any) -> str:
     return "; ".join(str(item) for item in value) if isinstance(value, list) else str(value)
 
 
-def _facts(case: Record) -> list[Record]:
-    pairs = [(label, typeset(_sentence(case[key]))) for key, label in _FACTS if case.get(key)]
+def _facts(case: Record) -> list[tuple[str, str]]:
+    pairs = [(label, _sentence(case[key])) for key, label in _FACTS if case.get(key)]
     reference = case.get("reference") or {}
     told = [str(reference[key]) for key in ("kind", "source", "uncertainty") if reference.get(key)]
-    if told:
-        pairs.append(("Reference", typeset("; ".join(told))))
-    pairs.append(("Run", _how_run(case)))
-    return [{"label": label, "text": text} for label, text in pairs]
+    return [*pairs, *([("Reference", "; ".join(told))] if told else []), ("Run", _how_run(case))]
 
 
 def _how_run(case: Record) -> str:
@@ -82,14 +77,14 @@ def _criterion(quantity: Record) -> str:
     return f"within {given(limit, unit)}"
 
 
-def quantity_row(quantity: Record) -> Record:
+def _quantity_row(quantity: Record) -> Record:
     """One judged quantity, every number in the unit that suits its size."""
     unit = quantity.get("unit") or "1"
     own = quantity.get("value_uncertainty")
     half_width = quantity.get("uncertainty") if own is None else own
     return {
-        "name": typeset(quantity.get("title") or quantity["name"]),
-        "why": typeset(quantity.get("why") or ""),
+        "name": quantity.get("title") or quantity["name"],
+        "why": quantity.get("why") or "",
         "value": _value(quantity, half_width),
         "reference": shown(quantity.get("reference"), unit, quantity.get("reference_uncertainty"), digits=4),
         "error": shown(quantity.get("error"), unit, quantity.get("uncertainty"), digits=2),
@@ -106,45 +101,36 @@ def _value(quantity: Record, half_width: float | None) -> str:
     return short(value, digits=6 if float(value).is_integer() else 3)
 
 
-def sequence_view(sequence: Record) -> Record:
-    """One convergence table."""
+def _sequence_table(sequence: Record) -> Table:
+    """One convergence table, with those columns that it has."""
+    levels, unit = len(sequence["h"]), sequence.get("unit") or "1"
     orders = list(sequence.get("observed_order") or [])
-    levels = len(sequence["h"])
-    padded = [None] * (levels - len(orders)) + orders
-    unit = sequence.get("unit") or "1"
-    columns = {key: sequence.get(key) or [None] * levels for key in ("unknowns", "value", "error")}
-    rows = [
-        {
-            "h": short(sequence["h"][i], digits=3),
-            "unknowns": short(columns["unknowns"][i]),
-            "value": shown(columns["value"][i], unit, digits=8),
-            "error": shown(columns["error"][i], unit, digits=3),
-            "order": number(padded[i], digits=3),
-        }
-        for i in range(levels)
-    ]
-    return {
-        "label": sequence_label(sequence),
-        "note": "; ".join(_notes(sequence)),
-        "formal_order": short(sequence["formal_order"], digits=3) if sequence.get("formal_order") else "",
-        "rows": rows,
-        **{
-            f"has_{name}": bool(sequence.get(key))
-            for name, key in (("unknowns", "unknowns"), ("values", "value"), ("errors", "error"))
-        },
+    columns = {
+        "Relative mesh size": [short(h, digits=3) for h in sequence["h"]],
+        "Unknowns": [short(n) for n in sequence.get("unknowns") or []],
+        "Value": [shown(value, unit, digits=8) for value in sequence.get("value") or []],
+        "Error": [shown(error, unit, digits=3) for error in sequence.get("error") or []],
+        "Observed order": [number(p, digits=3) for p in [None] * (levels - len(orders)) + orders],
     }
+    present = {head: column for head, column in columns.items() if column}
+    formal = sequence.get("formal_order")
+    order = [f"formal order {short(formal, digits=3)}"] if formal else []
+    caption = "; ".join([_sequence_label(sequence), *order, *_notes(sequence)])
+    return Table(
+        caption=caption, heads=tuple(present), rows=list(zip(*present.values(), strict=True)), style=""
+    )
 
 
-def sequence_label(sequence: Record) -> str:
+def _sequence_label(sequence: Record) -> str:
     """What a convergence sequence is of."""
     geometry = f", {sequence['geometry']} geometry" if sequence.get("geometry") else ""
-    return typeset(f"{sequence['quantity']}{geometry}")
+    return f"{sequence['quantity']}{geometry}"
 
 
 def _notes(sequence: Record) -> list[str]:
     gci = sequence.get("gci")
     told = [] if gci is None else [f"Expanded uncertainty (95 %) of the finest value {percent(gci)}"]
-    return [*told, typeset(sequence["note"])] if sequence.get("note") else told
+    return [*told, sequence["note"]] if sequence.get("note") else told
 
 
 def _equations(case: Record) -> list[Record]:
@@ -154,27 +140,22 @@ def _equations(case: Record) -> list[Record]:
     ]
 
 
-def table_view(table: Record) -> Record:
+def _data_table(table: Record) -> Table:
     """One data table of a case, each column in one unit."""
     columns = [
         _column(name, values, table["units"].get(name, "1")) for name, values in table["columns"].items()
     ]
-    heads = [{"text": typeset(head), "num": numeric} for head, _, numeric in columns]
-    rows = [
-        [{"text": text, "num": numeric} for text, (_, _, numeric) in zip(row, columns, strict=True)]
-        for row in zip(*(texts for _, texts, _ in columns), strict=True)
-    ]
-    return {"name": typeset(table["name"]), "heads": heads, "rows": rows}
+    rows = list(zip(*(texts for _, texts in columns), strict=True))
+    return Table(caption=table["name"], heads=tuple(head for head, _ in columns), rows=rows)
 
 
-def _column(name: str, values: list[Any], unit: str) -> tuple[str, list[str], bool]:
-    numbers = [value for value in values if not isinstance(value, str)]
-    display = display_unit(unit, *numbers)
+def _column(name: str, values: list[Any], unit: str) -> tuple[str, list[str]]:
+    display = display_unit(unit, *(value for value in values if not isinstance(value, str)))
     texts = [
-        typeset(v) if isinstance(v, str) else short(None if v is None else v * display.factor, digits=5)
+        v if isinstance(v, str) else short(None if v is None else v * display.factor, digits=5)
         for v in values
     ]
-    return f"{name} in {display.symbol}" if display.symbol else name, texts, bool(numbers)
+    return f"{name} in {display.symbol}" if display.symbol else name, texts
 
 
 def _mutations(case: Record) -> list[str]:
@@ -185,11 +166,11 @@ def _mutations(case: Record) -> list[str]:
         end = f"must come out as {item['expect']}"
         if found:
             end = f"came out as {found['verdict']}, {'as it must' if found['failed'] else 'and was missed'}"
-        told.append(typeset(f"{item['what']}: {end}"))
+        told.append(f"{item['what']}: {end}")
     return told
 
 
-def deciding_quantity(case: Record) -> Record | None:
+def _deciding_quantity(case: Record) -> Record | None:
     """The judged quantity that a case's verdict rests on: the first that has the case's own verdict.
 
     Returns: The quantity; None when there is none.
@@ -201,7 +182,7 @@ def deciding_quantity(case: Record) -> Record | None:
 
 def _in_brief(case: Record) -> Record:
     """The deciding quantity in one line: what the paper has, what was found, the comparison's half-width."""
-    quantity = deciding_quantity(case)
+    quantity = _deciding_quantity(case)
     if quantity is None:
         return dict.fromkeys(("paper", "found", "half_width"), MISSING) | {"what": ""}
     unit, reference = quantity.get("unit") or "1", quantity.get("reference")
@@ -212,7 +193,7 @@ def _in_brief(case: Record) -> Record:
         "paper": _criterion(quantity) if reference is None else given(reference, unit, digits=4),
         "found": _without_half_width(_value(quantity, quantity.get("value_uncertainty"))),
         "half_width": with_unit(width, display.symbol),
-        "what": typeset(quantity.get("title") or ""),
+        "what": quantity.get("title") or "",
     }
 
 
@@ -227,24 +208,26 @@ def _without_half_width(text: str) -> str:
 
 def case_view(case: Record) -> Record:
     """Everything that the page shows of one case."""
-    sequences = [{**item, "label": sequence_label(item)} for item in case.get("convergence") or []]
+    sequences = [{**item, "label": _sequence_label(item)} for item in case.get("convergence") or []]
     return {
         "id": case["id"],
         "anchor": anchor(case),
-        "title": typeset(case.get("title") or case["id"]),
+        "title": case.get("title") or case["id"],
         "number": case.get("number"),
         "verdict": case["verdict"],
-        "claim": typeset(case.get("claim") or ""),
-        "why_not_run": typeset(case.get("status") or "") if case["verdict"] == "not run" else "",
+        "claim": case.get("claim") or "",
+        "why_not_run": case.get("status") or "" if case["verdict"] == "not run" else "",
         "brief": _in_brief(case),
-        "consequence": typeset(case.get("consequence") or ""),
+        "consequence": case.get("consequence") or "",
         "facts": _facts(case),
         "equations": _equations(case),
-        "rows": [quantity_row(quantity) for quantity in case.get("quantities") or []],
+        "rows": [_quantity_row(quantity) for quantity in case.get("quantities") or []],
         "order_plot": order_plot({**case, "convergence": sequences}),
         "drawings": series_plots(case),
-        "sequences": [sequence_view(sequence) for sequence in case.get("convergence") or []],
-        "tables": [table_view(table) for table in case.get("tables") or []],
+        "tables": [
+            *(_sequence_table(sequence) for sequence in case.get("convergence") or []),
+            *(_data_table(table) for table in case.get("tables") or []),
+        ],
         "mutations": _mutations(case),
-        "doubts": [typeset(doubt) for doubt in case.get("doubts") or []],
+        "doubts": case.get("doubts") or [],
     }

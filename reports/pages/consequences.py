@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from types import MappingProxyType
+from typing import Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,12 +11,11 @@ from matplotlib.axes import Axes
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import MISSING, number, percent, short, shown
-from ringbalance.reports.prose import typeset
-from ringbalance.reports.section import Section
+from ringbalance.reports.section import Record, Section, Table, Work
+from ringbalance.reports.studies.consequences import consequences_document, find_consequences
 
-Record = dict[str, Any]
-
-_TICKS: Final = [step * 10.0**exponent for exponent in range(-4, 5) for step in (1, 2, 5)]
+_MEMBERS: Final = MappingProxyType({"light": 500, "heavy": 20_000})
+"""Runs of each ensemble, by level: at 500 a probability is known to about four per cent."""
 _COLUMNS: Final = ("the paper’s law", "the calibrated law", "the calibrated law, gain re-tuned")
 _CHANCES: Final = (
     ("not_settled", "does not settle in time"),
@@ -24,25 +24,23 @@ _CHANCES: Final = (
 )
 
 
-def consequence_view(found: Record | None) -> Record | None:
-    """The section on consequences, every number already text.
+def _collect(work: Work) -> Record:
+    members = _MEMBERS[work.level]
+    return consequences_document(find_consequences(work.scene, work.calibration.model, members=members))
 
-    Returns: `findings`, `notes`, `gains`, `runs`, `chances` and `figure`; None where there is nothing to
-    show.
-    """
-    if not found:
-        return None
+
+def _view(found: Record, _evidence: Record) -> Record:
     return {
-        "findings": [typeset(text) for text in found["findings"][:3]],
-        "notes": [typeset(text) for text in found["notes"]],
+        "findings": found["findings"][:3],
+        "notes": found["notes"],
         "gains": _gain_table(found["gain"]),
-        "runs": [_run_row(run) for run in found["runs"]],
+        "runs": _run_table(found["runs"]),
         "chances": _chance_table(found["ensembles"]),
-        "figure": gain_margin(found["gain"][-1]) if found["gain"] else None,
+        "figure": _gain_margin(found["gain"][-1]) if found["gain"] else None,
     }
 
 
-def _gain_table(gains: list[Record]) -> Record:
+def _gain_table(gains: list[Record]) -> Table:
     rows = (
         (
             "k at equal fills, as Eq. 18 reads the velocity",
@@ -59,38 +57,51 @@ def _gain_table(gains: list[Record]) -> Record:
         ("overshoot from Kc", [_gain(g["overshoot_proportional_s_per_m"]) for g in gains]),
         ("unstable from Kc", [_gain(g["instability_proportional_s_per_m"]) for g in gains]),
     )
-    return {
-        "heads": [f"the {g['law']} law".replace("the paper law", "the paper’s law") for g in gains],
-        "rows": [{"label": label, "cells": cells} for label, cells in rows],
-    }
+    heads = [f"the {g['law']} law".replace("the paper law", "the paper’s law") for g in gains]
+    return Table(
+        caption="The loop’s gain under both laws. An operation that takes away more than the whole residual "
+        "overshoots; more than twice, and the residual grows.",
+        heads=("", *heads),
+        rows=[(label, *cells) for label, cells in rows],
+    )
 
 
 def _gain(value: float | None) -> str:
     return shown(value, "s/m", digits=3)
 
 
-def _run_row(run: Record) -> Record:
-    return {
-        "title": typeset(run["title"]),
-        "gain": MISSING if run["proportional_s_per_m"] is None else _gain(run["proportional_s_per_m"]),
-        "settled": shown(run["settling_time_s"], "s", digits=3) if run["settled"] else "does not settle",
-        "operations": short(run["operations"]),
-        "overshoots": short(run["overshoots"]),
-        "misadjustments": short(run["misadjustments"]),
-    }
-
-
-def _chance_table(ensembles: list[Record]) -> Record:
+def _run_table(runs: list[Record]) -> Table:
     rows = [
-        {"label": label, "cells": [_chance(e["probability"][key]) for e in ensembles]}
-        for key, label in _CHANCES
+        (
+            run["title"],
+            MISSING if run["proportional_s_per_m"] is None else _gain(run["proportional_s_per_m"]),
+            shown(run["settling_time_s"], "s", digits=3) if run["settled"] else "does not settle",
+            *(short(run[key]) for key in ("operations", "overshoots", "misadjustments")),
+        )
+        for run in runs
     ]
-    times = [_times(e["settling_time_s"]["quantiles"]) for e in ensembles]
-    return {
-        "heads": _COLUMNS[: len(ensembles)],
-        "rows": [*rows, {"label": "settling time, median (5 % to 95 %)", "cells": times}],
-        "members": short(ensembles[0]["members"]) if ensembles else "",
-    }
+    return Table(
+        caption="One run each, with the scene’s noise. The law-based controller computes its valve-open "
+        "times from a law and needs no gain.",
+        heads=("Run", "Kc", "Settled after", "Operations", "Overshoots", "Misadjustments"),
+        rows=rows,
+        style="",
+    )
+
+
+def _chance_table(ensembles: list[Record]) -> Table:
+    chances = [
+        (label, *(_chance(ensemble["probability"][key]) for ensemble in ensembles)) for key, label in _CHANCES
+    ]
+    times = (_times(ensemble["settling_time_s"]["quantiles"]) for ensemble in ensembles)
+    members = short(ensembles[0]["members"]) if ensembles else ""
+    return Table(
+        caption="Probabilities over the uncertainty of k, λ, influence coefficient, lag angle and noise: "
+        f"{members} runs each, 95 % intervals in brackets.",
+        heads=("", *_COLUMNS[: len(ensembles)]),
+        rows=[*chances, ("settling time, median (5 % to 95 %)", *times)],
+        style="",
+    )
 
 
 def _chance(share: Record) -> str:
@@ -107,7 +118,7 @@ def _times(quantiles: Record | None) -> str:
     return f"{middle} ({low} to {high})"
 
 
-def gain_margin(gain: Record) -> Drawing:
+def _gain_margin(gain: Record) -> Drawing:
     """Gains at which the loop starts to overshoot and to be unstable, over the tube's drag coefficient.
 
     Args: `gain`: one law's entry of `gain`, SI.
@@ -130,8 +141,8 @@ def gain_margin(gain: Record) -> Drawing:
         )
         values = np.concatenate([np.asarray(curve[name]) * 1e-6 for name, *_ in lines] + [[scene]])
         low, high = values.min() * 0.8, values.max() * 1.25
-        style.logarithmic(axes, "x", ticks=[tick for tick in _TICKS if k[0] <= tick <= k[-1]])
-        style.logarithmic(axes, "y", ticks=[tick for tick in _TICKS if low <= tick <= high])
+        style.logarithmic(axes, "x", within=(k[0], k[-1]))
+        style.logarithmic(axes, "y", within=(low, high))
         axes.set_ylim(low, high)
 
     return draw(
@@ -153,5 +164,6 @@ def gain_margin(gain: Record) -> Drawing:
 SECTION: Final = Section(
     name="consequences",
     title="What a wrong k costs",
-    view=lambda evidence: consequence_view(evidence.get("consequences")),
+    collect=_collect,
+    show=_view,
 )

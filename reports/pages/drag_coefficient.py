@@ -13,8 +13,7 @@ from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.reports.figures.drag_coefficient import apparent_figure, map_figure
 from ringbalance.reports.numbers import MISSING, given, measured, percent, shown
-from ringbalance.reports.prose import typeset
-from ringbalance.reports.section import Record, Section, Work
+from ringbalance.reports.section import Cells, Record, Section, Table, Work
 from ringbalance.reports.studies.apparent_drag import apparent_drag
 from ringbalance.reports.studies.drag_map import (
     BORES,
@@ -31,7 +30,7 @@ _DIGITS: Final = 5
 _READINGS: Final = 60
 
 
-def collect(work: Work) -> Record:
+def _collect(work: Work) -> Record:
     """The map, its contours, the liquids, and Eq. 18's reading of a separated column, as plain numbers."""
     found = drag_map(calibration=work.calibration)
     verdicts = liquid_verdicts(calibration=work.calibration)
@@ -42,7 +41,7 @@ def collect(work: Work) -> Record:
         "contours": {
             name: _contour(found, apparent=apparent) for name, apparent in (("k", False), ("apparent", True))
         },
-        "liquids": liquid_records(verdicts),
+        "liquids": _liquid_records(verdicts),
         "apparent": _apparent(work.calibration),
     }
 
@@ -78,7 +77,7 @@ def _contour(found: DragMap, *, apparent: bool) -> Record:
     return {"kinematic_viscosity_m2_s": _rounded(viscosity), "bore_m": _rounded(bore)}
 
 
-def liquid_records(verdicts: LiquidVerdicts) -> list[Record]:
+def _liquid_records(verdicts: LiquidVerdicts) -> list[Record]:
     """The verdict on k = 50 for each liquid.
 
     Returns: One record a liquid: under the scene's gas where that starts the flow, else at equal heads.
@@ -157,27 +156,33 @@ def verdict_on_fifty(record: Record) -> str:
     return "too low" if gap > 0 else "too high"
 
 
-def liquid_row(record: Record) -> Record:
-    """One liquid as the tables show it."""
-    runs, bore = record["runs"], record["bore_for_paper_m"]
-    pressure = given(record["gas_pressure_Pa"], "Pa", digits=3)
-    start = shown(record["starting_pressure_Pa"], "Pa", digits=2)
-    error = percent(record["velocity_error"], signed=True, digits=2) if runs else MISSING
-    return {
-        "name": typeset(record["name"]),
-        "viscosity": shown(record["kinematic_viscosity_m2_s"], "m^2/s", digits=3),
-        "density": f"{record['density_kg_m3']:.0f}",
-        "pressure": pressure,
-        "needs": "" if record["starts_at_scene_pressure"] else start,
-        "runs": f"{record['regime']}, {record['flow_state']}" if runs else "nothing flows",
-        "velocity": shown(record["velocity_m_s"], "m/s", record["velocity_uncertainty"]) if runs else MISSING,
-        "k": measured(record["k"], record["k_uncertainty"]) if runs else MISSING,
-        "apparent": measured(record["apparent_k"], None, digits=3) if runs else MISSING,
-        "error": error,
-        "verdict": verdict_on_fifty(record),
-        "bore": shown(bore, "m", digits=3) if bore else _outside(record),
-        "stretched": runs and not record["in_range"],
-    }
+LIQUID_HEADS: Final = (
+    *("Liquid", "Viscosity", "Density\nkg/m³", "Gas", "The tube runs", "Velocity", "k"),
+    *("Eq. 18\nreads", "Eq. 19\nis off by"),
+)
+
+
+def liquid_cells(record: Record) -> Cells:
+    """One liquid under LIQUID_HEADS, and the verdict on k = 50; a star: not under the scene's gas."""
+    runs = record["runs"]
+    star = "" if record["starts_at_scene_pressure"] else "*"
+    return (
+        record["name"],
+        shown(record["kinematic_viscosity_m2_s"], "m^2/s", digits=3),
+        f"{record['density_kg_m3']:.0f}",
+        f"{given(record['gas_pressure_Pa'], 'Pa', digits=3)}{star}",
+        f"{record['regime']}, {record['flow_state']}" if runs else "nothing flows",
+        shown(record["velocity_m_s"], "m/s", record["velocity_uncertainty"]) if runs else MISSING,
+        measured(record["k"], record["k_uncertainty"]) if runs else MISSING,
+        measured(record["apparent_k"], None, digits=3) if runs else MISSING,
+        percent(record["velocity_error"], signed=True, digits=2) if runs else MISSING,
+        verdict_on_fifty(record),
+    )
+
+
+def _bore(record: Record) -> str:
+    bore = record["bore_for_paper_m"]
+    return shown(bore, "m", digits=3) if bore else _outside(record)
 
 
 def _outside(record: Record) -> str:
@@ -188,29 +193,36 @@ def _outside(record: Record) -> str:
     return f"below {low}" if record["k"] < paper.PAPER_DRAG_COEFFICIENT else f"none up to {high}"
 
 
-def view(evidence: Record) -> Record | None:
-    """The section's texts, table and figures.
-
-    Returns: Record; None where the evidence has none of it.
-    """
-    found = evidence.get("fifty")
-    if not found:
-        return None
-    rows = [liquid_row(record) for record in found["liquids"]]
+def _view(found: Record, evidence: Record) -> Record:
     apparent = found["apparent"]
+    paper_k = given(evidence["paper"]["drag_coefficient"], "1")
+    needs = [
+        f"{r['name']} needs {shown(r['starting_pressure_Pa'], 'Pa', digits=2)}"
+        for r in found["liquids"]
+        if not r["starts_at_scene_pressure"]
+    ]
     return {
-        "paper_k": given(evidence["paper"]["drag_coefficient"], "1"),
+        "paper_k": paper_k,
         "lead": _lead(found["liquids"]),
-        "rows": rows,
-        "any_needs": any(row["needs"] for row in rows),
-        "any_stretched": any(row["stretched"] for row in rows),
+        "table": _table(found, paper_k),
+        "needs": ", ".join(needs),
         "decreed": given(found["decreed_k"], "1") if found["decreed_k"] is not None else "",
         "gas": given(found["map"]["gas_pressure_Pa"], "Pa"),
-        "bore": given(found["bore_m"], "m"),
         "map": map_figure(found) if found["map"]["runs"] else None,
         "apparent": apparent_figure(apparent) if apparent else None,
         "hidden": _hidden(apparent) if apparent else "",
     }
+
+
+def _table(found: Record, paper_k: str) -> Table:
+    return Table(
+        caption=f"The known liquids in this tube of {given(found['bore_m'], 'm')} bore, at equal fills. The "
+        f"error of Eq. 19 is that of its velocity with k = {paper_k}. ± is the expanded uncertainty (95 %) "
+        "at the operating point, which moves with k itself.",
+        heads=(*LIQUID_HEADS, f"{paper_k} is", f"Bore for\nk = {paper_k}"),
+        rows=[(*liquid_cells(record), _bore(record)) for record in found["liquids"]],
+        style="dense",
+    )
 
 
 def _hidden(apparent: Record) -> str:
@@ -228,7 +240,7 @@ def _hidden(apparent: Record) -> str:
 def _lead(liquids: list[Record]) -> str:
     groups: dict[str, list[str]] = {}
     for record in liquids:
-        groups.setdefault(verdict_on_fifty(record), []).append(typeset(record["name"]))
+        groups.setdefault(verdict_on_fifty(record), []).append(record["name"])
     told = {
         "right": "it is right, within what can be told, for {}",
         "too high": "too high for {}, whose velocity Eq. 19 then makes too small",
@@ -245,4 +257,4 @@ def _series(names: list[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
-SECTION: Final = Section(name="fifty", title="Is k = 50 right?", collect=collect, view=view)
+SECTION: Final = Section(name="fifty", title="Is k = 50 right?", collect=_collect, show=_view)

@@ -8,13 +8,13 @@ from typing import Final
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import number
-from ringbalance.reports.prose import typeset
-from ringbalance.reports.section import Record, Section
+from ringbalance.reports.section import Cells, Record, Section, Table
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.extremes.axes import Axis, axis_of
 from ringbalance.verification.extremes.point import Ending
@@ -39,7 +39,7 @@ _LEGEND: Final = 0.62
 """Inches above a map for its legend."""
 
 
-def view(evidence: Record) -> Record:
+def _view(_own: Record, evidence: Record) -> Record:
     """Sentences, the table of axes and the maps."""
     case = next((c for c in evidence.get("verification", []) if c["id"] == CASE), None)
     if case is None or not case.get("tables"):
@@ -47,9 +47,15 @@ def view(evidence: Record) -> Record:
     tables = {table["name"]: table["columns"] for table in case["tables"]}
     return {
         "ran": True,
-        "text": typeset(case.get("explanation", "")),
+        "text": case.get("explanation", ""),
         "date": case.get("date", ""),
-        "rows": [{**row, "said": typeset(row["said"])} for row in axis_rows(tables["axes"])],
+        "table": Table(
+            caption="Each input alone, from end to end, all else as in the paper’s scene: where points begin "
+            "to end in another way, and what is said there.",
+            heads=("Input", "Stretch", "Answer", "Loop", "Said"),
+            rows=axis_rows(tables["axes"]),
+            style="",
+        ),
         "maps": map_drawings(tables),
     }
 
@@ -59,17 +65,17 @@ def map_drawings(tables: Mapping[str, Record]) -> list[Drawing]:
     return [_map(name, columns) for name, columns in tables.items() if name.startswith(MAP_PREFIX)]
 
 
-def axis_rows(columns: Record) -> list[Record]:
-    """The stretches of every axis as texts."""
+def axis_rows(columns: Record) -> list[Cells]:
+    """The intervals of every axis: its title (at its first), interval, answer, loop and message."""
     before = ["", *columns["axis"]]
     return [
-        {
-            "title": "" if title == before[index] else title,
-            "span": _span(columns["from"][index], columns["to"][index], columns["unit"][index]),
-            "ending": str(columns["ending"][index]).removesuffix(" with a message"),
-            "loop": str(columns["loop"][index]).replace("_", " "),
-            "said": _shortened(str(columns["said"][index])),
-        }
+        (
+            "" if title == before[index] else title,
+            _span(columns["from"][index], columns["to"][index], columns["unit"][index]),
+            str(columns["ending"][index]).removesuffix(" with a message"),
+            str(columns["loop"][index]).replace("_", " "),
+            _shortened(str(columns["said"][index])),
+        )
         for index, title in enumerate(columns["axis"])
     ]
 
@@ -102,14 +108,8 @@ def _map(name: str, columns: Record) -> Drawing:
         present = [ending for ending in Ending if np.any(endings == str(ending))]
         for ending in present:
             colour, strength = _COLOURS[ending]
-            for row, column in zip(*np.nonzero(endings == str(ending)), strict=True):
-                axes.fill_between(
-                    edges_x[column : column + 2],
-                    *edges_y[row : row + 2],
-                    color=colour,
-                    alpha=strength,
-                    linewidth=0,
-                )
+            there = np.ma.masked_not_equal(endings == str(ending), True)
+            axes.pcolormesh(edges_x, edges_y, there, cmap=ListedColormap([colour]), alpha=strength)
         for label, outcomes, marker, size in _MARKS:
             rows, cols = np.nonzero(np.isin(loops, outcomes))
             if rows.size:
@@ -164,5 +164,5 @@ def _legend(axes: Axes, present: list[Ending]) -> None:
     axes.set_position((box.x0, box.y0, box.width, 1 - box.y0 - _LEGEND / height))
 
 
-SECTION: Final = Section(name="extremes", title="At the extremes", view=view)
+SECTION: Final = Section(name="extremes", title="At the extremes", show=_view)
 """Shown also where it was not run, to say how it is."""

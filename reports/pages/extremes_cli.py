@@ -15,6 +15,7 @@ from rich.table import Table
 from ringbalance.reports.figures.style import standalone
 from ringbalance.reports.numbers import number
 from ringbalance.reports.pages.extremes import axis_rows, map_drawings
+from ringbalance.reports.section import Cells
 from ringbalance.scene.platform.files import staged, write_whole
 from ringbalance.scene.platform.progress import activity
 from ringbalance.scene.platform.terminal import messages_console, results_console
@@ -88,7 +89,7 @@ def extremes(
     return BROKEN if broken(found) else DONE
 
 
-def _show(told: Record, rows: list[Record]) -> None:
+def _show(told: Record, rows: list[Cells]) -> None:
     console = results_console()
     endings = ", ".join(f"{count} {ending}" for ending, count in told["endings"].items() if count)
     console.print(f"{told['judged']} points: {endings}", highlight=False)
@@ -101,7 +102,7 @@ def _show(told: Record, rows: list[Record]) -> None:
     for title in ("input", "stretch", "answer", "loop", "said"):
         table.add_column(title, overflow="fold")
     for row in rows:
-        table.add_row(*(escape(text) for text in row.values()))
+        table.add_row(*(escape(text) for text in row))
     console.print(table, highlight=False)
     for fault in told["violations"]:
         console.print(Padding(f"{fault['violations']} at {fault['point']}", (0, 0, 0, 2)), style="red")

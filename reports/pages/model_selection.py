@@ -11,8 +11,7 @@ from matplotlib.axes import Axes
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import MISSING, number, percent
-from ringbalance.reports.prose import typeset
-from ringbalance.reports.section import Record, Section, Work
+from ringbalance.reports.section import Record, Section, Table, Work
 from ringbalance.scene.models import Scene
 from ringbalance.verification.selection_studies.study import (
     TradeStudy,
@@ -26,7 +25,7 @@ _LEAST: Final = 1e-9
 _MOST_ROWS: Final = 8
 
 
-def collect(work: Work) -> Record | None:
+def _collect(work: Work) -> Record | None:
     """The trade of the scene, light: without the settling time."""
     return trade_document(_study(work.scene))
 
@@ -37,26 +36,16 @@ def _study(scene: Scene) -> TradeStudy:
     return trade_study(scene, level="light")
 
 
-def view(evidence: Record) -> Record | None:
-    """The section on models against tolerances, every number already text.
-
-    Returns: `quantities`, `numbers` and `tolerance`; None where nothing was measured.
-    """
-    found = evidence.get("trade")
-    if not found:
-        return None
+def _view(found: Record, evidence: Record) -> Record:
     times = (evidence["times"].get("trade") or {}).get("rungs", {})
+    numbers = [(n["name"], number(n["value"], digits=3), n["formula"], n["tells"]) for n in found["numbers"]]
     return {
-        "tolerance": typeset(tolerance_text(found["tolerance"], _error)),
-        "numbers": [
-            {
-                "name": typeset(n["name"]),
-                "value": MISSING if n["value"] is None else number(n["value"], digits=3),
-                "formula": typeset(n["formula"]),
-                "tells": typeset(n["tells"]),
-            }
-            for n in found["numbers"]
-        ],
+        "tolerance": tolerance_text(found["tolerance"], _error),
+        "numbers": Table(
+            caption="The scene’s dimensionless numbers, at equal fills.",
+            heads=("Number", "Value", "Formula", "What it decides"),
+            rows=numbers,
+        ),
         "quantities": [_quantity(q, times.get(q["quantity"], [])) for q in found["quantities"] if q["rungs"]],
     }
 
@@ -64,35 +53,35 @@ def view(evidence: Record) -> Record | None:
 def _quantity(found: Record, times: list[Record]) -> Record:
     seconds = {entry["name"]: entry["seconds"] for entry in times}
     front = sorted((r for r in found["rungs"] if r["on_front"]), key=lambda r: r["cost_s"])
-    own = found["choices"][-1]
+    models = [
+        (
+            model["name"],
+            MISSING if model["name"] == found["top"] else _error(model["error"]),
+            _time(model["cost_s"]),
+            _time(seconds.get(model["name"])),
+        )
+        for model in front[:_MOST_ROWS]
+    ]
+    *choices, own = found["choices"]
+    chosen = [(_error(c["tolerance"]), c["rung"], _error(c["measured"]), _time(c["cost_s"])) for c in choices]
     return {
-        "title": typeset(_headed(found["title"])),
-        "status": "" if found["status"]["code"] == "ok" else typeset(found["status"]["text"]),
-        "knee": typeset(found["knee"]),
-        "top": typeset(found["top"]),
-        "known": _error(found["top_uncertainty"]),
-        "front": [
-            {
-                "name": typeset(fidelity["name"]),
-                "error": MISSING if fidelity["name"] == found["top"] else _error(fidelity["error"]),
-                "cost": _time(fidelity["cost_s"]),
-                "time": MISSING
-                if seconds.get(fidelity["name"]) is None
-                else _time(seconds[fidelity["name"]]),
-            }
-            for fidelity in front[:_MOST_ROWS]
-        ],
-        "choices": [
-            {
-                "tolerance": _error(choice["tolerance"]),
-                "model": typeset(choice["rung"]),
-                "check": MISSING if choice["measured"] is None else _error(choice["measured"]),
-                "cost": _time(choice["cost_s"]),
-            }
-            for choice in found["choices"][:-1]
-        ],
-        "own": {"model": typeset(own["rung"]), "reasons": [typeset(text) for text in own["reasons"]]},
-        "figure": front_figure(found),
+        "title": _headed(found["title"]),
+        "status": "" if found["status"]["code"] == "ok" else found["status"]["text"],
+        "front": Table(
+            caption=f"The front, cheapest first. Finest model: {found['top']}, known to "
+            f"{_error(found['top_uncertainty'])}. Trade-off point: {found['knee']}.",
+            heads=("Model", "Error", "Counted cost", "Measured time"),
+            rows=models,
+            style="",
+        ),
+        "choices": Table(
+            caption="What a tolerance needs, chosen by estimates and checked by the next finer model.",
+            heads=("Tolerance", "Models", "Left out, measured", "Counted cost"),
+            rows=chosen,
+            style="",
+        ),
+        "own": {"model": own["rung"], "reasons": own["reasons"]},
+        "figure": _front_figure(found),
     }
 
 
@@ -101,16 +90,20 @@ def _headed(title: str) -> str:
     return title if len(title) == 1 else title[0].upper() + title[1:]
 
 
-def _error(value: float) -> str:
+def _error(value: float | None) -> str:
+    if value is None:
+        return MISSING
     return percent(value, digits=2) if value >= 1e-3 else number(value, digits=2)
 
 
-def _time(value: float) -> str:
+def _time(value: float | None) -> str:
+    if value is None:
+        return MISSING
     unit, scale = ("µs", 1e-6) if value < 1e-3 else ("ms", 1e-3) if value < 1 else ("s", 1.0)
     return f"{number(value / scale, digits=2)} {unit}"
 
 
-def front_figure(found: Record) -> Drawing:
+def _front_figure(found: Record) -> Drawing:
     """Error against counted cost of every model, with the front and its trade-off point."""
     fidelities = sorted(found["rungs"], key=lambda r: r["cost_s"])
     cost = np.array([r["cost_s"] for r in fidelities])
@@ -149,4 +142,4 @@ def front_figure(found: Record) -> Drawing:
     )
 
 
-SECTION: Final = Section(name="trade", title="Speed against accuracy", collect=collect, view=view)
+SECTION: Final = Section(name="trade", title="Speed against accuracy", collect=_collect, show=_view)

@@ -17,7 +17,7 @@ from ringbalance.reduced_model.law.paper_law import PaperMoment, paper_model
 from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.reports.figures.paper import figure_4, figure_6, figure_7, figure_7_phase, figure_8
 from ringbalance.reports.numbers import given, number, percent, short, shown
-from ringbalance.reports.section import Record, Section, Work
+from ringbalance.reports.section import Record, Section, Table, Work
 from ringbalance.scene.models import Scene
 from ringbalance.verification import paper_numbers
 from ringbalance.verification.loops import AMPLITUDES, PHASES, calibration_of, loop_scene, run_loop
@@ -30,11 +30,8 @@ _SEARCH: Final = tuple((np.arange(4, 41) * 5e3).tolist())
 """Kp among which the onset of overshoot is looked for, s/m."""
 
 
-def collect(work: Work) -> Record:
-    """Velocities of Fig. 4 and the runs of Figs. 6 to 8, all under the paper's law on the paper's disc.
-
-    Args: `work`: scene, calibration and level; another scene than the paper's only lends its level.
-    """
+def _collect(work: Work) -> Record:
+    """Velocities of Fig. 4 and the runs of Figs. 6 to 8, all under the paper's law on the paper's disc."""
     scene = paper_scene()
     own = work.scene.sha256 == scene.sha256
     calibration = work.calibration if own else calibration_of(scene)
@@ -173,17 +170,11 @@ def literal_moment(model: BalancerModel) -> PaperMoment:
     return replace(moment, moment_per_transferred_mass=2 * moment.moment_per_transferred_mass)
 
 
-def view(evidence: Record) -> Record | None:
-    """The section's tables and figures.
-
-    Returns: Record; None where the evidence has none of it.
-    """
-    found = evidence.get("paper_again")
-    if not found:
-        return None
+def _view(found: Record, _evidence: Record) -> Record:
+    """The section's tables and figures."""
     limit = found["limit_m"]
     return {
-        "constants": _constant_rows(found["constants"]),
+        "constants": _constant_table(found["constants"]),
         "results": _results(found),
         "reading": _reading_text(found),
         "velocity": figure_4(found["velocity"]),
@@ -193,7 +184,7 @@ def view(evidence: Record) -> Record | None:
     }
 
 
-def _constant_rows(told: Record) -> list[Record]:
+def _constant_table(told: Record) -> Table:
     rate = shown(told["rate_m_per_s"], "m", digits=3)
     bore, influence = given(told["bore_m"], "m"), given(told["influence_coefficient"], "m/(kg m)")
     steps = ", ".join(given(told[f"{name}_s"], "s") for name in ("first_trial", "long_step", "short_step"))
@@ -228,10 +219,12 @@ def _constant_rows(told: Record) -> list[Record]:
             "the paper’s; seconds per micrometre is inferred",
         ),
     )
-    return [{"name": name, "value": value, "origin": origin} for name, value, origin in rows]
+    return Table(
+        caption="The constants behind the four figures.", heads=("Constant", "Value", "Origin"), rows=rows
+    )
 
 
-def _results(found: Record) -> list[Record]:
+def _results(found: Record) -> Table:
     velocity = found["velocity"]
     printed, levels = (
         " and ".join(percent(v[f"departure_{name}"], digits=3) for v in velocity)
@@ -241,29 +234,29 @@ def _results(found: Record) -> list[Record]:
     rises = [run["misadjustments"] for run in trial]
     quiet = [run["of"] for run in gains if not run["overshoots"]]
     loud = [run["of"] for run in gains if run["overshoots"]]
-    return [
-        _result("Fig. 4", f"the velocity falls by {printed}", f"{levels} with the finite elements’ levels"),
-        _result(
-            "Fig. 6",
-            "below 0.05 µm in about 40 s at four phases, with misadjustment",
-            f"{_span(trial)}; {min(rises)} to {max(rises)} misadjustments",
+    return Table(
+        caption="What the paper says of its figures, and what comes out here.",
+        heads=("Figure", "The paper", "Here"),
+        rows=(
+            ("Fig. 4", f"the velocity falls by {printed}", f"{levels} with the finite elements’ levels"),
+            (
+                "Fig. 6",
+                "below 0.05 µm in about 40 s at four phases, with misadjustment",
+                f"{_span(trial)}; {min(rises)} to {max(rises)} misadjustments",
+            ),
+            (
+                "Fig. 7",
+                "no overshoot up to Kp = 0.12, overshoot from 0.16, the phase then flips by 180°",
+                f"none up to {_gain(max(quiet, default=None))}, overshoot from "
+                f"{_gain(min(loud, default=None))}, where the phase turns by {_turn(gains)}",
+            ),
+            (
+                "Fig. 8",
+                "2 to 10 µm within 5 s, without misadjustment",
+                f"{_span(amplitudes)}; {sum(run['misadjustments'] for run in amplitudes)} misadjustments",
+            ),
         ),
-        _result(
-            "Fig. 7",
-            "no overshoot up to Kp = 0.12, overshoot from 0.16, the phase then flips by 180°",
-            f"none up to {_gain(max(quiet, default=None))}, overshoot from {_gain(min(loud, default=None))}, "
-            f"where the phase turns by {_turn(gains)}",
-        ),
-        _result(
-            "Fig. 8",
-            "2 to 10 µm within 5 s, without misadjustment",
-            f"{_span(amplitudes)}; {sum(run['misadjustments'] for run in amplitudes)} misadjustments",
-        ),
-    ]
-
-
-def _result(figure: str, paper_says: str, here: str) -> Record:
-    return {"figure": figure, "paper": paper_says, "found": here}
+    )
 
 
 def _span(runs: list[Record]) -> str:
@@ -309,5 +302,5 @@ def _reading_text(found: Record) -> list[str]:
 
 
 SECTION: Final = Section(
-    name="paper_again", title="The paper’s figures, drawn again", collect=collect, view=view
+    name="paper_again", title="The paper’s figures, drawn again", collect=_collect, show=_view
 )

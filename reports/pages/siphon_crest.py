@@ -14,7 +14,7 @@ from ringbalance.reduced_model.tube.pressure_profile import HumpProfile, hump_pr
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import MISSING, given, shown
-from ringbalance.reports.section import Record, Section, Work
+from ringbalance.reports.section import Cells, Record, Section, Table, Work
 from ringbalance.scene.models import Scene
 
 _POINTS: Final = 161
@@ -25,7 +25,7 @@ _FACTORS: Final = (1.0, 0.6, 0.3, 1.5, 2.0)
 _ORDER: Final = (Regime.SIPHON, Regime.SEPARATED, Regime.BLOCKED, Regime.REVERSE)
 
 
-def path_figure(found: Record) -> Drawing:
+def _path_figure(found: Record) -> Drawing:
     """Gauge pressure along the path, one line a regime, dotted where the tube is not full."""
     states = found["states"]
 
@@ -104,11 +104,8 @@ def _margin(axes: Axes, states: list[Record], hump: float) -> None:
     axes.plot([hump, hump], [low, high], color=style.FOUND, linewidth=3, alpha=0.6, solid_capstyle="butt")
 
 
-def collect(work: Work) -> Record | None:
-    """One operating state of every regime that this tube can be in, with its pressures along the path.
-
-    Returns: Record; None for a tube without a crest.
-    """
+def _collect(work: Work) -> Record | None:
+    """One operating state of every regime that this tube can be in, with its pressures along the path."""
     law = work.calibration.flow_law
     if work.scene.tube.hump_radius is None:
         return None
@@ -161,34 +158,34 @@ def _judged(state: Record) -> str:
     return "holds" if margin > 0 else "separates"
 
 
-def _row(state: Record) -> Record:
-    pressures = {
-        name: shown(state[f"{name}_Pa"], "Pa", digits=3) for name in ("hump_pressure", "cavity_pressure")
-    }
-    return {
-        "regime": state["regime"],
-        "fills": f"{state['fill_ratio']:.3f}, {state['opposite_fill_ratio']:.3f}",
-        "gas": given(state["gas_pressure_Pa"], "Pa", digits=3),
-        "velocity": shown(state["velocity_m_s"], "m/s", digits=3),
-        **pressures,
-        "margin": shown(state["margin_Pa"], "Pa", state["margin_uncertainty_Pa"]),
-        "column": _judged(state),
-    }
+def _row(state: Record) -> Cells:
+    return (
+        state["regime"],
+        f"{state['fill_ratio']:.3f}, {state['opposite_fill_ratio']:.3f}",
+        given(state["gas_pressure_Pa"], "Pa", digits=3),
+        shown(state["velocity_m_s"], "m/s", digits=3),
+        shown(state["hump_pressure_Pa"], "Pa", digits=3),
+        shown(state["cavity_pressure_Pa"], "Pa", digits=3),
+        shown(state["margin_Pa"], "Pa", state["margin_uncertainty_Pa"]),
+        _judged(state),
+    )
 
 
-def view(evidence: Record) -> Record | None:
-    """The section's table and figure.
-
-    Returns: Record; None where the evidence has none of it.
-    """
-    found = evidence.get("hump")
-    if not found or not found["states"]:
+def _view(found: Record, _evidence: Record) -> Record | None:
+    if not found["states"]:
         return None
-    return {
-        "rows": [_row(state) for state in found["states"]],
-        "absent": " and ".join(found["absent"]),
-        "figure": path_figure(found),
-    }
+    table = Table(
+        caption="The states drawn. The margin is that of a full siphon under the same conditions, with its "
+        "expanded uncertainty (95 %); within it the regime is undecided. A blocked tube’s margin is what a "
+        "primed one would have.",
+        heads=(
+            *("Regime", "Fill, driven\nand opposite", "Gas", "Velocity", "Pressure\nover the siphon crest"),
+            *("Cavity\npressure", "Margin of a siphon", "A full column"),
+        ),
+        rows=[_row(state) for state in found["states"]],
+        style="dense",
+    )
+    return {"table": table, "absent": " and ".join(found["absent"]), "figure": _path_figure(found)}
 
 
-SECTION: Final = Section(name="hump", title="Pressure over the siphon crest", collect=collect, view=view)
+SECTION: Final = Section(name="hump", title="Pressure over the siphon crest", collect=_collect, show=_view)

@@ -22,11 +22,8 @@ _NEAR: Final = 0.15
 """Distance of a frequency from the speed, over the speed, that counts as a fill to avoid."""
 
 
-def collect(work: Work) -> Record | None:
-    """Frequencies and swings over the fills, as plain numbers.
-
-    Returns: Record; None on a vertical shaft or without gravity, which then drives no waves.
-    """
+def _collect(work: Work) -> Record | None:
+    """Frequencies and swings over the fills, as plain numbers."""
     scene = work.scene
     if scene.environment.shaft == "vertical" or scene.environment.gravity == 0:
         return None
@@ -67,14 +64,8 @@ def collect(work: Work) -> Record | None:
     }
 
 
-def view(evidence: Record) -> Record | None:
-    """Sentences and figures.
-
-    Returns: `findings`, `frequencies` and `swing`; None where there is nothing to show.
-    """
-    found = evidence.get("sloshing")
-    if not found:
-        return None
+def _view(found: Record, _evidence: Record) -> Record:
+    """Sentences and figures."""
     return {
         "findings": [_equal(found), _avoid(found), *_reservation(found)],
         "frequencies": _frequencies(found),
@@ -170,7 +161,7 @@ def _swing(found: Record) -> Drawing:
         )
         for item in found["resonant"]:
             axes.axvline(item["fill_ratio"], color=style.MUTED, linewidth=0.8, linestyle=":")
-        style.logarithmic(axes, "y", ticks=[a * 10.0**b for b in range(-3, 4) for a in (1, 2, 5)])
+        style.logarithmic(axes, "y", within=(1e-3, 5e3))
         values = np.asarray([*found["amplification"], *found["pressure_amplification"]])
         axes.set_ylim(0.7 * values.min(), 1.5 * max(values.max(), 1.0))
         axes.set_xlim(0, 1.05 * fills[-1])
@@ -187,4 +178,4 @@ def _swing(found: Record) -> Drawing:
     )
 
 
-SECTION: Final = Section(name="sloshing", title="Waves on the ring", collect=collect, view=view)
+SECTION: Final = Section(name="sloshing", title="Waves on the ring", collect=_collect, show=_view)

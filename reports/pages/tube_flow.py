@@ -91,7 +91,7 @@ def _levels(values: FloatArray) -> FloatArray:
     return np.asarray(step * np.arange(13), dtype=np.float64)
 
 
-def section_figure(record: Record) -> Drawing:
+def _section_figure(record: Record) -> Drawing:
     """Axial velocity in colour and in-plane streamlines in the section of the turning tube.
 
     Args: `record`: `section` of the evidence's `inside`.
@@ -138,7 +138,7 @@ def section_figure(record: Record) -> Drawing:
     )
 
 
-def end_figure(record: Record, end: str) -> Drawing:
+def _end_figure(record: Record, end: str) -> Drawing:
     """Speed in colour and streamlines where liquid enters or leaves the tube."""
     field, psi = _unpacked(record, "colour"), _unpacked(record, "stream_function")
     points = _unpacked(record, "points").reshape(2, -1)
@@ -180,11 +180,8 @@ def end_figure(record: Record, end: str) -> Drawing:
     )
 
 
-def collect(work: Work) -> Record | None:
-    """Laminar flow fields at the operating point, or at the nearest one that can be drawn.
-
-    Returns: Record; None where nothing flows.
-    """
+def _collect(work: Work) -> Record | None:
+    """Laminar flow fields at the operating point, or at the nearest one that can be drawn."""
     scene, speed = work.scene, work.calibration.operating_point.loss_velocity
     if not speed:
         return None
@@ -239,18 +236,12 @@ def _end_record(flow: EndFlow) -> Record:
     }
 
 
-def view(evidence: Record) -> Record | None:
-    """The section's texts and figures.
-
-    Returns: Record; None where the evidence has none of it.
-    """
-    found = evidence.get("inside")
-    if not found:
-        return None
+def _view(found: Record, evidence: Record) -> Record:
+    """The section's texts and figures."""
     return {
         "lead": _lead(found),
-        "section": section_figure(found["section"]),
-        "ends": [end_figure(found[name], name) for name in ("entrance", "exit")],
+        "section": _section_figure(found["section"]),
+        "ends": [_end_figure(found[name], name) for name in ("entrance", "exit")],
         "check": three_dimensional_check(evidence),
     }
 
@@ -294,4 +285,4 @@ def three_dimensional_check(evidence: Record) -> Record | None:
     }
 
 
-SECTION: Final = Section(name="inside", title="Flow inside the tube", collect=collect, view=view)
+SECTION: Final = Section(name="inside", title="Flow inside the tube", collect=_collect, show=_view)

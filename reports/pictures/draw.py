@@ -21,21 +21,13 @@ from typing import Any, Final
 import numpy as np
 import pyvista as pv
 from matplotlib import colormaps
-from matplotlib.colors import Colormap, ListedColormap
-from matplotlib.ticker import MaxNLocator
+from matplotlib.colors import ListedColormap
 from PIL import Image
 
 from ringbalance.reports.pictures.disc_shapes import chamber_outline, ring, split_hexahedra, tube_path, web
 from ringbalance.reports.pictures.draw_tube import draw_tube
 from ringbalance.reports.pictures.draw_view import label_at, look
-from ringbalance.reports.pictures.text import (
-    BAR_SHADES,
-    Bar,
-    Label,
-    letter,
-    shade_bar,
-    with_palette,
-)
+from ringbalance.reports.pictures.text import Bar, Label, bar, letter
 from ringbalance.reports.pictures.theme import PICTURE, THEMES, Theme
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.platform.processes import end_with
@@ -65,8 +57,8 @@ def main(arguments: list[str]) -> int:
                 off_screen=True, window_size=[SCALE * side for side in PICTURE], lighting="light kit"
             )
             plotter.set_background(theme.background)
-            labels, bar = paint(plotter, job | {"lengths": lengths}, liquid, theme)
-            _save(plotter, labels, bar, theme, Path(job["folder"]) / f"{name}-{theme.name}.png")
+            labels, scale = paint(plotter, job | {"lengths": lengths}, liquid, theme)
+            _save(plotter, labels, scale, theme, Path(job["folder"]) / f"{name}-{theme.name}.png")
     return 0
 
 
@@ -88,7 +80,7 @@ def _pixel(plotter: Any, place: FloatArray) -> tuple[float, float]:
     return (x / w + 1) / 2 * width, (1 - y / w) / 2 * height
 
 
-def _save(plotter: Any, labels: list[tuple[FloatArray, Label]], bar: Bar, theme: Theme, path: Path) -> None:
+def _save(plotter: Any, labels: list[tuple[FloatArray, Label]], scale: Bar, theme: Theme, path: Path) -> None:
     """Letters, reduces and writes the picture."""
     image = Image.fromarray(plotter.screenshot(return_img=True))
     placed = [
@@ -96,28 +88,9 @@ def _save(plotter: Any, labels: list[tuple[FloatArray, Label]], bar: Bar, theme:
         for place, label in labels
     ]
     plotter.close()
-    lettered = letter(image, labels=placed, bar=bar, ink=theme.ink, ground=theme.background, scale=SCALE)
-    small = lettered.resize(PICTURE, Image.Resampling.LANCZOS)
-    few = small.quantize(
-        colors=_COLOURS - BAR_SHADES, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE
-    )
-    with_palette(shade_bar(few.convert("RGB"), bar)).save(path, optimize=True)
-
-
-def _bar(title: str, colours: Colormap, high: float) -> Bar:
-    ticks = [
-        float(tick)
-        for tick in MaxNLocator(5, steps=[1, 2, 5, 10]).tick_values(0.0, high)
-        if 0 <= tick <= high
-    ]
-    return Bar(
-        title=title,
-        colours=colours,
-        low=0.0,
-        high=high,
-        ticks=tuple(ticks),
-        labels=tuple(f"{tick:g}" for tick in ticks),
-    )
+    lettered = letter(image, labels=placed, bar=scale, ink=theme.ink, ground=theme.background, scale=SCALE)
+    few = lettered.resize(PICTURE, Image.Resampling.LANCZOS).quantize(_COLOURS, dither=Image.Dither.NONE)
+    few.save(path, optimize=True)
 
 
 def _draw_pressure(
@@ -142,7 +115,7 @@ def _draw_pressure(
         label_at("outer wall", _polar(outer, 0.45 * half, 0.1 * width), shift=(60, -110)),
         label_at("free surface", _polar(shallow, 0.55 * half, width / 2), shift=(-125, 150)),
         label_at("gas", _polar(0.75 * inner + 0.25 * outer, 0.0, width / 2)),
-    ], _bar("pressure in MPa", _VIRIDIS, high)
+    ], bar("pressure in MPa", _VIRIDIS, (0.0, high))
 
 
 def _without_corner(liquid: Any) -> tuple[Any, Any]:
@@ -210,7 +183,7 @@ def _draw_disc(
         angle = 2 * math.pi * (index / count) - 0.22 * job["central_angle"]
         # Beside the middle of the chamber, where the tube does not run.
         labels.append(label_at(name, _polar(0.62 * inner + 0.38 * outer, angle, 0.0), size=54))
-    return labels, _bar("depth in mm", _WATER, high)
+    return labels, bar("depth in mm", _WATER, (0.0, high))
 
 
 def _add_metal(plotter: Any, job: Record, theme: Theme) -> None:

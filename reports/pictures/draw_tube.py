@@ -8,11 +8,10 @@ from typing import Any, Final
 import numpy as np
 import pyvista as pv
 from matplotlib import colormaps
-from matplotlib.ticker import MaxNLocator
 
 from ringbalance.reports.pictures.disc_shapes import ring
 from ringbalance.reports.pictures.draw_view import label_at, look
-from ringbalance.reports.pictures.text import Bar, Label
+from ringbalance.reports.pictures.text import Bar, Label, bar
 from ringbalance.reports.pictures.theme import Theme
 from ringbalance.scene.arrays import BoolArray, FloatArray
 
@@ -45,7 +44,7 @@ def draw_tube(
         bounds=(-edge, edge, -0.35 * outer, edge, 0.0, 2 * _THICK * outer),
         lift=0.17,
     )
-    return _labels(points, full, job, told), _bar(low, high)
+    return _labels(points, full, job, told), bar("pressure in MPa", _VIRIDIS, (low, high))
 
 
 def _runs(full: BoolArray) -> list[tuple[bool, slice]]:
@@ -116,15 +115,3 @@ def _labels(points: FloatArray, full: BoolArray, job: Record, told: Record) -> l
     if empty.size:
         found.append(label_at("no liquid here", points[empty[empty.size // 2]], shift=(-190, -80)))
     return found
-
-
-def _bar(low: float, high: float) -> Bar:
-    ticks = [float(t) for t in MaxNLocator(5, steps=[1, 2, 5, 10]).tick_values(low, high) if low <= t <= high]
-    return Bar(
-        title="pressure in MPa",
-        colours=_VIRIDIS,
-        low=low,
-        high=high,
-        ticks=tuple(ticks),
-        labels=tuple(f"{t:g}".replace("-", "\N{MINUS SIGN}") for t in ticks),
-    )

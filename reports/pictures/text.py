@@ -10,11 +10,11 @@ from typing import Final
 import matplotlib
 import numpy as np
 from matplotlib.colors import Colormap
+from matplotlib.ticker import MaxNLocator
 from PIL import Image, ImageDraw, ImageFont
 
 FONT_SIZE: Final = 34
 """px of the finished picture."""
-BAR_SHADES: Final = 64
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +41,15 @@ class Bar:
     labels: tuple[str, ...]
 
 
-def font(size: int, *, bold: bool = False) -> ImageFont.FreeTypeFont:
+def bar(title: str, colours: Colormap, limits: tuple[float, float]) -> Bar:
+    """A colour bar with about five round ticks within its limits."""
+    low, high = limits
+    ticks = [float(t) for t in MaxNLocator(5, steps=[1, 2, 5, 10]).tick_values(low, high) if low <= t <= high]
+    labels = tuple(f"{tick:g}".replace("-", "\N{MINUS SIGN}") for tick in ticks)
+    return Bar(title=title, colours=colours, low=low, high=high, ticks=tuple(ticks), labels=labels)
+
+
+def _font(size: int, *, bold: bool = False) -> ImageFont.FreeTypeFont:
     """The sans-serif font that comes with matplotlib, so that every machine draws the same letters.
 
     Args: `size`: px.
@@ -51,15 +59,14 @@ def font(size: int, *, bold: bool = False) -> ImageFont.FreeTypeFont:
 
 
 def letter(
-    image: Image.Image, *, labels: Sequence[Label], bar: Bar | None, ink: str, ground: str, scale: int
+    image: Image.Image, *, labels: Sequence[Label], bar: Bar, ink: str, ground: str, scale: int
 ) -> Image.Image:
     """Draws labels and a colour bar onto a picture."""
     result = image.copy()
     pen = ImageDraw.Draw(result)
     for label in labels:
         _draw_label(pen, label, ink, ground, scale)
-    if bar is not None:
-        _draw_bar(pen, bar, result.height, ink, scale)
+    _draw_bar(pen, bar, result.height, ink, scale)
     return result
 
 
@@ -73,7 +80,7 @@ def _draw_label(pen: ImageDraw.ImageDraw, label: Label, ink: str, ground: str, s
         pen.ellipse([x - dot, y - dot, x + dot, y + dot], fill=ink)
         # The leader ends at the text, above or below it.
         anchor = "md" if dy < 0 else "ma"
-    face = font(label.size * scale, bold=label.size > FONT_SIZE)
+    face = _font(label.size * scale, bold=label.size > FONT_SIZE)
     pen.text(
         (x + dx, y + dy),
         label.text,
@@ -85,48 +92,14 @@ def _draw_label(pen: ImageDraw.ImageDraw, label: Label, ink: str, ground: str, s
     )
 
 
-def _bar_box(height: int, scale: int) -> tuple[int, int, int, int]:
-    """Left, right, top and bottom of the bar in a picture of a height."""
-    return 40 * scale, 84 * scale, round(0.24 * height), round(0.82 * height)
-
-
-def shade_bar(image: Image.Image, bar: Bar) -> Image.Image:
-    """Fills the frame of the colour bar, in few shades, once the rest has been brought to a palette.
-
-    Args: `image`: finished picture with the bar's frame.
-    """
-    result = image.copy()
-    pen = ImageDraw.Draw(result)
-    left, right, top, bottom = _bar_box(image.height, 1)
-    shades = np.rint(255 * np.asarray(bar.colours(np.linspace(1, 0, BAR_SHADES)))).astype(int)
-    for row in range(top + 3, bottom - 2):
-        red, green, blue, _ = (int(part) for part in shades[(row - top) * BAR_SHADES // (bottom - top)])
-        pen.line([(left + 3, row), (right - 3, row)], fill=(red, green, blue))
-    return result
-
-
-def with_palette(image: Image.Image) -> Image.Image:
-    """The same picture with a palette, which takes a third of the bytes.
-
-    Raises: ValueError: more than 256 colours.
-    """
-    pixels = np.asarray(image.convert("RGB"), dtype=np.uint32)
-    codes = pixels @ np.array([65536, 256, 1], dtype=np.uint32)
-    colours, places = np.unique(codes, return_inverse=True)
-    if colours.size > 256:
-        raise ValueError(f"a palette holds 256 colours, not {colours.size}")
-    result = Image.fromarray(places.reshape(codes.shape).astype(np.uint8), mode="P")
-    result.putpalette(
-        np.stack([colours >> 16, colours >> 8 & 255, colours & 255], axis=1).astype(np.uint8).tobytes()
-    )
-    return result
-
-
 def _draw_bar(pen: ImageDraw.ImageDraw, bar: Bar, height: int, ink: str, scale: int) -> None:
-    left, right, top, bottom = _bar_box(height, scale)
+    left, right, top, bottom = 40 * scale, 84 * scale, round(0.24 * height), round(0.82 * height)
+    shades = np.rint(255 * np.asarray(bar.colours(np.linspace(1, 0, bottom - top)))).astype(int)
+    for row, (red, green, blue, _) in enumerate(shades.tolist(), start=top):
+        pen.line([(left, row), (right, row)], fill=(red, green, blue))
     pen.rectangle([left, top, right, bottom], outline=ink, width=2 * scale)
-    pen.text((left, top - 28 * scale), bar.title, font=font(FONT_SIZE * scale), fill=ink, anchor="ls")
+    pen.text((left, top - 28 * scale), bar.title, font=_font(FONT_SIZE * scale), fill=ink, anchor="ls")
     for tick, text in zip(bar.ticks, bar.labels, strict=True):
         y = bottom - (tick - bar.low) / (bar.high - bar.low) * (bottom - top)
         pen.line([(right, y), (right + 10 * scale, y)], fill=ink, width=2 * scale)
-        pen.text((right + 18 * scale, y), text, font=font((FONT_SIZE - 4) * scale), fill=ink, anchor="lm")
+        pen.text((right + 18 * scale, y), text, font=_font((FONT_SIZE - 4) * scale), fill=ink, anchor="lm")

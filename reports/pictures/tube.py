@@ -39,7 +39,7 @@ def tube_field(scene: Scene) -> Record | None:
     last = np.append(np.diff(found.path) > 0, True)
     share = found.path[last] / scene.tube.length
     return {
-        "points": spiral(share=share, radius=found.radius[last]).tolist(),
+        "points": _spiral(share=share, radius=found.radius[last]).tolist(),
         "pressure": found.pressure[last].tolist(),
         "full": found.full[last].astype(int).tolist(),
         "hump": int(np.argmin(found.radius[last])),
@@ -48,7 +48,7 @@ def tube_field(scene: Scene) -> Record | None:
     }
 
 
-def spiral(*, share: FloatArray, radius: FloatArray) -> FloatArray:
+def _spiral(*, share: FloatArray, radius: FloatArray) -> FloatArray:
     """Half a turn about the shaft at a given radius, from the first chamber to the opposite one.
 
     Args: `share`: s/L, shape (n,). `radius`: r, m, shape (n,).

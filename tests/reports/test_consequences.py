@@ -6,7 +6,7 @@ import copy
 from typing import Any
 
 from ringbalance.reports import summary
-from ringbalance.reports.pages.consequences import consequence_view
+from ringbalance.reports.pages.consequences import SECTION
 from ringbalance.reports.render import render
 
 Record = dict[str, Any]
@@ -64,19 +64,19 @@ def _consequences() -> Record:
 
 
 def test_every_number_is_the_evidences_own() -> None:
-    view = consequence_view(_consequences())
+    view = SECTION.view({"consequences": _consequences()})
     assert view is not None
-    assert view["gains"]["heads"] == ["the paper’s law", "the calibrated law"]
-    shares = next(row for row in view["gains"]["rows"] if row["label"].startswith("share"))
-    assert [cell.replace("\u202f", " ") for cell in shares["cells"]] == ["60.0 %", "194 %"]
-    assert view["runs"][0]["settled"] == "does not settle"
-    assert view["runs"][0]["overshoots"] == "96"
-    assert "4.2" in view["chances"]["rows"][-1]["cells"][0]
-    assert "40" in view["chances"]["rows"][1]["cells"][1]
+    assert list(view["gains"].heads) == ["", "the paper’s law", "the calibrated law"]
+    shares = next(row for row in view["gains"].rows if row[0].startswith("share"))
+    assert [cell.replace("\u202f", " ") for cell in shares[1:]] == ["60.0 %", "194 %"]
+    assert view["runs"].rows[0][2] == "does not settle"
+    assert view["runs"].rows[0][4] == "96"
+    assert "4.2" in view["chances"].rows[-1][1]
+    assert "40" in view["chances"].rows[1][2]
 
 
 def test_a_gain_that_no_run_found_leaves_a_gap_in_the_figure() -> None:
-    view = consequence_view(_consequences())
+    view = SECTION.view({"consequences": _consequences()})
     assert view is not None
     assert view["figure"].svg.count("<svg") == 1
     assert "nan" not in view["figure"].svg.lower().replace("mountain", "")
@@ -94,11 +94,11 @@ def test_the_page_has_the_section_only_with_its_evidence(evidence: Record) -> No
 
 def test_a_law_that_does_not_flow_leaves_its_tables_out() -> None:
     found = {**_consequences(), "gain": [], "ensembles": []}
-    view = consequence_view(found)
+    view = SECTION.view({"consequences": found})
     assert view is not None
     assert view["figure"] is None
-    assert view["chances"]["members"] == ""
-    assert consequence_view(None) is None
+    assert len(view["chances"].heads) == 1
+    assert SECTION.view({}) is None
 
 
 def test_claims_judged_on_another_disc_are_distinguished(evidence: Record) -> None:

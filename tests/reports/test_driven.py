@@ -38,7 +38,7 @@ def test_each_paper_has_its_own_claims() -> None:
 
 
 def test_verdicts_are_counted() -> None:
-    view = driven.view(evidence())
+    view = driven.SECTION.view(evidence())
     assert view is not None
     assert view["lead"] == "Of 2 claims of the eccentric-mass paper 1 is confirmed, 1 is refuted."
 
@@ -52,19 +52,19 @@ def test_a_balancer_that_does_not_settle_has_no_time() -> None:
         "energy_J": [90.2, 6.9],
         "status": ["not settled", "settled"],
     }
-    view = driven.view(evidence(compared))
+    view = driven.SECTION.view(evidence(compared))
     assert view is not None
-    assert view["compared"]["heads"] == ["liquid ring", "two eccentric masses"]
-    assert view["compared"]["rows"][0]["cells"][0] == "–"
+    assert view["compared"].heads == ("", "liquid ring", "two eccentric masses")
+    assert view["compared"].rows[0][1] == "–"
     assert view["status"][1] == "Two eccentric masses: settled."
 
 
 def test_what_cannot_be_compared_is_said() -> None:
-    view = driven.view(evidence(text="the rotor stands still"))
+    view = driven.SECTION.view(evidence(text="the rotor stands still"))
     assert view is not None
     assert view["compared"] is None
     assert view["text"] == "the rotor stands still"
 
 
 def test_no_claims_no_section() -> None:
-    assert driven.view({"verification": []}) is None
+    assert driven.SECTION.view({"verification": []}) is None

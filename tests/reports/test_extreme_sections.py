@@ -35,7 +35,7 @@ def waves(*, resonant: list[Record], top: float, code: str = "ok", text: str = "
 
 
 def findings(record: Record) -> str:
-    view = sloshing.view({"sloshing": record})
+    view = sloshing.SECTION.view({"sloshing": record})
     assert view is not None
     return " ".join(view["findings"])
 
@@ -66,8 +66,8 @@ def test_waves_that_are_not_small_are_said() -> None:
 
 def test_no_gravity_no_waves(vertical_scene: Scene) -> None:
     work = Work(scene=vertical_scene, calibration=cast(Any, None), level="light")
-    assert sloshing.collect(work) is None
-    assert sloshing.view({}) is None
+    assert sloshing.SECTION.collect(work) is None
+    assert sloshing.SECTION.view({}) is None
 
 
 @pytest.fixture
@@ -106,24 +106,27 @@ def evidence() -> Record:
 
 
 def test_the_extremes_say_how_far_and_what_is_beyond() -> None:
-    slow, fast, fill = extremes.view(evidence())["rows"]
-    assert (slow["title"], slow["span"]) == ("speed", "1.00 to 160 rpm")
-    assert slow["said"].startswith("[rotor] speed")
-    assert (fast["title"], fast["ending"], fast["loop"], fast["said"]) == ("", "solved", "time limit", "")
-    assert (fill["title"], fill["ending"], fill["loop"]) == ("fill", "solved", "settled")
-    assert slow["ending"] == "refused"
-    assert "to" not in fill["span"]
+    view = extremes.SECTION.view(evidence())
+    assert view is not None
+    slow, fast, fill = view["table"].rows
+    assert slow[:3] == ("speed", "1.00 to 160 rpm", "refused")
+    assert slow[-1].startswith("[rotor] speed")
+    assert (fast[0], *fast[2:]) == ("", "solved", "time limit", "")
+    assert (fill[0], *fill[2:4]) == ("fill", "solved", "settled")
+    assert "to" not in fill[1]
 
 
 def test_a_map_draws_every_ending_that_occurs_and_no_other() -> None:
-    (drawing,) = extremes.view(evidence())["maps"]
+    view = extremes.SECTION.view(evidence())
+    assert view is not None
+    (drawing,) = view["maps"]
     assert drawing.name == "extremes-speed-fill"
     assert "refused with a message" in drawing.svg
     assert "broken" not in drawing.svg
 
 
 def test_extremes_that_were_not_run_say_so() -> None:
-    assert extremes.view({"verification": [{"id": "extremes", "tables": []}]}) == {"ran": False}
+    assert extremes.SECTION.view({"verification": [{"id": "extremes", "tables": []}]}) == {"ran": False}
 
 
 def test_a_table_named_in_a_message_is_not_taken_for_markup(capsys: pytest.CaptureFixture[str]) -> None:

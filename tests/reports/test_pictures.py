@@ -8,13 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib import colormaps
 from PIL import Image
 
 from ringbalance.reports.cli import plot
 from ringbalance.reports.pictures.opengl import OpenGL, find_opengl
 from ringbalance.reports.pictures.process import finish_drawing, start_drawing, stop_drawing, write_fields
-from ringbalance.reports.pictures.text import BAR_SHADES, Bar, letter, shade_bar, with_palette
 from ringbalance.reports.pictures.theme import PICTURE, THEMES
 from ringbalance.reports.pictures.tube import tube_field
 from ringbalance.scene import Scene, bundled_scene
@@ -109,26 +107,6 @@ def test_plot_without_opengl_writes_the_fields(
 def test_fields_are_written_at_two_fills(tmp_path: Path, paper_scene: Scene) -> None:
     empty = dataclasses.replace(paper_scene, disc=dataclasses.replace(paper_scene.disc, initial_fill=0.0))
     assert set(write_fields(scene=empty, folder=tmp_path)) == {"pressure", "disc"}
-
-
-def test_lettering_and_palette() -> None:
-    bar = Bar(title="depth", colours=colormaps["gray"], low=0.0, high=1.0, ticks=(0.5,), labels=("0.5",))
-    blank = Image.new("RGB", (200, 300), "#ffffff")
-    lettered = letter(blank, labels=[], bar=bar, ink="#000000", ground="#ffffff", scale=1)
-    shaded = shade_bar(lettered, bar)
-    column = np.asarray(shaded)[round(0.24 * 300) + 3 : round(0.82 * 300) - 2, 60, 0]
-    assert (np.diff(column.astype(int)) <= 0).all()
-    assert len(np.unique(column)) <= BAR_SHADES
-    kept = with_palette(shaded)
-    assert kept.mode == "P"
-    assert (np.asarray(kept.convert("RGB")) == np.asarray(shaded)).all()
-
-
-def test_a_palette_holds_no_more_than_it_can() -> None:
-    noise = np.arange(300 * 3, dtype=np.uint8).reshape(10, 30, 3)
-    noise[..., 1] = np.arange(10)[:, None]
-    with pytest.raises(ValueError, match="256 colours"):
-        with_palette(Image.fromarray(noise))
 
 
 def test_the_tube_is_coloured_by_its_own_pressures(paper_scene: Scene) -> None:

@@ -10,15 +10,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from keep_evidence import kept_document
 
 from ringbalance.reports import cli
 from ringbalance.reports import evidence as evidence_module
 from ringbalance.reports import report as report_module
 from ringbalance.reports.page import page_content
+from ringbalance.reports.pages import consequences as consequences_module
 from ringbalance.reports.pictures.opengl import OpenGL
 from ringbalance.reports.render import render
 from ringbalance.reports.report import Report, write_report
-from ringbalance.reports.saved import heavy_cases, kept_document, saved_cases
+from ringbalance.reports.saved import heavy_cases, saved_cases
 from ringbalance.reports.studies.consequences import find_consequences
 from ringbalance.scene import Scene, SceneError, bundled_scene
 from ringbalance.verification.runner import cases_under_way
@@ -43,7 +45,7 @@ def few_cases() -> Iterator[None]:
     found: list[Any] = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(evidence_module, "cases_under_way", run)
-        patch.setattr(evidence_module, "find_consequences", consequences)
+        patch.setattr(consequences_module, "find_consequences", consequences)
         yield
 
 

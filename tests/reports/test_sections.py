@@ -76,16 +76,16 @@ def with_section(evidence: Record, name: str, record: Record | None) -> Record:
 
 @pytest.fixture(scope="module")
 def fifty_record(work: Work) -> Record:
-    return fifty.collect(work)
+    return fifty.SECTION.collect(work) or {}
 
 
 def test_the_page_on_fifty_says_what_the_map_says(evidence: Record, fifty_record: Record) -> None:
-    view = fifty.view(with_section(evidence, "fifty", fifty_record))
+    view = fifty.SECTION.view(with_section(evidence, "fifty", fifty_record))
     assert view is not None
-    rows = {row["name"]: row for row in view["rows"]}
-    assert rows["water"]["verdict"] == "too high"
-    assert rows["silicone oil 100 cSt"]["verdict"] == "too low"
-    assert rows["gallium"]["needs"]
+    verdicts = {row[0]: row[-2] for row in view["table"].rows}
+    assert verdicts["water"] == "too high"
+    assert verdicts["silicone oil 100 cSt"] == "too low"
+    assert "gallium needs" in view["needs"]
     assert {drawing.name for drawing in drawings_in(view)} == {"fifty-map", "fifty-apparent"}
     page = render(with_section(evidence, "fifty", fifty_record))
     assert page.count('href="#fifty"') == 1
@@ -98,10 +98,10 @@ def test_where_nothing_flows_the_page_says_so(evidence: Record, fifty_record: Re
     dry["apparent"] = None
     for record in dry["liquids"]:
         record["runs"] = False
-    view = fifty.view({**evidence, "fifty": dry})
+    view = fifty.SECTION.view({**evidence, "fifty": dry})
     assert view is not None
     assert view["map"] is None
-    assert {row["verdict"] for row in view["rows"]} == {"nothing flows"}
+    assert {row[-2] for row in view["table"].rows} == {"nothing flows"}
     assert "no k can be given" in view["lead"]
     assert "there is no map to draw" in render({**evidence, "fifty": dry})
 
@@ -120,7 +120,7 @@ def test_the_velocity_decides_whether_fifty_is_right() -> None:
 
 @pytest.fixture(scope="module")
 def hump_record(work: Work) -> Record:
-    record = hump.collect(work)
+    record = hump.SECTION.collect(work)
     assert record is not None
     return record
 
@@ -130,9 +130,9 @@ def test_every_regime_that_is_found_is_drawn(evidence: Record, hump_record: Reco
     assert set(states) == {"siphon", "separated", "blocked"}
     assert hump_record["absent"] == ["reverse"]
     assert states["siphon"]["margin_Pa"] > 0 > states["separated"]["margin_Pa"]
-    view = hump.view(with_section(evidence, "hump", hump_record))
+    view = hump.SECTION.view(with_section(evidence, "hump", hump_record))
     assert view is not None
-    columns = {row["regime"]: row["column"] for row in view["rows"]}
+    columns = {row[0]: row[-1] for row in view["table"].rows}
     assert (columns["siphon"], columns["separated"]) == ("holds", "separates")
     assert view["absent"] == "reverse"
     assert 'id="hump"' in render(with_section(evidence, "hump", hump_record))
@@ -141,21 +141,24 @@ def test_every_regime_that_is_found_is_drawn(evidence: Record, hump_record: Reco
 def test_a_margin_within_its_half_width_tells_nothing(evidence: Record, hump_record: Record) -> None:
     record = json.loads(json.dumps(hump_record))
     record["states"][0]["margin_uncertainty_Pa"] = 2 * record["states"][0]["margin_Pa"]
-    view = hump.view({**evidence, "hump": record})
+    view = hump.SECTION.view({**evidence, "hump": record})
     assert view is not None
-    assert view["rows"][0]["column"] == "cannot be told"
+    assert view["table"].rows[0][-1] == "cannot be told"
 
 
 def test_a_tube_without_a_hump_has_no_such_section(evidence: Record, work: Work) -> None:
     straight = replace(work, scene=replace(work.scene, tube=replace(work.scene.tube, hump_radius=None)))
-    assert hump.collect(straight) is None
-    assert hump.view(evidence) is None
+    assert hump.SECTION.collect(straight) is None
+    assert hump.SECTION.view(evidence) is None
 
 
 def test_the_figures_of_sections_carry_no_colour_of_their_own(
     evidence: Record, fifty_record: Record, hump_record: Record
 ) -> None:
-    views = [fifty.view({**evidence, "fifty": fifty_record}), hump.view({**evidence, "hump": hump_record})]
+    views = [
+        fifty.SECTION.view({**evidence, "fifty": fifty_record}),
+        hump.SECTION.view({**evidence, "hump": hump_record}),
+    ]
     for drawing in drawings_in(views):
         bare = re.sub(r'(href="|url\()#[^")]+', "", drawing.svg)
         assert not re.search(r"#[0-9a-fA-F]{3,8}\b(?![-\w])|\bblack\b|\bwhite\b|rgb\(", bare), drawing.name
@@ -163,14 +166,14 @@ def test_the_figures_of_sections_carry_no_colour_of_their_own(
 
 @pytest.fixture(scope="module")
 def inside_record(work: Work) -> Record:
-    record = inside.collect(work)
+    record = inside.SECTION.collect(work)
     assert record is not None
     return record
 
 
 def test_flow_that_is_not_laminar_is_not_passed_off_as_drawn(evidence: Record, inside_record: Record) -> None:
     assert not inside_record["laminar"]
-    view = inside.view(with_section(evidence, "inside", inside_record))
+    view = inside.SECTION.view(with_section(evidence, "inside", inside_record))
     assert view is not None
     assert "the pattern, not the flow of this tube" in view["lead"]
     names = [drawing.name for drawing in drawings_in(view)]
@@ -211,7 +214,7 @@ def test_the_three_dimensional_check_tells_when_it_was_run(evidence: Record) -> 
 
 @pytest.fixture(scope="module")
 def again(work: Work) -> Record:
-    return paper_again.collect(work)
+    return paper_again.SECTION.collect(work) or {}
 
 
 def test_the_papers_figures_come_out_of_one_set_of_constants(evidence: Record, again: Record) -> None:
@@ -224,9 +227,9 @@ def test_the_papers_figures_come_out_of_one_set_of_constants(evidence: Record, a
     for told in again["velocity"]:
         assert told["departure_paper"] == pytest.approx(told["departure_printed"], abs=2e-3)
         assert told["departure_levels"] > told["departure_paper"] + 0.01
-    view = paper_again.view(with_section(evidence, "paper_again", again))
+    view = paper_again.SECTION.view(with_section(evidence, "paper_again", again))
     assert view is not None
-    origins = " ".join(row["origin"] for row in view["constants"])
+    origins = " ".join(row[-1] for row in view["constants"].rows)
     assert origins.count("fitted") == 2
     assert {drawing.name for drawing in drawings_in(view)} == {
         f"paper-figure-{name}" for name in ("4", "4-law", "6", "7", "7-phase", "8")

@@ -14,8 +14,8 @@ from ringbalance.reports.summary import (
     headlines,
     key_numbers,
     lead_sentence,
-    loop_rows,
     loop_sentence,
+    loop_table,
     tone,
     verdict_counts,
 )
@@ -32,7 +32,7 @@ def test_every_verdict_has_a_colour_and_a_place() -> None:
 
 def test_counts_add_up(evidence: Record) -> None:
     counts = verdict_counts(claims(evidence), CLAIM_VERDICTS)
-    assert {item.verdict: item.count for item in counts} == {
+    assert {item["verdict"]: item["count"] for item in counts} == {
         "confirmed": 1,
         "confirmed with correction": 1,
         "refuted": 2,
@@ -63,12 +63,12 @@ def test_without_marked_claims_those_that_fell_are_reported(evidence: Record) ->
 
 
 def test_numbers_come_with_their_bars(evidence: Record) -> None:
-    shown = {item.label: item for item in key_numbers(evidence)}
-    assert (shown["Lever arm λ"].value, shown["Lever arm λ"].half_width) == ("72.040", "±\u202f0.024")
-    assert shown["Lever arm λ"].unit == "mm"
-    assert shown["Drag coefficient k"].paper == "about 50"
-    assert shown["Velocity in the tube"].half_width == "±\u202f0.3"
-    assert all(item.half_width for item in shown.values())
+    shown = {item["label"]: item for item in key_numbers(evidence)}
+    assert (shown["Lever arm λ"]["value"], shown["Lever arm λ"]["half_width"]) == ("72.040", "±\u202f0.024")
+    assert shown["Lever arm λ"]["unit"] == "mm"
+    assert shown["Drag coefficient k"]["paper"] == "about 50"
+    assert shown["Velocity in the tube"]["half_width"] == "±\u202f0.3"
+    assert all(item["half_width"] for item in shown.values())
 
 
 @pytest.mark.parametrize(
@@ -85,7 +85,7 @@ def test_the_loops_are_compared(evidence: Record, calibrated: bool, paper: bool,
         if not settled:
             evidence["closed_loop"][law]["settling_time_s"] = None
     assert said.replace("it does", "the run does" if not calibrated else "it does") in loop_sentence(evidence)
-    rows = {row.label: row for row in loop_rows(evidence)}
-    assert (rows["Settling time"].calibrated == "does not settle") is not calibrated
-    assert rows["Gas operations"].calibrated == "6"
-    assert rows["Regime of the tube"].paper == "siphon"
+    rows = {row[0]: row for row in loop_table(evidence).rows}
+    assert (rows["Settling time"][1] == "does not settle") is not calibrated
+    assert rows["Gas operations"][1] == "6"
+    assert rows["Regime of the tube"][2] == "siphon"

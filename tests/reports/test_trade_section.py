@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from ringbalance.reports.pages.model_selection import view
+from ringbalance.reports.pages.model_selection import SECTION
 
 Record = dict[str, Any]
 
@@ -65,24 +65,19 @@ def evidence() -> Record:
 
 
 def test_the_front_and_the_choices_are_reported(evidence: Record) -> None:
-    found = view(evidence)
+    found = SECTION.view(evidence)
     assert found is not None
     (quantity,) = found["quantities"]
-    assert [row["name"] for row in quantity["front"]] == ["formula", "closed form", "fine mesh"]
-    assert quantity["front"][1] == {
-        "name": "closed form",
-        "error": "0.16\u202f%",
-        "cost": "300 µs",
-        "time": "560 µs",
-    }
-    assert [row["model"] for row in quantity["choices"]] == ["formula", "closed form"]
+    assert [row[0] for row in quantity["front"].rows] == ["formula", "closed form", "fine mesh"]
+    assert quantity["front"].rows[1] == ("closed form", "0.16\u202f%", "300 µs", "560 µs")
+    assert [row[1] for row in quantity["choices"].rows] == ["formula", "closed form"]
     assert quantity["own"]["reasons"][1].startswith("checked")
     assert "closed ring" in quantity["status"]
-    assert found["numbers"][1]["value"] == "–"
+    assert found["numbers"].rows[1][1] == "–"
 
 
 def test_the_figure_draws_every_model(evidence: Record) -> None:
-    found = view(evidence)
+    found = SECTION.view(evidence)
     assert found is not None
     figure = found["quantities"][0]["figure"]
     assert figure.name == "trade-wall-pressure"
@@ -90,16 +85,16 @@ def test_the_figure_draws_every_model(evidence: Record) -> None:
 
 
 def test_without_a_trade_there_is_no_section() -> None:
-    assert view({"times": {}}) is None
+    assert SECTION.view({"times": {}}) is None
 
 
 @pytest.mark.parametrize(
     ("asked", "told"),
     [
-        (0.01, "this scene’s tolerance of 1.0 %"),
+        (0.01, "this scene's tolerance of 1.0 %"),
         (
             1e-10,
-            "1.0 × 10⁻⁶, the nearest to this scene’s tolerance of 1.0 × 10⁻¹⁰ that models are chosen for",
+            "1.0 × 10⁻⁶, the nearest to this scene's tolerance of 1.0 × 10⁻¹⁰ that models are chosen for",
         ),
     ],
 )
@@ -107,6 +102,6 @@ def test_a_tolerance_that_no_models_are_chosen_for_is_reported(
     evidence: Record, asked: float, told: str
 ) -> None:
     evidence["trade"]["tolerance"] = asked
-    found = view(evidence)
+    found = SECTION.view(evidence)
     assert found is not None
     assert found["tolerance"].replace("\u202f", " ").replace("\u2009", " ") == told

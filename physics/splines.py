@@ -12,11 +12,10 @@ _HERMITE = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [-3, 3, -2, -1], [2, -2, 1, 1]]
 """From (y0, y1, h y0', h y1') to the coefficients of a cubic piece in t from 0 to 1."""
 
 
-def cubic_slopes(x: FloatArray, y: FloatArray) -> FloatArray:
+def _cubic_slopes(x: FloatArray, y: FloatArray) -> FloatArray:
     """Slopes at its knots of the cubic spline through points, without knots at the second and last but one.
 
     Args: `x`: ascending, shape (n,), n at least 4. `y`: shape (n, ...), along the first axis.
-    Returns: dy/dx, the shape of `y`.
     Source: de Boor, A Practical Guide to Splines (2001), chapter IV.
     """
     h = np.diff(x)
@@ -43,8 +42,8 @@ class CubicSpline:
 
     @classmethod
     def through(cls, x: FloatArray, y: FloatArray) -> CubicSpline:
-        """Spline of `cubic_slopes`, shape (n,) each."""
-        h, slope = np.diff(x), cubic_slopes(x, y)
+        """Spline of `_cubic_slopes`, shape (n,) each."""
+        h, slope = np.diff(x), _cubic_slopes(x, y)
         ends = np.array([y[:-1], y[1:], h * slope[:-1], h * slope[1:]])
         return cls(knots=x, coefficients=_HERMITE @ ends)
 
@@ -66,10 +65,10 @@ class Surface:
 
     @classmethod
     def bicubic(cls, x: FloatArray, y: FloatArray, z: FloatArray) -> Surface:
-        """Products of the splines of `cubic_slopes`, z of shape (x, y)."""
+        """Products of the splines of `_cubic_slopes`, z of shape (x, y)."""
         dx, dy = np.diff(x)[:, None], np.diff(y)[None, :]
-        along_x = cubic_slopes(x, z)
-        along_y, twist = cubic_slopes(y, z.T).T, cubic_slopes(y, along_x.T).T
+        along_x = _cubic_slopes(x, z)
+        along_y, twist = _cubic_slopes(y, z.T).T, _cubic_slopes(y, along_x.T).T
 
         def corners(values: FloatArray) -> FloatArray:
             lower, upper = values[:-1], values[1:]

@@ -13,16 +13,26 @@ import json
 import sys
 from collections.abc import Sequence
 from concurrent.futures import Executor, Future, wait
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 from rich.console import Console
 from rich.progress import MofNCompleteColumn, Progress, TimeElapsedColumn
 
 from ringbalance.physics.convergence.grid import gci
-from ringbalance.physics.tube.rotation_grid import TableSettings, fast_pair, slow_pair, table_settings
+from ringbalance.physics.tube.rotation_table import (
+    KL_LIMIT,
+    KL_SCALE,
+    ROTATION_LIMIT,
+    ROTATION_SCALE,
+    fast_first,
+    least_s,
+    slow_first,
+)
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.platform.files import write_whole
 from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification.navier_stokes.continuation import StepRule, follow
@@ -37,6 +47,57 @@ from ringbalance.verification.navier_stokes.rotating_section import (
 from ringbalance.verification.navier_stokes.transfer import transfer
 
 COLUMNS = ("table", "a", "b", "coarse", "medium", "fine", "uncertainty")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TableSettings:
+    """All that the table depends on."""
+
+    slow_a: tuple[float, ...]
+    slow_b: tuple[float, ...]
+    fast_a: tuple[float, ...]
+    fast_b: tuple[float, ...]
+    around: tuple[int, ...] = (8, 12, 16)
+    """Cells n of `SectionMesh`, coarse to fine; one and a half times as many across."""
+    wall_ratio: float = 15.0
+    formal_order: float = 4.0
+    """Of the friction ratio, a functional of a velocity that converges at order 2 in its gradient."""
+    newton_tolerance: float = 1e-7
+    path_level: int = 1
+    """Mesh on which the paths are followed; the other meshes start from its flows."""
+    branch_kl: float = 7e5
+    """Above this Kl further steady flows appear, and a long step may land on one of them."""
+    branch_step: float = 0.06
+    """Longest step in `a` above that Kl."""
+
+    def plain(self) -> dict[str, object]:
+        """As plain data, for a header. Returns: Field names and values."""
+        return asdict(self)
+
+
+def _rounded(values: FloatArray) -> tuple[float, ...]:
+    return tuple(float(v) for v in np.round(values, 12))
+
+
+def table_settings() -> TableSettings:
+    """Settings of the table that comes with the package."""
+    return TableSettings(
+        slow_a=_rounded(np.linspace(0.0, slow_first(KL_LIMIT), 24)),
+        slow_b=_rounded(np.arange(11) / 12),
+        fast_a=_rounded(np.linspace(0.0, fast_first(ROTATION_LIMIT), 20)),
+        fast_b=_rounded(np.linspace(0.0, 1.0, 5)),
+    )
+
+
+def slow_pair(a: float, b: float) -> tuple[float, float]:
+    """Kl and S of a point of the slow rectangle. Args: `a`: ln(1 + Kl/300). `b`: S/(1 + S)."""
+    return float(KL_SCALE * np.expm1(a)), b / (1 - b)
+
+
+def fast_pair(a: float, b: float) -> tuple[float, float]:
+    """R and 1/S of a point of the fast rectangle. Args: `a`: ln(1 + R/20). `b`: S_min(R)/S."""
+    rotation = float(ROTATION_SCALE * np.expm1(a))
+    return rotation, float(b / least_s(rotation))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -33,10 +33,9 @@ def best_fit(values: FloatArray, sizes: FloatArray, *, formal_order: float) -> F
 
     Fixed orders: formal; formal/2; and, when convergence is slower than 0.5, both together.  Every fit is
     tried with equal weights and with weights proportional to 1/h; the one with the smaller deviation is kept.
-    Args: `values`: finest first, shape (n,), at least four. `sizes`: of the cells, shape (n,).
-        `formal_order`: of the number.
+    Args: `values`: finest first, shape (n,), at least four.
     Source: Eca and Hoekstra (2014), section 3, doi:10.1016/j.jcp.2014.01.006; their orders 1 and 2 stand here
-    as half the formal order and the formal order.
+        as half the formal order and the formal order.
     """
     h = sizes / sizes[0]
     free = min((_free(values, h, w, formal_order) for w in _weights(h)), key=lambda fit: fit.deviation)

@@ -29,7 +29,7 @@ _CHUNK = 8192
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rule:
+class _Rule:
     """Shape functions of one reference cell at the points of a quadrature."""
 
     weights: FloatArray
@@ -76,10 +76,10 @@ def _element(dimension: int) -> ElementQuad2 | ElementHex2:
     return ElementQuad2() if dimension == 2 else ElementHex2()
 
 
-def _rule(dimension: int, points: FloatArray, weights: FloatArray, normal: FloatArray) -> Rule:
+def _rule(dimension: int, points: FloatArray, weights: FloatArray, normal: FloatArray) -> _Rule:
     element = _element(dimension)
     shapes = [element.lbasis(points, i) for i in range(element.doflocs.shape[0])]
-    return Rule(
+    return _Rule(
         weights=weights,
         values=np.stack([np.broadcast_to(value, weights.shape) for value, _ in shapes]),
         gradients=np.stack([np.asarray(gradient).T for _, gradient in shapes]),
@@ -88,18 +88,17 @@ def _rule(dimension: int, points: FloatArray, weights: FloatArray, normal: Float
 
 
 @lru_cache(maxsize=4)
-def cell_rule(dimension: int) -> Rule:
+def _cell_rule(dimension: int) -> _Rule:
     """Shape functions at the Gauss points of a cell.
 
     Args: `dimension`: 2 or 3.
-    Returns: The rule, three points along each axis.
     """
     points, weights = get_quadrature(RefQuad if dimension == 2 else RefHex, _ORDER)
     return _rule(dimension, points, weights, np.zeros(dimension))
 
 
 @lru_cache(maxsize=16)
-def facet_rule(dimension: int, side: int) -> Rule:
+def _facet_rule(dimension: int, side: int) -> _Rule:
     """Shape functions at the Gauss points of one side of a reference cell.
 
     Args: `dimension`: 2 or 3. `side`: number of the side, in scikit-fem's order.
@@ -115,13 +114,13 @@ def facet_rule(dimension: int, side: int) -> Rule:
 @lru_cache(maxsize=4)
 def _gradient_products(dimension: int) -> FloatArray:
     """Products of reference gradients, shape (points * dimension^2, functions^2)."""
-    gradients = cell_rule(dimension).gradients
+    gradients = _cell_rule(dimension).gradients
     products = np.einsum("iqa,jqb->qabij", gradients, gradients)
     functions = gradients.shape[0]
     return np.ascontiguousarray(products.reshape(-1, functions**2))
 
 
-def _jacobians(mesh: Mesh, nodes: IntArray, rule: Rule) -> tuple[FloatArray, FloatArray]:
+def _jacobians(mesh: Mesh, nodes: IntArray, rule: _Rule) -> tuple[FloatArray, FloatArray]:
     """Cofactor matrix and determinant of dx/dX, shapes (cells, points, dim, dim) and (cells, points)."""
     corner = mesh.doflocs[:, nodes[:, :1]]
     local = mesh.doflocs[:, nodes] - corner  # differences first: a film's depth would cancel in the sums
@@ -155,7 +154,7 @@ def stiffness(mesh: Mesh) -> csr_matrix:
     Source: standard Galerkin form, Gauss quadrature with three points along each axis.
     """
     dimension, unknowns = mesh.dim(), mesh.doflocs.shape[1]
-    rule = cell_rule(dimension)
+    rule = _cell_rule(dimension)
     total = csr_matrix((unknowns, unknowns))
     for nodes in _chunks(mesh):
         cofactor, determinant = _jacobians(mesh, nodes, rule)
@@ -175,7 +174,7 @@ def volume_points(mesh: Mesh) -> Volume:
     Args: `mesh`: quadratic quadrilaterals or hexahedra.
     Returns: Points, weights and shape functions, in the mesh's unit.
     """
-    rule, nodes = cell_rule(mesh.dim()), np.asarray(mesh.dofs.element_dofs.T)
+    rule, nodes = _cell_rule(mesh.dim()), np.asarray(mesh.dofs.element_dofs.T)
     _, determinant = _jacobians(mesh, nodes, rule)
     return Volume(
         points=np.asarray(mesh.doflocs[:, nodes] @ rule.values),
@@ -207,7 +206,7 @@ def facet_points(mesh: Mesh, boundary: str) -> Facets:
 
 
 def _side_points(mesh: Mesh, cells: IntArray, side: int) -> Facets:
-    rule = facet_rule(mesh.dim(), side)
+    rule = _facet_rule(mesh.dim(), side)
     nodes = np.asarray(mesh.dofs.element_dofs[:, cells].T)
     cofactor, determinant = _jacobians(mesh, nodes, rule)
     vector = np.moveaxis(cofactor @ rule.normal, -1, 0) * np.sign(determinant)
@@ -224,9 +223,7 @@ def _side_points(mesh: Mesh, cells: IntArray, side: int) -> Facets:
 def volume_load(volume: Volume, density: FloatArray, *, unknowns: int) -> FloatArray:
     """Vector of the integrals of f v over the cells.
 
-    Args: `volume`: quadrature points. `density`: f at the points, shape (cells, points). `unknowns`: number
-        of nodes of the mesh.
-    Returns: Vector over the nodes, shape (unknowns,).
+    Args: `unknowns`: number of nodes of the mesh.
     """
     local = (density * volume.weights) @ volume.values.T
     return _summed(volume.nodes, local, unknowns)
@@ -235,9 +232,7 @@ def volume_load(volume: Volume, density: FloatArray, *, unknowns: int) -> FloatA
 def facet_load(facets: Facets, density: FloatArray, *, unknowns: int) -> FloatArray:
     """Vector of the integrals of f v over a boundary.
 
-    Args: `facets`: quadrature points. `density`: f at the points, shape (facets, points). `unknowns`: number
-        of nodes of the mesh.
-    Returns: Vector over the nodes, shape (unknowns,).
+    Args: `unknowns`: number of nodes of the mesh.
     """
     local = np.einsum("fq,fiq->fi", density * facets.weights, facets.values)
     return _summed(facets.nodes, local, unknowns)
@@ -265,7 +260,6 @@ def at_facets(facets: Facets, nodal: FloatArray) -> FloatArray:
     """Values of a nodal field at the quadrature points of a boundary.
 
     Args: `nodal`: the field at the mesh's nodes, shape (unknowns,).
-    Returns: Its values, shape (facets, points).
     """
     return np.asarray(np.einsum("fi,fiq->fq", nodal[facets.nodes], facets.values))
 
@@ -274,6 +268,5 @@ def at_cells(volume: Volume, nodal: FloatArray) -> FloatArray:
     """Values of a nodal field at the quadrature points of all cells.
 
     Args: `nodal`: the field at the mesh's nodes, shape (unknowns,).
-    Returns: Its values, shape (cells, points).
     """
     return np.asarray(nodal[volume.nodes] @ volume.values)

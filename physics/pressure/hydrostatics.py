@@ -17,8 +17,7 @@ Radius = TypeVar("Radius", float, FloatArray)
 def hydrostatic_pressure(*, density: float, angular_velocity: float, inner: Radius, outer: float) -> Radius:
     """Rise of the pressure from an inner to an outer radius, rho omega^2 (b^2 - a^2)/2.
 
-    Args: `density`: rho, kg/m^3. `angular_velocity`: omega, rad/s. `inner`: a, m, a number or an array.
-        `outer`: b, m.
+    Args: `inner`: a, m, a number or an array.
     Returns: Pa, the shape of `inner`; negative where it is the larger radius.
     Source: dp = rho omega^2 r dr.
     """
@@ -29,8 +28,7 @@ def hydrostatic_pressure(*, density: float, angular_velocity: float, inner: Radi
 def column_radius(*, density: float, angular_velocity: float, pressure: float, outer: float) -> float:
     """Inner radius of the column that a pressure at an outer radius supports, inverse of the above.
 
-    Args: `density`: rho, kg/m^3. `angular_velocity`: omega, rad/s. `pressure`: Pa, relative to that at the
-        inner end. `outer`: b, m.
+    Args: `pressure`: Pa, relative to that at the inner end.
     Returns: m; zero when the column would reach beyond the axis.
     """
     return math.sqrt(max(outer**2 - pressure / (density * angular_velocity**2 / 2), 0.0))
@@ -39,7 +37,6 @@ def column_radius(*, density: float, angular_velocity: float, pressure: float, o
 def displaced_by_gravity(*, disc: Disc, density: float, gravity: float, fill_ratio: FloatArray) -> FloatArray:
     """Bound of what gravity could do to a chamber's liquid: take it from the middle to a corner, or back.
 
-    Args: `density`: rho, kg/m^3. `gravity`: g, m/s^2. `fill_ratio`: x, shape (n,).
     Returns: Changes of wall pressure (Pa), moment (kg m) and dU/dV' (kg/m^2), shape (3, n).
     """
     a = surface_radius(disc=disc, fill_ratio=fill_ratio)

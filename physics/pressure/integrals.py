@@ -63,11 +63,10 @@ class LiquidIntegrals:
 def section_integrals(*, solution: PressureSolution, density: float) -> SectionIntegrals:
     """Integrals of a two-dimensional solution, per unit depth.
 
-    Args: `solution`: on a two-dimensional mesh. `density`: rho, kg/m^3.
-    Returns: Integrals per metre of depth.
+    Args: `solution`: on a two-dimensional mesh.
     Raises: ValueError: a three-dimensional solution.
     Source: definitions; the shape derivative is dU/dV' = rho int x/|n.grad p| / int 1/|n.grad p| over the
-    free surface, because a raised pressure level moves the surface by dp/|n.grad p|.
+        free surface, because a raised pressure level moves the surface by dp/|n.grad p|.
     """
     if solution.chamber.dimension != 2:
         raise ValueError("section_integrals takes a two-dimensional solution; use liquid_integrals")
@@ -110,8 +109,7 @@ def liquid_integrals(*, solution: PressureSolution, density: float) -> LiquidInt
 def over_width(*, section: SectionIntegrals, axial_width: float) -> LiquidIntegrals:
     """Totals of a chamber whose every cross-section is the same.
 
-    Args: `section`: integrals per metre of depth. `axial_width`: B, m.
-    Returns: Totals, with the forces on the two ends.
+    Args: `section`: integrals per metre of depth.
     Source: definition; exact without axial gravity.
     """
     forces = {name: np.append(axial_width * f, 0.0) for name, f in section.force_per_depth.items()}

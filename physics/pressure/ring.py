@@ -112,15 +112,14 @@ def ring_quantities(
     volume, mean p on the outer wall, U = int rho x, dU/dV' = rho int x/|n.grad p| / int 1/|n.grad p|, and
     the forces int p n.
     Args:
-        density: rho, kg/m^3.
-        angular_velocity: omega, rad/s, not zero.
         fill_ratio: x, any shape, flattened to (n,), within [0, 1]; an empty chamber is exact.
         gravity: g, m/s^2; zero leaves it out.
         shaft: "horizontal" turns gravity across the chamber, "vertical" points it along -z.
         dimension: 2 or 3; default 2, or 3 for a vertical shaft with gravity, which 2 cannot describe.
-        cells: meshes, finest first, each with half the cells of the one before; default `default_cells` and
-            two coarser ones; they decide the dimension when given.
-        turn_samples: even number of angles of gravity over a turn; default enough for a mean within 1e-8.
+        cells: meshes, finest first, each with half the cells of the one before; default `default_cells`
+            and two coarser ones; they decide the dimension when given.
+        turn_samples: even number of angles of gravity over a turn; default enough for a mean within
+            1e-8.
     Returns: The totals. Where gravity leaves no closed ring, or its surface is not found, status says so,
         `closed` is False and the values are those without gravity, their half-widths widened by all that
         gravity could do to the liquid there.
@@ -128,7 +127,7 @@ def ring_quantities(
         number of samples that make no sense; two dimensions for gravity along the shaft; fewer than three
         meshes.
     Source: Eqs. 3 to 12 of the liquid-ring paper, with exact plates; Celik et al. (2008),
-    doi:10.1115/1.2960953.
+        doi:10.1115/1.2960953.
     """
     fills = np.atleast_1d(np.asarray(fill_ratio, dtype=np.float64)).ravel()
     _check(fills, density, angular_velocity, gravity)

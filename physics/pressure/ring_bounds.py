@@ -50,13 +50,12 @@ def rounding_bound(*, case: Case, fill_ratio: float, samples: Sequence[Sample]) 
     stiffness = max(2 * cells[0], 2 * cells[1] * depth / arc) ** 2
     moved = max(sample.rounding for sample in samples)
     relative = _EPSILON * (4 * disc.outer_radius / depth + 0.2 * stiffness) + moved
-    return relative * natural_size(case=case, fill_ratio=fill_ratio)
+    return relative * _natural_size(case=case, fill_ratio=fill_ratio)
 
 
-def natural_size(*, case: Case, fill_ratio: float) -> FloatArray:
+def _natural_size(*, case: Case, fill_ratio: float) -> FloatArray:
     """Size that every column of `Sample.values` would have without symmetry.
 
-    Args: `case`: disc and liquid. `fill_ratio`: x.
     Returns: Sizes in the unit of each column, shape (28,).
     """
     disc, density = case.disc, case.liquid.density
@@ -96,7 +95,7 @@ def stated_widths(
             stated[k] = 0.0
             stated[k, first_drop] = displaced[first_drop]
         elif not all(sample.status.ok for sample in samples[k]):
-            stated[k] = natural_size(case=case, fill_ratio=float(x))
+            stated[k] = _natural_size(case=case, fill_ratio=float(x))
         elif not closed[k]:
             stated[k] += displaced
     return stated

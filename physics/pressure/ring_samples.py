@@ -107,7 +107,6 @@ def empty_sample(*, moment_per_volume: float) -> Sample:
     """Sample of a chamber without liquid: all zero but the moment that the first drop would bring.
 
     Args: `moment_per_volume`: limit of dU/dV', kg/m^2.
-    Returns: The sample, exact.
     """
     values = np.zeros(WIDTH)
     values[COLUMNS["moment_per_volume"]] = moment_per_volume

@@ -64,7 +64,6 @@ class RotatingLiquid:
         """Force per volume, rho (omega^2 r e_r + g).
 
         Args: `places`: m, shape (dimension, ...).
-        Returns: N/m^3, the shape of `places`.
         Source: Eq. 9 of the liquid-ring paper, with gravity added.
         """
         force = np.array(places, dtype=np.float64) * self.angular_velocity**2
@@ -101,7 +100,7 @@ class PressureSolution:
 
 
 @dataclass(frozen=True, kw_only=True)
-class DiscreteProblem:
+class _DiscreteProblem:
     """Matrix and load of the weak form, before any condition on the free surface; lengths in mesh units."""
 
     matrix: csr_matrix
@@ -141,7 +140,7 @@ def solve_pressure(
     return _solution(chamber, discrete, pressure, linear)
 
 
-def discretise(*, chamber: ChamberMesh, problem: PressureProblem) -> DiscreteProblem:
+def discretise(*, chamber: ChamberMesh, problem: PressureProblem) -> _DiscreteProblem:
     """Matrix and load of the weak form; the free surface is left without a condition.
 
     Args: `chamber`: mesh with its named boundaries. `problem`: right-hand sides.
@@ -154,14 +153,13 @@ def discretise(*, chamber: ChamberMesh, problem: PressureProblem) -> DiscretePro
     for name in mesh.boundaries:
         if name != FREE_SURFACE:
             load += wall_load(chamber=chamber, problem=problem, boundary=name)
-    return DiscreteProblem(matrix=stiffness(mesh), load=load)
+    return _DiscreteProblem(matrix=stiffness(mesh), load=load)
 
 
 def wall_load(*, chamber: ChamberMesh, problem: PressureProblem, boundary: str) -> FloatArray:
     """Part of the load that one boundary contributes, int q v.
 
-    Args: `chamber`: mesh with its named boundaries. `problem`: right-hand sides. `boundary`: name of the
-        boundary.
+    Args: `chamber`: mesh with its named boundaries. `problem`: right-hand sides.
     Returns: Vector over the nodes, in the mesh's unit of length.
     """
     unit = chamber.length_scale
@@ -176,7 +174,7 @@ def places(chamber: ChamberMesh) -> FloatArray:
 
 
 def _solution(
-    chamber: ChamberMesh, discrete: DiscreteProblem, pressure: FloatArray, linear: LinearSolution
+    chamber: ChamberMesh, discrete: _DiscreteProblem, pressure: FloatArray, linear: LinearSolution
 ) -> PressureSolution:
     gradient = _surface_gradient(chamber, discrete, pressure)
     return PressureSolution(
@@ -189,7 +187,7 @@ def _solution(
 
 
 def _surface_gradient(
-    chamber: ChamberMesh, discrete: DiscreteProblem, pressure: FloatArray
+    chamber: ChamberMesh, discrete: _DiscreteProblem, pressure: FloatArray
 ) -> LinearSolution:
     """Flux that balances the weak form on the surface: more accurate than the gradient of the field.
 

@@ -119,7 +119,6 @@ def find_surface(
     Args: `liquid`: with gravity in the chamber's axes. `fill_ratio`: x, above 0 and at most 1. `cells`: along
         the radius, the angle and, for a three-dimensional mesh, the axis. `start`: radii to start from, m, at
         the surface nodes; default concentric.
-    Returns: The mesh and how the search ended.
     Raises: ValueError: a fill ratio outside (0, 1].
     Source: Newton's method on the position of an isobar; the slope is that of the hydrostatic force.
     """

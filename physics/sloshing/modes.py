@@ -127,8 +127,6 @@ def natural_frequencies(system: SloshingSystem) -> FloatArray:
 
     With S = L L^T and y = L^T psi the oscillator y'' + 2 C y' + A y = 0 is d/dt (y', A^(1/2) y) = B (...)
     with a real antisymmetric B, whose eigenvalues are +- i s.
-    Returns: s, shape (n,).
-    Source: linear algebra of gyroscopic systems.
     """
     lower = cholesky(system.kinetic, lower=True)
 

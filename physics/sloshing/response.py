@@ -55,15 +55,13 @@ def sloshing_response(
     wall pressure follows from psi by p'/rho = G + c - i s phi - 2 psi.
     Args:
         fill_ratio: x, any shape, flattened to (n,), above 0 and at most 1.
-        angular_velocity: omega, rad/s, above 0.
         kinematic_viscosity: nu, m^2/s, zero or more; zero leaves resonance without a limit.
-        gravity: g across the shaft, m/s^2, zero or more.
         frequency_ratio: s, above 0; 1 for gravity.
         cells: three meshes or more, finest first; default those of `sloshing_modes`.
     Returns: SloshingResponse; status says where the waves would not be small, or gravity leaves no ring.
     Raises: ValueError: fill ratios outside (0, 1], or an argument outside its range.
     Validity: small planar waves; thin Stokes layers on all walls without the Coriolis force, which makes the
-    damping, and with it a peak, good to a factor of about two.
+        damping, and with it a peak, good to a factor of about two.
     Source: derived in `sloshing_system`; the layers as in Landau and Lifshitz, "Fluid Mechanics", section 24.
     """
     fills = np.atleast_1d(np.asarray(fill_ratio, dtype=np.float64)).ravel()

@@ -1,10 +1,11 @@
 """Loss of the tube's smooth bends: by correlation where flow is turbulent, by finite elements where laminar.
 
 What a laminar bend costs beyond the friction of its own arc was computed for r = 2 d and 90 degrees at rest:
-0.18, 0.55, 0.94 and 1.14 at Re 20, 50, 100 and 200 (`physics.bent_tube`).  K_0 De^2/(De^2 + De_0^2) with the
-Dean number De = Re sqrt(d/2r) meets them within 0.05; other shapes are scaled by it and carry a wide
-half-width.  In a tube that turns, curvature acts as rotation, R' = R +- s with s = (4/3) Re d/2r
-(`bent_tube_terms`): a bend then costs more or less by its sense of turning, which a scene does not give.
+0.18, 0.55, 0.94 and 1.14 at Re 20, 50, 100 and 200 (`verification.reference.bent_tube`).
+K_0 De^2/(De^2 + De_0^2) with the Dean number De = Re sqrt(d/2r) meets them within 0.05; other shapes are
+scaled by it and carry a wide half-width.  In a tube that turns, curvature acts as rotation, R' = R +- s with
+s = (4/3) Re d/2r (`verification.reference.bend_shift`): a bend then costs more or less by its sense of
+turning, which a scene does not give.
 """
 
 from __future__ import annotations
@@ -16,7 +17,6 @@ import numpy as np
 import numpy.typing as npt
 from fluids.fittings import bend_rounded
 
-from ringbalance.physics.tube.bend_terms import MOMENTUM_FACTOR
 from ringbalance.physics.tube.friction import turbulent_share
 from ringbalance.physics.tube.rotation import rotating_friction_ratio
 from ringbalance.scene.arrays import FloatArray
@@ -30,6 +30,8 @@ LARGEST_EXCESS: Final = 1.25
 """K_0, for 90 degrees and r = 2 d."""
 HALF_WAY_DEAN: Final = 28.0
 """De_0."""
+MOMENTUM_FACTOR: Final = 4 / 3
+"""Mean of u^2 over U^2 in Poiseuille flow."""
 
 
 def bend_loss(
@@ -47,13 +49,10 @@ def bend_loss(
     K_lam = K_0 (phi/90 deg) 2 sqrt(d/2r) De^2/(De^2 + De_0^2) s^2/(s^2 + R^2).
     Args:
         bend: angle phi and centre-line radius r.
-        bore: d, m.
         friction_factor: f (Darcy) of the straight tube at rest at the same Re, any shape.
-        reynolds: Re, positive, broadcasts.
-        rotation_reynolds: R, zero or more, broadcasts.
         critical_ratio: critical Re over the straight tube's, broadcasts.
     Returns: K and its expanded uncertainty (95 %), of the broadcast shape; the friction of the arc counts as
-    known.
+        known.
     Range: computed for r = 2 d and 90 degrees up to Re 200 at rest, and at Re 200, R 118; elsewhere scaled.
     Source: finite elements, see the head of this module; `turbulent_bend_loss`.
     """
@@ -90,9 +89,8 @@ def turbulent_bend_loss(*, bend: Bend, bore: float, friction_factor: npt.ArrayLi
     """Loss coefficient of one bend in turbulent flow, with the friction of its own arc in it.
 
     K = f phi r/d + (0.10 + 2.4 f) sin(phi/2) + 6.6 f (sqrt(sin(phi/2)) + sin(phi/2)) (d/r)^(4 phi/pi)
-    Args: `bend`: angle phi and centre-line radius r. `bore`: d, m. `friction_factor`: f (Darcy) of the
-        straight tube at the same Re, any shape.
-    Returns: K, the shape of `friction_factor`.
+    Args: `bend`: angle phi and centre-line radius r. `friction_factor`: f (Darcy) of the straight tube at the
+        same Re, any shape.
     Range: turbulent flow in smooth tubes, phi up to 180 degrees, r/d of at least 0.5.
     Source: Rennels and Hudson, Pipe Flow (2012), through `fluids.fittings.bend_rounded`.
     """
@@ -109,7 +107,6 @@ def turbulent_bend_loss(*, bend: Bend, bore: float, friction_factor: npt.ArrayLi
 def bend_in_range(*, bend: Bend, bore: float) -> bool:
     """Whether a bend's shape lies within the formula's range.
 
-    Args: `bore`: d, m.
     Returns: True for an angle up to 180 degrees and r/d of at least 0.5.
     Source: Rennels and Hudson, Pipe Flow (2012).
     """
@@ -121,7 +118,6 @@ def straight_length(*, tube: Tube) -> float:
 
     Returns: Length, m.
     Raises: ValueError: arcs longer than the tube.
-    Source: geometry.
     """
     straight = tube.length - sum(b.angle * b.radius for b in tube.bends)
     if straight < -1e-9 * tube.length:

@@ -31,8 +31,7 @@ def developing_length(
     The three are the creeping end effect; the carrying of vorticity, 0.0175 Re without rotation; and the
     exact limit of fast rotation without inertia, geostrophic flow over the section's depth that friction in
     its Ekman layers wears down.
-    Args: `reynolds`: Re, any shape, zero or more. `rotation_reynolds`: R = omega d^2/nu, any shape that
-        broadcasts, zero or more. `friction_ratio`: F of developed laminar flow there, broadcasts.
+    Args: `friction_ratio`: F of developed laminar flow there, broadcasts.
     Returns: l/d, of the broadcast shape: at least the length of the section's eigenproblem, at most 3 times
         it.
     Range: compared with `entry_length.slowest_decay` for Re up to 2000, R up to 1e4, R Re up to 3e5.

@@ -15,9 +15,6 @@ from ringbalance.physics.results import Estimate, Status, StatusCode
 from ringbalance.physics.splines import CubicSpline
 from ringbalance.scene.arrays import FloatArray
 
-__all__ = ["EndTable", "end_table", "laminar_entrance_loss", "laminar_exit_loss"]
-
-
 _SCALE, _LIMIT = 5.0, 2000.0
 _DOMAIN = 1e-3
 """Relative: reservoir and tube are cut off at a distance, the edge is resolved down to 1e-4 of the bore."""
@@ -26,7 +23,7 @@ _OUTSIDE = 0.3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class EndTable:
+class _EndTable:
     """Interpolants of one end over a = ln(1 + Re/5)."""
 
     scaled: CubicSpline
@@ -41,11 +38,10 @@ class EndTable:
 
 
 @lru_cache(maxsize=2)
-def end_table(end: str) -> EndTable:
+def end_table(end: str) -> _EndTable:
     """The table of one end, as it comes with the package.
 
     Args: `end`: "entrance" or "exit".
-    Returns: The table, read once.
     """
     path = resources.files("ringbalance.physics") / "data" / "end_losses.csv"
     lines = [x for x in path.read_text(encoding="utf-8").splitlines() if not x.startswith("#")]
@@ -57,7 +53,7 @@ def end_table(end: str) -> EndTable:
     checks = [row for row in rows if row["kind"] == "check"]
     at, solved = (np.array([float(row[name]) for row in checks]) for name in ("a", "fine"))
     gaps = np.abs(spline(at) * np.exp(power * at) - solved) * np.exp(-at)
-    return EndTable(
+    return _EndTable(
         scaled=spline,
         numerical=np.array([float(row["uncertainty"]) for row in nodes]),
         nodes=a,
@@ -98,7 +94,6 @@ def laminar_entrance_loss(*, reynolds: npt.ArrayLike) -> Estimate:
 
     K_ent = 2 (p_reservoir - p_tube)/(rho U^2) with the developed line of p carried back to the entrance; it
     contains the developed stream's kinetic factor 2.  Creeping: 0.986 * 6 pi/Re.
-    Args: `reynolds`: Re = U d/nu, any shape, above zero.
     Returns: Estimate of K_ent, the same shape; OUT_OF_RANGE above Re = 2000.
     Raises: ValueError: a Reynolds number that is not finite and above zero.
     Range: 0 < Re <= 2000, tube long enough for flow to develop.
@@ -112,7 +107,6 @@ def laminar_exit_loss(*, reynolds: npt.ArrayLike) -> Estimate:
 
     K_exit = 2 (p_mouth - p_reservoir)/(rho U^2) with the developed line of p carried on to the mouth; about
     zero at high Re, where the stream leaves with the pressure of the reservoir.
-    Args: `reynolds`: Re = U d/nu, any shape, above zero.
     Returns: Estimate of K_exit, the same shape; OUT_OF_RANGE above Re = 2000.
     Raises: ValueError: a Reynolds number that is not finite and above zero.
     Range: 0 < Re <= 2000.

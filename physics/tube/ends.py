@@ -29,9 +29,8 @@ def kinetic_factor(
 
     Laminar alpha = 1.2 + 0.8/F^1.5, smooth between laminar and turbulent: Coriolis forces blunt the profile,
     down to u ~ (depth along the axis of rotation)^1.5 in fast rotation, which has alpha = 1.199.
-    Args: `reynolds`: Re, any shape, positive. `critical_ratio`: critical Re over the straight tube's,
-        broadcasts. `friction_ratio`: F of developed laminar flow, broadcasts.
-    Returns: alpha, of the broadcast shape.
+    Args: `critical_ratio`: critical Re over the straight tube's, broadcasts. `friction_ratio`: F of developed
+        laminar flow, broadcasts.
     Range: laminar within `ROTATING_PROFILE_UNCERTAINTY` of finite-element solutions for R Re up to 3e5.
     Source: integral of (w/u)^3 over the bore: exact for Poiseuille flow and for fast rotation without
         inertia, our interpolation between; 1/7-power profile.
@@ -65,8 +64,7 @@ def entrance_loss(
 
     Laminar: K_ent - 2 of a sharp entrance by finite elements, turbulent: the entrance's K, blended over the
     transition.
-    Args: `reynolds`: Re, any shape, positive. `critical_ratio`: critical Re over the straight tube's,
-        broadcasts.
+    Args: `critical_ratio`: critical Re over the straight tube's, broadcasts.
     Returns: K and its expanded uncertainty (95 %), of the broadcast shape.
     Source: the table of `end_losses_table`; an entrance that is not sharp has the same laminar value with a
         wider half-width.

@@ -59,10 +59,7 @@ def friction_uncertainty(
     between the two branches, since flow may stay laminar or turn early; on a rough wall, while its grains lie
     near the viscous layer (eps+ below about 35), the gap to a smooth wall, because sand-like walls still act
     smooth there.
-    Args: `reynolds`: Re, any shape, positive. `relative_roughness`: eps/d. `laminar_ratio`: as for
-        `friction_factor`. `turbulent_ratio`: as for `friction_factor`. `critical_ratio`: as for
-        `friction_factor`.
-    Returns: Half-width of f, of the broadcast shape.
+    Args: `relative_roughness`: eps/d.
     Range: as for `friction_factor`.
     Source: spread against McKeon et al., J. Fluid Mech. 511 (2004) 41, and Nikuradse, VDI Forschungsheft 361
         (1933), which the tests hold inside it.
@@ -100,9 +97,7 @@ def turbulent_share(
     """Smooth switch from laminar (0) to turbulent (1), w = 1/(1 + (Re_c/Re)^n).
 
     With n = 4 a loss coefficient that falls through the transition still makes a head that grows with u.
-    Args: `reynolds`: Re, any shape, positive. `critical_ratio`: critical Re over the straight tube's 2303,
-        broadcasts.
-    Returns: w, of the broadcast shape.
+    Args: `critical_ratio`: critical Re over the straight tube's 2303, broadcasts.
     Source: our interpolation between the two ends.
     """
     re = np.asarray(reynolds, dtype=np.float64)

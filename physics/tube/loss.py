@@ -68,10 +68,9 @@ def tube_loss(
     k + 1 = f L/d + rotation + K_entrance + K_bends + extra + (1 + K_exit); the "1" is the exit loss of
     turbulent flow, so K_exit holds only what a laminar exit adds.  k is smooth in u and (k + 1) u^2 grows
     with u, so that a head has one velocity.
-    Args: `tube`: the tube; a `drag_coefficient` prescribes k. `angular_velocity`: omega, rad/s.
-        `velocity`: u, mean over the bore, m/s, any shape, positive. `inputs`: expanded uncertainties (95 %)
-        of scene quantities; those of the tube, the viscosity and the speed are used.
-    Returns: TubeLoss, arrays of the shape of `velocity`.
+    Args: `tube`: the tube; a `drag_coefficient` prescribes k. `velocity`: u, mean over the bore, m/s, any
+        shape, positive. `inputs`: expanded uncertainties (95 %) of scene quantities; those of the tube, the
+        viscosity and the speed are used.
     Raises: ValueError: a velocity that is not positive and finite, or arcs longer than the tube.
     Range: calibrated from 0.1 to 20 m/s; `in_range` and `range_notes` say where a correlation is stretched.
     Source: definition of k from Eq. 14 of the liquid-ring paper; the sources of the terms stand with them.
@@ -115,7 +114,6 @@ def _estimate(state: TubeState, parts: Mapping[str, FloatArray], stretched: bool
 def flow_states(state: TubeState) -> npt.NDArray[np.str_]:
     """Laminar, transitional or turbulent, by the critical Re of the turning tube.
 
-    Args: `state`: the terms of k.
     Returns: Values of `FlowState`, the shape of the state's arrays.
     Source: `critical_reynolds`.
     """

@@ -11,9 +11,7 @@ from ringbalance.scene.arrays import FloatArray
 def reynolds_number(*, velocity: npt.ArrayLike, bore: float, kinematic_viscosity: float) -> FloatArray:
     """Reynolds number of the tube, Re = |u| d/nu.
 
-    Args: `velocity`: u, mean over the bore, m/s, any shape. `bore`: d, m. `kinematic_viscosity`: nu, m^2/s.
-    Returns: Re, the shape of `velocity`.
-    Source: definition.
+    Args: `velocity`: u, mean over the bore, m/s, any shape.
     """
     return np.asarray(np.abs(np.asarray(velocity, dtype=np.float64)) * bore / kinematic_viscosity)
 

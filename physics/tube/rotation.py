@@ -36,8 +36,6 @@ _EQUAL_FORCE: Final = (1.0, 0.25)
 def rotation_in_range(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike) -> BoolArray:
     """Whether the laminar rotation ratio rests on finite-element solutions: Kl <= 1e7 and R_Om <= 1e5.
 
-    Args: `reynolds`: Re, any shape. `rotation_reynolds`: R_Om, any shape that broadcasts.
-    Returns: True inside, of the broadcast shape.
     Source: the table of `rotating_section_table`.
     """
     return rotation_table_covers(reynolds=reynolds, rotation_reynolds=rotation_reynolds)
@@ -47,8 +45,6 @@ def turbulent_friction_ratio(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.
     """Turbulent friction factor with rotation over the one without.
 
     0.942 + 0.058 Kt^0.282 up to Kt = 500, 0.942 Kt^0.05 above, 1 below Kt = 1, the joints rounded.
-    Args: `reynolds`: Re, any shape, positive. `rotation_reynolds`: R_Om, any shape that broadcasts, zero or
-        more.
     Returns: Estimate of the ratio, of the broadcast shape. The formula is recalled and unverified, so its 95
         % half-width reaches the farthest of what else could be: no effect at all, and `curved_friction_ratio`
         of the bend whose centrifugal force equals the Coriolis force, a/R_c = S, or S/2. Zero without
@@ -75,8 +71,6 @@ def curved_friction_ratio(*, curvature_number: npt.ArrayLike) -> FloatArray:
     A turning tube is like a curved one when the forces across are alike: with S = R_Om/Re,
     2 omega w against w^2/R_c gives a/R_c = S at the mean velocity, half of it for equal gradients; then T is
     Kt = R_Om^2/Re, or a quarter of it.
-    Args: `curvature_number`: T, any shape, zero or more.
-    Returns: Ratio, the shape of `curvature_number`.
     Source: Mori and Nakayama, Int. J. Heat Mass Transfer 10 (1967) 37; the analogy after Ishigaki, J. Fluid
         Mech. 307 (1996) 1; the fading is ours.
     """
@@ -89,8 +83,6 @@ def curved_friction_ratio(*, curvature_number: npt.ArrayLike) -> FloatArray:
 def critical_reynolds(*, rotation_reynolds: npt.ArrayLike) -> FloatArray:
     """Reynolds number at which the rotating tube's flow turns turbulent, 1070 R_Om^0.23, at least 2303.
 
-    Args: `rotation_reynolds`: R_Om, any shape, zero or more.
-    Returns: Critical Re, the shape of `rotation_reynolds`.
     Range: 28 <= R_Om <= 2000; below, the straight tube's value, joined smoothly; above, extrapolated.
     Source: Ito and Nanbu, J. Basic Eng. 93 (1971) 383, recalled.
     """

@@ -3,6 +3,13 @@
 Inside the table: bicubic splines, in coordinates in which F is smooth, of what ln F differs by from a closed
 formula that has F's exact slow limit; two rectangles joined smoothly between S = 2.5 and 4.5.  Outside:
 carried on from the table's edge with a wide uncertainty, and said so.
+
+The rectangles overlap, because no single pair of coordinates is regular in both limits; with Kl = R Re,
+S = R/Re and R = omega d^2/nu:
+
+- "slow": a = ln(1 + Kl/300), b = S/(1 + S), from S = 0 (Kl alone matters) to S = 5, Kl up to 1e7;
+- "fast": a = ln(1 + R/20), b = S_min(R)/S, from 1/S = 0 (Re = 0, linear, R alone matters) to S_min(R), which
+  is 2 as long as Kl = R^2/S stays below 1.05e7 and follows that bound above.
 """
 
 from __future__ import annotations
@@ -19,31 +26,33 @@ import numpy.typing as npt
 
 from ringbalance.physics.results import Estimate, Status, StatusCode
 from ringbalance.physics.splines import Surface
-from ringbalance.physics.tube.rotation_grid import (
-    KL_LIMIT,
-    KL_SCALE,
-    ROTATION_LIMIT,
-    ROTATION_SCALE,
-    fast_first,
-    least_s,
-    slow_first,
-)
 from ringbalance.scene.arrays import BoolArray, FloatArray
-
-__all__ = [
-    "FrictionTable",
-    "friction_table",
-    "ito_nanbu_laminar",
-    "rotating_friction_ratio",
-    "rotation_table_covers",
-]
 
 Rows = Sequence[Mapping[str, str]]
 
+KL_SCALE, ROTATION_SCALE = 300.0, 20.0
+KL_LIMIT, ROTATION_LIMIT = 1e7, 1e5
+FAST_S, FAST_KL = 2.0, 1.05e7
 _JOIN = (2.5, 4.5)
 _OUTSIDE = 0.3
 """Relative expanded uncertainty (95 %) outside the table: no source holds there, and flow is likely to be
 unsteady."""
+
+
+def slow_first(kl: npt.ArrayLike) -> FloatArray:
+    """a = ln(1 + Kl/300)."""
+    return np.log1p(np.asarray(kl, dtype=np.float64) / KL_SCALE)
+
+
+def fast_first(rotation_reynolds: npt.ArrayLike) -> FloatArray:
+    """a = ln(1 + R/20)."""
+    return np.log1p(np.asarray(rotation_reynolds, dtype=np.float64) / ROTATION_SCALE)
+
+
+def least_s(rotation_reynolds: npt.ArrayLike) -> FloatArray:
+    """S_min(R) = (2^4 + (R^2/1.05e7)^4)^(1/4), below which the fast rectangle ends."""
+    bound = np.asarray(rotation_reynolds, dtype=np.float64) ** 2 / FAST_KL
+    return np.asarray((FAST_S**4 + bound**4) ** 0.25, dtype=np.float64)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -163,11 +172,7 @@ def _coordinates(re: FloatArray, rotation: FloatArray) -> tuple[FloatArray, Floa
 
 
 def rotation_table_covers(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike) -> BoolArray:
-    """Whether the table of laminar friction ratios holds: Kl <= 1e7 and R <= 1e5.
-
-    Args: `reynolds`: Re, any shape. `rotation_reynolds`: R = omega d^2/nu, any shape that broadcasts.
-    Returns: True inside, of the broadcast shape.
-    """
+    """Whether the table of laminar friction ratios holds: Kl <= 1e7 and R <= 1e5."""
     rotation = np.asarray(rotation_reynolds, dtype=np.float64)
     kl = rotation * np.asarray(reynolds, dtype=np.float64)
     return np.asarray((kl <= KL_LIMIT) & (rotation <= ROTATION_LIMIT))
@@ -195,8 +200,6 @@ def rotating_friction_ratio(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.A
 
     F depends on Kl = R Re and S = R/Re alone; its exact slow limit is 1 + R^2/9216 + Kl^2/16515072, its
     fast one (Re = 0) tends to 0.07863 sqrt(R).
-    Args: `reynolds`: Re = U d/nu, any shape, zero or more. `rotation_reynolds`: R = omega d^2/nu, any shape
-        that broadcasts, zero or more.
     Returns: Estimate of F, of the broadcast shape; the uncertainty adds discretisation and interpolation. Its
         status says OUT_OF_RANGE when any point lies outside the table, where 30 % is added.
     Raises: ValueError: a negative or undefined argument.
@@ -238,8 +241,6 @@ def _interpolation_uncertainty(table: FrictionTable, kl: FloatArray, rotation: F
 def ito_nanbu_laminar(*, kl: npt.ArrayLike) -> FloatArray:
     """Ito and Nanbu's laminar friction ratio, 0.0883 Kl^(1/4) (1 + 11.2 Kl^-0.325), for comparison.
 
-    Args: `kl`: Kl = R Re, any shape, above zero.
-    Returns: F, the same shape.
     Range: stated for 220 < Kl < 1e7 and S = R/Re < 0.5.
     Source: Ito and Nanbu, J. Basic Eng. 93 (1971) 383, doi 10.1115/1.3425260, as recalled.
     """

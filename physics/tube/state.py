@@ -74,8 +74,7 @@ def tube_state(*, tube: Tube, liquid: Liquid, angular_velocity: float, velocity:
 def tube_state_at(*, tube: Tube, reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike) -> TubeState:
     """Evaluate every term of k from the two numbers that it depends on, for many liquids at once.
 
-    Args: `reynolds`: Re, any shape, positive. `rotation_reynolds`: R_Om, any shape that broadcasts to that of
-        `reynolds`.
+    Args: `rotation_reynolds`: R_Om, any shape that broadcasts to that of `reynolds`.
     Returns: TubeState, arrays of the shape of `reynolds`.
     Raises: ValueError: arcs longer than the tube.
     Source: the sources of the terms stand with them.
@@ -152,8 +151,6 @@ def upstream_loss(*, tube: Tube, state: TubeState) -> FloatArray:
 
     Entrance, the share `hump_position` of friction, rotation and extra loss, and the bends that lie before
     the crest when all are spread evenly along the path; of a prescribed k the share `hump_position`.
-    Args: `state`: its terms.
-    Returns: k_up, the shape of the state's arrays.
     Source: energy balance from the chamber to the crest; the scene does not say where the bends lie.
     """
     share = tube.hump_position

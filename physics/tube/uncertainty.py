@@ -33,10 +33,8 @@ def uncertainty_parts(
 ) -> Mapping[str, FloatArray]:
     """Expanded uncertainties (95 %) of k, one per cause; independent, so they combine by the root of the sum
     of squares.
-
-    Args: `liquid`: the liquid; its own viscosity uncertainty is used unless `inputs` has one.
-        `angular_velocity`: omega, rad/s. `velocity`: u, m/s, any shape. `state`: the terms of k at these
-        velocities. `inputs`: expanded uncertainties (95 %) of scene quantities.
+    Args: `liquid`: the liquid; its own viscosity uncertainty is used unless `inputs` has one. `state`: the
+        terms of k at these velocities. `inputs`: expanded uncertainties (95 %) of scene quantities.
     Returns: Half-width of k by cause, each the shape of `velocity`; parts that vanish everywhere are kept.
     Source: ASME V&V 20-2009, input uncertainty by sensitivity; model spreads stand with the correlations.
     """
@@ -53,7 +51,6 @@ def uncertainty_parts(
 def model_parts(*, tube: Tube, state: TubeState) -> dict[str, FloatArray]:
     """Expanded uncertainties (95 %) of k by the correlations and tables themselves.
 
-    Args: `state`: the terms of k.
     Returns: Half-width of k by cause, each the shape of the state's arrays.
     Source: the spreads stand with the correlations.
     """
@@ -110,9 +107,8 @@ def input_parts(
 ) -> dict[str, FloatArray]:
     """Expanded uncertainties (95 %) of k by what the scene leaves uncertain.
 
-    Args: `liquid`: the liquid; its own viscosity uncertainty is used unless `inputs` has one.
-        `angular_velocity`: omega, rad/s. `inputs`: expanded uncertainties (95 %) of scene quantities. `k_of`:
-        k for another tube, liquid and omega.
+    Args: `liquid`: the liquid; its own viscosity uncertainty is used unless `inputs` has one. `inputs`:
+        expanded uncertainties (95 %) of scene quantities. `k_of`: k for another tube, liquid and omega.
     Returns: Half-width of k by input, each the shape of `k`.
     Source: ASME V&V 20-2009, input uncertainty by sensitivity.
     """

@@ -12,9 +12,7 @@ import numpy as np
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.physics.results import Estimate, Statistics, Status
 from ringbalance.reduced_model.chamber.element_check import ElementCheck, element_check
-from ringbalance.reduced_model.chamber.gravity import SAFETY, GravityEffect, closed_ring, gravity_effect
-from ringbalance.reduced_model.chamber.gravity_choice import gravity_choice
-from ringbalance.reduced_model.chamber.gravity_open import open_ring_effect
+from ringbalance.reduced_model.chamber.gravity import SAFETY, GravityEffect, gravity_effect
 from ringbalance.reduced_model.chamber.inputs import InputEffect, input_effects
 from ringbalance.reduced_model.chamber.ring_values import RingValues, ring_values
 from ringbalance.reduced_model.selection.chamber_range import chamber_status, mean_gravity
@@ -94,19 +92,15 @@ class ChamberCalibration:
     input_effects: Mapping[str, InputEffect]
     """Effect of each uncertain input."""
     gravity: GravityEffect
-    """A-priori estimate along `fill_ratio`."""
-    gravity_share: float
-    """Its largest estimated share of wall pressure or moment over the range of fills."""
+    """Along `fill_ratio`."""
     gravity_modelled: bool
     """Whether the values hold it."""
-    gravity_check: str
-    """What running the next model at a few fills said of that choice."""
     status: Status
     """Of the solves or, where these are sound, of the ring's waves over the range of fills."""
     statistics: Statistics
 
 
-def fill_nodes(*, largest: float) -> tuple[FloatArray, FloatArray]:
+def _fill_nodes(*, largest: float) -> tuple[FloatArray, FloatArray]:
     """Fill ratios of the tables and of the report.
 
     Args: `largest`: max_fill_ratio.
@@ -123,17 +117,15 @@ def fill_nodes(*, largest: float) -> tuple[FloatArray, FloatArray]:
 def calibrate_chamber(scene: Scene) -> ChamberCalibration:
     """Evaluate the closed forms over the fill range and check them by finite elements at a few fills.
 
-    Gravity is modelled when its second-order share exceeds the scene's tolerance, by the estimate and by a
-    check at a few fills; otherwise its estimate goes into the half-widths.
-    Args: `scene`: the scene; a ring must exist.
+    Gravity is modelled when its effect exceeds the scene's tolerance at some fill; otherwise the effect goes
+    into the uncertainties. A ring must exist.
     Raises: SceneError: as `scene_ring`.
     Source: Eqs. 2 to 12 of the liquid-ring paper with exact plates.
     """
-    choice = gravity_choice(scene=scene, share=mean_gravity(scene))
-    modelled = choice.modelled
-    nodes, reported = fill_nodes(largest=scene.disc.max_fill_ratio)
+    modelled = mean_gravity(scene) > scene.tolerance
+    nodes, reported = _fill_nodes(largest=scene.disc.max_fill_ratio)
     fills = np.append(nodes, [x for x in reported if np.min(np.abs(nodes - x)) > 1e-12])
-    effect = _gravity(scene, fills)
+    effect = gravity_effect(scene, fill_ratio=fills)
     ring = ring_values(scene, fill_ratio=fills, gravity=modelled)
     check = element_check(scene, values=ring, gravity=modelled)
     unmodelled = unmodelled_fractions(scene, fills)
@@ -164,9 +156,7 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
         moment_per_mass_inputs=math.hypot(*(e.moment_per_mass for e in effects.values())),
         input_effects=effects,
         gravity=effect,
-        gravity_share=choice.share,
         gravity_modelled=modelled,
-        gravity_check=choice.told,
         status=next((s for s in (ring.status, check.status) if not s.ok), chamber_status(scene)),
         statistics=check.elements.statistics,
     )
@@ -215,33 +205,3 @@ def _central(
         uncertainty=np.asarray(math.hypot(numerical, left_out, float(unmodelled[m]) * value)),
         status=slope.status,
     )
-
-
-def _gravity(scene: Scene, fills: FloatArray) -> GravityEffect:
-    """Second-order effect; by quadrature where the ring is open."""
-    disc, speed, gravity = scene.disc, scene.rotor.speed, scene.environment.gravity
-    vertical = scene.environment.shaft == "vertical"
-    effect = gravity_effect(
-        disc=disc,
-        density=scene.liquid.density,
-        angular_velocity=speed,
-        gravity=gravity,
-        vertical=vertical,
-        fill_ratio=fills,
-    )
-    is_open = ~closed_ring(
-        disc=disc, angular_velocity=speed, gravity=gravity, vertical=vertical, fill_ratio=fills
-    )
-    if not np.any(is_open):
-        return effect
-    opened = open_ring_effect(
-        disc=disc,
-        density=scene.liquid.density,
-        angular_velocity=speed,
-        gravity=gravity,
-        vertical=vertical,
-        fill_ratio=fills[is_open],
-    )
-    pressure, moment = effect.wall_pressure.copy(), effect.moment.copy()
-    pressure[is_open], moment[is_open] = opened.wall_pressure, opened.moment
-    return GravityEffect(wall_pressure=pressure, moment=moment)

@@ -1,4 +1,4 @@
-"""What gravity does to the means over a turn, to second order, and when a ring exists at all."""
+"""Gravity and the ring: its effect on the means over a turn, and when a ring exists at all."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import half_angle, surface_radius
+from ringbalance.reduced_model.chamber.tilted_ring import tilted_ring
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.faults import SceneError
-from ringbalance.scene.models import Disc, Scene
+from ringbalance.scene.models import Scene
 
 SAFETY: Final = 1.5
-"""Factor on the estimates, for the orders above and the plates' shape."""
+"""Factor on the effect where it is left out and enters an uncertainty instead."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,69 +51,34 @@ def check_ring(scene: Scene) -> None:
     raise SceneError([fault])
 
 
-def gravity_ratio(scene: Scene) -> float:
-    """Gravity over the centrifugal acceleration at the free surface of equal fills, eps = g/(omega^2 a).
-
-    Returns: eps; the first-order ripple at 1x that a horizontal shaft gives the liquid.
-    Source: definition.
-    """
-    radius = float(surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio / 2))
-    return scene.environment.gravity / (scene.rotor.speed**2 * radius)
-
-
-def gravity_effect(
-    *,
-    disc: Disc,
-    density: float,
-    angular_velocity: float,
-    gravity: float,
-    vertical: bool,
-    fill_ratio: FloatArray,
-) -> GravityEffect:
-    """Second-order change of wall pressure and moment, means over a turn.
-
-    With delta = g/omega^2, alpha the half-angle at the free surface a and s = sin(alpha)/alpha,
-    horizontal shaft: dP = rho omega^2 delta^2 (1 - s^2)/2,
-    dU = -rho B a delta^2 sin(alpha) (3 s^2 - 1 - 2 s cos(alpha))/2;
-    vertical shaft: dP = rho omega^2 delta^2 B^2 t/(24 alpha a^3), dU = -rho B^3 delta^2 sin(alpha)/(12 a).
-    Args: `density`: rho, kg/m^3. `angular_velocity`: omega, rad/s. `gravity`: g, m/s^2. `vertical`: whether
-        gravity points along the shaft. `fill_ratio`: x, shape (n,).
-    Returns: GravityEffect, shape (n,); zero for an empty chamber.
-    Range: delta small against the liquid's depth.
-    Source: expansion of the free surface |r + g/omega^2| = const at constant volume, plates taken as radial.
-    """
-    a = surface_radius(disc=disc, fill_ratio=fill_ratio)
-    alpha, delta = half_angle(disc=disc, radius=a), gravity / angular_velocity**2
-    s, width = np.sin(alpha) / alpha, disc.axial_width
+def gravity_effect(scene: Scene, *, fill_ratio: FloatArray) -> GravityEffect:
+    """Change of the means over a turn, a dry part of the outer wall included; zero where empty."""
+    pressure, moment = np.zeros_like(fill_ratio), np.zeros_like(fill_ratio)
     wet = fill_ratio > 0
-    if vertical:
-        moment = -density * width**3 * delta**2 * np.sin(alpha) / (12 * a)
-        opening = disc.plate_thickness / (24 * alpha * a**3)
-        pressure = density * angular_velocity**2 * delta**2 * width**2 * opening
-        return _where_wet(wet, pressure, moment)
-    bracket = 3 * s**2 - 1 - 2 * s * np.cos(alpha)
-    moment = -density * width * a * delta**2 * np.sin(alpha) * bracket / 2
-    pressure = density * angular_velocity**2 * delta**2 * (1 - s**2) / 2
-    return _where_wet(wet, pressure, moment)
+    ring, level = (
+        tilted_ring(
+            disc=scene.disc,
+            density=scene.liquid.density,
+            angular_velocity=scene.rotor.speed,
+            gravity=gravity,
+            shaft=scene.environment.shaft,
+            fill_ratio=fill_ratio[wet],
+        )
+        for gravity in (scene.environment.gravity, 0.0)
+    )
+    pressure[wet], moment[wet] = ring.wall_pressure - level.wall_pressure, ring.moment - level.moment
+    return GravityEffect(wall_pressure=pressure, moment=moment)
 
 
-def _where_wet(wet: BoolArray, pressure: FloatArray, moment: FloatArray) -> GravityEffect:
-    return GravityEffect(wall_pressure=np.where(wet, pressure, 0.0), moment=np.where(wet, moment, 0.0))
-
-
-def closed_ring(
-    *, disc: Disc, angular_velocity: float, gravity: float, vertical: bool, fill_ratio: FloatArray
-) -> BoolArray:
-    """Whether the liquid still covers the whole outer wall under gravity.
+def closed_ring(scene: Scene, fill_ratio: FloatArray) -> BoolArray:
+    """Whether the liquid still covers the whole outer wall under gravity; an empty chamber counts as closed.
 
     Horizontal shaft: R2 - a > g/omega^2; vertical: R2^2 - a^2 > g B/omega^2.
-    Args: `angular_velocity`: omega, rad/s. `gravity`: g, m/s^2. `vertical`: whether gravity points along the
-        shaft. `fill_ratio`: x, shape (n,).
-    Returns: True where it does, shape (n,); an empty chamber counts as closed.
     Source: the free surface |r + g/omega^2| = const, to first order.
     """
-    a, delta = surface_radius(disc=disc, fill_ratio=fill_ratio), gravity / angular_velocity**2
-    if vertical:
+    disc, gravity = scene.disc, scene.environment.gravity
+    a, delta = surface_radius(disc=disc, fill_ratio=fill_ratio), gravity / scene.rotor.speed**2
+    if scene.environment.shaft == "vertical":
         closed = disc.outer_radius**2 - a**2 > delta * disc.axial_width
     else:
         closed = disc.outer_radius - a > delta
@@ -124,7 +90,6 @@ def spilling_ring(scene: Scene, fill_ratio: FloatArray) -> BoolArray:
 
     Horizontal shaft: a - delta [(cos(alpha) - s)^2 + sin^2(alpha)]^(1/2) < R1, s = sin(alpha)/alpha;
     vertical: a^2 - delta B/2 < R1^2; delta = g/omega^2.
-    Args: `fill_ratio`: x, shape (n,).
     Source: the free surface |r + g/omega^2| = const, to first order.
     """
     disc, delta = scene.disc, scene.environment.gravity / scene.rotor.speed**2

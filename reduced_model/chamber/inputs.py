@@ -42,7 +42,6 @@ class InputEffect:
 def half_widths(scene: Scene) -> Mapping[str, float]:
     """Absolute expanded uncertainties (95 %) of a scene's inputs; the liquid's own where the scene states
     none.
-
     Returns: SI half-width by quantity; only those above zero.
     """
     liquid = scene.liquid
@@ -67,7 +66,6 @@ def _absolute(scene: Scene, stated: InputUncertainty) -> float | None:
 def input_effects(*, scene: Scene, fill_ratio: FloatArray) -> Mapping[str, InputEffect]:
     """Effect of each uncertain input of the chamber, at a fixed fill ratio.
 
-    Args: `fill_ratio`: x, shape (n,).
     Returns: InputEffect by quantity; empty when every input is exact.
     Source: ASME V&V 20-2009, propagation of input uncertainty by local sensitivities.
     """
@@ -97,7 +95,6 @@ def chamber_closed_forms(
     """Wall pressure, moment and lambda of a chamber without gravity.
 
     P = rho omega^2 (R2^2 - a^2)/2, U = rho B int x dA, lambda = 2 a sin(alpha)/alpha.
-    Args: `fill_ratio`: x, any shape.
     Returns: P, Pa, U, kg m, and lambda, m, the shape of `fill_ratio`.
     Source: hydrostatics with the chamber's exact geometry.
     """

@@ -22,9 +22,8 @@ def scene_ring(
 ) -> RingQuantities:
     """Totals of one chamber's liquid, every one of them computed.
 
-    Args: `fill_ratio`: x, any shape. `gravity`: whether gravity is modelled. `cells`: meshes, finest first;
-        default as in `ring_quantities`.
-    Returns: RingQuantities, solved at every fill ratio.
+    Args: `gravity`: whether gravity is modelled. `cells`: meshes, finest first; default as in
+        `ring_quantities`.
     Raises: SceneError: a chamber so narrow or a ring so shallow that a solve failed; the numbers of a failed
         solve would enter the tables of all other fill ratios.
     """

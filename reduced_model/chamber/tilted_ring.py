@@ -2,12 +2,13 @@
 
 Its free surface is the circle |r + g/omega^2| = b (horizontal shaft) or the paraboloid r^2 = c^2 + 2 G z
 (vertical), G = g/omega^2, with b or c from the liquid's volume.  With phi = eta alpha(r) every integral over
-the chamber is smooth in eta, plates and all, so that few Gauss points give all digits.
+the chamber is smooth in eta, plates and all, so that few Gauss points give all digits.  Where part of the
+outer wall runs dry the surface is cut off there; the integrals have kinks and take more points.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -19,11 +20,14 @@ from ringbalance.scene.models import Disc, Shaft
 POINTS: Final = 20
 """Gauss points along the angle or the axis."""
 RADIAL_POINTS: Final = 14
-NEWTON_STEPS: Final = 12
+_OPEN_POINTS: Final = 200
+"""The same where part of the wall is dry: about four digits of gravity's effect."""
+_STEPS: Final = (12, 60)
+"""Newton's method and halving."""
+_RULES: Final = tuple(np.polynomial.legendre.leggauss(n) for n in (POINTS, _OPEN_POINTS))
 _TURN: Final = (8, 96)
 """Fewest and most angles of gravity over a turn."""
 _AVERAGING: Final = 1e-12
-_ABSCISSA, _WEIGHT = np.polynomial.legendre.leggauss(POINTS)
 _RADIAL, _RADIAL_WEIGHT = np.polynomial.legendre.leggauss(RADIAL_POINTS)
 
 
@@ -42,9 +46,7 @@ class TiltedRing:
     moment_ripple: FloatArray
     """First harmonic over a turn, kg m zero-to-peak."""
     closed: BoolArray
-    """Whether the liquid covers the whole outer wall; values hold only there."""
-    points: int
-    """Quadrature points of one fill ratio, for the count of work."""
+    """Whether the liquid covers the whole outer wall; where not, values have about four digits."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,12 +60,7 @@ class _Turned:
 
 
 def turn_samples(*, disc: Disc, angular_velocity: float, gravity: float) -> int:
-    """Angles of gravity over a turn for means good to twelve digits.
-
-    Args: `angular_velocity`: omega, rad/s. `gravity`: g across the shaft, m/s^2.
-    Returns: An even number.
-    Source: harmonics fall like (g/(omega^2 R1))^n.
-    """
+    """Angles of gravity for means good to twelve digits: harmonics fall like (g/(omega^2 R1))^n."""
     tilt = gravity / (angular_velocity**2 * disc.inner_radius)
     if tilt < 1e-12:
         return _TURN[0]
@@ -83,26 +80,32 @@ def tilted_ring(
     """Wall pressure, moment and dU/dV' of a chamber under gravity, exactly for liquid at rest.
 
     p = rho omega^2 (|r + g/omega^2|^2 - b^2)/2; dU/dV' = rho int x w / int w on the surface, w = 1/|grad p|.
-    Args: `density`: rho, kg/m^3. `angular_velocity`: omega, rad/s, not zero. `gravity`: g, m/s^2. `shaft`:
-        "horizontal" turns gravity across the chamber. `fill_ratio`: x, shape (n,), above zero.
-    Range: a ring that covers the whole outer wall; `closed` says where.
+    Args: `gravity`: g; "horizontal" turns it across the chamber. `fill_ratio`: x, shape (n,), above zero.
+    Range: a surface that stays outside the plates' inner edge; the inner radius is not looked at.
     Source: Eqs. 9 to 11 of the liquid-ring paper with gravity and exact plates; hydrostatics.
     """
     length = gravity / angular_velocity**2
-    if shaft == "vertical":
-        turned, turn = _along(disc, length, fill_ratio), 1
-    else:
-        turn = turn_samples(disc=disc, angular_velocity=angular_velocity, gravity=gravity)
-        turned = _across(disc, length, fill_ratio, turn)
+    turn = turn_samples(disc=disc, angular_velocity=angular_velocity, gravity=gravity)
+
+    def turned(fills: FloatArray, *, cut: bool) -> _Turned:
+        if shaft == "vertical":
+            return _along(disc, length, fills, cut)
+        return _across(disc, length, fills, turn, cut)
+
+    found = turned(fill_ratio, cut=False)
+    is_open = ~np.all(found.closed, axis=1)
+    if np.any(is_open):
+        parts = turned(fill_ratio[is_open], cut=True)
+        for name in ("wall_pressure", "moment", "moment_per_volume"):
+            getattr(found, name)[is_open] = getattr(parts, name)
     scale = density * angular_velocity**2 / 2
     return TiltedRing(
-        wall_pressure=scale * turned.wall_pressure.mean(axis=1),
-        moment=density * disc.axial_width * turned.moment.mean(axis=1),
-        moment_per_volume=density * turned.moment_per_volume.mean(axis=1),
-        wall_pressure_ripple=scale * _first_harmonic(turned.wall_pressure),
-        moment_ripple=density * disc.axial_width * _first_harmonic(turned.moment),
-        closed=np.all(turned.closed, axis=1),
-        points=turn * POINTS * RADIAL_POINTS,
+        wall_pressure=scale * found.wall_pressure.mean(axis=1),
+        moment=density * disc.axial_width * found.moment.mean(axis=1),
+        moment_per_volume=density * found.moment_per_volume.mean(axis=1),
+        wall_pressure_ripple=scale * _first_harmonic(found.wall_pressure),
+        moment_ripple=density * disc.axial_width * _first_harmonic(found.moment),
+        closed=~is_open,
     )
 
 
@@ -114,59 +117,89 @@ def _first_harmonic(values: FloatArray) -> FloatArray:
     return np.asarray(2 / count * np.abs(values @ turn))
 
 
-def _along(disc: Disc, length: float, fills: FloatArray) -> _Turned:
-    outer, start = disc.outer_radius, surface_radius(disc=disc, fill_ratio=fills) ** 2
-    rise = length * disc.axial_width * _ABSCISSA[None, :]
-    target = liquid_area(disc=disc, surface_radius=np.sqrt(start))
-    weight = _WEIGHT[None, :] / 2
-    square = start.copy()
-    for _ in range(NEWTON_STEPS):
-        radius = _held(disc, np.sqrt(np.maximum(square[:, None] + rise, 0.0)))
-        area = np.sum(weight * liquid_area(disc=disc, surface_radius=radius), axis=1)
-        square = square + (area - target) / np.sum(weight * half_angle(disc=disc, radius=radius), axis=1)
-    radius = _held(disc, np.sqrt(np.maximum(square[:, None] + rise, 0.0)))
-    alpha = half_angle(disc=disc, radius=radius)
-    centre = np.sum(weight * radius * np.sin(alpha), axis=1) / np.sum(weight * alpha, axis=1)
-    moment = np.sum(weight * liquid_first_moment(disc=disc, surface_radius=radius), axis=1)
-    return _Turned(
-        wall_pressure=(outer**2 - square)[:, None],
-        moment=moment[:, None],
-        moment_per_volume=centre[:, None],
-        closed=np.all(square[:, None] + rise < outer**2, axis=1)[:, None],
-    )
+@dataclass(frozen=True, kw_only=True)
+class _Search:
+    """b^2 or c^2, by Newton's method or, where dry parts of the wall make kinks, by halving its bounds."""
+
+    value: FloatArray
+    low: FloatArray
+    high: FloatArray
+    halved: bool
+
+    def narrowed(self, excess: FloatArray, opening: FloatArray) -> _Search:
+        """After the liquid's area exceeded its target by `excess`, which falls with b^2 like `opening`."""
+        if not self.halved:
+            return replace(self, value=self.value + excess / opening)
+        low = np.where(excess > 0, self.value, self.low)
+        high = np.where(excess > 0, self.high, self.value)
+        return replace(self, value=(low + high) / 2, low=low, high=high)
 
 
 def _held(disc: Disc, radius: FloatArray) -> FloatArray:
-    """Within what the chamber's formulas take; a surface beyond the wall or the hub is flagged by
-    `closed`."""
+    """Within what the chamber's formulas take."""
     return np.asarray(np.clip(radius, disc.plate_thickness * 1.001 + 1e-12, disc.outer_radius))
 
 
-def _across(disc: Disc, length: float, fills: FloatArray, turn: int) -> _Turned:
+def _along(disc: Disc, length: float, fills: FloatArray, cut: bool) -> _Turned:
+    abscissa, weights = _RULES[cut]
+    outer, start = disc.outer_radius, surface_radius(disc=disc, fill_ratio=fills) ** 2
+    rise, weight = length * disc.axial_width * abscissa[None, :], weights[None, :] / 2
+    target = liquid_area(disc=disc, surface_radius=np.sqrt(start))
+    reach = length * disc.axial_width + outer**2 * 1e-12
+    search = _Search(value=start, low=start - reach, high=start + reach, halved=cut)
+
+    def surface() -> tuple[FloatArray, FloatArray]:
+        """Radius, and half-angle where it is wet."""
+        radius = _held(disc, np.sqrt(np.maximum(search.value[:, None] + rise, 0.0)))
+        return radius, np.where(radius < outer, half_angle(disc=disc, radius=radius), 0.0)
+
+    for _ in range(_STEPS[cut]):
+        radius, alpha = surface()
+        area = np.sum(weight * liquid_area(disc=disc, surface_radius=radius), axis=1)
+        search = search.narrowed(area - target, np.sum(weight * alpha, axis=1))
+    radius, alpha = surface()
+    level = search.value[:, None] + rise
+    moment = np.sum(weight * liquid_first_moment(disc=disc, surface_radius=radius), axis=1)
+    return _Turned(
+        wall_pressure=np.sum(weight * np.maximum(outer**2 - level, 0.0), axis=1)[:, None],
+        moment=moment[:, None],
+        moment_per_volume=(np.sum(weight * radius * np.sin(alpha), axis=1) / np.sum(weight * alpha, axis=1))[
+            :, None
+        ],
+        closed=np.all(level < outer**2, axis=1)[:, None],
+    )
+
+
+def _across(disc: Disc, length: float, fills: FloatArray, turn: int, cut: bool) -> _Turned:
+    abscissa, weights = _RULES[cut]
     outer, start = disc.outer_radius, surface_radius(disc=disc, fill_ratio=fills)
     psi = (2 * np.pi * np.arange(turn) / turn)[None, :, None]
-    eta, weight = _ABSCISSA[None, None, :], _WEIGHT[None, None, :] / 2
+    eta, weight = abscissa[None, None, :], weights[None, None, :] / 2
     target = liquid_area(disc=disc, surface_radius=start)[:, None]
-    radius = np.broadcast_to(start[:, None, None], (fills.size, turn, POINTS)).copy()
+    radius = np.broadcast_to(start[:, None, None], (fills.size, turn, weights.size)).copy()
     # b^2, started from the first order in g/omega^2.
     alpha = half_angle(disc=disc, radius=start)[:, None]
-    square = (start[:, None] + length * np.sin(alpha) / alpha * np.cos(psi[..., 0])) ** 2
-    for _ in range(NEWTON_STEPS):
+    first = (start[:, None] + length * np.sin(alpha) / alpha * np.cos(psi[..., 0])) ** 2
+    reach = length**2 + 2 * outer * length + outer**2 * 1e-12
+    middle = np.broadcast_to(start[:, None] ** 2, first.shape)
+    search = _Search(value=first, low=middle - reach, high=middle + reach, halved=cut)
+    for _ in range(_STEPS[cut]):
         for _ in range(3):
             level, slope = _level(disc, length, radius, eta, psi)
-            radius = _held(disc, radius - (level - square[..., None]) / slope)
-        opening = 2 * half_angle(disc=disc, radius=radius) * radius / slope
+            radius = _held(disc, radius - (level - search.value[..., None]) / slope)
+        opening = np.where(radius < outer, 2 * half_angle(disc=disc, radius=radius) * radius / slope, 0.0)
         area = np.sum(weight * liquid_area(disc=disc, surface_radius=radius), axis=2)
-        square = square + (area - target) / np.sum(weight * opening, axis=2)
+        search = search.narrowed(area - target, np.sum(weight * opening, axis=2))
     _, slope = _level(disc, length, radius, eta, psi)
-    share = weight * half_angle(disc=disc, radius=radius) * radius / slope
-    place = radius * np.cos(eta * half_angle(disc=disc, radius=radius))
+    half = half_angle(disc=disc, radius=radius)
+    share = np.where(radius < outer, weight * half * radius / slope, 0.0)
     wall = outer**2 + 2 * outer * length * np.cos(eta * half_angle(disc=disc, radius=outer) - psi) + length**2
+    depth = wall - search.value[..., None]
     return _Turned(
-        wall_pressure=np.sum(weight * wall, axis=2) - square,
+        wall_pressure=np.sum(weight * np.maximum(depth, 0.0), axis=2),
         moment=np.sum(weight * _moment_on_rays(disc, radius, eta), axis=2),
-        moment_per_volume=np.sum(share * place, axis=2) / np.sum(share, axis=2),
-        closed=np.all(wall > square[..., None], axis=2),
+        moment_per_volume=np.sum(share * radius * np.cos(eta * half), axis=2) / np.sum(share, axis=2),
+        closed=np.all(depth > 0, axis=2),
     )
 
 

@@ -11,7 +11,6 @@ import numpy as np
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.physics import deferred
 from ringbalance.physics.pressure.ring import RingQuantities
-from ringbalance.reduced_model.chamber.gravity_series import second_order
 from ringbalance.reduced_model.chamber.inputs import chamber_closed_forms
 from ringbalance.reduced_model.chamber.scene_ring import scene_ring
 from ringbalance.reduced_model.chamber.tilted_ring import tilted_ring
@@ -43,8 +42,6 @@ class ChamberValues:
 def by_paper(scene: Scene, fill: float) -> ChamberValues:
     """Eqs. 3, 4, 7 and 12, and lambda = 72 mm.
 
-    Args: `fill`: x.
-    Returns: ChamberValues without any ripple.
     Source: the liquid-ring paper.
     """
     disc, rho = scene.disc, scene.liquid.density
@@ -79,26 +76,9 @@ def by_closed_form(scene: Scene, fill: float) -> ChamberValues:
     )
 
 
-def by_series(scene: Scene, fill: float) -> ChamberValues:
-    """The closed form with gravity's ripple to first order and its means to second.
-
-    Args: `fill`: x.
-    Source: `second_order`.
-    """
-    base, more = by_closed_form(scene, fill), second_order(scene=scene, fill_ratio=fill)
-    return ChamberValues(
-        wall_pressure=base.wall_pressure + more.wall_pressure,
-        wall_pressure_ripple=more.wall_pressure_ripple,
-        moment=base.moment + more.moment,
-        moment_ripple=more.moment_ripple,
-        moment_per_mass=base.moment_per_mass + more.moment_per_mass,
-    )
-
-
 def by_quadrature(scene: Scene, fill: float) -> ChamberValues:
     """The tilted free surface found, and integrated over, without a mesh.
 
-    Args: `fill`: x.
     Returns: ChamberValues, exact for liquid at rest in the rotating frame at every instant.
     Source: `tilted_ring`.
     """
@@ -122,11 +102,9 @@ def by_quadrature(scene: Scene, fill: float) -> ChamberValues:
 def by_elements(scene: Scene, fill: float, *, cells: tuple[int, ...], gravity: bool) -> ChamberValues:
     """Finite elements on a mesh and the two coarser ones that its grid convergence needs.
 
-    Args: `fill`: x. `cells`: of the finest mesh. `gravity`: whether gravity is in.
-    Returns: ChamberValues of the finest mesh.
     Source: `ring_quantities`.
     """
-    found = elements_at(scene, fill, cells=cells, gravity=gravity)
+    found = _elements_at(scene, fill, cells=cells, gravity=gravity)
     return ChamberValues(
         wall_pressure=float(found.wall_pressure.value[0]),
         wall_pressure_ripple=float(found.ripple["wall_pressure"][0]),
@@ -141,12 +119,11 @@ def with_sloshing(
 ) -> ChamberValues:
     """Values of a quasi-static model with its ripples as the swinging liquid makes them.
 
-    Args: `fill`: x.
     Returns: ChamberValues; the ripples times their amplifications.
     Source: `sloshing_response`.
     """
     found = still(scene, fill)
-    of_pressure, of_moment = sloshing_factors(scene, fill)
+    of_pressure, of_moment = _sloshing_factors(scene, fill)
     return replace(
         found,
         wall_pressure_ripple=of_pressure * found.wall_pressure_ripple,
@@ -156,24 +133,20 @@ def with_sloshing(
 
 def forget_solves() -> None:
     """Do every solve again when it is next asked for, so that it can be timed."""
-    elements_at.cache_clear()
-    sloshing_factors.cache_clear()
+    _elements_at.cache_clear()
+    _sloshing_factors.cache_clear()
 
 
 def sloshing_meshes(scene: Scene) -> tuple[tuple[int, int], ...]:
-    """Meshes on which the swinging liquid is solved, finest first: half as fine as for frequencies.
-
-    Returns: Cells along the radius and the angle.
-    """
+    """Meshes on which the swinging liquid is solved, finest first: half as fine as for frequencies."""
     radial, angular = default_cells(disc=scene.disc)
     return tuple((radial // k, angular // k) for k in (1, 2, 4))
 
 
 @lru_cache(maxsize=256)
-def sloshing_factors(scene: Scene, fill: float) -> tuple[float, float]:
+def _sloshing_factors(scene: Scene, fill: float) -> tuple[float, float]:
     """How much the swinging liquid enlarges gravity's ripples, by finite elements.
 
-    Args: `fill`: x, above zero.
     Returns: Amplifications of the wall pressure and of the moment.
     Source: `sloshing_response`.
     """
@@ -189,11 +162,7 @@ def sloshing_factors(scene: Scene, fill: float) -> tuple[float, float]:
 
 
 @lru_cache(maxsize=256)
-def elements_at(scene: Scene, fill: float, *, cells: tuple[int, ...], gravity: bool) -> RingQuantities:
-    """The finite elements of `by_elements`, with all they tell.
-
-    Args: `fill`: x. `cells`: of the finest mesh. `gravity`: whether gravity is in.
-    Returns: RingQuantities at one fill ratio.
-    """
+def _elements_at(scene: Scene, fill: float, *, cells: tuple[int, ...], gravity: bool) -> RingQuantities:
+    """The finite elements of `by_elements`, with all they tell."""
     meshes = tuple(tuple(max(1, n // k) for n in cells) for k in (1, 2, 4))
     return scene_ring(scene, fill_ratio=[fill], gravity=gravity, cells=meshes)

@@ -53,10 +53,7 @@ def range_contributions(scene: Scene) -> Mapping[str, Mapping[str, Contribution]
 
 
 def mean_gravity(scene: Scene) -> float:
-    """Estimated contribution of gravity to the means over a turn, wall pressure or moment.
-
-    Source: second order in g/(omega^2 a).
-    """
+    """Estimated contribution of gravity to the means over a turn, wall pressure or moment."""
     found = range_contributions(scene)
     return max(found[part][MEAN].value or 0.0 for part in ("pressures", "moments"))
 

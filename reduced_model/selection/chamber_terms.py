@@ -9,8 +9,7 @@ import numpy as np
 
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_area, surface_radius
-from ringbalance.reduced_model.chamber.gravity_series import second_order
-from ringbalance.reduced_model.chamber.values import ChamberValues, by_closed_form
+from ringbalance.reduced_model.chamber.values import by_closed_form, by_quadrature
 from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.reduced_model.selection.contribution import Contribution
 from ringbalance.scene.arrays import FloatArray
@@ -21,7 +20,6 @@ Terms = Mapping[str, Contribution]
 PLATES: Final = "plates between the chambers"
 RIPPLE: Final = "gravity, ripple at 1x"
 MEAN: Final = "gravity, mean over a turn"
-HIGHER: Final = "gravity, higher orders"
 SLOSHING: Final = "sloshing at 1x"
 COARSE_MESH: Final = "coarse mesh"
 FINE_MESH: Final = "fine mesh"
@@ -143,42 +141,32 @@ def chamber_contributions(scene: Scene, fills: FloatArray) -> Mapping[str, Terms
 
 
 def _at(scene: Scene, fill: float) -> Mapping[str, Mapping[str, float]]:
-    base, more = by_closed_form(scene, fill), second_order(scene=scene, fill_ratio=fill)
-    a = float(surface_radius(disc=scene.disc, fill_ratio=fill))
-    alpha = float(half_angle(disc=scene.disc, radius=a))
-    tilt = scene.environment.gravity / (scene.rotor.speed**2 * a)
-    if scene.environment.shaft == "vertical":
-        tilt *= scene.disc.axial_width / (2 * a)
-    radial = scene.disc.plate_thickness / (a * alpha)
-
+    base = by_closed_form(scene, fill)
+    tilted = by_quadrature(scene, fill) if scene.environment.gravity else base
     factor = amplification(scene, fill)
 
     def gravity(ripple: float, mean: float, swing: float) -> dict[str, float]:
-        higher = mean * (tilt + radial) + ripple * tilt**2
-        return {RIPPLE: ripple, SLOSHING: ripple * swing, MEAN: mean, HIGHER: higher + tilt**4}
+        return {RIPPLE: ripple, SLOSHING: ripple * swing, MEAN: mean}
 
     return {
         "pressures": gravity(
-            more.wall_pressure_ripple / base.wall_pressure,
-            abs(more.wall_pressure) / base.wall_pressure,
+            tilted.wall_pressure_ripple / base.wall_pressure,
+            abs(tilted.wall_pressure / base.wall_pressure - 1),
             _CORIOLIS * max(1.0, factor),
         ),
         "moments": gravity(
-            more.moment_ripple / base.moment,
-            _moment_share(base, more.moment, more.moment_per_mass),
+            tilted.moment_ripple / base.moment,
+            max(
+                abs(tilted.moment / base.moment - 1),
+                abs(tilted.moment_per_mass / base.moment_per_mass - 1),
+            ),
             abs(factor - 1) + _SWING_FLOOR,
         ),
     }
 
 
-def _moment_share(base: ChamberValues, moment: float, per_mass: float) -> float:
-    return max(abs(moment) / base.moment, abs(per_mass) / base.moment_per_mass)
-
-
 def _terms(scene: Scene, rows: list[Mapping[str, float]], part: str) -> Terms:
-    largest = {
-        name: max((row[name] for row in rows), default=0.0) for name in (RIPPLE, SLOSHING, MEAN, HIGHER)
-    }
+    largest = {name: max((row[name] for row in rows), default=0.0) for name in (RIPPLE, SLOSHING, MEAN)}
     disc, cells = scene.disc, default_cells(disc=scene.disc)[1]
     bare = paper.sector_area(disc=disc) * disc.axial_width
     strips = 1 - chamber_volume(disc=disc) / bare
@@ -195,8 +183,12 @@ def _terms(scene: Scene, rows: list[Mapping[str, float]], part: str) -> Terms:
             f"ripple times {swing}, s^2 = k tanh(k ln(R2/a)), k = pi/theta",
             f"lowest mode of a chamber {force}, driven at 1x",
         ),
-        (MEAN, largest[MEAN], "order (G/a)^2", "second order of the same surface, mean over a turn"),
-        (HIGHER, largest[HIGHER], "second order times (G/a + t/(a alpha)), and (G/a)^4", "remainder"),
+        (
+            MEAN,
+            largest[MEAN],
+            "order (G/a)^2, by quadrature",
+            "the same surface, mean over a turn",
+        ),
         (
             COARSE_MESH,
             mesh_error(scene, max(4, cells // 2)),

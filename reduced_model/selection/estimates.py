@@ -133,7 +133,7 @@ def _chamber(scene: Scene) -> dict[str, TermEstimate]:
         (
             GRAVITY,
             mean_gravity(scene),
-            "second order in g/(omega^2 a) at the worst fill of the range",
+            "free surface |r + g/omega^2| = b against a concentric one, at the worst fill of the range",
             None,
         ),
         (

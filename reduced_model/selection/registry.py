@@ -12,7 +12,6 @@ from types import MappingProxyType
 from typing import Final, Literal
 
 from ringbalance.mesh.geometry import chamber_volume
-from ringbalance.reduced_model.chamber.gravity_choice import gravity_choice
 from ringbalance.reduced_model.chamber.values import by_closed_form
 from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.reduced_model.selection.chamber_range import mean_gravity
@@ -181,8 +180,7 @@ def _plates(term: Term, scene: Scene, _: TermEstimate) -> Selection:
 
 
 def _gravity(term: Term, scene: Scene, _: TermEstimate) -> Selection:
-    choice = gravity_choice(scene=scene, share=mean_gravity(scene))
-    return term.models[choice.modelled], choice.told
+    return term.models[mean_gravity(scene) > scene.tolerance], ""
 
 
 def _sloshing(term: Term, scene: Scene, estimate: TermEstimate) -> Selection:

@@ -215,13 +215,7 @@ def _on_velocity(loss: Contribution) -> Contribution:
 
 
 def _closed(scene: Scene, fills: np.ndarray) -> np.ndarray:
-    closed = closed_ring(
-        disc=scene.disc,
-        angular_velocity=scene.rotor.speed,
-        gravity=scene.environment.gravity,
-        vertical=scene.environment.shaft == "vertical",
-        fill_ratio=fills,
-    )
+    closed = closed_ring(scene, fills)
     return np.asarray(fills[closed])
 
 

@@ -13,15 +13,15 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from rotating_friction_table import columns, run_column, settings_hash
+from rotating_friction_table import columns, run_column, settings_hash, table_settings
 
 from ringbalance.physics.results import Status, StatusCode
-from ringbalance.physics.tube.rotation_grid import slow_first, table_settings
 from ringbalance.physics.tube.rotation_table import (
     friction_table,
     ito_nanbu_laminar,
     rotating_friction_ratio,
     rotation_table_covers,
+    slow_first,
 )
 from ringbalance.verification.navier_stokes.continuation import StepRule, follow
 from ringbalance.verification.navier_stokes.newton import FlowSolution, FlowSystem, NewtonSettings

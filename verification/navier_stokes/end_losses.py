@@ -36,16 +36,6 @@ from ringbalance.verification.navier_stokes.newton import (
 from ringbalance.verification.navier_stokes.space import taylor_hood
 from ringbalance.verification.navier_stokes.transfer import probe
 
-__all__ = [
-    "EndMesh",
-    "end_loss_times_reynolds",
-    "end_mesh",
-    "end_system",
-    "entry_length",
-    "graded_line",
-    "solve_end",
-]
-
 End = Literal["entrance", "exit"]
 
 DEVELOPED_SLOPE = 32.0
@@ -72,11 +62,10 @@ class EndMesh:
     """Longest cell along the axis of the reservoir, at two cells per fold."""
 
 
-def graded_line(*, length: float, longest: float, cells: EndMesh) -> FloatArray:
+def _graded_line(*, length: float, longest: float, cells: EndMesh) -> FloatArray:
     """Vertices from 0 to a length whose cells grow geometrically from the edge cell up to the longest one.
 
-    Args: `longest`: cell allowed, at two cells per fold. `cells`: grading.
-    Returns: Vertices, first 0, last the length.
+    Args: `longest`: cell allowed, at two cells per fold.
     """
     growth = np.exp(1 / cells.cells_per_fold)
     limit = 2 * longest / cells.cells_per_fold
@@ -88,7 +77,7 @@ def graded_line(*, length: float, longest: float, cells: EndMesh) -> FloatArray:
 
 
 def _line(length: float, longest: float, cells: EndMesh) -> FloatArray:
-    return with_midpoints(vertices=graded_line(length=length, longest=longest, cells=cells))
+    return with_midpoints(vertices=_graded_line(length=length, longest=longest, cells=cells))
 
 
 def end_mesh(*, cells: EndMesh, end: End) -> Any:

@@ -33,9 +33,6 @@ from ringbalance.verification.navier_stokes.rotating_section import (
 )
 from ringbalance.verification.navier_stokes.space import FlowSpace, at_points, stiffness_entries, taylor_hood
 
-__all__ = ["EndFlow", "SectionFlow", "entrance_flow", "exit_flow", "section_flow"]
-
-
 LARGEST_KL: Final = 1e6
 """R Re up to which the section is drawn; near it further steady flows appear."""
 LARGEST_ROTATION: Final = 1e4
@@ -161,7 +158,6 @@ def _in_plane_stream_function(system: FlowSystem, flow: FlowSolution) -> FloatAr
 def section_flow(*, reynolds: float, rotation_reynolds: float) -> SectionFlow:
     """Developed laminar flow in the section of a tube that turns about an axis across it.
 
-    Args: `reynolds`: Re = U d/nu, above zero. `rotation_reynolds`: R = omega d^2/nu, zero or more.
     Returns: The flow over the whole disc; beyond R Re = 1e6 or R = 1e4 the nearest flow of the same R/Re, its
         status OUT_OF_RANGE.
     Raises: ValueError: an argument that is not finite or out of its bounds.
@@ -224,7 +220,6 @@ def _check(value: float, name: str, *, above: bool) -> None:
 def entrance_flow(*, reynolds: float) -> EndFlow:
     """Laminar flow from a large reservoir into a sharp-edged tube.
 
-    Args: `reynolds`: Re = U d/nu, above zero.
     Returns: The flow near the mouth; beyond Re = 2000 the one there, its status OUT_OF_RANGE.
     Raises: ValueError: an argument that is not finite or not above zero.
     Raises: ArithmeticError: the flow was not found.
@@ -239,7 +234,6 @@ def entrance_flow(*, reynolds: float) -> EndFlow:
 def exit_flow(*, reynolds: float) -> EndFlow:
     """Laminar developed flow from a sharp-edged tube into a large reservoir.
 
-    Args: `reynolds`: Re = U d/nu, above zero.
     Returns: The flow near the mouth; beyond Re = 2000 the one there, its status OUT_OF_RANGE.
     Raises: ValueError: an argument that is not finite or not above zero.
     Raises: ArithmeticError: the flow was not found.
@@ -303,11 +297,7 @@ def _meridional_stream_function(system: FlowSystem, flow: FlowSolution) -> Float
 
 
 def nodal_pressure(*, space: FlowSpace, pressure: FloatArray) -> FloatArray:
-    """The linear pressure at all nodes of the velocity.
-
-    Args: `pressure`: nodal, shape (pressure nodes,).
-    Returns: Shape (velocity nodes,).
-    """
+    """The linear pressure at all nodes of the velocity."""
     basis: Any = space.pressure
     at = np.asarray(space.velocity.elem.doflocs, dtype=np.float64).T
     shape = np.stack([np.broadcast_to(basis.elem.lbasis(at, i)[0], at.shape[1]) for i in range(basis.Nbfun)])

@@ -44,18 +44,14 @@ class _Face:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class LayeredFactors:
+class _LayeredFactors:
     """Factors of a matrix whose unknowns lie in slabs and on the faces between them."""
 
     slabs: tuple[_Slab, ...]
     faces: tuple[_Face, ...]
 
     def solve(self, right: FloatArray) -> FloatArray:
-        """Solution of A x = b.
-
-        Args: `right`: b, shape (n,).
-        Returns: x, shape (n,).
-        """
+        """Solution of A x = b."""
         x = np.array(right, dtype=np.float64)
         for slab in self.slabs:
             x[slab.own] = _solved(slab.factors, x[slab.own])
@@ -95,8 +91,7 @@ def layers_of(*, slab: IntArray, element_dofs: IntArray, size: int) -> IntArray:
     """Layer of every unknown: 2 k inside slab k, 2 k + 1 on the face between slabs k and k + 1.
 
     Args: `slab`: number of the slab, by element, shape (elements,). `element_dofs`: unknowns of the elements,
-        shape (local, elements). `size`: number of unknowns.
-    Returns: Shape (size,).
+        shape (local, elements).
     Raises: ValueError: an unknown shared by slabs that are not neighbours.
     """
     low, high = np.full(size, np.iinfo(np.int64).max), np.full(size, -1)
@@ -119,7 +114,7 @@ def _eliminated(
     return kept, np.asarray(from_faces.toarray() @ solved).reshape(sum(sizes), sum(sizes))
 
 
-def factorize_layers(*, matrix: Any, layers: IntArray) -> LayeredFactors:
+def factorize_layers(*, matrix: Any, layers: IntArray) -> _LayeredFactors:
     """Factors of a matrix, slab by slab.
 
     Args: `matrix`: sparse, square; odd layers couple over two layers at most, even ones with their
@@ -145,7 +140,7 @@ def factorize_layers(*, matrix: Any, layers: IntArray) -> LayeredFactors:
         pending = rows[after][:, after].toarray() - taken[split:, split:]
         if faces:
             pending -= faces[-1].behind @ faces[-1].ahead
-    return LayeredFactors(slabs=tuple(slabs), faces=tuple(faces))
+    return _LayeredFactors(slabs=tuple(slabs), faces=tuple(faces))
 
 
 def _face(

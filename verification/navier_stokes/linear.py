@@ -31,8 +31,6 @@ class Factors:
     def solve(self, right: FloatArray) -> FloatArray:
         """Solution of A x = b, refined; factors with partial pivoting replace the sparse ones if they must.
 
-        Args: `right`: b, shape (n,).
-        Returns: x, shape (n,).
         Raises: RuntimeError: the matrix is singular.
         """
         x, gap = _refined(self.matrix, self.factors, right)

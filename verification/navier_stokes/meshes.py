@@ -34,11 +34,7 @@ class Patch:
 
 
 def with_midpoints(*, vertices: npt.ArrayLike) -> FloatArray:
-    """Nodes of quadratic cells on a line: the vertices with their midpoints between them.
-
-    Args: `vertices`: increasing, shape (n + 1,).
-    Returns: Shape (2 n + 1,).
-    """
+    """Nodes of quadratic cells on a line: the vertices with their midpoints between them."""
     v = np.asarray(vertices, dtype=np.float64)
     nodes = np.empty(2 * v.size - 1)
     nodes[::2] = v
@@ -50,7 +46,6 @@ def geometric_vertices(*, cells: int, ratio: float) -> FloatArray:
     """Vertices on [0, 1] whose cells grow by one factor from the first to the last.
 
     Args: `cells`: number of cells, at least 1. `ratio`: last cell over first cell; 1 is uniform.
-    Returns: Shape (cells + 1,), from 0 to 1.
     """
     growth = np.linspace(0.0, 1.0, cells) if cells > 1 else np.zeros(1)
     lengths = ratio**growth

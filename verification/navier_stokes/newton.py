@@ -264,7 +264,6 @@ def wall_torque(
 
     T = -sum over nodes of [(x - x0) R_y - (y - y0) R_x]; needs the stress form when the wall moves.
     Args: `boundary`: name of a boundary whose velocity is given. `centre`: (x0, y0).
-    Returns: Torque per unit depth.
     """
     nodes = system.space.boundary_nodes(boundary)
     x, y = system.space.node_coordinates()[:, nodes] - np.asarray(centre)[:, None]

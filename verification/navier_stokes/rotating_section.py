@@ -37,16 +37,6 @@ from ringbalance.verification.navier_stokes.newton import (
 )
 from ringbalance.verification.navier_stokes.space import taylor_hood
 
-__all__ = [
-    "SectionMesh",
-    "friction_ratio",
-    "section_mesh",
-    "section_system",
-    "solve_section",
-    "solve_section_without_inertia",
-]
-
-
 POISEUILLE_GRADIENT = 32.0
 """G of a tube at rest: -dp/dx d^2/(mu U)."""
 CORIOLIS = ((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (-1.0, 0.0, 0.0))
@@ -104,10 +94,7 @@ def section_mesh(*, cells: SectionMesh) -> Any:
 
 
 def section_system(*, cells: SectionMesh) -> FlowSystem:
-    """Discrete equations of the half section: no slip at the wall, mirror symmetry about z = 0.
-
-    Returns: The system, to be solved by `solve_section`.
-    """
+    """Discrete equations of the half section: no slip at the wall, mirror symmetry about z = 0."""
     space = taylor_hood(mesh=section_mesh(cells=cells), components=3)
     conditions = [Dirichlet(boundary="symmetry", component=1)]
     conditions += [Dirichlet(boundary="wall", component=c) for c in range(3)]
@@ -127,8 +114,7 @@ def solve_section(
     The in-plane velocity is measured in nu/d: Re and R then enter through Kl and S alone, and S may be zero.
 
         u w_y + v w_z - 2 S u = G + lap w,    u u_y + v u_z + 2 Kl w = -p_y + lap u,    ...
-    Args: `kl`: Kl, at least 0. `s`: S, at least 0. `start`: a neighbouring flow; needed once Kl exceeds a few
-        thousand. `settings`: of Newton's method.
+    Args: `start`: a neighbouring flow; needed once Kl exceeds a few thousand. `settings`: of Newton's method.
     Returns: The flow; nodal velocity components along (y, z) over nu/d, and along x over U.
     """
     rotation = ((0.0, 0.0, 2 * kl), (0.0, 0.0, 0.0), (2 * s, 0.0, 0.0))
@@ -140,7 +126,6 @@ def solve_section(
 def solve_section_without_inertia(*, system: FlowSystem, rotation_reynolds: float) -> FlowSolution:
     """Fully developed flow in the rotating tube in the limit Re = 0, where it is linear.
 
-    Args: `rotation_reynolds`: R = omega d^2/nu.
     Returns: The flow; nodal velocity components along (y, z, x) over U.
     """
     c = Coefficients(inertia=0.0, viscosity=1.0, rotation=2 * rotation_reynolds)
@@ -152,6 +137,5 @@ def friction_ratio(solution: FlowSolution) -> float:
     """F = G/32, the pressure gradient over that of the tube at rest at the same flow rate.
 
     Args: `solution`: of the section, made dimensionless with bore and mean velocity.
-    Returns: F, dimensionless.
     """
     return solution.driving_gradient / POISEUILLE_GRADIENT

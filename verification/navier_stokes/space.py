@@ -40,7 +40,7 @@ def _scattered(where: IntArray, values: FloatArray, size: int) -> FloatArray:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ScalarPattern:
+class _ScalarPattern:
     """Where the entries of a scalar element matrix go in its assembled matrix."""
 
     rows: IntArray
@@ -52,7 +52,6 @@ class ScalarPattern:
         """Sum element matrices into the entries of the assembled matrix.
 
         Args: `element_matrices`: shape (elements, rows * cols).
-        Returns: Shape (entries,).
         """
         return np.asarray(
             np.bincount(self.slot, weights=element_matrices.ravel(), minlength=self.rows.size),
@@ -85,8 +84,8 @@ class FlowSpace:
     """Their reference derivatives, shape (k, local, points)."""
     pressure_shape: FloatArray
     """Pressure shape functions, shape (local, points)."""
-    velocity_pattern: ScalarPattern
-    coupling_pattern: ScalarPattern
+    velocity_pattern: _ScalarPattern
+    coupling_pattern: _ScalarPattern
     """Rows pressure, columns velocity."""
 
     @property
@@ -112,7 +111,6 @@ class FlowSpace:
     def boundary_nodes(self, name: str) -> IntArray:
         """Velocity nodes on a named boundary.
 
-        Returns: Node numbers.
         Raises: ValueError: the mesh has no such boundary.
         """
         if name not in (self.mesh.boundaries or {}):
@@ -125,12 +123,12 @@ class FlowSpace:
         return np.asarray(self.velocity.doflocs, dtype=np.float64)
 
 
-def _pattern(row_dofs: IntArray, col_dofs: IntArray, columns: int) -> ScalarPattern:
+def _pattern(row_dofs: IntArray, col_dofs: IntArray, columns: int) -> _ScalarPattern:
     rows = np.repeat(row_dofs.T[:, :, None], col_dofs.shape[0], axis=2)
     cols = np.repeat(col_dofs.T[:, None, :], row_dofs.shape[0], axis=1)
     key = rows.astype(np.int64).ravel() * columns + cols.ravel()
     unique, slot = np.unique(key, return_inverse=True)
-    return ScalarPattern(rows=unique // columns, cols=unique % columns, slot=slot.ravel().astype(np.int64))
+    return _ScalarPattern(rows=unique // columns, cols=unique % columns, slot=slot.ravel().astype(np.int64))
 
 
 def _tables(element: Any, points: FloatArray, local: int) -> tuple[FloatArray, FloatArray]:
@@ -146,7 +144,6 @@ def taylor_hood(*, mesh: Any, components: int | None = None, axisymmetric: bool 
     Args: `mesh`: scikit-fem mesh of triangles, quadrilaterals, tetrahedra or hexahedra, straight or
         quadratic. `components`: velocity components, at least the mesh's dimension; default equal to it.
         `axisymmetric`: read the coordinates as (x, r) and the components as (u_x, u_r).
-    Returns: The space with its tables.
     Raises: ValueError: fewer components than dimensions, or an axisymmetric mesh that is not plane.
     Source: Taylor and Hood, Comput. Fluids 1 (1973) 73.
     """
@@ -206,16 +203,12 @@ def mass_entries(space: FlowSpace, coefficient: FloatArray) -> FloatArray:
     """Assembled entries of the form integral(coefficient N_i N_j).
 
     Args: `coefficient`: at the quadrature points, shape (elements, points).
-    Returns: Entries in the order of `velocity_pattern`.
     """
     return space.velocity_pattern.assemble(_contract(space.weights * coefficient, mass_table(space)))
 
 
 def stiffness_entries(space: FlowSpace) -> FloatArray:
-    """Assembled entries of integral(grad N_i . grad N_j).
-
-    Returns: Entries in the order of `velocity_pattern`.
-    """
+    """Assembled entries of integral(grad N_i . grad N_j)."""
     metric = np.einsum("eq,kdeq,ldeq->kleq", space.weights, space.inverse, space.inverse)
     return space.velocity_pattern.assemble(_contract(metric, _outer(space.slope, space.slope)))
 
@@ -223,19 +216,14 @@ def stiffness_entries(space: FlowSpace) -> FloatArray:
 def cross_entries(space: FlowSpace, row: int, col: int) -> FloatArray:
     """Assembled entries of integral(dN_i/dx_col dN_j/dx_row): the transposed gradient of the stress form.
 
-    Args: `row`: component of the momentum equation. `col`: component of the velocity.
-    Returns: Entries in the order of `velocity_pattern`.
+    Args: `row`: component of the momentum equation.
     """
     product = np.einsum("eq,keq,leq->kleq", space.weights, space.inverse[:, col], space.inverse[:, row])
     return space.velocity_pattern.assemble(_contract(product, _outer(space.slope, space.slope)))
 
 
 def divergence_entries(space: FlowSpace, component: int) -> FloatArray:
-    """Assembled entries of integral(psi_i dN_j/dx_component), plus psi_i N_j / r for u_r in (x, r).
-
-    Args: `component`: of the velocity.
-    Returns: Entries in the order of `coupling_pattern`.
-    """
+    """Assembled entries of integral(psi_i dN_j/dx_component), plus psi_i N_j / r for u_r in (x, r)."""
     coefficient = space.weights * space.inverse[:, component]
     entries = _contract(coefficient, _outer(space.pressure_shape[None], space.slope))
     if space.axisymmetric and component == 1:
@@ -245,20 +233,13 @@ def divergence_entries(space: FlowSpace, component: int) -> FloatArray:
 
 
 def pressure_mass_entries(space: FlowSpace) -> FloatArray:
-    """Assembled entries of integral(psi_i N_j), pressure against velocity shape functions.
-
-    Returns: Entries in the order of `coupling_pattern`.
-    """
+    """Assembled entries of integral(psi_i N_j), pressure against velocity shape functions."""
     table = _outer(space.pressure_shape[None], space.shape[None])
     return space.coupling_pattern.assemble(_contract(space.weights, table))
 
 
 def load_vector(space: FlowSpace, values: FloatArray) -> FloatArray:
-    """Integral of a function against every velocity shape function.
-
-    Args: `values`: at the quadrature points, shape (elements, points).
-    Returns: Shape (velocity nodes,).
-    """
+    """Integral of a function against every velocity shape function."""
     local = (space.weights * values) @ space.shape.T
     return _scattered(space.velocity.element_dofs.T.ravel(), local, space.velocity_nodes)
 
@@ -287,7 +268,6 @@ def nodal(space: FlowSpace, function: Callable[[FloatArray], FloatArray] | float
     """Values of a function at the velocity nodes.
 
     Args: `function`: of coordinates, shape (dimension, n), or a constant.
-    Returns: Shape (velocity nodes,).
     """
     at = space.node_coordinates()
     values = function(at) if callable(function) else function

@@ -244,11 +244,7 @@ def split(space: FlowSpace, vector: FloatArray) -> tuple[FloatArray, FloatArray]
 
 
 def linear_entries(system: FlowSystem, coefficients: Coefficients) -> FloatArray:
-    """Entries of the linear part of the equations.
-
-    Args: `coefficients`: of the momentum equation.
-    Returns: Entries in the system's order.
-    """
+    """Entries of the linear part of the equations."""
     count = system.space.components
     factors = np.broadcast_to(np.asarray(coefficients.rotation, dtype=np.float64), (count, count))
     turning = np.array([factors[block] for block in system.blocks])
@@ -272,7 +268,6 @@ def convection_vector(system: FlowSystem, vector: FloatArray) -> FloatArray:
     """Integral of (u . grad) u against every velocity shape function.
 
     Args: `vector`: shape (unknowns,).
-    Returns: Shape (unknowns,).
     """
     space = system.space
     u, gradient = at_points(space, split(space, vector)[0])
@@ -284,11 +279,7 @@ def convection_vector(system: FlowSystem, vector: FloatArray) -> FloatArray:
 
 
 def convection_entries(system: FlowSystem, vector: FloatArray) -> FloatArray:
-    """Exact derivative of `convection_vector`: u . grad(du) + du . grad(u).
-
-    Args: `vector`: where to differentiate, shape (unknowns,).
-    Returns: Entries in the system's order.
-    """
+    """Exact derivative of `convection_vector`: u . grad(du) + du . grad(u)."""
     space, dim = system.space, system.space.dimension
     u, gradient = at_points(space, split(space, vector)[0])
     reference = np.einsum("eq,deq,kdeq->eqk", space.weights, u[:dim], space.inverse, optimize=True)

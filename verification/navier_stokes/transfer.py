@@ -54,7 +54,7 @@ def _outside(local: FloatArray, simplex: bool) -> FloatArray:
     return np.asarray(np.maximum(excess, 0.0), dtype=np.float64)
 
 
-def locate(*, space: FlowSpace, points: npt.ArrayLike) -> tuple[IntArray, FloatArray]:
+def _locate(*, space: FlowSpace, points: npt.ArrayLike) -> tuple[IntArray, FloatArray]:
     """Element and reference coordinates of points.
 
     Args: `points`: shape (dimension, n).
@@ -77,14 +77,13 @@ def probe(*, system: FlowSystem, solution: FlowSolution, points: npt.ArrayLike) 
     """Velocity and pressure at points.
 
     Args: `points`: shape (dimension, n), inside the mesh.
-    Returns: Shape (components + 1, n), pressure last.
     Raises: ValueError: a point outside the mesh.
     """
     return _evaluate(system.space, solution.vector, np.asarray(points, dtype=np.float64))
 
 
 def _evaluate(space: FlowSpace, vector: FloatArray, points: FloatArray) -> FloatArray:
-    element, local = locate(space=space, points=points)
+    element, local = _locate(space=space, points=points)
     velocity, pressure = split(space, vector)
     rows = []
     for basis, values in [(space.velocity, v) for v in velocity] + [(space.pressure, pressure)]:
@@ -94,11 +93,7 @@ def _evaluate(space: FlowSpace, vector: FloatArray, points: FloatArray) -> Float
 
 
 def transfer(*, source: FlowSystem, solution: FlowSolution, target: FlowSystem) -> FloatArray:
-    """A flow on another mesh of the same domain, as a start for Newton's method there.
-
-    Args: `target`: system on the other mesh.
-    Returns: Full vector of the target.
-    """
+    """A flow on another mesh of the same domain, as a start for Newton's method there."""
     space = target.space
     velocity = _evaluate(source.space, solution.vector, space.node_coordinates())[:-1]
     pressure_points = np.asarray(space.pressure.doflocs, dtype=np.float64)

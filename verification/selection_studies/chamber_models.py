@@ -21,7 +21,6 @@ from ringbalance.reduced_model.chamber.values import (
     by_elements,
     by_paper,
     by_quadrature,
-    by_series,
     forget_solves,
     sloshing_meshes,
     with_sloshing,
@@ -30,7 +29,6 @@ from ringbalance.reduced_model.selection.chamber_range import chamber_fills, cha
 from ringbalance.reduced_model.selection.chamber_terms import (
     COARSE_MESH,
     FINE_MESH,
-    HIGHER,
     MEAN,
     PLATES,
     RIPPLE,
@@ -147,7 +145,7 @@ def _fidelity(scene: Scene, fills: FloatArray, kind: _Kind, part: str, memo: Mem
 
 
 def _kinds(scene: Scene) -> tuple[_Kind, ...]:
-    pull = (RIPPLE, MEAN, HIGHER, SLOSHING)
+    pull = (RIPPLE, MEAN, SLOSHING)
     plain = (
         _kind("the paper's formula", "none", "left out", (PLATES, *pull), by_paper, formula=4),
         _kind("closed form", "exact", "left out", pull, by_closed_form, formula=30),
@@ -159,14 +157,6 @@ def _kinds(scene: Scene) -> tuple[_Kind, ...]:
     turns = _turns(scene)
     swing = () if scene.environment.shaft == "vertical" else (SLOSHING,)
     gravity = (
-        _kind(
-            "closed form, gravity to second order",
-            "exact",
-            "second order",
-            (HIGHER, *swing),
-            by_series,
-            formula=60,
-        ),
         _kind(
             "quadrature, gravity to all orders",
             "exact",
@@ -226,7 +216,7 @@ def _mesh_kind(scene: Scene, cells: tuple[int, ...], *, heavy: bool) -> _Kind:
     """Finite elements on a mesh and two coarser ones; with gravity when `heavy`."""
     fine = cells == default_cells(disc=scene.disc, dimension=len(cells))
     swing = () if scene.environment.shaft == "vertical" or scene.environment.gravity == 0 else (SLOSHING,)
-    lacks = (FINE_MESH if fine else COARSE_MESH, *swing, *(() if heavy else (RIPPLE, MEAN, HIGHER)))
+    lacks = (FINE_MESH if fine else COARSE_MESH, *swing, *(() if heavy else (RIPPLE, MEAN)))
     solves = _mesh_turns(scene) * GRAVITY_SWEEPS if heavy else 1
     unknowns = sum(float(np.prod([2 * (n // k) + 1 for n in cells])) for k in (1, 2, 4))
     named = " x ".join(str(n) for n in cells)

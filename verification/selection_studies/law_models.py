@@ -11,7 +11,7 @@ import numpy as np
 
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.chamber.gravity import closed_ring
-from ringbalance.reduced_model.chamber.values import by_closed_form, by_paper, by_quadrature, by_series
+from ringbalance.reduced_model.chamber.values import by_closed_form, by_paper, by_quadrature
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.reduced_model.paper import formulas as paper
@@ -25,15 +25,14 @@ from ringbalance.verification.selection_studies.hierarchy import Work
 
 EQ_12: Final = "Eq. 12"
 CLOSED: Final = "closed form"
-SERIES: Final = "closed form, gravity to second order"
 QUADRATURE: Final = "quadrature, gravity to all orders"
-LEVELS: Final = (EQ_12, CLOSED, SERIES, QUADRATURE)
+LEVELS: Final = (EQ_12, CLOSED, QUADRATURE)
 """In order of increasing cost."""
 SIPHON: Final = "always a full siphon"
 REGIMES: Final = "four regimes over the siphon crest"
 LEVEL_NODES: Final = 21
-_AT: Final = {EQ_12: by_paper, CLOSED: by_closed_form, SERIES: by_series, QUADRATURE: by_quadrature}
-_LEVEL_FORMULAS: Final = {EQ_12: 4, CLOSED: 30, SERIES: 60, QUADRATURE: 200}
+_AT: Final = {EQ_12: by_paper, CLOSED: by_closed_form, QUADRATURE: by_quadrature}
+_LEVEL_FORMULAS: Final = {EQ_12: 4, CLOSED: 30, QUADRATURE: 200}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,13 +73,7 @@ def levels_available(scene: Scene) -> tuple[str, ...]:
     if gravity == 0:
         return LEVELS[:2]
     fills = scene.disc.max_fill_ratio * np.linspace(0, 1, LEVEL_NODES)[1:]
-    closed = closed_ring(
-        disc=scene.disc,
-        angular_velocity=scene.rotor.speed,
-        gravity=gravity,
-        vertical=scene.environment.shaft == "vertical",
-        fill_ratio=fills,
-    )
+    closed = closed_ring(scene, fills)
     # The thinnest film is open under any gravity; what counts is where the chamber works.
     return LEVELS if bool(np.all(closed[2:])) else LEVELS[:2]
 
@@ -133,7 +126,7 @@ def _level_tables(scene: Scene, level: str) -> tuple[HermiteTable, HermiteTable]
         law = paper_law(scene).moment
         half = law.density * law.chamber_volume / 2
         moment = law.moment_per_transferred_mass * half * fills
-    if level in (SERIES, QUADRATURE):
+    if level == QUADRATURE:
         pressure, moment = _thin_film(scene, fills, pressure), _thin_film(scene, fills, moment, moment=True)
     return (
         table_from_samples(start=0.0, stop=largest, value=pressure),
@@ -143,13 +136,7 @@ def _level_tables(scene: Scene, level: str) -> tuple[HermiteTable, HermiteTable]
 
 def _thin_film(scene: Scene, fills: FloatArray, values: FloatArray, *, moment: bool = False) -> FloatArray:
     """Below the thinnest closed ring gravity's change fades in proportion to the fill."""
-    closed = closed_ring(
-        disc=scene.disc,
-        angular_velocity=scene.rotor.speed,
-        gravity=scene.environment.gravity,
-        vertical=scene.environment.shaft == "vertical",
-        fill_ratio=fills,
-    )
+    closed = closed_ring(scene, fills)
     if np.all(closed):
         return values
     first = int(np.max(np.flatnonzero(~closed))) + 1

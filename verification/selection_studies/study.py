@@ -17,7 +17,7 @@ from ringbalance.verification.selection_studies.choice import Choice, Values, ch
 from ringbalance.verification.selection_studies.choices import TOLERANCES, hierarchies_for
 from ringbalance.verification.selection_studies.cost import CostModel, committed_costs, fitted_costs
 from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy
-from ringbalance.verification.selection_studies.law_models import QUADRATURE, SERIES
+from ringbalance.verification.selection_studies.law_models import QUADRATURE
 from ringbalance.verification.selection_studies.measure import (
     Clock,
     Measured,
@@ -100,7 +100,7 @@ def thinned(hierarchy: ModelHierarchy) -> ModelHierarchy:
     """A model hierarchy without the models that lie close to others; choices are made on the whole one."""
 
     def kept(fidelity: Fidelity) -> bool:
-        close = fidelity.models.get("level of a chamber") in (SERIES, QUADRATURE)
+        close = fidelity.models.get("level of a chamber") == QUADRATURE
         return fidelity is hierarchy.top or not (
             close or fidelity.models.get("operation in time") == EXPLICIT[MANY]
         )

@@ -41,7 +41,6 @@ from ringbalance.verification.selection_studies.law_models import (
     EQ_12,
     QUADRATURE,
     REGIMES,
-    SERIES,
     SIPHON,
     LawModels,
     law_of,
@@ -60,7 +59,6 @@ LACKS_LOSS: Final[Mapping[str, tuple[str, ...]]] = {
 LACKS_LEVEL: Final[Mapping[str, tuple[str, ...]]] = {
     EQ_12: (LEVEL, GRAVITY),
     CLOSED: (GRAVITY,),
-    SERIES: (),
     QUADRATURE: (),
 }
 

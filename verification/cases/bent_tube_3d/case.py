@@ -11,7 +11,6 @@ import numpy as np
 
 from ringbalance.mesh.bent_tube import Segment
 from ringbalance.physics.convergence.grid import gci
-from ringbalance.physics.tube.bend_terms import bend_shift
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.physics.tube.numbers import rotation_reynolds_number
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
@@ -28,6 +27,7 @@ from ringbalance.verification.evidence import (
     figure,
 )
 from ringbalance.verification.navier_stokes.rotating_section import SectionMesh
+from ringbalance.verification.reference.bend_shift import bend_shift
 from ringbalance.verification.reference.bent_tube import BentTubeFlow, bent_tube_flow, pressure_loss
 
 REYNOLDS: Final = 200.0

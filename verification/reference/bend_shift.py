@@ -7,20 +7,15 @@ one to the right they oppose each other: the bend then costs less than the strai
 
 from __future__ import annotations
 
-from typing import Final
-
+from ringbalance.physics.tube.bends import MOMENTUM_FACTOR
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
-
-MOMENTUM_FACTOR: Final = 4 / 3
-"""Mean of u^2 over U^2 in Poiseuille flow."""
 
 
 def rotation_with_curvature(*, reynolds: float, rotation_reynolds: float, curvature: float) -> float:
     """Rotation Reynolds number of the straight tube in which liquid is driven aside as strongly.
 
     R' = R + (4/3) Re kappa d/2, from 2 omega' U = 2 omega U + mean(u^2) kappa.
-    Args: `reynolds`: Re. `rotation_reynolds`: R, zero or more. `curvature`: kappa d, of the path; positive
-        where it turns to the left, the sense of rotation.
+    Args: `curvature`: kappa d, of the path; positive where it turns to the left, the sense of rotation.
     Returns: R', negative where the curvature outweighs the rotation.
     Range: an estimate to first order in what the curvature adds.
     Source: balance of forces across the path.
@@ -34,8 +29,7 @@ def bend_shift(
     """What a bend adds to the rotating friction of its own arc, laminar.
 
     K = (64/Re) phi (r/d) (F(R') - F(R))
-    Args: `reynolds`: Re, above zero. `rotation_reynolds`: R, zero or more. `angle`: phi, rad. `radius`: r/d,
-        of the path. `with_rotation`: the path turns in the sense of the disc's rotation.
+    Args: `radius`: r/d, of the path. `with_rotation`: the path turns in the sense of the disc's rotation.
     Returns: K, negative where the bend turns against a rotation that outweighs it.
     Range: R well above Re d/r; the stream's recovery behind the bend is left out.
     Source: `rotation_with_curvature` with the table of friction ratios.

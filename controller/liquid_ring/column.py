@@ -113,6 +113,8 @@ class Column:
     """Whether liquid leaves only a chamber that has gas, as in the paper's Eq. 19."""
     gas_off: float
     """Gauge, Pa, at or below which a chamber counts as without gas in a tube without a crest."""
+    gas_factor: float = 1.0
+    """Gas pressure on the liquid over the one at the place of measurement, which all arguments are."""
 
     def steady(self, fills: tuple[float, float], gases: tuple[float, float], *, primed: bool) -> Steady:
         """Velocity without inertia, from fill ratios and gauge pressures (Pa) of chambers 0 and 1."""
@@ -129,8 +131,8 @@ class Column:
         self, fills: tuple[float, float], gases: tuple[float, float], direction: int = 1
     ) -> TubeEnds[float]:
         ends = TubeEnds(
-            upstream_gas=gases[0],
-            downstream_gas=gases[1],
+            upstream_gas=self.gas_factor * gases[0],
+            downstream_gas=self.gas_factor * gases[1],
             upstream_hydrostatic=self.hydrostatic(fills[0]),
             downstream_hydrostatic=self.hydrostatic(fills[1]),
             port_pressure=self.port_pressure,
@@ -215,6 +217,7 @@ def _calibrated(law: CalibratedLaw, tube: Tube, gas_off: float) -> Column:
         crest=law.path.crest if tables else None,
         one_way=False,
         gas_off=gas_off,
+        gas_factor=law.gas_factor,
     )
 
 

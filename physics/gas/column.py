@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.gas.supply import HEAT_CAPACITY_RATIO
+from ringbalance.scene.models import Scene
 
 AIR_CONSTANT: Final = 287.05
 """R of dry air, J/(kg K)."""
@@ -35,6 +37,22 @@ def nozzle_flow(*, pressure: float, area: float, temperature: float) -> float:
     gamma = HEAT_CAPACITY_RATIO
     shape: float = math.sqrt(gamma) * (2 / (gamma + 1)) ** ((gamma + 1) / (2 * (gamma - 1)))
     return pressure * area * shape * math.sqrt(AIR_CONSTANT * temperature)
+
+
+def pressure_factor(scene: Scene) -> float:
+    """Gauge pressure of the gas on the liquid over the one where the scene's pressure is measured.
+
+    Measured on the shaft's axis it is the column's ratio up to the surface at equal fills, for the driven
+    chamber and, because it vents to the same place, for the opposite one: p_abs f - p_a f = p f.
+    """
+    if scene.gas.measured_at == "chamber":
+        return 1.0
+    return column_ratio(
+        angular_velocity=scene.rotor.speed,
+        inner_radius=0.0,
+        outer_radius=float(surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio / 2)),
+        temperature=scene.gas.temperature,
+    )
 
 
 def normal_volume(*, pressure_volume: float, temperature: float) -> float:

@@ -11,12 +11,15 @@ import pytest
 
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.gas_use import gas_use
+from ringbalance.controller.liquid_ring.column import column_of
 from ringbalance.controller.liquid_ring.interval import Passage
 from ringbalance.controller.liquid_ring.motion import Dynamics
 from ringbalance.controller.liquid_ring.plant import LiquidRing, initial_state
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Event
 from ringbalance.controller.loop import simulate
+from ringbalance.mesh.geometry import surface_radius
+from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.gas_line import line_answers, line_text, line_warning
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.models import Scene
@@ -72,6 +75,28 @@ def test_a_fast_line_delivers_what_its_lag_lets_it(calibrated: BalancerModel, sc
     (none,) = line_answers(weak, calibrated)
     assert none.smallest_correction is None
     assert "starts no flow" in line_text((none,))
+
+
+def test_a_pressure_on_the_axis_counts_with_its_column(scene: Scene) -> None:
+    """The spinning gas adds exp(omega^2 a^2/(2 R T)) - 1 up to the liquid, about 1 %."""
+    own = replace(scene, gas=replace(scene.gas, measured_at="shaft"))
+    here, there = calibrate(scene), calibrate(own)
+    a = float(surface_radius(disc=scene.disc, fill_ratio=0.25))
+    factor = math.exp((10000 * math.pi / 30 * a) ** 2 / (2 * 287.05 * scene.gas.temperature))
+    assert 1.005 < factor < 1.02
+    for name in ("priming_vented", "stall"):
+        near, far = (getattr(found.operating_point, name) for found in (here, there))
+        assert near == pytest.approx(far * factor)
+    asked = {"fill_ratio": 0.25, "primed": True}
+    at_axis = there.flow_law.evaluate(gas_pressure=0.7e6, **asked).velocity
+    assert float(at_axis) == pytest.approx(
+        float(here.flow_law.evaluate(gas_pressure=0.7e6 * factor, **asked).velocity)
+    )
+    columns = [column_of(law=found.flow_law, tube=scene.tube) for found in (here, there)]
+    assert columns[0] is not None
+    assert columns[1] is not None
+    near_u = columns[0].steady((0.25, 0.25), (0.7e6 * factor, 0.0), primed=True).velocity
+    assert columns[1].steady((0.25, 0.25), (0.7e6, 0.0), primed=True).velocity == pytest.approx(near_u)
 
 
 def test_a_chamber_run_dry_passes_gas(model: BalancerModel, scene: Scene) -> None:

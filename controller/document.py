@@ -47,6 +47,8 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
             "normal_litres": simulation.gas.normal_volume * 1e3,
             "compression_energy_J": simulation.gas.energy,
             "injections_run_dry": simulation.gas.run_dry,
+            "residual_fill_ratio": simulation.gas.residual_fill_ratio,
+            "injections_below_residual_fill": simulation.gas.below_residual,
             "passed_through_normal_litres": simulation.gas.passed_through * 1e3,
             "warning": simulation.gas.warning,
         },

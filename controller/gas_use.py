@@ -10,6 +10,7 @@ from ringbalance.controller.liquid_ring.plant import Operation
 from ringbalance.physics.gas.column import compression_work, normal_volume, nozzle_flow
 from ringbalance.physics.gas.supply import gas_line
 from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.tube.residual import residual_fill_ratio
 from ringbalance.scene.models import Scene
 
 _LITRE = 1e-3
@@ -29,6 +30,10 @@ class GasUse:
     """Injections that ran their chamber dry."""
     passed_through: float
     """Upper bound on the gas that passed through those, normal m^3; part of `normal_volume`."""
+    residual_fill_ratio: float
+    """Fill of a driven chamber below which gas enters its port."""
+    below_residual: int
+    """Injections that left their chamber below it, those that ran it dry included."""
 
     @property
     def text(self) -> str:
@@ -38,13 +43,19 @@ class GasUse:
 
     @property
     def warning(self) -> str:
-        """Empty when no chamber ran dry."""
-        if not self.run_dry:
+        """Empty when no gas entered a port."""
+        if not self.below_residual:
             return ""
+        dry = (
+            f", {self.run_dry} of them ran it dry: up to {self.passed_through / _LITRE:.3g} normal litres of "
+            "gas passed through the tube into the opposite chamber"
+            if self.run_dry
+            else ""
+        )
         return (
-            f"{self.run_dry} injections ran their chamber dry: up to {self.passed_through / _LITRE:.3g} "
-            "normal litres of gas passed through the tube into the opposite chamber; open the valve for less "
-            "time or fill in more liquid"
+            f"{self.below_residual} of {self.fillings} injections left their chamber below a fill ratio of "
+            f"{self.residual_fill_ratio:.3g}, where gas enters the port{dry}; open the valve for less time "
+            "or fill in more liquid"
         )
 
 
@@ -69,6 +80,7 @@ def gas_use(*, scene: Scene, model: BalancerModel, operations: Sequence[Operatio
         for done in operations
     )
     total = content + passed
+    residual = residual_fill_ratio(scene, law=model.flow)
     return GasUse(
         fillings=len(operations),
         normal_volume=normal_volume(pressure_volume=total, temperature=gas.temperature),
@@ -76,5 +88,7 @@ def gas_use(*, scene: Scene, model: BalancerModel, operations: Sequence[Operatio
             pressure_volume=total, pressure=supply, ambient_pressure=gas.ambient_pressure
         ),
         run_dry=sum(operation.run_dry > 0 for operation in operations),
+        residual_fill_ratio=residual,
+        below_residual=sum(done.run_dry > 0 or done.fill_after < residual for done in operations),
         passed_through=normal_volume(pressure_volume=passed, temperature=gas.temperature),
     )

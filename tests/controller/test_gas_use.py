@@ -110,7 +110,16 @@ def test_a_chamber_run_dry_passes_gas(model: BalancerModel, scene: Scene) -> Non
     # A choked nozzle of 1.5 mm at 0.801 MPa and 20 degC passes 3.34 g/s of air at the most, 1.2929 kg/m^3.
     grams = 0.0404 * math.pi / 4 * 1.5e-3**2 * 801325.0 / math.sqrt(293.15)
     assert found.passed_through == pytest.approx(grams * operation.run_dry / 1.2929, rel=2e-3)
-    assert "ran their chamber dry" in found.warning
+    assert found.below_residual == found.run_dry == 1
+    assert "1 of them ran it dry" in found.warning
+    (brief,) = ring.advance(
+        initial_state(disc=scene.disc), gas_times={0: 0.1}, duration=0.1, points=1
+    ).operations
+    assert gas_use(scene=scene, model=model, operations=[brief]).warning == ""
+    residual = found.residual_fill_ratio
+    assert 0 < residual < 0.2
+    low = replace(brief, fill_after=0.9 * residual)
+    assert "below a fill ratio of" in gas_use(scene=scene, model=model, operations=[low]).warning
     content = 801325.0 * model.chamber_volume / AMBIENT * 273.15 / scene.gas.temperature
     assert found.normal_volume == pytest.approx(content + found.passed_through)
 

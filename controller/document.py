@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ringbalance.controller.simulation import Injection, Sample, Simulation
+from ringbalance.reduced_model.gas_line import line_document
 from ringbalance.reduced_model.selection.registry import neglected_in_injections
 
 
@@ -41,6 +42,17 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         "overshoots": simulation.overshoots,
         "misadjustments": simulation.misadjustments,
         "energy_J": simulation.energy,
+        "gas": {
+            "fillings": simulation.gas.fillings,
+            "normal_litres": simulation.gas.normal_volume * 1e3,
+            "compression_energy_J": simulation.gas.energy,
+            "injections_run_dry": simulation.gas.run_dry,
+            "residual_fill_ratio": simulation.gas.residual_fill_ratio,
+            "injections_below_residual_fill": simulation.gas.below_residual,
+            "passed_through_normal_litres": simulation.gas.passed_through * 1e3,
+            "warning": simulation.gas.warning,
+        },
+        "gas_line": line_document(simulation.gas_line),
         "noise_floor_m": simulation.noise_floor,
         "samples": _samples(simulation.samples),
         "terms_modelled": list(simulation.terms_modelled),
@@ -63,6 +75,7 @@ def _injection(injection: Injection) -> dict[str, Any]:
         "fill_before": operation.fill_before,
         "fill_after": operation.fill_after,
         "energy_J": operation.energy,
+        "run_dry_s": operation.run_dry,
     }
 
 

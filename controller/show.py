@@ -13,6 +13,7 @@ from rich.text import Text
 
 from ringbalance.controller.liquid_ring.transfer import Event
 from ringbalance.controller.simulation import Injection, Simulation
+from ringbalance.reduced_model.gas_line import line_text, line_warning
 from ringbalance.reduced_model.selection.registry import neglected_in_injections
 from ringbalance.scene.arrays import FloatArray
 
@@ -40,6 +41,9 @@ def sparkline(values: FloatArray) -> str:
 def _parts(simulation: Simulation) -> Iterable[RenderableType]:
     colour = "green" if simulation.settled else "yellow"
     yield Text(simulation.status, style=f"bold {colour}")
+    for warning in (simulation.gas.warning, line_warning(simulation.gas_line)):
+        if warning:
+            yield Text(warning, style="yellow")
     yield _summary(simulation)
     yield _amplitude(simulation)
     if simulation.injections:
@@ -63,7 +67,9 @@ def _summary(simulation: Simulation) -> Table:
         ("limit", f"{_um(simulation.limit)} for {simulation.hold_time:.4g} s"),
         ("loop factor", _loop(simulation)),
         ("valve-open time", f"{_gas_time(simulation):.3f} s in {len(simulation.injections)} injections"),
-        ("gas energy", f"{simulation.energy:.4g} J"),
+        ("gas energy", f"{simulation.energy:.4g} J of work on the liquid"),
+        ("gas consumption", simulation.gas.text),
+        ("gas line", line_text(simulation.gas_line)),
         ("overshoots", str(simulation.overshoots)),
         ("misadjustments", str(simulation.misadjustments)),
         ("fill ratios", "  ".join(f"{letter} {fill:.4f}" for letter, fill in last.items())),

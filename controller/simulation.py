@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
+from ringbalance.controller.gas_use import GasUse
 from ringbalance.controller.liquid_ring.plant import Operation
 from ringbalance.controller.tuning.loop_factor import LoopFactor
 from ringbalance.physics.results import Status
+from ringbalance.reduced_model.gas_line import LineAnswer
 from ringbalance.reduced_model.selection.registry import ModelUsed
 from ringbalance.scene.arrays import FloatArray
 
@@ -108,6 +110,9 @@ class Simulation:
     """m."""
     energy: float
     """Work of the driving gas against the surroundings over all injections, J."""
+    gas: GasUse
+    gas_line: tuple[LineAnswer, ...]
+    """What the gas line can deliver, or both ends of a default range of lines."""
     models_used: tuple[ModelUsed, ...]
     """Every physical term, with its model and its estimated contribution."""
     tolerance: float

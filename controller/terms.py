@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 from ringbalance.controller.liquid_ring.column import column_of
-from ringbalance.controller.liquid_ring.gas import VENTED, GasLine
 from ringbalance.controller.liquid_ring.motion import Dynamics
+from ringbalance.physics.gas.supply import VENTED, gas_line
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.selection.estimates import FILLING, INERTIA, LAG, term_estimates
 from ringbalance.reduced_model.selection.registry import IN_INJECTIONS, ModelUsed, models_used
-from ringbalance.scene.models import Gas, Scene
+from ringbalance.scene.models import Scene
 
 
 def run_models(
@@ -35,7 +35,7 @@ def terms_modelled(used: Sequence[ModelUsed]) -> tuple[str, ...]:
 def dynamics_of(*, scene: Scene, model: BalancerModel, modelled: Collection[str]) -> Dynamics | None:
     """The plant's terms. Args: `modelled`: their names. Returns: Dynamics; None when no term is modelled."""
     _check(scene, model, modelled)
-    line = _line(scene.gas) if FILLING in modelled else None
+    line = gas_line(scene.gas) if FILLING in modelled else None
     gas_off = 0.0 if line is None else VENTED * scene.gas.ambient_pressure
     column = column_of(law=model.flow, tube=scene.tube, gas_off=gas_off)
     if not modelled or column is None:
@@ -70,16 +70,3 @@ def _obstacles(scene: Scene, model: BalancerModel) -> dict[str, str]:
     if isinstance(model.flow, PaperLaw):
         return {INERTIA: "the paper's law has no mass in the tube"}
     return {}
-
-
-def _line(gas: Gas) -> GasLine | None:
-    if gas.conductance is None or gas.critical_ratio is None:
-        return None
-    return GasLine(
-        supply_pressure=gas.pressure + gas.ambient_pressure,
-        ambient_pressure=gas.ambient_pressure,
-        temperature=gas.temperature,
-        conductance=gas.conductance,
-        critical_ratio=gas.critical_ratio,
-        process=gas.process,
-    )

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from ringbalance.reduced_model.calibration import Calibration, lambda_over_fill, lambda_variation
 from ringbalance.reduced_model.chamber.calibration import Curve
 from ringbalance.reduced_model.chamber.element_check import CHECKED, ElementCheck
+from ringbalance.reduced_model.gas_line import line_document
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.scene.arrays import FloatArray
@@ -44,6 +45,7 @@ def calibration_document(calibration: Calibration) -> dict[str, Any]:
         "residual_liquid": _residual(calibration),
         "identifiability": calibration.identifiability,
         "tolerance": scene.tolerance,
+        "gas_line": line_document(calibration.gas_line),
         "models_used": [asdict(term) for term in calibration.models_used],
         "status": {"code": str(calibration.chamber.status.code), "text": calibration.chamber.status.text},
         "statistics": dict(calibration.statistics),

@@ -14,6 +14,7 @@ from rich.text import Text
 
 from ringbalance.reduced_model.calibration import Calibration, lambda_variation
 from ringbalance.reduced_model.documents import PRESSURE_FACTORS, paper_columns
+from ringbalance.reduced_model.gas_line import line_text, line_warning
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.operating_point import OperatingPoint
 
@@ -94,6 +95,9 @@ def _summary_rows(calibration: Calibration) -> Iterator[tuple[str, str]]:
         )
     if point.cavitation_margin is not None:
         yield "cavitation margin", _margin_text(point)
+    yield "gas line", line_text(calibration.gas_line)
+    if line_warning(calibration.gas_line):
+        yield "note", line_warning(calibration.gas_line)
     if not chamber.status.ok:
         yield "note", chamber.status.text
 

@@ -284,7 +284,7 @@ class Gas:
         PressurePlace,
         standard(
             "chamber",
-            "where `pressure` holds: at inner_radius, or on the shaft's axis; spinning gas adds to it",
+            "where `pressure` holds: on the liquid, or on the shaft's axis; spinning gas adds to it there",
         ),
         shown("gas pressure measured at"),
     ]

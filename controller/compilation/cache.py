@@ -36,13 +36,7 @@ _NumbaFormat: Any = getattr(caching, "CompileResultCacheImpl", object)
 
 
 def checked_content(path: Path) -> bytes:
-    """Read a kept file.
-
-    Returns: Its content without the checksum.
-    Raises: FileNotFoundError: there is none.
-    Raises: OSError: it cannot be read, or is no file.
-    Raises: ValueError: the checksum differs.
-    """
+    """Content of a kept file without the checksum; OSError or ValueError when it cannot be used."""
     if path.exists() and not path.is_file():
         raise OSError(f"{path} is not a file")
     data = path.read_bytes()
@@ -52,10 +46,7 @@ def checked_content(path: Path) -> bytes:
 
 
 def discard(path: Path) -> None:
-    """Remove a file or a folder, as far as that is possible.
-
-    Args: `path`: what to remove; it need not exist.
-    """
+    """Remove a file or a folder, as far as that is possible."""
     try:
         path.unlink(missing_ok=True)
     except OSError:
@@ -63,10 +54,7 @@ def discard(path: Path) -> None:
 
 
 def is_damaged(path: Path) -> bool:
-    """Whether a kept file would be discarded when it is needed.
-
-    Returns: True for one that cannot be read or has another checksum.
-    """
+    """Whether a kept file would be discarded when it is needed."""
     try:
         checked_content(path)
     except (OSError, ValueError):
@@ -154,10 +142,7 @@ def _write(path: Path, content: bytes) -> None:
 
 
 class KeptCode(_NumbaCache):  # type: ignore[misc]
-    """Numba's cache of one function, in the files described above.
-
-    Args: `function`: to be compiled. `folder`: of this version's code.
-    """
+    """Numba's cache of one function, in the files described above."""
 
     def __init__(self, function: Callable[..., Any], folder: Path) -> None:
         source = Path(inspect.getfile(function))
@@ -183,11 +168,7 @@ class KeptCode(_NumbaCache):  # type: ignore[misc]
         )
 
     def load_overload(self, sig: object, target_context: object) -> object:
-        """Look for the compiled code of a signature.
-
-        Args: `sig`: types of the arguments. `target_context`: of the processor.
-        Returns: The code, or None: it is then compiled.
-        """
+        """The compiled code of a signature, or None: it is then compiled."""
         try:
             found = super().load_overload(sig, target_context)
         except Exception:
@@ -199,10 +180,7 @@ class KeptCode(_NumbaCache):  # type: ignore[misc]
         return found
 
     def save_overload(self, sig: object, data: object) -> None:
-        """Keep the compiled code of a signature, where that can be done.
-
-        Args: `sig`: types of the arguments.
-        """
+        """Keep the compiled code of a signature, where that can be done."""
         try:
             super().save_overload(sig, data)
             remove_old(self._folder)
@@ -221,9 +199,5 @@ def _note_unwritable(folder: Path, reason: str) -> None:
 
 
 def kept_files(folder: Path) -> Iterator[Path]:
-    """Files of compiled code below a folder.
-
-    Args: `folder`: that may not exist.
-    Yields: Paths of index and data files.
-    """
+    """Index and data files below a folder, which may not exist."""
     yield from (path for path in folder.rglob("*") if path.suffix in {INDEX, DATA})

@@ -41,11 +41,8 @@ _Dispatcher: Any = getattr(registry, "CPUDispatcher", object)
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
     """Compile a function of numbers and arrays, in strict floating point and free of the interpreter's lock.
 
-    Args: `function`: in the part of Python that numba knows; it may call other compiled functions. The plain
-        function stays at hand as the result's `py_func`.
-    Returns: The function, compiled at its first call, or taken from an earlier process. Ctrl-C during a call
-        acts when the call has ended.
-    Source: the documentation of numba, `@jit`.
+    Compiled at the first call or taken from an earlier process; the plain function stays as `py_func`.
+    Ctrl-C during a call acts when the call has ended.
     """
     dispatcher = numba.njit(function, **_OPTIONS)
     if _gives_records(function) and _Dispatcher is not object:
@@ -80,17 +77,14 @@ class _Guarded(_Dispatcher):  # type: ignore[misc]
 
 
 def code_root() -> Path:
-    """Folder that holds the code of all versions.
-
-    Returns: The user's folder for what can be made again, unless numba has been given one by NUMBA_CACHE_DIR.
-    """
+    """Folder that holds the code of all versions; NUMBA_CACHE_DIR moves it."""
     given = os.environ.get("NUMBA_CACHE_DIR")
     return Path(given) / "ringbalance" if given else cache_folder()
 
 
 @cache
 def code_folder() -> Path:
-    """Folder of this version's code. Returns: Path; it may not exist yet."""
+    """Folder of this version's code; it may not exist yet."""
     return code_root() / folder_name(checkout=Path(__file__).parent, digest=_digest())
 
 

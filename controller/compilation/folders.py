@@ -16,32 +16,24 @@ from functools import cache
 from pathlib import Path
 from typing import Final
 
-LONGEST_UNUSED: Final = 30 * 86400.0
+_LONGEST_UNUSED: Final = 30 * 86400.0
 """Time after which an unused folder is removed, s."""
-MOST_PER_CHECKOUT: Final = 2
+_MOST_PER_CHECKOUT: Final = 2
 """The current version and the one before, so that changing between two branches compiles nothing."""
-MOST_FOLDERS: Final = 16
+_MOST_FOLDERS: Final = 16
 """Of all checkouts together; about 13 MB each."""
 # Earlier releases named a folder after the digest alone.
 _NAME: Final = re.compile(r"(?:(?P<checkout>[0-9a-f]{8})-)?[0-9a-f]{16}")
 
 
 def folder_name(*, checkout: Path, digest: str) -> str:
-    """Name of the folder of one version.
-
-    Args: `checkout`: folder of the sources. `digest`: of the sources, 16 hexadecimal digits.
-    Returns: Eight digits for the checkout, a hyphen, the digest.
-    """
+    """Eight digits for the checkout, a hyphen, and the digest of the sources."""
     place = hashlib.sha256(os.fsencode(checkout.resolve())).hexdigest()[:8]
     return f"{place}-{digest}"
 
 
 def code_folders(root: Path) -> list[Path]:
-    """Folders of compiled code, the most recently used first.
-
-    Args: `root`: the folder that holds them; it may not exist.
-    Returns: Paths; other things in `root` are not among them.
-    """
+    """Folders of compiled code, the most recently used first; `root` may not exist."""
     try:
         named = [path for path in root.iterdir() if _NAME.fullmatch(path.name) and path.is_dir()]
     except OSError:
@@ -50,11 +42,7 @@ def code_folders(root: Path) -> list[Path]:
 
 
 def last_used(folder: Path) -> float:
-    """Time of the last use.
-
-    Args: `folder`: of compiled code.
-    Returns: Seconds since 1970; zero when the folder is gone.
-    """
+    """Time of the last use, s since 1970; zero when the folder is gone."""
     try:
         return folder.stat().st_mtime
     except OSError:
@@ -63,36 +51,29 @@ def last_used(folder: Path) -> float:
 
 @cache
 def mark_used(folder: Path) -> None:
-    """Note once in a process that a folder's code is in use. Args: `folder`: of compiled code."""
+    """Note once in a process that a folder's code is in use."""
     with contextlib.suppress(OSError):
         os.utime(folder)
 
 
 @cache
 def remove_old(current: Path) -> None:
-    """Remove once in a process the folders that nobody is likely to need.
-
-    Args: `current`: folder in use; it stays.
-    """
+    """Remove once in a process the folders that nobody is likely to need; `current` stays."""
     mark_used(current)
-    for folder in outdated(code_folders(current.parent), current=current, now=time.time()):
+    for folder in _outdated(code_folders(current.parent), current=current, now=time.time()):
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def outdated(folders: list[Path], *, current: Path, now: float) -> list[Path]:
-    """Folders to be removed.
-
-    Args: `folders`: the most recently used first. `current`: stays in any case. `now`: s since 1970.
-    Returns: Those unused for 30 days, those beyond two of one checkout, and those beyond 16 in all.
-    """
+def _outdated(folders: list[Path], *, current: Path, now: float) -> list[Path]:
+    """Those unused for 30 days, beyond two of one checkout, or beyond 16 in all, but never `current`."""
     counts: dict[str, int] = {_checkout(current): 1}
     kept, old = 1, []
     for folder in folders:
         if folder == current:
             continue
         checkout = _checkout(folder)
-        many = kept >= MOST_FOLDERS or counts.get(checkout, 0) >= MOST_PER_CHECKOUT
-        if many or now - last_used(folder) > LONGEST_UNUSED:
+        many = kept >= _MOST_FOLDERS or counts.get(checkout, 0) >= _MOST_PER_CHECKOUT
+        if many or now - last_used(folder) > _LONGEST_UNUSED:
             old.append(folder)
             continue
         counts[checkout], kept = counts.get(checkout, 0) + 1, kept + 1

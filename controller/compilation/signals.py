@@ -17,8 +17,8 @@ from typing import Any, Final
 
 Handler = Callable[[int, FrameType | None], Any]
 
-NAMES: Final = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK", "SIGALRM", "SIGUSR1", "SIGUSR2")
-SIGNALS: Final = tuple(getattr(signal, name) for name in NAMES if hasattr(signal, name))
+_NAMES: Final = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK", "SIGALRM", "SIGUSR1", "SIGUSR2")
+SIGNALS: Final = tuple(getattr(signal, name) for name in _NAMES if hasattr(signal, name))
 """Whose handlers may raise: those that end a program or limit its time."""
 
 
@@ -39,8 +39,6 @@ def signals_deferred() -> Iterator[None]:
     """Let Python's signal handlers act at the end of the block, in the main thread; elsewhere none ever run.
 
     Handlers that are not Python functions, such as the system's own for SIGTERM, act at once as before.
-    Yields: Nothing.
-    Raises: BaseException: what a handler raises whose signal arrived within the block.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -72,11 +70,7 @@ def _give_back(deferred: dict[int, _Deferred]) -> None:
 
 @contextlib.contextmanager
 def signals_live() -> Iterator[None]:
-    """Within `signals_deferred`: let handlers act at once again, for Python code that takes long.
-
-    Yields: Nothing.
-    Raises: BaseException: what a handler raises.
-    """
+    """Within `signals_deferred`: let handlers act at once again, for Python code that takes long."""
     main = threading.current_thread() is threading.main_thread()
     found = {number: signal.getsignal(number) for number in SIGNALS} if main else {}
     deferred = {number: held for number, held in found.items() if isinstance(held, _Deferred)}

@@ -14,20 +14,10 @@ def linear_course(
     total: float,
     lowest: float,
 ) -> tuple[float, float, float, bool]:
-    """What the flow does from a fill on.
+    """Initial velocity (m/s, zero where nothing flows), decrease (m/s^2), end (s), whether it stalls there.
 
     u^2 = a (p + b (2x - total)) gives du/dt = -a b S/V; it ends at a velocity of zero or at the lowest fill,
     where D = (S/V) t (u0 + u_end)/2 with u_end^2 = u0^2 - 2 a b D.
-    Args:
-        fill: x at the start.
-        squared_per_pressure: a, m^3/kg.
-        pressure_per_fill: b, Pa.
-        gas_pressure: p, gauge, Pa.
-        exchange_rate: S/V, 1/m.
-        total: x_A + x_C.
-        lowest: smallest x.
-    Returns: Velocity at the start (m/s, zero where nothing flows), its decrease (m/s^2), the time at which
-        the flow ends (s), and whether it stalls there.
     """
     squared = squared_per_pressure * (gas_pressure + pressure_per_fill * (2.0 * fill - total))
     slowing = squared_per_pressure * pressure_per_fill * exchange_rate

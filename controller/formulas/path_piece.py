@@ -8,17 +8,13 @@ from ringbalance.scene.arrays import FloatArray
 
 Number = TypeVar("Number", float, FloatArray)
 
-MOST_NEWTON: Final = 60
-CLOSE: Final = 1e-15
+_MOST_NEWTON: Final = 60
+_CLOSE: Final = 1e-15
 """Step of Newton's method, as a part of a piece, that ends it."""
 
 
 def piece_rise(part: Number, rise: Number, d0: Number, d1: Number) -> Number:
-    """Change of x since the start of a piece.
-
-    Args: `part`: of the piece's time, within [0, 1]. `rise`: of x over the whole piece.
-        `d0`: dx/dt at its start times its time. `d1`: the same at its end.
-    """
+    """Change of x after a part of a piece's time; `d0` and `d1` are dx/dt at its ends times its duration."""
     return part * (d0 + part * (3.0 * rise - 2.0 * d0 - d1 + part * (d0 + d1 - 2.0 * rise)))
 
 
@@ -31,7 +27,7 @@ def piece_part(wanted: float, rise: float, d0: float, d1: float) -> float:
         return 0.0
     a2, a3 = 3.0 * rise - 2.0 * d0 - d1, d0 + d1 - 2.0 * rise
     low, high, s = 0.0, 1.0, min(max(wanted / rise, 0.0), 1.0)
-    for _ in range(MOST_NEWTON):
+    for _ in range(_MOST_NEWTON):
         excess = s * (d0 + s * (a2 + s * a3)) - wanted
         if excess * rise < 0.0:
             low = s
@@ -41,6 +37,6 @@ def piece_part(wanted: float, rise: float, d0: float, d1: float) -> float:
         step = s - excess / slope if slope != 0.0 else -1.0
         before = s
         s = step if low <= step <= high else (low + high) / 2.0
-        if abs(s - before) <= CLOSE:
+        if abs(s - before) <= _CLOSE:
             break
     return s

@@ -31,10 +31,7 @@ class LinearSquaredVelocity(Protocol):
 
 
 def has_closed_form(law: FlowLaw) -> bool:
-    """Whether `closed_form` applies to a law.
-
-    Returns: True when it offers the two coefficients of `LinearSquaredVelocity`.
-    """
+    """Whether a law offers the two coefficients of `LinearSquaredVelocity`."""
     return hasattr(law, "velocity_squared_per_pressure") and hasattr(law, "pressure_per_fill_difference")
 
 
@@ -43,7 +40,6 @@ def closed_form(drive: Drive, instants: FloatArray) -> Transfer:
 
     u^2 = a (p + b (2x - total)) gives du/dt = -a b S/V, so
     x(t) = x0 - (S/V) (u0 t - a b (S/V) t^2/2) until the velocity is zero or a chamber empty or full.
-    Args: `drive`: its law must have a closed form. `instants`: s from the start, shape (m,), ascending.
     Raises: ValueError: a law without a closed form, or instants that do not ascend from zero.
     Source: Eqs. 19 and 20 of the liquid-ring paper in the limit of small segments.
     """
@@ -87,11 +83,7 @@ def _course(drive: Drive, fill: float) -> tuple[float, float, float, bool]:
 
 
 def boundary_event(drive: Drive, fill: float) -> Event:
-    """Which event it is to reach an end of the range of x.
-
-    Args: `fill`: the end reached, `drive.lowest` or `drive.highest`.
-    Returns: EMPTY when the giving chamber has no liquid left, else FULL.
-    """
+    """EMPTY or FULL: which event it is to reach `drive.lowest` or `drive.highest`."""
     if fill == drive.lowest:
         return Event.EMPTY if drive.lowest == 0 else Event.FULL
     return Event.EMPTY if drive.highest == drive.total else Event.FULL

@@ -19,13 +19,14 @@ once; its liquid belongs to the term "liquid held in the tube".
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.liquid_ring.table import ScalarTable, line
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import FlowLaw
 from ringbalance.reduced_model.law.paper_law import PaperLaw
@@ -33,8 +34,48 @@ from ringbalance.reduced_model.tables.hermite import HermiteTable
 from ringbalance.reduced_model.tube.regime import SiphonCrest, Truth, TubeEnds, column_flow
 from ringbalance.scene.models import Tube
 
-SLOWEST = 1e-150
+_SLOWEST: Final = 1e-150
 """m/s, below which the tube's loss is neglected."""
+_NEWTON_STEPS: Final = 5
+
+
+class _ScalarTable:
+    """A `HermiteTable` read one number at a time, without arrays; it continues straight beyond its ends."""
+
+    def __init__(self, table: HermiteTable) -> None:
+        """Work the pieces' coefficients out once."""
+        self.start = float(table.start)
+        self.step = float(table.step)
+        self.values: list[float] = table.value.tolist()
+        pieces = table.coefficients
+        self.cells: list[tuple[float, ...]] = list(zip(*(c.tolist() for c in pieces), strict=True))
+
+    def __call__(self, x: float) -> float:
+        """Value at any x."""
+        place = (x - self.start) / self.step
+        cell = min(max(int(place), 0), len(self.cells) - 1)
+        t = place - cell
+        c0, c1, c2, c3, c4, c5 = self.cells[cell]
+        if 0.0 <= t <= 1.0:
+            return c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5))))
+        held = 0.0 if t < 0.0 else 1.0
+        slope = c1 + held * (2 * c2 + held * (3 * c3 + held * (4 * c4 + held * 5 * c5)))
+        inside = c0 + held * (c1 + held * (c2 + held * (c3 + held * (c4 + held * c5))))
+        return inside + (t - held) * slope
+
+    def inverse(self, y: float) -> float:
+        """The x of a value, to round-off, for a table that grows from node to node."""
+        cell = min(max(bisect_left(self.values, y) - 1, 0), len(self.cells) - 1)
+        c0, c1, c2, c3, c4, c5 = self.cells[cell]
+        low = self.values[cell]
+        t = min(max((y - low) / (self.values[cell + 1] - low), 0.0), 1.0)
+        found, slope = c0, c1
+        for step in range(_NEWTON_STEPS + 1):
+            found = c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5))))
+            slope = c1 + t * (2 * c2 + t * (3 * c3 + t * (4 * c4 + t * 5 * c5)))
+            if step < _NEWTON_STEPS:
+                t = min(max(t + (y - found) / slope, 0.0), 1.0)
+        return self.start + self.step * (cell + t + (y - found) / slope)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,9 +101,9 @@ class Column:
     """Fraction of the path, from chamber 0, at which the crest lies."""
     hydrostatic: Callable[[float], float]
     """P(x), Pa."""
-    head: ScalarTable
+    head: _ScalarTable
     """ln((k + 1) u^2/2) over ln u."""
-    hump_heads: tuple[ScalarTable, ScalarTable] | None
+    hump_heads: tuple[_ScalarTable, _ScalarTable] | None
     """ln((alpha + k_up) u^2/2) over ln u for flow out of chamber 0 and out of chamber 1; None: no crest."""
     port_pressure: float
     """D_p, Pa."""
@@ -72,14 +113,11 @@ class Column:
     """Whether liquid leaves only a chamber that has gas, as in the paper's Eq. 19."""
     gas_off: float
     """Gauge, Pa, at or below which a chamber counts as without gas in a tube without a crest."""
+    gas_factor: float = 1.0
+    """Gas pressure on the liquid over the one at the place of measurement, which all arguments are."""
 
     def steady(self, fills: tuple[float, float], gases: tuple[float, float], *, primed: bool) -> Steady:
-        """Velocity without inertia.
-
-        Args: `fills`: x of chambers 0 and 1. `gases`: gauge, Pa, in chambers 0 and 1. `primed`: whether the
-            tube holds a continuous column beforehand.
-        Source: `column_flow`, with gas in both chambers.
-        """
+        """Velocity without inertia, from fill ratios and gauge pressures (Pa) of chambers 0 and 1."""
         ends = self._ends(fills, gases)
         forward = self._directed(ends, 1, primed)
         if forward.velocity > 0:
@@ -93,8 +131,8 @@ class Column:
         self, fills: tuple[float, float], gases: tuple[float, float], direction: int = 1
     ) -> TubeEnds[float]:
         ends = TubeEnds(
-            upstream_gas=gases[0],
-            downstream_gas=gases[1],
+            upstream_gas=self.gas_factor * gases[0],
+            downstream_gas=self.gas_factor * gases[1],
             upstream_hydrostatic=self.hydrostatic(fills[0]),
             downstream_hydrostatic=self.hydrostatic(fills[1]),
             port_pressure=self.port_pressure,
@@ -112,7 +150,7 @@ class Column:
         )
         return Steady(velocity=flow.velocity, separated=bool(flow.separated), primed=bool(flow.primed))
 
-    def _separation_head(self, direction: int) -> ScalarTable:
+    def _separation_head(self, direction: int) -> _ScalarTable:
         return self.head if self.hump_heads is None else self.hump_heads[direction < 0]
 
     def _allowed(self, ends: TubeEnds[float], primed: bool) -> bool:
@@ -122,24 +160,18 @@ class Column:
         against = ends.downstream_gas > self.gas_off and primed
         return self.crest is not None or ends.upstream_gas > self.gas_off or against
 
-    def _velocity(self, table: ScalarTable, pressure: float, where: Truth) -> float:
+    def _velocity(self, table: _ScalarTable, pressure: float, where: Truth) -> float:
         return math.exp(table.inverse(math.log(pressure / self.density))) if where else 0.0
 
     def acceleration(
         self, fills: tuple[float, float], gases: tuple[float, float], *, speed: float, direction: int
     ) -> float:
-        """Acceleration of a moving column along its own direction, min(a_f, a_s).
-
-        Args: `fills`: x of chambers 0 and 1. `gases`: gauge, Pa, in chambers 0 and 1. `speed`: u along the
-            direction, m/s, at least zero. `direction`: +1 or -1.
-        Returns: m/s^2.
-        Source: momentum of the column, full or separated at the crest; the module's text.
-        """
+        """Acceleration of a moving column along its own direction, min(a_f, a_s), m/s^2; `speed` >= 0."""
         return min(self._accelerations(self._ends(fills, gases, direction), speed, direction))
 
     def _accelerations(self, ends: TubeEnds[float], speed: float, direction: int) -> tuple[float, float]:
         """Of the full column and of the separated one."""
-        slow = speed < SLOWEST
+        slow = speed < _SLOWEST
         log_speed = 0.0 if slow else math.log(speed)
         loss = 0.0 if slow else math.exp(self.head(log_speed))
         full = (ends.driving_pressure() / self.density - loss) / self.length
@@ -153,32 +185,18 @@ class Column:
     def separated(
         self, fills: tuple[float, float], gases: tuple[float, float], *, speed: float, direction: int
     ) -> bool:
-        """Whether a moving column is separated at the crest.
-
-        Args: `fills`: x of chambers 0 and 1. `gases`: gauge, Pa, in chambers 0 and 1. `speed`: u along the
-            direction, m/s, at least zero. `direction`: +1 or -1.
-        Returns: True where a_s < a_f.
-        """
+        """Whether a moving column is separated at the crest, a_s < a_f; `speed` >= 0."""
         full, separated = self._accelerations(self._ends(fills, gases, direction), speed, direction)
         return separated < full
 
     def open_to_gas(self, fills: tuple[float, float], gases: tuple[float, float], *, direction: int) -> bool:
-        """Whether only gas can leave the upstream chamber.
-
-        Args: `fills`: x of chambers 0 and 1. `gases`: gauge, Pa, in chambers 0 and 1. `direction`: +1 or -1.
-        Returns: True when its liquid leaves the port open, or flow is ruled out without gas.
-        """
+        """Whether its liquid leaves the upstream chamber's port open, or flow is ruled out without gas."""
         ends = self._ends(fills, gases, direction)
         return not (ends.upstream_covered() and self._allowed(ends, True))
 
 
 def column_of(*, law: FlowLaw, tube: Tube, gas_off: float = 0.0) -> Column | None:
-    """The column that a flow law describes.
-
-    Args: `tube`: the scene's tube, for its length and the place of its crest. `gas_off`: gauge, Pa, at or
-        below which a chamber counts as without gas; for a tube without a crest.
-    Returns: Column; None for a law that gives velocities and no forces.
-    """
+    """The column that a flow law describes; None for a law that gives velocities and no forces."""
     if isinstance(law, CalibratedLaw):
         return _calibrated(law, tube, gas_off)
     return _paper(law, tube, gas_off) if isinstance(law, PaperLaw) else None
@@ -186,19 +204,20 @@ def column_of(*, law: FlowLaw, tube: Tube, gas_off: float = 0.0) -> Column | Non
 
 def _calibrated(law: CalibratedLaw, tube: Tube, gas_off: float) -> Column:
     ahead, back = law.heads.hump_head, law.heads.return_hump_head
-    tables = (ScalarTable(ahead), ScalarTable(back)) if ahead and back and law.path.crest else None
-    hydrostatic = ScalarTable(law.wall_pressure)
+    tables = (_ScalarTable(ahead), _ScalarTable(back)) if ahead and back and law.path.crest else None
+    hydrostatic = _ScalarTable(law.wall_pressure)
     return Column(
         density=law.density,
         length=tube.length,
         hump_position=tube.hump_position,
         hydrostatic=lambda x: max(hydrostatic(x), 0.0),
-        head=ScalarTable(law.heads.head),
+        head=_ScalarTable(law.heads.head),
         hump_heads=tables,
         port_pressure=law.path.port_pressure,
         crest=law.path.crest if tables else None,
         one_way=False,
         gas_off=gas_off,
+        gas_factor=law.gas_factor,
     )
 
 
@@ -207,7 +226,7 @@ def _paper(law: PaperLaw, tube: Tube, gas_off: float) -> Column:
         density=law.density,
         length=tube.length,
         hump_position=tube.hump_position,
-        hydrostatic=line(at_zero=0.0, slope=law.pressure_per_fill_difference),
+        hydrostatic=lambda x: law.pressure_per_fill_difference * x,
         head=_constant_drag(law.drag_coefficient),
         hump_heads=None,
         port_pressure=0.0,
@@ -217,8 +236,8 @@ def _paper(law: PaperLaw, tube: Tube, gas_off: float) -> Column:
     )
 
 
-def _constant_drag(drag_coefficient: float) -> ScalarTable:
+def _constant_drag(drag_coefficient: float) -> _ScalarTable:
     """ln((k + 1) u^2/2), straight in ln u."""
     value = np.log((drag_coefficient + 1) / 2) + 2 * np.array([-1.0, 1.0])
     straight = HermiteTable(start=-1.0, step=2.0, value=value, slope=np.full(2, 2.0), curvature=np.zeros(2))
-    return ScalarTable(straight)
+    return _ScalarTable(straight)

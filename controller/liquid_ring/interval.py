@@ -287,7 +287,9 @@ def _flip(pair: Pair, now: Now) -> Now:
     if now.direction and not plant.inertia:
         now = _note_regime(pair, now)
         now = replace(now, primed=steady(pair, now.state, primed=True).primed, direction=0)
-    state = now.state.copy()
+    state, record = now.state.copy(), now.record
+    if not switch.opens and switch.chamber == record.chamber:
+        record = replace(record, closing_pressure=seen(pair, state)[1][switch.chamber])
     if plant.line is None:
         pressure = plant.gas_pressure if switch.opens else 0.0
         state[2 + 2 * switch.chamber] = plant.ambient_pressure + pressure
@@ -295,6 +297,7 @@ def _flip(pair: Pair, now: Now) -> Now:
     return replace(
         now,
         state=state,
+        record=record,
         pending=pending,
         valves=(first, switch.opens) if switch.chamber else (switch.opens, second),
         balanced=False,
@@ -326,9 +329,21 @@ def _note(pair: Pair, now: Now, event: Event, direction: int) -> Now:
     if direction == outward(now):
         first = record.regime_start is Regime.BLOCKED and event is Event.NONE
         closed = event is Event.STALLED and not now.valves[record.chamber]
-        start = _regime(pair, now) if first else record.regime_start
-        record = replace(record, event=record.event if closed else event, regime_start=start)
+        record = replace(
+            record,
+            event=record.event if closed else event,
+            regime_start=_regime(pair, now) if first else record.regime_start,
+            run_dry=_open_for(now) if event is Event.EMPTY is not record.event else record.run_dry,
+        )
     return _note_regime(pair, replace(now, record=record))
+
+
+def _open_for(now: Now) -> float:
+    """Time for which the driven chamber's valve will stay open, s."""
+    chamber = now.record.chamber
+    if not now.valves[chamber]:
+        return 0.0
+    return max(s.after for s in now.pending if s.chamber == chamber and not s.opens) - now.time
 
 
 def _note_regime(pair: Pair, now: Now) -> Now:

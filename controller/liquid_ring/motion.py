@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from ringbalance.controller.liquid_ring.column import Column
-from ringbalance.controller.liquid_ring.gas import GasLine
 from ringbalance.controller.liquid_ring.transfer import Event
+from ringbalance.physics.gas.supply import GasLine
 from ringbalance.reduced_model.law.flow_law import Regime
 
 Two = tuple[float, float]
@@ -40,6 +40,10 @@ class Record:
     regime_start: Regime = Regime.BLOCKED
     regime_end: Regime = Regime.BLOCKED
     event: Event = Event.BLOCKED
+    closing_pressure: float = 0.0
+    """Gauge, of the driven chamber's gas when its valve closed, Pa."""
+    run_dry: float = 0.0
+    """Time for which the valve stayed open to an empty chamber, s."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -75,12 +75,10 @@ class _Map:
 
 
 def flow_paths(drive: Drive, *, primed: bool, most_changes: int = MOST_CHANGES) -> FlowPaths:
-    """Find all flows of a pair under the gas pressure of a drive.
+    """All flows of a pair under the gas pressure of a drive, whose fill and priming do not matter.
 
-    Args: `drive`: law, total, exchange rate and gas pressure; its fill and priming are not looked at.
-        `primed`: False: only where an empty tube starts to flow, and in which sense, without paths.
-        `most_changes`: of sense, regime and priming.
-    Raises: UntabulatedError: a law that changes regime more often than can be tabulated.
+    With `primed` False only where an empty tube starts to flow, and in which sense, without paths.
+    Raises: UntabulatedError: a law that changes sense, regime or priming more than `most_changes` times.
     """
     found = _mapped(drive, primed=primed, most_changes=most_changes)
     intervals = _intervals(drive, found)

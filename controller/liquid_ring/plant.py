@@ -45,7 +45,7 @@ class DiscState:
     pairs: tuple[PairState, ...]
 
     def fills(self) -> tuple[float, ...]:
-        """Fill ratios of all chambers. Returns: x in the order of the letters, n numbers."""
+        """x of all chambers in the order of the letters."""
         first = tuple(pair.fill for pair in self.pairs)
         return first + tuple(pair.opposite_fill for pair in self.pairs)
 
@@ -72,6 +72,10 @@ class Operation:
     event: Event
     energy: float
     """Work of the driven chamber's gas against the surroundings, integral of (p - ambient) dV, J."""
+    closing_pressure: float
+    """Gauge, of the driven chamber's gas when its valve closed, Pa."""
+    run_dry: float
+    """Time for which the valve stayed open to an empty chamber, s."""
 
     @property
     def moved(self) -> bool:
@@ -112,9 +116,9 @@ class LiquidRing:
     ) -> Advance:
         """Let time pass with some valves open from its start, all pairs in parallel.
 
-        Args: `gas_times`: s for each driven chamber's index, at most `duration`; empty while waiting.
-            `duration`: s, above zero. `points`: equally spaced instants to record beside the closing of each
-            valve, at least 1.
+        Args:
+            gas_times: s for each driven chamber's index, at most `duration`; empty while waiting.
+            points: equally spaced instants to record beside the closing of each valve, at least 1.
         Raises: ValueError: gas into both chambers of a pair at once.
         """
         spaced = duration * np.arange(1, points + 1) / points
@@ -155,6 +159,8 @@ class LiquidRing:
             regime_end=transfer.regime_end,
             event=transfer.event,
             energy=self.gas_pressure * self.model.chamber_volume * (before - float(transfer.fill[-1])),
+            closing_pressure=self.gas_pressure,
+            run_dry=_run_dry(transfer, before, valve.duration),
         )
         fill = np.concatenate([_first_fill(pair, transfer, first=first), off.fill])
         return replace(off, fill=fill, operation=operation)
@@ -212,14 +218,12 @@ class LiquidRing:
             regime_end=record.regime_end,
             event=record.event,
             energy=record.work,
+            closing_pressure=record.closing_pressure,
+            run_dry=record.run_dry,
         )
 
     def concluded(self, state: DiscState, operation: Operation) -> Operation:
-        """What a pair's last command has done by now, its tail included.
-
-        Args: `operation`: of the last command to its pair, as first returned.
-        Returns: Operation; the same where no term is modelled.
-        """
+        """What a pair's last command, as first returned, has done by now, its tail included."""
         if self.dynamics is None:
             return operation
         pair = state.pairs[operation.chamber % (self.chambers // 2)]
@@ -259,11 +263,14 @@ def initial_state(*, disc: Disc) -> DiscState:
 
 
 def longest(operations: Sequence[Operation]) -> Operation:
-    """The operation of a command that was given the most gas.
-
-    Args: `operations`: of one command, at least one.
-    """
+    """The operation of a command that was given the most gas."""
     return max(operations, key=lambda operation: operation.duration)
+
+
+def _run_dry(transfer: Transfer, before: float, duration: float) -> float:
+    if before <= 0:
+        return duration
+    return 0.0 if transfer.event is not Event.EMPTY else duration - (transfer.event_time or 0.0)
 
 
 def _first_fill(pair: PairState, transfer: Transfer, *, first: bool) -> FloatArray:

@@ -22,7 +22,7 @@ from ringbalance.controller.liquid_ring.transfer import (
 from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
 from ringbalance.scene.arrays import FloatArray
 
-KEPT: Final = 16
+_KEPT: Final = 16
 """Tables kept: a run needs one with gas and one without."""
 
 
@@ -57,8 +57,7 @@ def quadrature(drive: Drive, instants: FloatArray) -> Transfer:
     All flows under one gas pressure are tabulated at the first call, as `pair_path` describes; an ensemble
     walks along the same tables.  A velocity that vanishes like the distance to a stall is followed until
     1e-12 of fill is left.
-    Args: `drive`: law, fills, pressure and priming. `instants`: s from the start, shape (m,), ascending.
-    Returns: Transfer; its event is UNFINISHED, and nothing moves, under a law that cannot be tabulated.
+    Its event is UNFINISHED, and nothing moves, under a law that cannot be tabulated.
     Raises: ValueError: instants that do not ascend from zero.
     Source: section 5.1 of the liquid-ring paper in the limit of small segments, dx/dt = -u S/V.
     """
@@ -83,7 +82,7 @@ def quadrature(drive: Drive, instants: FloatArray) -> Transfer:
     )
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=_KEPT)
 def _paths(law: _SameLaw, total: float, exchange_rate: float, gas_pressure: float) -> FlowPaths:
     drive = Drive(
         law=law.law,

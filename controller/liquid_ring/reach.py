@@ -10,15 +10,13 @@ from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.reduced_model.law.flow_law import FlowLaw
 
-MAX_DOUBLINGS: Final = 40
-BISECTIONS: Final = 50
+_MAX_DOUBLINGS: Final = 40
+_BISECTIONS: Final = 50
 
 
 def largest_pair_moment(*, plant: LiquidRing, state: DiscState) -> float:
-    """Moment of a pair with its liquid moved as far as it goes to one side.
+    """Moment of a pair with its liquid moved as far as it goes to one side, kg m; all pairs hold the same.
 
-    Args: `plant`: the disc. `state`: its liquid; all pairs hold the same amount.
-    Returns: Moment, kg m.
     Source: Eq. 7 of the liquid-ring paper for a pair, by the model's own moment curve.
     """
     total = state.pairs[0].total
@@ -28,11 +26,9 @@ def largest_pair_moment(*, plant: LiquidRing, state: DiscState) -> float:
 
 
 def unreachable_moment(*, plant: LiquidRing, state: DiscState, wanted: complex) -> float:
-    """Distance of a moment from the nearest one that the disc can form.
+    """Distance of a moment from the nearest one that the disc can form, kg m; zero within reach.
 
     The moments within reach fill a polygon whose corners have every pair fully to one side or the other.
-    Args: `state`: its liquid. `wanted`: moment asked of the disc, kg m.
-    Returns: Distance, kg m; zero within reach.
     Source: Eq. 8 of the liquid-ring paper, in every direction and for any number of chambers.
     """
     n = plant.chambers
@@ -51,12 +47,9 @@ def unreachable_moment(*, plant: LiquidRing, state: DiscState, wanted: complex) 
 def starting_pressure(
     *, law: FlowLaw, fill: float, opposite_fill: float, primed: bool, above: float
 ) -> float | None:
-    """Smallest gas pressure at which liquid leaves a chamber.
+    """Smallest gauge pressure at which liquid leaves a chamber, Pa, to 12 digits, searched from `above` on.
 
-    Args: `fill`: x of the driven chamber. `opposite_fill`: x of the opposite chamber. `primed`: whether the
-        tube holds a continuous column beforehand. `above`: a gauge pressure, Pa, above zero, where the search
-        begins.
-    Returns: Gauge pressure, Pa, to 12 digits; None when no pressure found does.
+    None when no pressure found does.
     """
 
     def flows(pressure: float) -> bool:
@@ -68,13 +61,13 @@ def starting_pressure(
     if flows(above):
         return above
     low, high = above, 2 * above
-    for _ in range(MAX_DOUBLINGS):
+    for _ in range(_MAX_DOUBLINGS):
         if flows(high):
             break
         low, high = high, 2 * high
     else:
         return None
-    for _ in range(BISECTIONS):
+    for _ in range(_BISECTIONS):
         middle = (low + high) / 2
         low, high = (low, middle) if flows(middle) else (middle, high)
     return high

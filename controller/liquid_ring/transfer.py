@@ -1,4 +1,4 @@
-"""One stretch of flow through the tube of one pair: what is asked of an integrator, and what it returns.
+"""One interval of flow through the tube of one pair: what is asked of an integrator, and what it returns.
 
 The driven chamber's fill ratio x obeys dx/dt = -(S/V) u(x_A, x_C, p) with x_C = total - x, which is taken in
 `Drive.opposite` and nowhere else: liquid is conserved by construction.
@@ -60,20 +60,12 @@ class Drive:
         return min(self.total, self.law.max_fill_ratio)
 
     def opposite(self, fill: npt.ArrayLike) -> FloatArray:
-        """Fill ratio of the opposite chamber, x_C = total - x.
-
-        Args: `fill`: x of the driven chamber, any shape.
-        Returns: x_C, the shape of `fill`, held within the law's range against round-off.
-        """
+        """Fill ratio of the opposite chamber, x_C = total - x, held within the law's range."""
         other = self.total - np.asarray(fill, dtype=np.float64)
         return np.asarray(np.clip(other, 0.0, self.law.max_fill_ratio), dtype=np.float64)
 
     def flow(self, fill: npt.ArrayLike, *, primed: bool = True) -> Flow:
-        """The law's answer for fill ratios of the driven chamber under this drive's gas pressure.
-
-        Args: `fill`: x, any shape. `primed`: whether the tube holds a continuous column.
-        Returns: Flow, the shape of `fill`.
-        """
+        """The law's answer for fill ratios of the driven chamber, any shape."""
         return self.law.evaluate(
             fill_ratio=np.clip(fill, 0.0, self.law.max_fill_ratio),
             opposite_fill_ratio=self.opposite(fill),
@@ -84,10 +76,10 @@ class Drive:
 
 @dataclass(frozen=True, kw_only=True)
 class Transfer:
-    """Fills of the driven chamber over one stretch of flow."""
+    """Fills of the driven chamber over one interval of flow."""
 
     instants: FloatArray
-    """s from the start of the stretch, ascending."""
+    """s from the start, ascending."""
     fill: FloatArray
     """x at those instants."""
     regime_start: Regime
@@ -104,11 +96,7 @@ Integrator = Callable[[Drive, FloatArray], Transfer]
 
 
 def checked_instants(instants: npt.ArrayLike) -> FloatArray:
-    """Check the instants of a transfer.
-
-    Args: `instants`: s, shape (m,), m at least 1.
-    Raises: ValueError: none given, negative, descending or not finite.
-    """
+    """Instants as an array; ValueError when there are none, or negative, descending or infinite ones."""
     t = np.asarray(instants, dtype=np.float64)
     # A NaN fails every comparison, an infinity stands last.
     if t.ndim != 1 or t.size == 0 or not (t[0] >= 0 and t[-1] < np.inf and bool(np.all(t[1:] >= t[:-1]))):
@@ -117,11 +105,7 @@ def checked_instants(instants: npt.ArrayLike) -> FloatArray:
 
 
 def still(drive: Drive, instants: FloatArray, *, flow: Flow) -> Transfer:
-    """A stretch in which nothing flows.
-
-    Args: `instants`: s, shape (m,). `flow`: what the law says of the tube at the start, a velocity of zero.
-    Returns: Transfer with the initial fill throughout.
-    """
+    """An interval in which nothing flows."""
     regime = Regime(int(flow.regime))
     return Transfer(
         instants=instants,
@@ -143,12 +127,7 @@ def finished(
     event: Event,
     event_time: float | None,
 ) -> Transfer:
-    """A stretch that flowed, with the tube's state at its end.
-
-    Args: `instants`: s, shape (m,). `fill`: x at the instants, shape (m,). `regime_start`: what the law said
-        of the tube at the start. `event`: what ended the flow. `event_time`: s; None without an event.
-    Returns: Transfer; gas that has blown through an emptied chamber leaves no column.
-    """
+    """An interval that flowed; gas that has blown through an emptied chamber leaves no column."""
     held = np.clip(fill, drive.lowest, drive.highest)
     after = drive.flow(held[-1])
     return Transfer(

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.physics.gas.column import pressure_factor
 from ringbalance.physics.pressure.hydrostatics import Radius, hydrostatic_pressure
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration
 from ringbalance.reduced_model.chamber.inputs import half_widths
@@ -40,6 +41,7 @@ def calibrated_law(*, scene: Scene, chamber: ChamberCalibration, heads: TubeHead
         path=tube_path(scene),
         heads=heads,
         inputs=_drive_uncertainty(scene),
+        gas_factor=pressure_factor(scene),
         moment=CalibratedMoment(
             chamber_moment=chamber.moment.table, half_width=chamber.moment.uncertainty_table(inputs=no_inputs)
         ),

@@ -54,6 +54,8 @@ class CalibratedLaw:
     """Half-widths of what drives the flow."""
     moment: CalibratedMoment
     """The moment that goes with this law."""
+    gas_factor: float = 1.0
+    """Gas pressure on the liquid over the one at the place of measurement, which all arguments are."""
 
     @property
     def density(self) -> float:
@@ -92,7 +94,7 @@ class CalibratedLaw:
         x = np.asarray(fill_ratio, dtype=np.float64)
         y = self.max_fill_ratio - x if opposite_fill_ratio is None else opposite_fill_ratio
         gas, own, other = np.broadcast_arrays(
-            np.asarray(gas_pressure, dtype=np.float64),
+            self.gas_factor * np.asarray(gas_pressure, dtype=np.float64),
             np.maximum(self.wall_pressure(x), 0.0),
             np.maximum(self.wall_pressure(y), 0.0),
         )

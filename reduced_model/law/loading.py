@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import Field, fields
+from dataclasses import MISSING, Field, fields
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, cast
@@ -49,7 +49,16 @@ _OLD_NAMES: Final[Mapping[str, str]] = MappingProxyType(
 """Types and keys of earlier files, with what they are called now."""
 _LAWS: Final = (CalibratedLaw, PaperLaw)
 _POSITIVE: Final = frozenset(
-    {"density", "chamber_volume", "tube_area", "max_fill_ratio", "axial_width", "central_angle", "step"}
+    {
+        "density",
+        "chamber_volume",
+        "tube_area",
+        "max_fill_ratio",
+        "axial_width",
+        "central_angle",
+        "step",
+        "gas_factor",
+    }
 )
 _NOT_NEGATIVE: Final = frozenset({"ambient_pressure", "drag_coefficient", "interpolation_error"})
 _LONGEST: Final = 40
@@ -91,6 +100,9 @@ class _Reader:
             return None
 
     def field(self, data: Mapping[str, object], field: Field[Any], where: str) -> Any:
+        if field.name not in data and field.default is not MISSING:
+            # A key that earlier files do not have.
+            return field.default
         if field.name not in data:
             self.fault(where, "missing", "the key is missing", str(field.type))
             return None

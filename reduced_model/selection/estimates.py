@@ -7,7 +7,7 @@ range, and what belongs to an injection for the one that matters most, the short
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from types import MappingProxyType
 from typing import Final
@@ -16,6 +16,7 @@ import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.reduced_model.chamber.values import by_closed_form
+from ringbalance.reduced_model.gas_line import LineEnd, line_ends
 from ringbalance.reduced_model.selection.chamber_range import (
     chamber_fills,
     mean_gravity,
@@ -41,11 +42,9 @@ from ringbalance.reduced_model.selection.tube_terms import (
 )
 from ringbalance.reduced_model.time_scales import (
     deciding_gas_time,
-    filling_time,
     long_start_up_loss,
     start_up_loss,
     start_up_time,
-    venting_time,
 )
 from ringbalance.scene.accuracy import FINEST
 from ringbalance.scene.models import Scene
@@ -79,6 +78,9 @@ class TermEstimate:
     time: float | None = None
     """Valve-open time that it costs of a long injection, s; None for a term that is no time."""
 
+    default_range: tuple[float, float] | None = None
+    """Contribution at both ends of a default range, where the scene does not give the numbers."""
+
     @property
     def above(self) -> bool:
         """Whether the contribution exceeds the tolerance."""
@@ -87,6 +89,9 @@ class TermEstimate:
     @property
     def comparison(self) -> str:
         """The contribution compared with the tolerance."""
+        if self.default_range is not None:
+            low, high = (percent(end) for end in self.default_range)
+            return f"not in the scene: {low if low == high else f'{low} to {high}'} over a default range"
         if self.contribution is None:
             return NO_BASIS
         if self.tolerance == FINEST:
@@ -190,17 +195,64 @@ def injection_estimates(scene: Scene) -> Mapping[str, TermEstimate]:
     """
     flow, deciding = range_flow(scene), injection_time(scene)
     within = f"in the shortest injection that matters, {1e3 * deciding:.3g} ms"
-    lag = scene.gas.valve_lag
-    share = None if lag is None else min(lag / deciding, 1.0)
     slowest = float(np.min(flow.velocity[flow.starts], initial=np.inf))
     held = None if not np.isfinite(slowest) else min(scene.tube.length / max(slowest * deciding, 1e-300), 1.0)
-    return _by_term(
+    slow, fast = line_ends(scene)[0], line_ends(scene)[-1]
+    moment = arc_moment(scene)
+    found = _by_term(
         scene,
         _inertia(scene, flow, deciding, within),
-        _gas_filling(scene, deciding, within),
-        (LAG, share, "no valve lag" if lag is None else f"{1e3 * lag:.3g} ms {within}", lag),
-        (HELD, held, f"at most S L over the liquid moved {within}, at the worst fill, L/(u T)", None),
+        _gas_filling(scene, slow, fast, deciding, within),
+        _lag(slow, fast, deciding, within),
+        (
+            HELD,
+            held,
+            f"at most S L over the liquid moved {within}, at the worst fill, L/(u T); a full tube along half "
+            f"a turn has a moment of 2 rho S (L/pi)^2 = {1e6 * moment:.2g} g mm, "
+            f"{1e6 * moment * scene.rotor.influence_coefficient:.2g} um of vibration",
+            None,
+        ),
     )
+    times = {FILLING: (_slower(scene, fast), _slower(scene, slow)), LAG: (fast.valve_lag, slow.valve_lag)}
+    given = {FILLING: scene.gas.conductance, LAG: scene.gas.valve_lag}
+    return {
+        term: estimate
+        if given.get(term, 0.0) is not None
+        else replace(
+            estimate,
+            contribution=None,
+            time=None,
+            default_range=(min(times[term][0] / deciding, 1.0), min(times[term][1] / deciding, 1.0)),
+        )
+        for term, estimate in found.items()
+    }
+
+
+def arc_moment(scene: Scene) -> float:
+    """First moment of a full tube that follows an arc of half a turn, 2 rho S (L/pi)^2, kg m.
+
+    Source: int r sin(q) r dq over half a turn, with pi r = L; legs along a radius make it smaller.
+    """
+    area = np.pi / 4 * scene.tube.bore**2
+    return float(2 * scene.liquid.density * area * (scene.tube.length / np.pi) ** 2)
+
+
+def _chamber_gas(scene: Scene) -> float:
+    """Gas volume of a chamber without liquid, m^3."""
+    return chamber_volume(disc=scene.disc) + (scene.gas.dead_volume or 0.0)
+
+
+def _slower(scene: Scene, end: LineEnd) -> float:
+    """The longer of filling and venting, s."""
+    volume, supply = _chamber_gas(scene), end.line.supply_pressure
+    filling = float(end.line.filling_time(supply, volume=volume))
+    return max(filling, float(end.line.venting_time(supply, volume=volume)))
+
+
+def _lag(slow: LineEnd, fast: LineEnd, deciding: float, within: str) -> Row:
+    low, high = 1e3 * fast.valve_lag, 1e3 * slow.valve_lag
+    lag = f"{high:.3g} ms" if low == high else f"{low:.3g} to {high:.3g} ms"
+    return LAG, min(slow.valve_lag / deciding, 1.0), f"{lag} {within}", slow.valve_lag
 
 
 def injection_time(scene: Scene) -> float:
@@ -234,12 +286,11 @@ def _inertia(scene: Scene, flow: RangeFlow, deciding: float, within: str) -> Row
     return INERTIA, lost, formula, long_start_up_loss(slowest, laminar=laminar)
 
 
-def _gas_filling(scene: Scene, deciding: float, within: str) -> Row:
-    volume = chamber_volume(disc=scene.disc) + (scene.gas.dead_volume or 0.0)
-    filling, venting = filling_time(scene.gas, volume=volume), venting_time(scene.gas, volume=volume)
-    if filling is None:
-        return FILLING, None, "no sonic conductance", None
-    longest = max(filling, venting or 0.0)
-    also = "" if venting is None else f" and vents in {1e3 * venting:.3g} ms"
-    formula = f"an empty chamber fills in {1e3 * filling:.3g} ms{also}, {within}"
+def _gas_filling(scene: Scene, slow: LineEnd, fast: LineEnd, deciding: float, within: str) -> Row:
+    volume, supply = _chamber_gas(scene), slow.line.supply_pressure
+    lines = [end.line for end in dict.fromkeys((fast, slow))]
+    filling = " to ".join(f"{1e3 * float(line.filling_time(supply, volume=volume)):.3g}" for line in lines)
+    venting = " to ".join(f"{1e3 * float(line.venting_time(supply, volume=volume)):.3g}" for line in lines)
+    longest = _slower(scene, slow)
+    formula = f"an empty chamber fills in {filling} ms and vents in {venting} ms, {within}"
     return FILLING, min(longest / deciding, 1.0), formula, longest

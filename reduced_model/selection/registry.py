@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import Final, Literal
 
 from ringbalance.mesh.geometry import chamber_volume
+from ringbalance.physics.gas.supply import HEAT_CAPACITY_RATIO
 from ringbalance.reduced_model.chamber.values import by_closed_form
 from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.reduced_model.selection.chamber_range import mean_gravity
@@ -32,7 +33,6 @@ from ringbalance.reduced_model.selection.estimates import (
     term_estimates,
 )
 from ringbalance.reduced_model.selection.tube_terms import ROTATION
-from ringbalance.reduced_model.time_scales import HEAT_CAPACITY_RATIO
 from ringbalance.scene.models import Scene
 
 Part = Literal["chamber", "tube", "injection"]

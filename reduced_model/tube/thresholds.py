@@ -34,7 +34,7 @@ def priming_pressure(
     if crest is None:
         return None
     ends = law.ends(fill_ratio=fill_ratio, opposite_fill_ratio=opposite_fill_ratio)
-    return np.asarray(replace(crest, trapped=hump_gas == "trapped").priming_pressure(ends))
+    return np.asarray(replace(crest, trapped=hump_gas == "trapped").priming_pressure(ends)) / law.gas_factor
 
 
 def siphon_stall_pressure(
@@ -50,4 +50,7 @@ def siphon_stall_pressure(
     Returns: Gauge pressure, Pa, of the broadcast shape; negative where the driven chamber holds more.
     Source: Eq. 18 of the liquid-ring paper with u = 0 and finite-element wall pressures.
     """
-    return law.ends(fill_ratio=fill_ratio, opposite_fill_ratio=opposite_fill_ratio).stall_pressure()
+    return (
+        law.ends(fill_ratio=fill_ratio, opposite_fill_ratio=opposite_fill_ratio).stall_pressure()
+        / law.gas_factor
+    )

@@ -6,32 +6,16 @@ import dataclasses
 import math
 from typing import Literal
 
-import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from ringbalance.reduced_model.time_scales import (
     deciding_gas_time,
-    filling_time,
     long_start_up_loss,
     start_up_loss,
     start_up_time,
-    venting_time,
 )
-from ringbalance.scene.models import Gas, Scene
-
-GAS = Gas(
-    pressure=0.7e6,
-    measured_at="chamber",
-    ambient_pressure=101325.0,
-    temperature=313.15,
-    conductance=1e-8,
-    critical_ratio=0.3,
-    dead_volume=0.0,
-    valve_lag=None,
-    process="isothermal",
-)
-VOLUME = 51e-6
+from ringbalance.scene.models import Scene
 
 
 def moved(gas_time: float, *, power: int) -> float:
@@ -64,45 +48,6 @@ def test_both_forms_of_the_start_up_time_agree() -> None:
     u = math.sqrt(2 * pressure / rho / (k + 1))
     tau = start_up_time(density=rho, length=length, velocity=u, driving_pressure=pressure)
     assert tau == pytest.approx(2 * length / ((k + 1) * u))
-
-
-def rate(upstream: float, downstream: float) -> float:
-    """dp/dt of isothermal gas behind an ISO 6358 line, by hand."""
-    b, ratio = 0.3, downstream / upstream
-    choked = 1.0 if ratio <= b else math.sqrt(max(1 - ((ratio - b) / (1 - b)) ** 2, 0.0))
-    mass_flow = 1e-8 * upstream * 1e5 / (287.0 * 293.15) * math.sqrt(293.15 / 313.15) * choked
-    return mass_flow * 287.0 * 313.15 / VOLUME
-
-
-def test_filling_time_is_that_of_the_choked_line() -> None:
-    time = filling_time(GAS, volume=VOLUME)
-    assert time is not None
-    supply = GAS.pressure + GAS.ambient_pressure
-    assert GAS.pressure / rate(supply, GAS.ambient_pressure) == pytest.approx(time)
-
-
-@pytest.mark.parametrize("pressure", [0.7e6, 0.05e6])
-def test_venting_time_is_that_of_the_line(pressure: float) -> None:
-    gas = dataclasses.replace(GAS, pressure=pressure)
-    time = venting_time(gas, volume=VOLUME)
-    assert time is not None
-    ambient = gas.ambient_pressure
-    path = solve_ivp(
-        lambda _, p: [-rate(max(p[0], ambient), ambient)],
-        (0, 2 * time),
-        [ambient + pressure],
-        rtol=1e-9,
-        atol=1.0,
-        max_step=time / 200,
-    )
-    reached = path.t[int(np.argmax(path.y[0] <= ambient * (1 + 1e-5)))]
-    assert reached == pytest.approx(time, rel=1e-2)
-
-
-def test_without_a_line_there_is_no_time() -> None:
-    without = dataclasses.replace(GAS, conductance=None, critical_ratio=None)
-    assert filling_time(without, volume=VOLUME) is None
-    assert venting_time(without, volume=VOLUME) is None
 
 
 def test_the_deciding_injection_is_the_one_at_the_limit(table_1_scene: Scene) -> None:

@@ -1,0 +1,164 @@
+r"""Gas of a chamber that fills and vents through its valve and line, by ISO 6358.
+
+    m' = C rho_0 p_1 sqrt(T_0/T_1) phi(p_2/p_1)
+with phi = 1 up to the critical ratio b (choked), sqrt(1 - ((r - b)/(1 - b))^2) above it (subsonic), and
+straight from r = 0.999 to 1, where the flow is laminar and the ellipse's slope would be infinite.
+
+Isothermal gas keeps the temperature of the supply: d(p V)/dt = R T m'.  Adiabatic gas exchanges no heat with
+the walls: V dp/dt = gamma (R T_in m'_in - R T m'_out - p dV/dt), with its temperature from p V = m R T.
+Filling a closed volume is faster by up to gamma when adiabatic; a real chamber lies between the two.
+
+**Times of isothermal gas in a constant volume**, tau = V/(C p_0) sqrt(T_0/T).  Filling, the supply p_1 is
+upstream: with r = p/p_1, dr/dt = phi(r)/tau takes tau (b - r) while choked and, with
+sin q = (r - b)/(1 - b), tau (1 - b) dq beyond, so tau (1 - b) pi/2 from b to r = 1.  Choked to the end it
+would be V p/(C p_1 p_0) sqrt(T_0/T) for the gauge pressure p, a lower bound.  Venting, the chamber is
+upstream: with r = p_a/p, dr/dt = r phi(r)/tau takes tau ln(b/r) while choked and
+tau (1 - b) dq/(b + (1 - b) sin q) beyond, whose integral is elementary.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Gas, GasProcess
+
+REFERENCE_PRESSURE: Final = 1e5
+"""Of the reference atmosphere of ISO 6358, Pa."""
+REFERENCE_TEMPERATURE: Final = 293.15
+"""Of the same, K."""
+HEAT_CAPACITY_RATIO: Final = 1.4
+"""gamma of air."""
+_LAMINAR_RATIO: Final = 0.999
+"""Pressure ratio above which the conductance is taken as laminar."""
+VENTED: Final = 1 - _LAMINAR_RATIO
+"""Gauge pressure over ambient pressure below which a chamber counts as vented."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class GasLine:
+    """Valve and line of one chamber, with a supply and the surroundings at its other end."""
+
+    supply_pressure: float
+    """Absolute, Pa."""
+    ambient_pressure: float
+    """Absolute, Pa."""
+    temperature: float
+    """Of the supply and the surroundings, K."""
+    conductance: float
+    """C, m^3/(s Pa)."""
+    critical_ratio: float
+    """b."""
+    process: GasProcess
+
+    def rates(
+        self, *, pressure: float, content: float, volume: float, growth: float, is_open: bool
+    ) -> tuple[float, float]:
+        """dp/dt (Pa/s) and d(m R)/dt (W/K) of a chamber's gas.
+
+        Args:
+            pressure: p, absolute, Pa.
+            content: m R = p V/T, J/K.
+            growth: dV/dt, m^3/s.
+            is_open: whether the line leads to the supply; else to the surroundings.
+        Source: ISO 6358-1 for the mass flow; first law for the chamber's gas.
+        """
+        outside = self.supply_pressure if is_open else self.ambient_pressure
+        isothermal = self.process == "isothermal"
+        if outside >= pressure:
+            temperature = self.temperature
+            flow = self._flow(upstream=outside, downstream=pressure, temperature=temperature)
+        else:
+            # A trial step of the integrator may empty a chamber of its gas; such a step is thrown away.
+            own = pressure * volume / max(content, 1e-9 * volume)
+            temperature = self.temperature if isothermal else own
+            flow = -self._flow(upstream=pressure, downstream=outside, temperature=temperature)
+        exponent = 1.0 if isothermal else HEAT_CAPACITY_RATIO
+        return exponent * (flow - pressure * growth) / volume, flow / temperature
+
+    def _flow(self, *, upstream: float, downstream: float, temperature: float) -> float:
+        """R T_1 m' = C p_0 p_1 sqrt(T_1/T_0) phi(p_2/p_1), pressure times volume per time, W."""
+        shape = flow_shape(ratio=downstream / upstream, critical_ratio=self.critical_ratio)
+        warm = math.sqrt(temperature / REFERENCE_TEMPERATURE)
+        return self.conductance * REFERENCE_PRESSURE * upstream * warm * shape
+
+    def time_constant(self, *, volume: float) -> float:
+        """tau = V/(C p_0) sqrt(T_0/T), s."""
+        warm = math.sqrt(REFERENCE_TEMPERATURE / self.temperature)
+        return volume / (self.conductance * REFERENCE_PRESSURE) * warm
+
+    def filling_time(self, pressure: npt.ArrayLike, *, volume: float) -> FloatArray:
+        """Time from ambient to an absolute pressure up to the supply's, s, isothermal."""
+        end = np.asarray(pressure, dtype=np.float64) / self.supply_pressure
+        started = self._filled(self.ambient_pressure / self.supply_pressure)
+        return self.time_constant(volume=volume) * (self._filled(end) - started)
+
+    def _filled(self, ratio: npt.ArrayLike) -> FloatArray:
+        """Integral of dr/phi from b to r."""
+        b = self.critical_ratio
+        return np.minimum(np.asarray(ratio) - b, 0.0) + (1 - b) * self._angle(ratio)
+
+    def choked_filling_time(self, *, volume: float) -> float:
+        """V p/(C p_1 p_0) sqrt(T_0/T), s: a lower bound on the time from ambient to the supply's pressure."""
+        return self.time_constant(volume=volume) * (1 - self.ambient_pressure / self.supply_pressure)
+
+    def venting_time(self, pressure: npt.ArrayLike, *, volume: float) -> FloatArray:
+        """Time from an absolute pressure above ambient back to ambient, s, isothermal."""
+        ratio = self.ambient_pressure / np.asarray(pressure, dtype=np.float64)
+        b = self.critical_ratio
+        choked = np.maximum(np.log(b / ratio), 0.0)
+        subsonic = (1 - b) * (_sine_integral(math.pi / 2, b) - _sine_integral(self._angle(ratio), b))
+        return self.time_constant(volume=volume) * (choked + subsonic)
+
+    def _angle(self, ratio: npt.ArrayLike) -> FloatArray:
+        b = self.critical_ratio
+        return np.asarray(np.arcsin(np.clip((np.asarray(ratio) - b) / (1 - b), 0.0, 1.0)))
+
+
+def _sine_integral(angle: npt.ArrayLike, b: float) -> FloatArray:
+    """Integral of dq/(b + c sin q) from 0, c = 1 - b.
+
+    With t = tan(q/2) it is that of 2 dt/(b t^2 + 2 c t + b), of discriminant c^2 - b^2.
+    """
+    c, t = 1 - b, np.tan(np.asarray(angle) / 2)
+    square = c**2 - b**2
+    if abs(square) < 1e-12:
+        return np.asarray(2 * (1 / c - 1 / (b * t + c)))
+    root = math.sqrt(abs(square))
+    if square < 0:
+        return np.asarray(2 / root * (np.arctan((b * t + c) / root) - math.atan(c / root)))
+    inside = (b * t + c - root) * (c + root) / ((b * t + c + root) * (c - root))
+    return np.asarray(np.log(inside) / root)
+
+
+def gas_line(gas: Gas) -> GasLine | None:
+    """The line of a scene's gas; None where the scene does not give its two numbers."""
+    if gas.conductance is None or gas.critical_ratio is None:
+        return None
+    return line_with(gas, conductance=gas.conductance, critical_ratio=gas.critical_ratio)
+
+
+def line_with(gas: Gas, *, conductance: float, critical_ratio: float) -> GasLine:
+    """A line with given numbers under a scene's pressures and temperature."""
+    return GasLine(
+        supply_pressure=gas.pressure + gas.ambient_pressure,
+        ambient_pressure=gas.ambient_pressure,
+        temperature=gas.temperature,
+        conductance=conductance,
+        critical_ratio=critical_ratio,
+        process=gas.process,
+    )
+
+
+def flow_shape(*, ratio: float, critical_ratio: float) -> float:
+    """phi(r), the mass flow over its choked value: 1 up to b, 0 at r = 1."""
+    if ratio <= critical_ratio:
+        return 1.0
+    held = min(ratio, max(_LAMINAR_RATIO, critical_ratio))
+    ellipse = math.sqrt(max(1 - ((held - critical_ratio) / (1 - critical_ratio)) ** 2, 0.0))
+    return ellipse if ratio == held else ellipse * (1 - ratio) / (1 - held)

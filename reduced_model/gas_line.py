@@ -1,0 +1,258 @@
+"""What the valve and line of a chamber let through at the least, and at what valve-open time.
+
+A line that a scene does not give is a range, not an absence: conductances of small valves behind a rotary
+distributor and their switching times, of which both ends are answered for.
+
+**The smallest correction.**  Without a column in the tube nothing flows before the gas has filled the chamber
+up to the pressure that starts the flow.  A valve that shuts at that moment leaves a started column, which
+runs until the chamber has vented to the pressure that stops it: this amount is the smallest that the line can
+deliver, whatever is commanded.  A valve is not expected to open for less than its own lag.  With isothermal
+gas the times belong to the pressure (`physics.gas.supply`), so the liquid moved is the integral of
+rho S u(p) dt over filling and venting, at constant fills.  The column's inertia delays both ends alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from ringbalance.physics.gas.supply import GasLine, line_with
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.scene.models import Gas, Scene
+
+DEFAULT_CONDUCTANCES: Final = (0.2e-8, 1e-8)
+"""C of small valves with a rotary distributor, slow and fast, m^3/(s Pa): 0.2 and 1 l/(s bar)."""
+DEFAULT_LAGS: Final = (10e-3, 5e-3)
+"""Of small solenoid valves, slow and fast, s."""
+DEFAULT_CRITICAL_RATIO: Final = 0.3
+"""Between 0.5 of a nozzle and 0.2 of a long line."""
+_PRESSURES: Final = 257
+"""Per refinement of a threshold, and of the integral over filling and venting."""
+_REFINEMENTS: Final = 4
+
+
+@dataclass(frozen=True, kw_only=True)
+class LineEnd:
+    """One gas line that answers are given for."""
+
+    name: str
+    """ "given", or "slow" and "fast", the ends of the default range."""
+    line: GasLine
+    valve_lag: float
+    """s."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LineAnswer:
+    """What a pair at equal fills can do with one gas line."""
+
+    end: str
+    conductance: float
+    """C, m^3/(s Pa)."""
+    critical_ratio: float
+    valve_lag: float
+    """s."""
+    filling_time: float
+    """From ambient to the supply's pressure, s."""
+    choked_filling_time: float
+    """The same if the line were choked to the end, a lower bound, s."""
+    venting_time: float
+    """Back to ambient, s."""
+    shortest_opening: float | None
+    """Valve-open time below which nothing moves, s; None: the gas starts no flow."""
+    smallest_correction: float | None
+    """Change of the vibration by the shortest opening, m."""
+    limit: float
+    """Of the vibration, m."""
+
+    @property
+    def above_limit(self) -> bool:
+        """Whether no correction as small as the controller's limit can be made."""
+        return self.smallest_correction is not None and self.smallest_correction > self.limit
+
+
+def line_ends(scene: Scene) -> tuple[LineEnd, ...]:
+    """The scene's gas line, or the slow and the fast end of the default range of what it does not give."""
+    gas = scene.gas
+    if gas.conductance is not None and gas.valve_lag is not None:
+        return (_end(gas, "given", 0),)
+    return _end(gas, "slow", 0), _end(gas, "fast", 1)
+
+
+def _end(gas: Gas, name: str, place: int) -> LineEnd:
+    line = line_with(
+        gas,
+        conductance=DEFAULT_CONDUCTANCES[place] if gas.conductance is None else gas.conductance,
+        critical_ratio=DEFAULT_CRITICAL_RATIO if gas.critical_ratio is None else gas.critical_ratio,
+    )
+    return LineEnd(
+        name=name, line=line, valve_lag=DEFAULT_LAGS[place] if gas.valve_lag is None else gas.valve_lag
+    )
+
+
+def line_answers(scene: Scene, model: BalancerModel) -> tuple[LineAnswer, ...]:
+    """What the balancer's gas line can deliver, for each of `line_ends`, at equal fills of a pair."""
+    fill = model.flow.max_fill_ratio / 2
+    edges = _edges(model, fill, scene.gas.pressure)
+    return tuple(_answer(scene, model, end, fill, edges) for end in line_ends(scene))
+
+
+def _answer(
+    scene: Scene, model: BalancerModel, end: LineEnd, fill: float, edges: tuple[float, float] | None
+) -> LineAnswer:
+    volume = (1 - fill) * model.chamber_volume + (scene.gas.dead_volume or 0.0)
+    line, opening, metres = end.line, None, None
+    if edges is not None:
+        opening, metres = _shortest(model, fill, end, volume, edges)
+    correction = None
+    if metres is not None:
+        moment = model.moment
+        correction = metres * model.tube_area / model.chamber_volume
+        moved = moment.pair_moment(fill_ratio=fill - correction, opposite_fill_ratio=fill + correction)
+        correction = abs(float(moved)) * scene.rotor.influence_coefficient
+    return LineAnswer(
+        end=end.name,
+        conductance=line.conductance,
+        critical_ratio=line.critical_ratio,
+        valve_lag=end.valve_lag,
+        filling_time=float(line.filling_time(line.supply_pressure, volume=volume)),
+        choked_filling_time=line.choked_filling_time(volume=volume),
+        venting_time=float(line.venting_time(line.supply_pressure, volume=volume)),
+        shortest_opening=opening,
+        smallest_correction=correction,
+        limit=scene.controller.limit,
+    )
+
+
+def _velocity(model: BalancerModel, fill: float, pressure: FloatArray, *, primed: bool) -> FloatArray:
+    flow = model.flow.evaluate(
+        fill_ratio=np.full(pressure.shape, fill),
+        opposite_fill_ratio=np.full(pressure.shape, fill),
+        gas_pressure=pressure,
+        primed=np.full(pressure.shape, primed),
+    )
+    return np.asarray(flow.velocity, dtype=np.float64)
+
+
+def _edges(model: BalancerModel, fill: float, pressure: float) -> tuple[float, float] | None:
+    """Gauge pressures that start a flow and that stop it, Pa; None where the gas starts none."""
+    start = _edge(lambda p: _velocity(model, fill, p, primed=False) > 0, pressure)
+    if start is None:
+        return None
+    stop = _edge(lambda p: _velocity(model, fill, p, primed=True) > 0, start)
+    return start, 0.0 if stop is None else stop
+
+
+def _edge(flows: Callable[[FloatArray], BoolArray], highest: float) -> float | None:
+    """Smallest pressure from which on liquid flows up to `highest`, where it must."""
+    low, high = 0.0, highest
+    for _ in range(_REFINEMENTS):
+        p = np.linspace(low, high, _PRESSURES)
+        dry = np.flatnonzero(~flows(p))
+        if dry.size == 0:
+            return low
+        if dry[-1] == p.size - 1:
+            return None
+        low, high = float(p[dry[-1]]), float(p[dry[-1] + 1])
+    return high
+
+
+def _shortest(
+    model: BalancerModel, fill: float, end: LineEnd, volume: float, edges: tuple[float, float]
+) -> tuple[float, float]:
+    """Shortest valve-open time that moves liquid, s, and the length of column that it moves, m."""
+    line, (start, stop) = end.line, edges
+    ambient, supply = line.ambient_pressure, line.supply_pressure
+    rising = ambient + np.linspace(start, supply - ambient, _PRESSURES)
+    filled = line.filling_time(rising, volume=volume)
+    opening = max(float(filled[0]), end.valve_lag)
+    # Beyond the end of filling the pressure stays the supply's.
+    reached = float(np.interp(opening, filled, rising))
+    up = ambient + np.linspace(start, reached - ambient, _PRESSURES)
+    down = ambient + np.linspace(stop, reached - ambient, _PRESSURES)
+    metres = float(_metres(model, fill, up - ambient, line.filling_time(up, volume=volume)).sum())
+    metres += _venting(model, fill, line, volume, down)
+    held = max(opening - float(filled[-1]), 0.0)
+    top = float(_velocity(model, fill, np.array([reached - ambient]), primed=True)[0])
+    return opening, metres + held * top
+
+
+def _metres(model: BalancerModel, fill: float, pressure: FloatArray, time: FloatArray) -> FloatArray:
+    """u dt of each step along a gauge pressure whose times are given."""
+    middle = (pressure[1:] + pressure[:-1]) / 2
+    speed = np.maximum(_velocity(model, fill, middle, primed=True), 0.0)
+    return np.asarray(speed * np.abs(np.diff(time)))
+
+
+def _venting(model: BalancerModel, fill: float, line: GasLine, volume: float, pressure: FloatArray) -> float:
+    """Metres that pass while an absolute pressure falls by venting and by giving way to the gas.
+
+    V dp = -(f + p S u) dt with f = -V dp/dt of the line alone.
+    """
+    alone = _metres(model, fill, pressure - line.ambient_pressure, line.venting_time(pressure, volume=volume))
+    middle = (pressure[1:] + pressure[:-1]) / 2
+    given_way = middle * model.tube_area * alone / (volume * np.diff(pressure))
+    return float(np.sum(alone / (1 + given_way)))
+
+
+def line_text(answers: tuple[LineAnswer, ...]) -> str:
+    """The smallest correction that the line can deliver, in one phrase."""
+    if any(answer.smallest_correction is None for answer in answers):
+        return "the gas starts no flow at equal fills"
+    whose = "the scene's" if answers[0].end == "given" else "not in the scene, default range"
+    each = [f"{1e6 * (answer.smallest_correction or 0.0):.2g} um{_which(answer)}" for answer in answers]
+    return f"{whose}: smallest correction {' or '.join(each)}"
+
+
+def line_warning(answers: tuple[LineAnswer, ...]) -> str:
+    """Empty where the line can deliver corrections as small as the limit."""
+    above = [answer for answer in answers if answer.above_limit]
+    if not above:
+        return ""
+    which = "" if above[0].end == "given" else " over its default range" if len(above) > 1 else " if slow"
+    return (
+        f"the smallest correction that the gas line can deliver{which}, {_sizes(above)} um, is "
+        f"above the limit of {1e6 * above[0].limit:.2g} um: no run is sure to settle; take a faster valve, "
+        "less dead volume or a higher limit"
+    )
+
+
+def _sizes(answers: Sequence[LineAnswer]) -> str:
+    """In um, the smaller one first."""
+    return " to ".join(f"{1e6 * size:.2g}" for size in sorted(a.smallest_correction or 0.0 for a in answers))
+
+
+def line_document(answers: tuple[LineAnswer, ...]) -> dict[str, Any]:
+    """For JSON, in SI."""
+    return {
+        "given": answers[0].end == "given",
+        "limit_m": answers[0].limit,
+        "ends": [
+            {
+                "end": answer.end,
+                "conductance_m3_per_s_Pa": answer.conductance,
+                "critical_ratio": answer.critical_ratio,
+                "valve_lag_s": answer.valve_lag,
+                "filling_time_s": answer.filling_time,
+                "choked_filling_time_s": answer.choked_filling_time,
+                "venting_time_s": answer.venting_time,
+                "shortest_opening_s": answer.shortest_opening,
+                "smallest_correction_m": answer.smallest_correction,
+                "above_limit": answer.above_limit,
+            }
+            for answer in answers
+        ],
+        "text": line_text(answers),
+        "warning": line_warning(answers),
+    }
+
+
+def _which(answer: LineAnswer) -> str:
+    if answer.end == "given":
+        return ""
+    numbers = f"{1e8 * answer.conductance:.2g} l/(s bar), {1e3 * answer.valve_lag:.2g} ms lag"
+    return f" ({answer.end}: {numbers})"

@@ -1,0 +1,155 @@
+"""What the gas line delivers at the least, compared with the plant in time; what a run costs in gas."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ringbalance.controller.document import simulation_document
+from ringbalance.controller.gas_use import gas_use
+from ringbalance.controller.liquid_ring.column import column_of
+from ringbalance.controller.liquid_ring.interval import Passage
+from ringbalance.controller.liquid_ring.motion import Dynamics
+from ringbalance.controller.liquid_ring.plant import LiquidRing, initial_state
+from ringbalance.controller.liquid_ring.quadrature import quadrature
+from ringbalance.controller.liquid_ring.transfer import Event
+from ringbalance.controller.loop import simulate
+from ringbalance.mesh.geometry import surface_radius
+from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.gas_line import line_answers, line_text, line_warning
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.scene.models import Scene
+
+Plant = Callable[..., Dynamics]
+Pulse = Callable[..., Passage]
+AMBIENT = 101325.0
+
+
+@pytest.mark.parametrize("inertia", [[], ["tube inertia"]])
+def test_the_smallest_correction_is_that_of_the_plant(
+    calibrated: BalancerModel, plant: Plant, pulse: Pulse, scene: Scene, inertia: list[str]
+) -> None:
+    """Within 10 %: the estimate takes the fills as constant while the chamber vents."""
+    for answer in line_answers(scene, calibrated):
+        line = {"conductance": answer.conductance, "critical_ratio": answer.critical_ratio}
+        dynamics = plant(calibrated, "gas filling", *inertia, **line)
+        opening = answer.shortest_opening
+        assert opening is not None
+        assert opening > answer.valve_lag
+        end = np.array([3.0])
+        assert pulse(dynamics, 0.99 * opening, end).fill == 0.25
+        moved = 0.25 - pulse(dynamics, 1.0001 * opening, end).fill
+        moment = calibrated.moment.pair_moment(fill_ratio=0.25 - moved, opposite_fill_ratio=0.25 + moved)
+        change = abs(float(moment)) * scene.rotor.influence_coefficient
+        assert answer.smallest_correction == pytest.approx(change, rel=0.1)
+
+
+def test_a_line_that_is_not_given_is_a_range(calibrated: BalancerModel, scene: Scene) -> None:
+    slow, fast = line_answers(scene, calibrated)
+    assert (slow.end, fast.end) == ("slow", "fast")
+    # A fifth of the conductance lets everything take five times as long.
+    assert slow.filling_time == pytest.approx(5 * fast.filling_time)
+    assert slow.smallest_correction == pytest.approx(5 * (fast.smallest_correction or 0.0), rel=0.1)
+    assert slow.above_limit
+    assert "over its default range" in line_warning((slow, fast))
+    assert "not in the scene" in line_text((slow, fast))
+
+
+def test_a_fast_line_delivers_what_its_lag_lets_it(calibrated: BalancerModel, scene: Scene) -> None:
+    """As C grows the chamber fills at once, and a valve open for its lag moves u S T."""
+    gas = replace(scene.gas, conductance=1e-4, critical_ratio=0.3, valve_lag=2e-3)
+    (given,) = line_answers(replace(scene, gas=gas), calibrated)
+    assert given.end == "given"
+    assert given.shortest_opening == 2e-3
+    u = calibrated.flow.evaluate(fill_ratio=0.25, gas_pressure=0.7e6, primed=True).velocity
+    moved = float(u) * 2e-3 * calibrated.tube_area / calibrated.chamber_volume
+    moment = calibrated.moment.pair_moment(fill_ratio=0.25 - moved, opposite_fill_ratio=0.25 + moved)
+    change = abs(float(moment)) * scene.rotor.influence_coefficient
+    assert given.smallest_correction == pytest.approx(change, rel=1e-2)
+    assert line_warning((replace(given, limit=2 * change),)) == ""
+    weak = replace(scene, gas=replace(gas, pressure=0.05e6))
+    (none,) = line_answers(weak, calibrated)
+    assert none.smallest_correction is None
+    assert "starts no flow" in line_text((none,))
+
+
+def test_a_pressure_on_the_axis_counts_with_its_column(scene: Scene) -> None:
+    """The spinning gas adds exp(omega^2 a^2/(2 R T)) - 1 up to the liquid, about 1 %."""
+    own = replace(scene, gas=replace(scene.gas, measured_at="shaft"))
+    here, there = calibrate(scene), calibrate(own)
+    a = float(surface_radius(disc=scene.disc, fill_ratio=0.25))
+    factor = math.exp((10000 * math.pi / 30 * a) ** 2 / (2 * 287.05 * scene.gas.temperature))
+    assert 1.005 < factor < 1.02
+    for name in ("priming_vented", "stall"):
+        near, far = (getattr(found.operating_point, name) for found in (here, there))
+        assert near == pytest.approx(far * factor)
+    asked = {"fill_ratio": 0.25, "primed": True}
+    at_axis = there.flow_law.evaluate(gas_pressure=0.7e6, **asked).velocity
+    assert float(at_axis) == pytest.approx(
+        float(here.flow_law.evaluate(gas_pressure=0.7e6 * factor, **asked).velocity)
+    )
+    columns = [column_of(law=found.flow_law, tube=scene.tube) for found in (here, there)]
+    assert columns[0] is not None
+    assert columns[1] is not None
+    near_u = columns[0].steady((0.25, 0.25), (0.7e6 * factor, 0.0), primed=True).velocity
+    assert columns[1].steady((0.25, 0.25), (0.7e6, 0.0), primed=True).velocity == pytest.approx(near_u)
+
+
+def test_a_chamber_run_dry_passes_gas(model: BalancerModel, scene: Scene) -> None:
+    ring = LiquidRing(model=model, chambers=4, gas_pressure=0.7e6, integrator=quadrature)
+    advance = ring.advance(initial_state(disc=scene.disc), gas_times={0: 4.0}, duration=4.0, points=4000)
+    (operation,) = advance.operations
+    assert operation.event is Event.EMPTY
+    emptied = float(advance.instants[np.argmax(advance.fill_ratio[0] == 0)])
+    assert operation.run_dry == pytest.approx(4.0 - emptied, abs=2e-3)
+    found = gas_use(scene=scene, model=model, operations=advance.operations)
+    # A choked nozzle of 1.5 mm at 0.801 MPa and 20 degC passes 3.34 g/s of air at the most, 1.2929 kg/m^3.
+    grams = 0.0404 * math.pi / 4 * 1.5e-3**2 * 801325.0 / math.sqrt(293.15)
+    assert found.passed_through == pytest.approx(grams * operation.run_dry / 1.2929, rel=2e-3)
+    assert found.below_residual == found.run_dry == 1
+    assert "1 of them ran it dry" in found.warning
+    (brief,) = ring.advance(
+        initial_state(disc=scene.disc), gas_times={0: 0.1}, duration=0.1, points=1
+    ).operations
+    assert gas_use(scene=scene, model=model, operations=[brief]).warning == ""
+    residual = found.residual_fill_ratio
+    assert 0 < residual < 0.2
+    low = replace(brief, fill_after=0.9 * residual)
+    assert "below a fill ratio of" in gas_use(scene=scene, model=model, operations=[low]).warning
+    content = 801325.0 * model.chamber_volume / AMBIENT * 273.15 / scene.gas.temperature
+    assert found.normal_volume == pytest.approx(content + found.passed_through)
+
+
+def test_with_a_line_the_chamber_runs_dry_too(calibrated: BalancerModel, plant: Plant, scene: Scene) -> None:
+    ring = LiquidRing(
+        model=calibrated,
+        chambers=4,
+        gas_pressure=0.7e6,
+        integrator=quadrature,
+        dynamics=plant(calibrated, "gas filling", "tube inertia", conductance=1e-8, critical_ratio=0.3),
+    )
+    begun = ring.advance(initial_state(disc=scene.disc), gas_times={0: 2.0}, duration=2.0, points=4000)
+    operation = begun.operations[0]
+    emptied = float(begun.instants[np.argmax(begun.fill_ratio[0] < 1e-12)])
+    assert operation.run_dry == pytest.approx(2.0 - emptied, abs=2e-3)
+    brief = ring.advance(initial_state(disc=scene.disc), gas_times={0: 0.01}, duration=0.01, points=1)
+    done = brief.operations[0]
+    # Choked, so the pressure rises by C p_0 p_1/V until the valve shuts.
+    volume = 0.75 * calibrated.chamber_volume
+    assert done.closing_pressure == pytest.approx(1e-8 * 1e5 * 801325.0 / volume * 0.01, rel=0.02)
+    assert done.run_dry == 0
+
+
+def test_a_run_reports_its_gas(model: BalancerModel, scene: Scene) -> None:
+    run = simulate(scene, model=model)
+    document = simulation_document(run)
+    gas, fills = document["gas"], [injection.operation.fill_after for injection in run.injections]
+    content = 801325.0 * math.fsum((1 - x) * model.chamber_volume for x in fills)
+    assert gas["compression_energy_J"] == pytest.approx(content * math.log(801325.0 / AMBIENT))
+    assert gas["fillings"] == len(run.injections)
+    assert document["gas_line"]["given"] is False
+    assert document["energy_J"] == run.energy

@@ -34,7 +34,13 @@ from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, nominal_value, with_value
 
 Load = Callable[[Mapping[str, Any]], Scene]
-BUNDLED = ("liquid_ring_paper", "silicone_oil_100cst", "perfluorinated_oil", "six_chamber")
+BUNDLED = (
+    "liquid_ring_paper",
+    "liquid_ring_paper_calibrated",
+    "silicone_oil_100cst",
+    "perfluorinated_oil",
+    "six_chamber",
+)
 DRIVEN = ("eccentric_mass_paper", "washing_machine", "driven_masses_small")
 """Tested in test_eccentric_scene.py."""
 

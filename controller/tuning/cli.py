@@ -10,6 +10,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from ringbalance.controller.eccentric_mass.sampled_loops import recommended_gains
+from ringbalance.controller.tuning.eccentric import eccentric_tuning_document, show_eccentric_tuning
 from ringbalance.controller.tuning.tune import Tuning, tuning_document
 from ringbalance.controller.tuning.tune import tune as tune_scene
 from ringbalance.reduced_model.calibration import calibrate
@@ -17,9 +19,9 @@ from ringbalance.reduced_model.law.loading import load_model
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.accuracy import Models, with_tolerance
+from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.models import Scene
-from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.platform.progress import activity
 from ringbalance.scene.platform.terminal import results_console
 
@@ -40,14 +42,15 @@ def tune(
 
     Args:
         scene: the scene file.
-        law: "calibrated", "paper", or a file written by `ringbalance calibrate --save`.
+        law: "calibrated", "paper", or a file written by `ringbalance calibrate --save`; eccentric masses have
+            none.
         json: print one JSON document instead of tables.
         tolerance: in place of the scene's, such as "0.5 %" or 0.005.
         models: "finest" models every term that has a model, whatever the tolerance.
 
     Returns:
-        Exit code: 0 a gain is recommended and settles 95 % of the runs, 1 otherwise; the result is printed
-        either way.
+        Exit code: 0 a gain is recommended and settles 95 % of the runs, or the loops of eccentric masses are
+        stable; 1 otherwise; the result is printed either way.
 
     Raises:
         SceneError: a scene or a law that cannot be used.
@@ -59,13 +62,24 @@ def tune(
         return paper_model(asked) if law == "paper" else load_model(Path(law))
 
     given = with_tolerance(load_scene(scene), tolerance=tolerance, models=models)
+    if isinstance(given, EccentricScene):
+        return _eccentric_masses(given, json=json)
     with activity("tune", f"flow law: {law} ...") as shown:
-        found = tune_scene(liquid_ring_scene(given), model_of=model_of, progress=shown.show)
+        found = tune_scene(given, model_of=model_of, progress=shown.show)
     if json:
         print(json_format.dumps(tuning_document(found), allow_nan=False))
     else:
         _show(found, results_console())
     return TUNED if found.succeeded else NOT_TUNED
+
+
+def _eccentric_masses(scene: EccentricScene, *, json: bool) -> int:
+    gains = recommended_gains(scene)
+    if json:
+        print(json_format.dumps(eccentric_tuning_document(scene, gains), allow_nan=False))
+    else:
+        show_eccentric_tuning(gains, results_console())
+    return TUNED if all(loop.stable for loop in gains.loops) else NOT_TUNED
 
 
 def _show(tuning: Tuning, console: Console) -> None:

@@ -6,10 +6,13 @@ strip of thickness t, with faces parallel to the bounding radii.
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import numpy.typing as npt
 
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.keys.derivations import swept_area
 from ringbalance.scene.models import Disc
 
 
@@ -24,12 +27,6 @@ def half_angle(*, disc: Disc, radius: npt.ArrayLike) -> FloatArray:
     return np.asarray(disc.central_angle / 2 - np.arcsin(disc.plate_thickness / r), dtype=np.float64)
 
 
-def _area_primitive(disc: Disc, r: FloatArray) -> FloatArray:
-    t = disc.plate_thickness
-    swept = disc.central_angle / 2 * r**2
-    return np.asarray(swept - r**2 * np.arcsin(t / r) - t * np.sqrt(r**2 - t**2), dtype=np.float64)
-
-
 def liquid_area(*, disc: Disc, surface_radius: npt.ArrayLike) -> FloatArray:
     """Cross-section between a concentric surface and the outer wall.
 
@@ -38,9 +35,8 @@ def liquid_area(*, disc: Disc, surface_radius: npt.ArrayLike) -> FloatArray:
     Returns: Area, m^2, the shape of `surface_radius`.
     Source: integral of 2 r alpha(r); the paper's Eq. 3 is its flat-strip approximation, O(t^3) away.
     """
-    a = np.asarray(surface_radius, dtype=np.float64)
-    outer = _area_primitive(disc, np.asarray(disc.outer_radius, dtype=np.float64))
-    return np.asarray(outer - _area_primitive(disc, a), dtype=np.float64)
+    within = partial(swept_area, central_angle=disc.central_angle, plate_thickness=disc.plate_thickness)
+    return np.asarray(within(radius=disc.outer_radius) - within(radius=surface_radius), dtype=np.float64)
 
 
 def liquid_first_moment(*, disc: Disc, surface_radius: npt.ArrayLike) -> FloatArray:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from ringbalance.reduced_model.calibration import Calibration, lambda_over_fill, lambda_variation
 from ringbalance.reduced_model.chamber.calibration import Curve
 from ringbalance.reduced_model.chamber.element_check import CHECKED, ElementCheck
+from ringbalance.reduced_model.chamber.row_status import row_status
 from ringbalance.reduced_model.gas_line import line_document
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.paper import formulas as paper
@@ -78,6 +79,9 @@ def _chamber(calibration: Calibration) -> dict[str, Any]:
             "max_liquid_volume_m3": scene.disc.max_fill_ratio * chamber.volume,
             "fill_ratio": _listed(fills),
             "free_surface_radius_m": _listed(chamber.ring.surface_radius[at]),
+            "row_status": [
+                str(status) for status in row_status(scene, fill_ratio=fills, closed=chamber.ring.closed[at])
+            ],
         }
         | _curve(chamber.wall_pressure, at, "wall_pressure", "Pa")
         | _curve(chamber.moment, at, "moment", "kg_m")

@@ -13,6 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ringbalance.reduced_model.calibration import Calibration, lambda_variation
+from ringbalance.reduced_model.chamber.row_status import REMEDIES, row_status
 from ringbalance.reduced_model.documents import PRESSURE_FACTORS, paper_columns
 from ringbalance.reduced_model.gas_line import line_text, line_warning
 from ringbalance.reduced_model.law.flow_law import Regime
@@ -139,7 +140,12 @@ def _margin_text(point: OperatingPoint) -> str:
 
 def _chamber_table(calibration: Calibration) -> Table:
     chamber, at = calibration.chamber, list(calibration.chamber.reported)
-    table = _table("Chamber", "fill", "R1' mm", "p MPa", "Eq. 12", "off %", "U g mm", "Eq. 7", "off %")
+    states = row_status(calibration.scene, fill_ratio=chamber.fill_ratio[at], closed=chamber.ring.closed[at])
+    limited = [state for state in REMEDIES if state in states]
+    columns_shown = ("fill", "R1' mm", "p MPa", "Eq. 12", "off %", "U g mm", "Eq. 7", "off %")
+    table = _table("Chamber", *columns_shown, *(["state"] if limited else []))
+    if limited:
+        table.caption = "; ".join(f"{state}: {REMEDIES[state]}" for state in limited)
     columns = paper_columns(calibration, chamber.fill_ratio[at])
     paper_pressure, paper_moment = columns["wall_pressure_paper_Pa"], columns["moment_paper_kg_m"]
     for row, i in enumerate(at):
@@ -153,6 +159,7 @@ def _chamber_table(calibration: Calibration) -> Table:
             f"{1e6 * u:.1f}",
             f"{1e6 * paper_moment[row]:.1f}",
             _off(float(paper_moment[row]), u),
+            *([str(states[row])] if limited else []),
         )
     return table
 

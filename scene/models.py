@@ -1,9 +1,8 @@
 """The frozen, validated, SI-only models that every other room reads.
 
-A scene is made by `ringbalance.scene.load_scene`, which turns units into SI and refuses what is impossible;
-these records carry no defaults of their own that a file could contradict.  Angles are radians, positive with
-the rotation; amplitudes are zero-to-peak; gas pressures are gauge, vapour pressures absolute.  What a field's
-key takes and means, and its default, stand in its annotation, see `ringbalance.scene.keys.declaration`.
+`ringbalance.scene.load_scene` makes them; it turns units into SI and refuses what is impossible.  Angles are
+radians, positive with the rotation; amplitudes are zero-to-peak; gas pressures are gauge, vapour pressures
+absolute.  What a field's key takes and means, and its default, stand in its annotation, see `scene.keys`.
 """
 
 from __future__ import annotations
@@ -16,11 +15,9 @@ from ringbalance.scene.keys.derivations import even_number_of_chambers, half_of,
 from ringbalance.scene.keys.fields import (
     NOT_NEGATIVE,
     POSITIVE,
-    Bounds,
     chamber_count,
     number,
     quantity,
-    share,
 )
 from ringbalance.scene.keys.quantities import (
     FillRatio,
@@ -30,6 +27,7 @@ from ringbalance.scene.keys.quantities import (
     PositiveLength,
     PositivePressure,
     Pressure,
+    ProperFraction,
     Temperature,
     Time,
 )
@@ -199,8 +197,7 @@ class Tube:
         shown("siphon crest radius", "mm", absent="none: always a full siphon"),
     ]
     hump_position: Annotated[
-        float,
-        share(Bounds(above=0, below=1), example=0.5),
+        ProperFraction,
         standard(0.5, "share of the path, from the driven chamber, at which the siphon crest lies"),
         UNCERTAIN,
         shown("siphon crest position", note="share of the path"),
@@ -288,6 +285,11 @@ class Gas:
         ),
         shown("gas pressure measured at"),
     ]
+    inlet_radius: Annotated[
+        PositiveLength | None,
+        unused("not compared with the level", "radius at which gas enters the chambers; never under liquid"),
+        shown("gas inlet radius", "mm"),
+    ] = None
     ambient_pressure: Annotated[
         PositivePressure,
         standard("101.325 kPa", "absolute pressure of the surroundings"),
@@ -308,8 +310,7 @@ class Gas:
         shown("sonic conductance C", "l/(s*bar)", absent="none: the chamber fills at once"),
     ]
     critical_ratio: Annotated[
-        float | None,
-        share(Bounds(above=0, below=1), example=0.3),
+        ProperFraction | None,
         unused(
             "the chamber fills at once",
             "critical pressure ratio b (ISO 6358) of valve and line; needs conductance",

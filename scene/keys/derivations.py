@@ -4,9 +4,25 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.keys.fields import LETTERS
 
 _NEARLY_WHOLE = 1e-3
+
+
+def swept_area(*, radius: npt.ArrayLike, central_angle: float, plate_thickness: float) -> FloatArray:
+    """Cross-section of a chamber within a radius, m^2, up to a constant.
+
+    theta r^2/2 - r^2 asin(t/r) - t sqrt(r^2 - t^2).
+    Args: `radius`: r, m, any shape, at least the plate thickness t.
+    Source: integral of 2 r (theta/2 - asin(t/r)); Fig. 2(b) of the liquid-ring paper, exact.
+    """
+    r, t = np.asarray(radius, dtype=np.float64), plate_thickness
+    swept = central_angle / 2 * r**2
+    return np.asarray(swept - r**2 * np.arcsin(t / r) - t * np.sqrt(r**2 - t**2), dtype=np.float64)
 
 
 def half_of(fill_ratio: float) -> float:

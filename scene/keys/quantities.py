@@ -42,6 +42,7 @@ Rate = Annotated[float, quantity("speed", NOT_NEGATIVE)]
 Inertia = Annotated[float, quantity("inertia", NOT_NEGATIVE)]
 Weight = Annotated[float, number(POSITIVE)]
 FillRatio = Annotated[float, share(Bounds(above=0, at_most=1), example=0.5)]
+ProperFraction = Annotated[float, share(Bounds(above=0, below=1), example=0.5)]
 Gate = Annotated[float, share(Bounds(above=0, at_most=1), example=0.01)]
 Angles = Annotated[tuple[float, float], each_of(angle_of_turn(), count=2, example='["0 deg", "180 deg"]')]
 Arms = Annotated[

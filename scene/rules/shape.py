@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from ringbalance.scene.keys.derivations import even_number_of_chambers, shortest_path
+from ringbalance.scene.keys.derivations import even_number_of_chambers, shortest_path, swept_area
 from ringbalance.scene.models import Bend
 from ringbalance.scene.rules.check import Check, Finding, check, written
 
@@ -127,6 +127,52 @@ def _port_in_chamber(port: float, inner: float, outer: float) -> Finding | None:
     )
 
 
+def _port_under_liquid(
+    port: float, initial: float, inner: float, outer: float, angle: float, thickness: float
+) -> Finding | None:
+    """At the start the ports lie under the liquid: what lies outside r_p holds less than the fill.
+
+    A port inside the outer wall is allowed: liquid outside it stays in its chamber.
+    """
+    outside = _fraction_outside(port, inner, outer, angle, thickness)
+    if outside < initial:
+        return None
+    larger = f", or max_fill_ratio above {2 * outside:.3g}" if 2 * outside < 1 else ""
+    return Finding(
+        problem=f"at the start (fill {initial:.3g}) the liquid does not cover the port: {outside:.3g} of the "
+        "chamber lies outside it, so gas would pass through the tube in place of liquid",
+        allowed=f"nearer to outer_radius ({written(outer, 'mm')}){larger}",
+    )
+
+
+def _inlet_above_liquid(
+    inlet: float, largest: float, inner: float, outer: float, angle: float, thickness: float
+) -> Finding | None:
+    """R1 <= r_i < R2, and the liquid of a pair in one chamber leaves the gas inlet free."""
+    if not inner <= inlet < outer:
+        inside = f"at least inner_radius ({written(inner, 'mm')})"
+        return Finding(
+            problem="the gas inlet lies outside the chamber",
+            allowed=f"{inside} and below outer_radius ({written(outer, 'mm')})",
+        )
+    outside = _fraction_outside(inlet, inner, outer, angle, thickness)
+    if largest < outside:
+        return None
+    return Finding(
+        problem=f"at max_fill_ratio ({largest:.3g}) the liquid covers the gas inlet: {outside:.3g} of the "
+        "chamber lies outside it",
+        allowed=f"nearer to inner_radius ({written(inner, 'mm')}), or max_fill_ratio below {outside:.3g}",
+    )
+
+
+def _fraction_outside(radius: float, inner: float, outer: float, angle: float, thickness: float) -> float:
+    """Fill ratio at which the free surface lies at a radius."""
+    within = swept_area(
+        radius=[inner, radius, outer], central_angle=angle, plate_thickness=thickness
+    ).tolist()
+    return float((within[2] - within[1]) / (within[2] - within[0]))
+
+
 def _crest_in_disc(crest: float, outer: float) -> Finding | None:
     """r_m < R2, which holds for a crest inside any port."""
     if crest < outer:
@@ -225,6 +271,8 @@ _PLATE, _FILL = "disc.plate_thickness", "disc.max_fill_ratio"
 _PORT, _CREST, _LENGTH, _BORE = "tube.port_radius", "tube.hump_radius", "tube.length", "tube.bore"
 _NO_RING = (_radii_in_order,)
 _NO_DEPTH = (_radii_in_order, _chamber_has_depth)
+_CHAMBER = (_INNER, _OUTER, _ANGLE, _PLATE)
+_NO_CHAMBER = (*_NO_DEPTH, _plates_leave_room, _chamber_wide_enough, _fill_has_depth, _fills_share_the_liquid)
 _NO_PATH = (_port_in_chamber, _crest_in_disc, _crest_inside_port)
 
 CHECKS: tuple[Check, ...] = (
@@ -237,6 +285,8 @@ CHECKS: tuple[Check, ...] = (
     check(_chambers_even, _ANGLE, when=lambda reading: not reading.given("disc.chambers")),
     check(_fills_share_the_liquid, "disc.initial_fill", _FILL),
     check(_port_in_chamber, _PORT, _INNER, _OUTER, moot=_NO_RING),
+    check(_port_under_liquid, _PORT, "disc.initial_fill", *_CHAMBER, moot=(*_NO_CHAMBER, _port_in_chamber)),
+    check(_inlet_above_liquid, "gas.inlet_radius", _FILL, *_CHAMBER, moot=_NO_CHAMBER),
     check(_crest_in_disc, _CREST, _OUTER),
     check(_crest_inside_port, _CREST, _PORT, moot=(_port_in_chamber, _crest_in_disc)),
     check(_bore_fits_bends, _BORE, "tube.bends"),

@@ -15,6 +15,7 @@ from ringbalance.scene.models import Scene
 
 CHAMBER = (
     "free_surface_radius_m",
+    "row_status",
     "wall_pressure_Pa",
     "wall_pressure_uncertainty",
     "wall_pressure_paper_Pa",

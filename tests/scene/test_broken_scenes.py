@@ -109,8 +109,8 @@ SINGLE: dict[str, Broken] = {
         "tube.port_radius", "20 mm", "port lies outside", "inner_radius (20.5 mm)"
     ),
     "siphon crest outside the port": Broken(
-        {"tube.port_radius": "40 mm", "tube.hump_radius": "41 mm"},
-        (Expected("tube", "hump_radius", '"41 mm"', "lies outside the port", "below port_radius (40 mm)"),),
+        {"tube.port_radius": "41 mm", "tube.hump_radius": "42 mm"},
+        (Expected("tube", "hump_radius", '"42 mm"', "lies outside the port", "below port_radius (41 mm)"),),
     ),
     "siphon crest outside the disc": _one(
         "tube.hump_radius", "50 mm", "outer wall too", "at most outer_radius (44.5 mm)"

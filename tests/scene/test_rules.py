@@ -84,3 +84,35 @@ def test_plates_close_where_the_opening_angle_vanishes() -> None:
         assert RULES["plates_leave_room"](limit * (1 + 1e-12), 0.02, angle) is not None
         assert RULES["plates_leave_room"](limit * (1 - 1e-12), 0.02, angle) is None
         assert math.asin(limit / 0.02) == pytest.approx(angle / 2, rel=1e-7)
+
+
+def _chamber_at(radius: float, *, thickness: float) -> float:
+    """Fill ratio of a surface, by summing thin rings of the paper's chamber between two plates."""
+    inner, outer, angle, count = 0.0205, 0.0445, math.pi / 2, 200_000
+
+    def area(start: float) -> float:
+        step = (outer - start) / count
+        radii = (start + (place + 0.5) * step for place in range(count))
+        return math.fsum(2 * r * (angle / 2 - math.asin(thickness / r)) * step for r in radii)
+
+    return area(radius) / area(inner)
+
+
+@pytest.mark.parametrize("thickness", [0.0, 0.002777])
+@pytest.mark.parametrize(("rule", "radius"), [("port_under_liquid", 0.041), ("inlet_above_liquid", 0.03)])
+def test_what_lies_at_the_surface_is_found_by_its_fill(rule: str, radius: float, thickness: float) -> None:
+    """A port just under the surface is allowed, one just above it not; of a gas inlet the other way round."""
+    fill = _chamber_at(radius, thickness=thickness)
+    chamber = (0.0205, 0.0445, math.pi / 2, thickness)
+    below, above = (RULES[rule](radius, fill * factor, *chamber) for factor in (1 - 1e-6, 1 + 1e-6))
+    assert (above is None) == (rule == "port_under_liquid")
+    assert (below is None) == (rule == "inlet_above_liquid")
+
+
+def test_the_fill_that_a_message_names_is_enough() -> None:
+    chamber = (0.0205, 0.0445, math.pi / 2, 0.002777)
+    found = RULES["port_under_liquid"](0.040, 0.2, *chamber)
+    assert found is not None
+    named = float(found.allowed.split()[-1])
+    assert RULES["port_under_liquid"](0.040, 1.01 * named / 2, *chamber) is None
+    assert RULES["port_under_liquid"](0.0445, 1e-6, *chamber) is None

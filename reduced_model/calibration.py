@@ -12,6 +12,7 @@ from ringbalance.physics.tube.loss import TubeLoss, tube_loss
 from ringbalance.physics.tube.range import VELOCITIES
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, calibrate_chamber
 from ringbalance.reduced_model.chamber.gravity import check_ring
+from ringbalance.reduced_model.chamber.instability import AsynchronousInstability, asynchronous_instability
 from ringbalance.reduced_model.gas_line import LineAnswer, line_answers
 from ringbalance.reduced_model.law.building import calibrated_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
@@ -51,6 +52,8 @@ class Calibration:
     """Of a chamber emptied under the scene's gas pressure, and what a pair can use."""
     gas_line: tuple[LineAnswer, ...]
     """What the gas line can deliver, or both ends of a default range of lines."""
+    instability: AsynchronousInstability | None
+    """Whirl that surface waves lock to; None where there is no such wave."""
     models_used: tuple[ModelUsed, ...]
     """Every physical term, with its model and its estimated contribution."""
     identifiability: str
@@ -86,6 +89,7 @@ def calibrate(scene: AnyScene) -> Calibration:
         operating_point=point,
         residual=residual_liquid(scene, law=law),
         gas_line=line_answers(scene, balancer_model(law)),
+        instability=asynchronous_instability(scene),
         models_used=models_used(scene),
         identifiability=IDENTIFIABILITY,
         statistics={

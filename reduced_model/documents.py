@@ -44,6 +44,7 @@ def calibration_document(calibration: Calibration) -> dict[str, Any]:
         "law": _law(calibration),
         "operating_point": _operating_point(calibration),
         "residual_liquid": _residual(calibration),
+        "asynchronous_instability": _instability(calibration),
         "identifiability": calibration.identifiability,
         "tolerance": scene.tolerance,
         "gas_line": line_document(calibration.gas_line),
@@ -60,6 +61,7 @@ def _listed(values: npt.ArrayLike) -> Any:
 def _curve(curve: Curve, at: list[int], name: str, unit: str) -> dict[str, Any]:
     return {
         f"{name}_{unit}": _listed(curve.value[at]),
+        f"{name}_status": str(curve.status.code),
         f"{name}_uncertainty": _listed(curve.uncertainty[at]),
         f"{name}_input_uncertainty": _listed(curve.inputs[at]),
         f"{name}_uncertainty_parts": {
@@ -141,6 +143,7 @@ def _lambda(calibration: Calibration) -> dict[str, Any]:
     return {
         "per_transferred_mass_m": value,
         "per_mass_difference_m": value / 2,
+        "status": str(chamber.moment_per_mass.status.code),
         "uncertainty_m": float(chamber.moment_per_mass.uncertainty),
         "input_uncertainty_m": chamber.moment_per_mass_inputs,
         "variation_over_range": lambda_variation(calibration=calibration),
@@ -215,4 +218,16 @@ def _residual(calibration: Calibration) -> dict[str, float]:
         "pair_moment_kg_m": rest.pair_moment,
         "usable_pair_moment_kg_m": rest.usable_pair_moment,
         "usable_pair_moment_uncertainty": rest.usable_pair_moment_uncertainty,
+    }
+
+
+def _instability(calibration: Calibration) -> dict[str, Any] | None:
+    found = calibration.instability
+    if found is None:
+        return None
+    return {
+        "fill_ratio": found.fill_ratio,
+        "critical_speed_rad_s": found.critical_speed,
+        "growth_over_critical_speed": found.growth,
+        "warning": found.warning,
     }

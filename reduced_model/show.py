@@ -101,6 +101,8 @@ def _summary_rows(calibration: Calibration) -> Iterator[tuple[str, str]]:
         yield "note", line_warning(calibration.gas_line)
     if not chamber.status.ok:
         yield "note", chamber.status.text
+    if calibration.instability is not None and calibration.instability.warning:
+        yield "warning", calibration.instability.warning
 
 
 def _usable_text(calibration: Calibration) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -42,13 +42,15 @@ class Curve:
     left_out: FloatArray
     """Expanded uncertainty (95 %) for gravity where it is left out; zero where it is modelled."""
     unmodelled: FloatArray
-    """95 % uncertainty for terms that no model holds: surface tension and friction at the walls."""
+    """95 % uncertainty for what no model holds: surface tension, friction at walls, high waves."""
     inputs: FloatArray
     """Expanded uncertainty (95 %) by the scene's uncertain inputs."""
     table: HermiteTable
     """Interpolates the values."""
     interpolation: float
     """Expanded uncertainty (95 %) of the table between its nodes."""
+    status: Status
+    """That of the whole range of fills."""
 
     @property
     def uncertainty(self) -> FloatArray:
@@ -130,6 +132,7 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
     check = element_check(scene, values=ring, gravity=modelled)
     unmodelled = unmodelled_fractions(scene, fills)
     effects = input_effects(scene=scene, fill_ratio=fills)
+    status = next((s for s in (ring.status, check.status) if not s.ok), chamber_status(scene))
     scale = 0.0 if modelled else SAFETY
     pressure, moment = (scale * np.abs(e) for e in (effect.wall_pressure, effect.moment))
     pressures = [e.wall_pressure for e in effects.values()]
@@ -142,22 +145,30 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
         reported_fill_ratio=reported,
         reported=tuple(int(np.argmin(np.abs(fills - x))) for x in reported),
         wall_pressure=_curve(
-            nodes, ring.wall_pressure, check.excess, pressure, unmodelled["pressures"], pressures
+            nodes,
+            replace(ring.wall_pressure, status=status),
+            check.excess,
+            pressure,
+            unmodelled["pressures"],
+            pressures,
         ),
-        moment=_curve(nodes, ring.moment, check.excess, moment, unmodelled["moments"], moments),
+        moment=_curve(
+            nodes, replace(ring.moment, status=status), check.excess, moment, unmodelled["moments"], moments
+        ),
         moment_per_mass=_central(
             scene,
             nodes,
-            ring.moment_per_volume,
+            replace(ring.moment_per_volume, status=status),
             check.excess,
             scale * effect.moment,
             unmodelled["moments"],
+            ring.moment.value,
         ),
         moment_per_mass_inputs=math.hypot(*(e.moment_per_mass for e in effects.values())),
         input_effects=effects,
         gravity=effect,
         gravity_modelled=modelled,
-        status=next((s for s in (ring.status, check.status) if not s.ok), chamber_status(scene)),
+        status=status,
         statistics=check.elements.statistics,
     )
 
@@ -183,6 +194,7 @@ def _curve(
         inputs=np.sqrt(sum((i**2 for i in inputs), start=np.zeros_like(value))),
         table=table,
         interpolation=missed / 2,
+        status=estimate.status,
     )
 
 
@@ -193,15 +205,17 @@ def _central(
     excess: float,
     gravity: FloatArray,
     unmodelled: FloatArray,
+    moment: FloatArray,
 ) -> Estimate:
-    """lambda at equal fills, 2 (dU/dV')/rho; gravity's share by how its moment changes with the fill."""
+    """lambda at equal fills, 2 (dU/dV')/rho; shares of the moment count by how they change with the fill."""
     m, density = nodes.size // 2, scene.liquid.density
     value = 2 * float(slope.value[m]) / density
     numerical = 2 * float(slope.uncertainty[m]) / density + (ROUND_OFF + excess) * value
     mass = density * chamber_volume(disc=scene.disc) * float(nodes[m + 1] - nodes[m - 1])
-    left_out = 2 * abs(float(gravity[m + 1] - gravity[m - 1])) / mass
+    left_out, missing = (2 * abs(float(u[m + 1] - u[m - 1])) / mass for u in (gravity, unmodelled * moment))
+    missing = max(missing, float(unmodelled[m]) * value)
     return Estimate(
         value=np.asarray(value),
-        uncertainty=np.asarray(math.hypot(numerical, left_out, float(unmodelled[m]) * value)),
+        uncertainty=np.asarray(math.hypot(numerical, left_out, missing)),
         status=slope.status,
     )

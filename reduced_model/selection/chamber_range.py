@@ -8,15 +8,14 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.results import Status, StatusCode
 from ringbalance.physics.sloshing.range import SMALL
 from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing, tilted_ring
 from ringbalance.reduced_model.selection.chamber_terms import (
     MEAN,
-    amplification,
     chamber_contributions,
     resonant_fill,
+    wave_height,
 )
 from ringbalance.reduced_model.selection.contribution import Contribution
 from ringbalance.scene.arrays import FloatArray
@@ -75,11 +74,7 @@ def chamber_status(scene: Scene) -> Status:
 
 def _waves(scene: Scene, fills: FloatArray) -> Status:
     """Whether the swinging surface stays small against the ring's depth, by the estimate of its swing."""
-    if scene.environment.shaft == "vertical":
-        return Status()
-    length = scene.environment.gravity / scene.rotor.speed**2
-    depth = scene.disc.outer_radius - surface_radius(disc=scene.disc, fill_ratio=fills)
-    swing = np.array([amplification(scene, float(x)) for x in fills]) * length / depth
+    swing = np.array([wave_height(scene, float(x)) for x in fills])
     worst = int(np.argmax(swing))
     if swing[worst] <= SMALL:
         return Status()

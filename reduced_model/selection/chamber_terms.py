@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Final
 
@@ -81,16 +82,17 @@ def wall_layers(scene: Scene, fill: float) -> tuple[float, float]:
 
 
 def unmodelled_fractions(scene: Scene, fills: FloatArray) -> Mapping[str, FloatArray]:
-    """Contribution of what no model of a chamber holds, surface tension and friction at the walls.
+    """Contribution of what no model holds: surface tension, friction at the walls, waves of finite height.
 
     Returns: Relative, of "pressures" and "moments", shape (n,) each; zero without liquid.
-    Source: sum of both estimates, errors of one sign at worst.
+    Source: sum of the estimates, errors of one sign at worst.
     """
     found = {"pressures": np.zeros(fills.shape), "moments": np.zeros(fills.shape)}
     for place in np.flatnonzero(fills > 0):
         layers, _ = wall_layers(scene, float(fills[place]))
+        waves = wave_mean(scene, float(fills[place]))
         for part, share in capillary_share(scene, fills[place : place + 1]).items():
-            found[part][place] = share + layers
+            found[part][place] = share + layers + waves
     return found
 
 
@@ -105,6 +107,29 @@ def amplification(scene: Scene, fill: float) -> float:
     disc, k = scene.disc, np.pi / scene.disc.central_angle
     square = k * np.tanh(k * np.log(disc.outer_radius / float(surface_radius(disc=disc, fill_ratio=fill))))
     return float(min(1 / max(abs(1 - 1 / square), 1e-9), LARGEST_SWING))
+
+
+def wave_height(scene: Scene, fill: float) -> float:
+    """Estimated height of the waves that gravity makes, zero-to-peak, over the depth of the ring.
+
+    A surface across gravity alone reaches g/omega^2 sin(alpha) at the plates; the swing enlarges that. Within
+    a factor of two of finite elements; of three in thin rings, where higher modes are near resonance.
+    """
+    if scene.environment.shaft == "vertical":
+        return 0.0
+    a = float(surface_radius(disc=scene.disc, fill_ratio=fill))
+    tilt = scene.environment.gravity / scene.rotor.speed**2
+    tilt *= math.sin(min(float(half_angle(disc=scene.disc, radius=a)), math.pi / 2))
+    return amplification(scene, fill) * tilt / (scene.disc.outer_radius - a)
+
+
+def wave_mean(scene: Scene, fill: float) -> float:
+    """Bound of what waves do to the means over a turn, relative: (eta/h)^2/4, at most 1.
+
+    In shallow waves the mean square of the velocity is g_c <eta^2>/h, of which Bernoulli's equation takes
+    half from the wall pressure and as much from the surface's mean place; <eta^2> is at most eta^2/2.
+    """
+    return min(wave_height(scene, fill) ** 2 / 4, 1.0)
 
 
 def resonant_fill(scene: Scene) -> float | None:

@@ -33,7 +33,7 @@ def terms_modelled(used: Sequence[ModelUsed]) -> tuple[str, ...]:
 
 
 def dynamics_of(*, scene: Scene, model: BalancerModel, modelled: Collection[str]) -> Dynamics | None:
-    """The plant's terms. Args: `modelled`: their names. Returns: Dynamics; None when no term is modelled."""
+    """The plant's terms; None when none is modelled."""
     _check(scene, model, modelled)
     line = gas_line(scene.gas) if FILLING in modelled else None
     gas_off = 0.0 if line is None else VENTED * scene.gas.ambient_pressure

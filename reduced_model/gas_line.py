@@ -30,7 +30,7 @@ DEFAULT_LAGS: Final = (10e-3, 5e-3)
 """Of small solenoid valves, slow and fast, s."""
 DEFAULT_CRITICAL_RATIO: Final = 0.3
 """Between 0.5 of a nozzle and 0.2 of a long line."""
-_PRESSURES: Final = 257
+_PRESSURES: Final = 65
 """Per refinement of a threshold, and of the integral over filling and venting."""
 _REFINEMENTS: Final = 4
 

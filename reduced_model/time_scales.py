@@ -19,8 +19,7 @@ from ringbalance.scene.models import Scene
 def first_gas_time(scene: Scene) -> float:
     """Valve-open time of the first injection, s: Kc times the initial amplitude, or the first trial.
 
-    Args: `scene`: the scene; its controller's limits hold. Without a vibration it is the longest valve-open
-    time.
+    The controller's limits hold; without a vibration it is the longest valve-open time.
     Source: section 4 of the liquid-ring paper.
     """
     control = scene.controller
@@ -37,8 +36,8 @@ def deciding_gas_time(scene: Scene, *, rate: float) -> float:
     Target vector: Kc times the limit; trial: the short step, where the limit lies below `fine_below`;
     law-based: the limit over the rate.  Every time scale is compared with this one, because the last
     injections decide whether a run settles.
-    Args: `scene`: the scene; its controller's limits hold. `rate`: change of the vibration per second of gas,
-        m/s; zero where nothing flows.
+    The controller's limits hold.  `rate` is the change of the vibration per second of gas, m/s; zero where
+    nothing flows.
     Source: section 4 of the liquid-ring paper.
     """
     control = scene.controller
@@ -56,30 +55,19 @@ def _within_limits(scene: Scene, commanded: float) -> float:
 
 
 def start_up_time(*, density: float, length: float, velocity: float, driving_pressure: float) -> float:
-    """Time scale tau on which the column in the tube starts, s: rho L u0/p = 2 L/((k + 1) u0).
-
-    Args: `density`: rho, kg/m^3. `length`: L of the tube, m. `velocity`: u0 that it tends to, m/s.
-        `driving_pressure`: p on the full column, Pa, above zero.
-    Source: this module's first lines.
-    """
+    """Time scale tau on which the column in the tube starts, s: rho L u0/p = 2 L/((k + 1) u0)."""
     return density * length * velocity / driving_pressure
 
 
 def long_start_up_loss(start_up: float, *, laminar: float = 0.0) -> float:
-    """Valve-open time that a start costs of a long injection, s: tau ln 2 turbulent, tau laminar.
-
-    Args: `laminar`: fraction of the loss that is laminar, from 0 to 1.
-    Source: this module's first lines.
-    """
+    """Valve-open time that a start costs of a long injection, s: tau ln 2 turbulent, tau laminar."""
     return start_up * (laminar + (1 - laminar) * math.log(2))
 
 
 def start_up_loss(*, start_up: float, gas_time: float, laminar: float = 0.0) -> float:
     """Fraction of an injection's steady volume that the column's start costs, from 0 to 1.
 
-    Args: `start_up`: tau, s, above zero. `gas_time`: T, s, above zero.
-    Returns: 1 - (tau/T) ln cosh(T/tau), or (tau/T) (1 - exp(-T/tau)) laminar.
-    Source: this module's first lines.
+    1 - (tau/T) ln cosh(T/tau), or (tau/T) (1 - exp(-T/tau)) laminar.
     """
     t = gas_time / start_up
     log_cosh = t + math.log1p(math.exp(-2 * t)) - math.log(2)

@@ -35,7 +35,7 @@ _NumbaCache: Any = getattr(caching, "FunctionCache", object)
 _NumbaFormat: Any = getattr(caching, "CompileResultCacheImpl", object)
 
 
-def checked_content(path: Path) -> bytes:
+def _checked_content(path: Path) -> bytes:
     """Content of a kept file without the checksum; OSError or ValueError when it cannot be used."""
     if path.exists() and not path.is_file():
         raise OSError(f"{path} is not a file")
@@ -56,7 +56,7 @@ def discard(path: Path) -> None:
 def is_damaged(path: Path) -> bool:
     """Whether a kept file would be discarded when it is needed."""
     try:
-        checked_content(path)
+        _checked_content(path)
     except (OSError, ValueError):
         return True
     return False
@@ -126,7 +126,7 @@ class _Files:
 
     def _unpickled(self, path: Path) -> object:
         try:
-            return pickle.loads(checked_content(path))
+            return pickle.loads(_checked_content(path))
         except FileNotFoundError:
             return None
         except Exception:

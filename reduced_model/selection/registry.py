@@ -135,7 +135,11 @@ def neglected_in_injections(used: Sequence[ModelUsed]) -> _Neglected:
     unknown = tuple(row.term for row in rows if row.estimated_contribution is None)
     bound = float(sum(known.values()))
     names = f" ({', '.join(known)})" if known else ""
-    more = f"; not estimated, for lack of numbers in the scene: {', '.join(unknown)}" if unknown else ""
+    # Without their numbers in the scene these two are a default range.
+    ranges = [term for term in unknown if term in (FILLING, LAG)]
+    others = [term for term in unknown if term not in ranges]
+    more = f"; not in the scene, see the gas line's default range: {', '.join(ranges)}" if ranges else ""
+    more += f"; not estimated, for lack of numbers in the scene: {', '.join(others)}" if others else ""
     return _Neglected(
         terms=tuple(known),
         bound=bound,

@@ -6,9 +6,11 @@ import dataclasses
 import math
 from typing import Literal
 
+import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from ringbalance.reduced_model.selection.estimates import FILLING, LAG, arc_moment, term_estimates
 from ringbalance.reduced_model.time_scales import (
     deciding_gas_time,
     long_start_up_loss,
@@ -64,3 +66,29 @@ def test_the_deciding_injection_is_the_one_at_the_limit(table_1_scene: Scene) ->
     assert deciding_gas_time(trial, rate=7.2e-6) == control.short_step
     slow = dataclasses.replace(control, minimum_gas_time=0.02)
     assert deciding_gas_time(dataclasses.replace(table_1_scene, controller=slow), rate=0.0) == 0.02
+
+
+def test_a_line_that_is_not_given_is_a_range_and_not_unknown(table_1_scene: Scene) -> None:
+    """C of 0.2 to 1 l/(s bar) and 5 to 10 ms of lag are longer than an injection of 4 ms."""
+    gas = dataclasses.replace(table_1_scene.gas, conductance=None, critical_ratio=None, valve_lag=None)
+    estimates = term_estimates(dataclasses.replace(table_1_scene, gas=gas))
+    for term in (FILLING, LAG):
+        found = estimates[term]
+        assert found.contribution is None
+        assert found.default_range == (1.0, 1.0)
+        assert "100 % over a default range" in found.reason
+    assert "5 to 10 ms" in estimates[LAG].formula
+    own = dataclasses.replace(gas, conductance=1e-8, critical_ratio=0.3, valve_lag=1e-3)
+    given = term_estimates(dataclasses.replace(table_1_scene, gas=own))
+    assert given[LAG].contribution == pytest.approx(0.25)
+    assert given[LAG].default_range is None
+
+
+def test_a_full_tube_along_half_a_turn_has_a_moment(table_1_scene: Scene) -> None:
+    """The first moment of an arc, summed in pieces: 1.77 g/m over 120 mm."""
+    density, tube = table_1_scene.liquid.density, table_1_scene.tube
+    radius = tube.length / math.pi
+    angle = np.linspace(0.0, math.pi, 20001)
+    pieces = density * math.pi / 4 * tube.bore**2 * radius * np.diff(angle)
+    moment = np.sum(pieces * radius * np.exp(0.5j * (angle[1:] + angle[:-1])))
+    assert arc_moment(table_1_scene) == pytest.approx(abs(moment), rel=1e-6)

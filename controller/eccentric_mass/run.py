@@ -15,6 +15,7 @@ from ringbalance.controller.eccentric_mass.plant.plant import rest_state, stuck_
 from ringbalance.controller.eccentric_mass.plant.speed import profile_arrays
 from ringbalance.controller.eccentric_mass.plant.substep_limit import check_substeps
 from ringbalance.controller.eccentric_mass.plant.whirl import steady_whirl
+from ringbalance.controller.eccentric_mass.remedies import expected_deviation
 from ringbalance.controller.eccentric_mass.run_loop import (
     NOISES,
     Profile,
@@ -25,8 +26,13 @@ from ringbalance.controller.eccentric_mass.run_loop import (
     run_stretch,
 )
 from ringbalance.controller.eccentric_mass.run_record import EccentricEstimates, EccentricRun, StageSpan
-from ringbalance.controller.eccentric_mass.run_status import RunFacts, outcome_of, status_text, warnings_of
-from ringbalance.controller.eccentric_mass.strategy.attainable import expected_deviation
+from ringbalance.controller.eccentric_mass.run_status import (
+    RunFacts,
+    outcome_of,
+    remedies_of,
+    status_text,
+    warnings_of,
+)
 from ringbalance.controller.eccentric_mass.strategy.plan import (
     RELEASED,
     STAGE_NAMES,
@@ -67,14 +73,17 @@ def simulate_eccentric(
     Source: Fig. 3 of the paper on eccentric masses.
     """
     check_substeps(scene)
-    record, findings = _recorded(scene, seed, progress or _silent, settings or strategy_settings(scene))
+    record, findings, innovation = _recorded(
+        scene, seed, progress or _silent, settings or strategy_settings(scene)
+    )
     cause = Cause(int(record.cause[-1]))
     times, speeds = profile_arrays(scene.rotor)
     time: FloatArray = np.arange(len(record.state), dtype=np.float64) * scene.sensor.step
     speed = np.interp(time, times, speeds)
     whirl = record.state[:, 0] + 1j * record.state[:, 1]
-    facts = _facts(scene, record, cause, findings, time, speed, np.abs(whirl))
+    facts = _facts(scene, record, cause, findings, innovation, speed, np.abs(whirl))
     outcome = outcome_of(facts)
+    remedies = remedies_of(facts, outcome)
     settled = facts.settling_time is not None and outcome.value in {"settled", "locked"}
     return EccentricRun(
         balancer="eccentric_mass",
@@ -82,8 +91,10 @@ def simulate_eccentric(
         outcome=outcome,
         settled=settled,
         settling_time=facts.settling_time if settled else None,
-        status=status_text(facts, outcome),
+        status=status_text(facts, outcome, remedies),
         warnings=warnings_of(facts),
+        remedies=remedies,
+        innovation=innovation,
         limit=scene.supervisor.limit,
         time=time,
         speed=speed,
@@ -124,10 +135,10 @@ class _Start(NamedTuple):
 
 def _recorded(
     scene: EccentricScene, seed: int | None, progress: Progress, settings: StrategySettings
-) -> tuple[Record, Findings]:
+) -> tuple[Record, Findings, float | None]:
     samples = _samples(scene)
     if scene.supervisor.strategy == "locked":
-        return _locked(scene, empty_record(samples), progress), Findings(False, 0.0, np.inf, 0, 0)
+        return _locked(scene, empty_record(samples), progress), Findings(False, 0.0, np.inf, 0, 0), None
     numbers = np.random.default_rng(scene.run.seed if seed is None else seed)
     return _driven(scene, settings, numbers.standard_normal((samples, NOISES)), progress)
 
@@ -142,7 +153,7 @@ def _locked(scene: EccentricScene, record: Record, progress: Progress) -> Record
 
 def _driven(
     scene: EccentricScene, settings: StrategySettings, numbers: FloatArray, progress: Progress
-) -> tuple[Record, Findings]:
+) -> tuple[Record, Findings, float | None]:
     start, record = _start(scene), empty_record(len(numbers))
     profile, sensor = Profile(*profile_arrays(scene.rotor)), scene.sensor
     noise = SensorNoise(
@@ -169,7 +180,9 @@ def _driven(
         if len(kept.state) < end:
             record = kept
             break
-    return _shifted(record), memory.plan.findings
+    whirl = memory.whirl
+    innovation = whirl.surprise / (4 * whirl.judged) if whirl.judged else None
+    return _shifted(record), memory.plan.findings, innovation
 
 
 def _start(scene: EccentricScene) -> _Start:
@@ -189,11 +202,11 @@ def _facts(
     record: Record,
     cause: Cause,
     findings: Findings,
-    time: FloatArray,
+    innovation: float | None,
     speed: FloatArray,
     amplitude: FloatArray,
 ) -> RunFacts:
-    content = np.flatnonzero(record.cause == int(Cause.BALANCED))
+    time: FloatArray = np.arange(len(speed), dtype=np.float64) * scene.sensor.step
     most = plant_parameters(scene).maximum_voltage
     at_limit = np.any(np.abs(record.voltage) >= most, axis=1)
     estimating = np.flatnonzero(record.stage == int(Stage.IMBALANCE))
@@ -209,7 +222,8 @@ def _facts(
         diverged=len(time) < _samples(scene),
         speed=speed,
         amplitude=amplitude,
-        checked=int(content[0]) if content.size else None,
+        left=_left(record, amplitude, scene.supervisor.limit),
+        innovation=innovation,
         settling_time=settling_time(time=time, amplitude=amplitude, limit=scene.supervisor.limit),
         deviation=float(np.sqrt(np.max(np.linalg.eigvalsh(record.imbalance_covariance[-1])))),
         imbalance=float(np.hypot(*record.imbalance[-1])),
@@ -219,6 +233,18 @@ def _facts(
         euler_limit=float(euler_step_limit(model=believed_whirl(scene), angular_velocity=fastest)),
         predicted=expected_deviation(scene, speed=slowest) if cause is Cause.IMBALANCE_UNCERTAIN else 0.0,
     )
+
+
+def _left(record: Record, amplitude: FloatArray, limit: float) -> int | None:
+    """Sample of the largest vibration above the limit after the rotor was balanced to within it; None for
+    none.
+    """
+    content = np.isin(record.cause, (int(Cause.BALANCED), int(Cause.SPEED_CHANGED)))
+    within = np.flatnonzero(content & (amplitude <= limit))
+    if within.size == 0:
+        return None
+    worst = int(within[0]) + int(np.argmax(amplitude[within[0] :]))
+    return worst if amplitude[worst] > limit else None
 
 
 def _separations(angles: FloatArray) -> FloatArray:

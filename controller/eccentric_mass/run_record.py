@@ -33,6 +33,15 @@ class EccentricOutcome(StrEnum):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Remedy:
+    """Values of the scene that are changed together."""
+
+    changes: tuple[tuple[str, float | str], ...]
+    """Key, such as "lqr.state_weight", and new value in SI."""
+    text: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class StageSpan:
     """One stage of the strategy."""
 
@@ -73,6 +82,10 @@ class EccentricRun:
     status: str
     """How the run ended and what to do next."""
     warnings: tuple[str, ...]
+    remedies: tuple[Remedy, ...]
+    """Each by itself, the likeliest first; empty for a settled run, and where no single value will do."""
+    innovation: float | None
+    """Mean square of the imbalance filter's normalised innovations: 1 for a true model; None without any."""
     limit: float
     """m."""
     time: FloatArray

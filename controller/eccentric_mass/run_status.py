@@ -3,30 +3,39 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome
-from ringbalance.controller.eccentric_mass.sampled_loops import (
-    RecommendedGains,
-    SampledLoop,
-    recommended_gains,
+from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
+from ringbalance.controller.eccentric_mass.plant.whirl import influence
+from ringbalance.controller.eccentric_mass.remedies import (
+    found_beforehand,
+    friction_floor,
+    friction_remedy,
+    gain_remedy,
+    imbalance_remedy,
+    remedy,
+    stall_remedy,
 )
+from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, Remedy
+from ringbalance.controller.eccentric_mass.sampled_loops import recommended_gains
 from ringbalance.controller.eccentric_mass.strategy.plan import HELD, Cause, Findings, Stage
 from ringbalance.controller.eccentric_mass.strategy.supervisor import STALLED_SHARE
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.eccentric_models import EccentricScene
-from ringbalance.scene.units import format_quantity
 
 MICROMETRE: Final = 1e-6
 RPM: Final = 2 * math.pi / 60
 NOTICEABLE_STALL: Final = 0.05
 """Share of the friction stage with a mass nearly at a standstill that is worth a warning."""
-CHATTER_SHARE: Final = 0.1
-"""Share of a run at the voltage's limit that an unstable loop is looked for behind."""
+TRIALS: Final = 40
+"""Of fine tuning that a longer time should allow."""
+WRONG_MODEL: Final = 1.5
+"""Mean normalised innovation squared beyond which the filter's model is called wrong; chance alone keeps it
+within 1 +- 0.1 after 100 samples, by the chi-square distribution."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,8 +55,10 @@ class RunFacts:
     """rad/s, shape (n,)."""
     amplitude: FloatArray
     """m, shape (n,)."""
-    checked: int | None
-    """Sample at which the strategy was content; None when it never was."""
+    left: int | None
+    """Sample of the largest vibration after the rotor was balanced, if that is above the limit."""
+    innovation: float | None
+    """Mean square of the normalised innovations."""
     settling_time: float | None
     """From when on the amplitude is within the limit, s; None when it is not at the end."""
     deviation: float
@@ -67,13 +78,13 @@ class RunFacts:
 
 
 def outcome_of(facts: RunFacts) -> EccentricOutcome:
-    """SETTLED only when the strategy was content and the true amplitude ends within the limit."""
+    """SETTLED only when the strategy was content and the true amplitude stays within the limit ever after."""
     if facts.diverged:
         return EccentricOutcome.DIVERGED
+    kept = facts.settling_time is not None and facts.left is None
     if facts.cause is Cause.BALANCED:
-        settled = facts.settling_time is not None
-        return EccentricOutcome.SETTLED if settled else EccentricOutcome.RISES_AGAIN
-    if facts.cause is Cause.SPEED_CHANGED and facts.settling_time is not None:
+        return EccentricOutcome.SETTLED if kept else EccentricOutcome.RISES_AGAIN
+    if facts.cause is Cause.SPEED_CHANGED and kept:
         return EccentricOutcome.SETTLED
     cause = _cause(facts)
     return EccentricOutcome.TIME_LIMIT if cause is Cause.NONE else EccentricOutcome(cause.name.lower())
@@ -92,22 +103,31 @@ def _cause(facts: RunFacts) -> Cause:
     return facts.cause
 
 
-def status_text(facts: RunFacts, outcome: EccentricOutcome) -> str:
+def status_text(facts: RunFacts, outcome: EccentricOutcome, remedies: Sequence[Remedy]) -> str:
     """One or two sentences: how the run ended, with its numbers, and what to do next."""
+    advice = f": {', or '.join(remedy.text for remedy in remedies)}" if remedies else ""
     if outcome in _WHOLE_TEXTS:
-        return _WHOLE_TEXTS[outcome](facts)
-    return f"{_not_settled(facts)}; {_REASONS[outcome](facts)}"
+        return _WHOLE_TEXTS[outcome](facts) + advice
+    return f"{_not_settled(facts)}; {_REASONS[outcome](facts)}{advice}"
+
+
+def remedies_of(facts: RunFacts, outcome: EccentricOutcome) -> tuple[Remedy, ...]:
+    """What would mend the run, the likeliest first.  An unstable loop comes before all else."""
+    if outcome in {EccentricOutcome.SETTLED, EccentricOutcome.LOCKED}:
+        return ()
+    own = _REMEDIES.get(outcome, lambda _: ())(facts)
+    gains = None if outcome is EccentricOutcome.TIME_LIMIT else gain_remedy(facts.scene)
+    return (gains, *own) if gains else own
 
 
 def warnings_of(facts: RunFacts) -> tuple[str, ...]:
     """What the user should know although the run continued."""
-    return tuple(text for is_due, text in _warnings(facts) if is_due)
+    return (*found_beforehand(facts.scene), *(text for is_due, text in _warnings(facts) if is_due))
 
 
 def _warnings(facts: RunFacts) -> list[tuple[bool, str]]:
     scene, findings = facts.scene, facts.findings
-    chatters = facts.saturation > CHATTER_SHARE * facts.time and facts.settling_time is None
-    loops = _unstable(recommended_gains(scene)) if chatters and not facts.diverged else []
+    unlike = facts.innovation is not None and facts.innovation > WRONG_MODEL
     share = findings.stalled / max(findings.driven, 1)
     gap = scene.masses.arc_length / scene.masses.guide_radius
     euler = scene.imbalance_filter.discretisation == "euler"
@@ -123,8 +143,10 @@ def _warnings(facts: RunFacts) -> list[tuple[bool, str]]:
             f"a motor voltage was at motor.maximum_voltage for {facts.saturation:.3g} s",
         ),
         (
-            bool(loops),
-            f"a drive's sampled loop is unstable and swings between the voltage's limits: {'; '.join(loops)}",
+            unlike,
+            f"the mean square of the imbalance filter's innovations is {facts.innovation or 0:.3g} times "
+            "what its model expects: check imbalance_filter.assumed_stiffness, assumed_damping and "
+            "assumed_mass, and the noise that it assumes",
         ),
         (
             facts.hold == HELD,
@@ -141,19 +163,6 @@ def _warnings(facts: RunFacts) -> list[tuple[bool, str]]:
             f'{facts.euler_limit:.3g} s at this speed: set discretisation = "exact"',
         ),
     ]
-
-
-def _unstable(gains: RecommendedGains) -> list[str]:
-    """What to lower to what, for each loop that is unstable by itself; the regulator first."""
-    return [_lowered(loop) for loop in (gains.regulator, gains.speed) if not loop.stable]
-
-
-def _lowered(loop: SampledLoop) -> str:
-    unit = f" {loop.unit}" if loop.unit else ""
-    return (
-        f"lower {loop.key} = {loop.value:.4g} to {loop.recommended:.2g}{unit} or less "
-        f"(largest sampled pole {loop.radius:.3g})"
-    )
 
 
 def length_text(length: float) -> str:
@@ -182,30 +191,18 @@ def _settled(facts: RunFacts) -> str:
 
 
 def _rises(facts: RunFacts) -> str:
-    since = facts.checked or 0
-    worst = since + int(np.argmax(facts.amplitude[since:]))
+    if facts.left is None:
+        return f"{_not_settled(facts)}, though balanced to within it as measured"
     return (
         f"not settled: balanced to within {_limit(facts)} as measured, but "
-        f"{length_text(float(facts.amplitude[worst]))} came later, at {facts.speed[worst] / RPM:.4g} rpm, "
-        f"and {_end(facts)}: lower imbalance_filter.gate, or raise supervisor.limit"
+        f"{length_text(float(facts.amplitude[facts.left]))} came later, at "
+        f"{facts.speed[facts.left] / RPM:.4g} rpm, and {_end(facts)}; correct what imbalance_filter assumes "
+        "of the rotor, or accept more"
     )
 
 
 def _diverged(facts: RunFacts) -> str:
-    """The loop that drove the masses first: the speed control in the friction stage, else the regulator."""
-    loops = _unstable(recommended_gains(facts.scene))
-    if facts.stage is Stage.FRICTION:
-        loops.reverse()
-    step = format_quantity(facts.scene.lqr.step, "time", "s")
-    if loops:
-        also = f"; then, if the run still does not settle, {loops[1]}" if len(loops) > 1 else ""
-        remedy = f"drives so light are unstable at a voltage held for {step}: {loops[0]}{also}"
-    else:
-        remedy = (
-            f"each drive alone is stable at a voltage held for {step}: lower lqr.state_weight and "
-            "friction_filter.speed_gain together, or set a motor.maximum_voltage"
-        )
-    return f"not settled: the loop diverged, and the run was stopped at {facts.time:.4g} s; {remedy}"
+    return f"not settled: the loop diverged, and the run was stopped at {facts.time:.4g} s"
 
 
 def _locked(facts: RunFacts) -> str:
@@ -217,15 +214,15 @@ def _saturated(facts: RunFacts) -> str:
     moment = facts.scene.masses.mass * facts.scene.masses.guide_radius
     return (
         f"the imbalance of {facts.imbalance:.4g} kg m is more than both masses can undo, {2 * moment:.4g} kg "
-        f"m, and {facts.findings.residual:.4g} kg m is left: balance the rotor first, or use heavier masses"
+        f"m, and {facts.findings.residual:.4g} kg m is left; balance the rotor first, or use heavier masses"
     )
 
 
 def _too_slow(facts: RunFacts) -> str:
     return (
         "the rotor turned slower than supervisor.lowest_speed, "
-        f"{facts.scene.supervisor.lowest_speed / RPM:.4g} rpm, where an imbalance cannot be seen: estimate "
-        "at a higher speed"
+        f"{facts.scene.supervisor.lowest_speed / RPM:.4g} rpm, where an imbalance cannot be seen; estimate "
+        "at a higher speed of rotor.speed_profile"
     )
 
 
@@ -234,24 +231,7 @@ def _imbalance_uncertain(facts: RunFacts) -> str:
     return (
         f"after {facts.scene.supervisor.imbalance_time:.4g} s the imbalance is known to {100 * share:.3g} % "
         f"(one standard deviation; {facts.predicted:.3g} kg m was to be expected) and "
-        f"{100 * facts.scene.imbalance_filter.gate:.3g} % is asked for: estimate at a higher speed or "
-        "longer, use better sensors, or raise imbalance_filter.gate"
-    )
-
-
-def _friction_uncertain(facts: RunFacts) -> str:
-    return (
-        f"the friction did not become known to {100 * facts.scene.friction_filter.gate:.3g} %: raise "
-        "supervisor.friction_time or friction_filter.gate, or use better encoders"
-    )
-
-
-def _not_arrived(facts: RunFacts) -> str:
-    breaks_away = facts.scene.lqr.friction_compensation == "break_away"
-    cure = "raise lqr.state_weight" if breaks_away else 'set lqr.friction_compensation = "break_away"'
-    return (
-        "the masses did not come to rest on their targets within "
-        f"{facts.scene.supervisor.positioning_time:.4g} s: {cure}, or supervisor.arrival_angle"
+        f"{100 * facts.scene.imbalance_filter.gate:.3g} % is asked for by imbalance_filter.gate"
     )
 
 
@@ -264,32 +244,120 @@ _WHOLE_TEXTS: Final[dict[EccentricOutcome, _Text]] = {
 }
 _REASONS: Final[dict[EccentricOutcome, _Text]] = {
     EccentricOutcome.SATURATED: _saturated,
-    EccentricOutcome.RESIDUAL: lambda _: (
-        "fine tuning came down to its smallest move: lower fine_tuning.stop, lengthen fine_tuning.average, "
-        "or raise supervisor.limit"
-    ),
-    EccentricOutcome.TUNING_TIME: lambda _: (
-        "fine tuning ran out of time: raise supervisor.fine_tuning_time, or the first fine_tuning.step"
-    ),
+    EccentricOutcome.RESIDUAL: lambda _: "fine tuning came down to its smallest move",
+    EccentricOutcome.TUNING_TIME: lambda _: "fine tuning ran out of time",
     EccentricOutcome.SPEED_CHANGED: lambda _: (
-        "the rotor's speed changed before the balancing was done: start earlier, or change the speed later "
-        "in rotor.speed_profile"
+        "the rotor's speed changed before the balancing was done; change it later in rotor.speed_profile"
     ),
     EccentricOutcome.TOO_SLOW: _too_slow,
     EccentricOutcome.SPEED_NOT_CONSTANT: lambda _: (
-        "the rotor's speed was not constant, and the imbalance filter holds for constant speed only: give "
+        "the rotor's speed was not constant, and the imbalance filter holds for constant speed only; give "
         "rotor.speed_profile a level stretch after supervisor.start"
     ),
     EccentricOutcome.MASSES_MOVE: lambda _: (
-        "the masses did not stay at rest, and the imbalance filter holds for resting masses only: raise "
-        "lqr.state_weight or motor.maximum_voltage, so that the drives can hold them"
+        "the masses moved too fast for the imbalance filter: the drives could not hold them"
     ),
     EccentricOutcome.IMBALANCE_UNCERTAIN: _imbalance_uncertain,
-    EccentricOutcome.FRICTION_UNCERTAIN: _friction_uncertain,
-    EccentricOutcome.STALLED: lambda _: (
-        "the drives stalled, so that friction could not be found: raise motor.maximum_voltage, "
-        "friction_filter.speed_gain or drive_speed"
+    EccentricOutcome.FRICTION_UNCERTAIN: lambda facts: (
+        f"the friction did not become known to {100 * facts.scene.friction_filter.gate:.3g} %"
     ),
-    EccentricOutcome.NOT_ARRIVED: _not_arrived,
-    EccentricOutcome.TIME_LIMIT: lambda _: "the run ended before the strategy did: raise run.time_limit",
+    EccentricOutcome.STALLED: lambda _: "the drives stalled, so that friction could not be found",
+    EccentricOutcome.NOT_ARRIVED: lambda facts: (
+        "the masses did not come to rest on their targets within "
+        f"{facts.scene.supervisor.positioning_time:.4g} s"
+    ),
+    EccentricOutcome.TIME_LIMIT: lambda _: "the run ended before the strategy did",
+}
+
+
+def _more_time(facts: RunFacts) -> tuple[Remedy, ...]:
+    """For all that the stages may take, so that the next run does not end within one."""
+    told, tuning = facts.scene.supervisor, facts.scene.fine_tuning
+    stages = told.start + told.imbalance_time + told.friction_time + told.positioning_time
+    tuned = told.fine_tuning_time if facts.stage >= Stage.CHECK else 0.0
+    return (
+        remedy(facts.scene, ("run.time_limit", stages + tuning.wait + tuning.average + tuned + facts.time)),
+    )
+
+
+def _more_volts(facts: RunFacts) -> list[Remedy]:
+    volts = facts.scene.motor.maximum_voltage
+    if volts is None or facts.saturation == 0:
+        return []
+    return [remedy(facts.scene, ("motor.maximum_voltage", 4 * volts))]
+
+
+def _stalled_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
+    found = stall_remedy(facts.scene)
+    faster = remedy(facts.scene, ("friction_filter.drive_speed", 4 * facts.scene.friction_filter.drive_speed))
+    return (*([found] if found else []), *_more_volts(facts), *([] if found else [faster]))
+
+
+def _arrival_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
+    scene = facts.scene
+    if scene.lqr.friction_compensation != "break_away":
+        return (remedy(scene, ("lqr.friction_compensation", "break_away")),)
+    found = _more_volts(facts)
+    most, weight = recommended_gains(scene).regulator.recommended, scene.lqr.state_weight
+    if most > 2 * weight:
+        found.append(remedy(scene, ("lqr.state_weight", min(30 * weight, most))))
+    angle, rate = 4 * scene.supervisor.arrival_angle, 10 * scene.supervisor.arrival_rate
+    found.append(remedy(scene, ("supervisor.arrival_angle", angle), ("supervisor.arrival_rate", rate)))
+    return tuple(found)
+
+
+def _limit_remedy(facts: RunFacts) -> tuple[Remedy, ...]:
+    last = float(np.max(facts.amplitude[-(facts.amplitude.size // 20 + 1) :]))
+    worst = last if facts.left is None else max(last, float(facts.amplitude[facts.left]))
+    return (remedy(facts.scene, ("supervisor.limit", 1.2 * max(worst, facts.scene.supervisor.limit))),)
+
+
+def _tuning_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
+    told = facts.scene.fine_tuning
+    longer = max(3 * facts.scene.supervisor.fine_tuning_time, TRIALS * (told.wait + told.average))
+    total = facts.scene.run.time_limit + longer
+    more = remedy(facts.scene, ("supervisor.fine_tuning_time", longer), ("run.time_limit", total))
+    return (more, *_limit_remedy(facts))
+
+
+def _imbalance_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
+    reach = abs(influence(plant_parameters(facts.scene), float(facts.speed[-1])))
+    told = (facts.deviation, facts.imbalance, reach)
+    return (imbalance_remedy(facts.scene, deviation=told[0], imbalance=told[1], reach=told[2]),)
+
+
+def _friction_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
+    scene, speed = facts.scene, float(facts.speed[-1])
+    arm = min(scene.masses.friction_arm)
+    found, gate = [friction_remedy(scene, arm=arm, speed=speed)], 2 * friction_floor(scene, speed=speed)
+    if scene.friction_filter.gate * arm < gate < 0.5 * arm:
+        found.append(remedy(scene, ("friction_filter.gate", gate / arm)))
+    return tuple(found)
+
+
+def _heavier(facts: RunFacts) -> tuple[Remedy, ...]:
+    masses = facts.scene.masses
+    reach = 2 * masses.guide_radius * math.cos(0.5 * masses.arc_length / masses.guide_radius)
+    return (remedy(facts.scene, ("masses.mass", 1.2 * facts.imbalance / reach)),) if reach > 0 else ()
+
+
+def _weaker(facts: RunFacts) -> tuple[Remedy, ...]:
+    if gain_remedy(facts.scene):
+        return ()
+    weight, gain = facts.scene.lqr.state_weight / 30, facts.scene.friction_filter.speed_gain / 4
+    return (remedy(facts.scene, ("lqr.state_weight", weight), ("friction_filter.speed_gain", gain)),)
+
+
+_REMEDIES: Final[dict[EccentricOutcome, Callable[[RunFacts], tuple[Remedy, ...]]]] = {
+    EccentricOutcome.RISES_AGAIN: _limit_remedy,
+    EccentricOutcome.SATURATED: _heavier,
+    EccentricOutcome.RESIDUAL: _limit_remedy,
+    EccentricOutcome.TUNING_TIME: _tuning_remedies,
+    EccentricOutcome.MASSES_MOVE: lambda facts: tuple(_more_volts(facts)) or _arrival_remedies(facts),
+    EccentricOutcome.IMBALANCE_UNCERTAIN: _imbalance_remedies,
+    EccentricOutcome.FRICTION_UNCERTAIN: _friction_remedies,
+    EccentricOutcome.STALLED: _stalled_remedies,
+    EccentricOutcome.NOT_ARRIVED: _arrival_remedies,
+    EccentricOutcome.TIME_LIMIT: _more_time,
+    EccentricOutcome.DIVERGED: _weaker,
 }

@@ -9,6 +9,7 @@ import numpy as np
 
 from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import (
     imbalance_history,
+    locked_masses,
     start_estimate,
 )
 from ringbalance.controller.eccentric_mass.estimation.imbalance_model import (
@@ -111,7 +112,7 @@ def estimate_imbalance(
         matrices=scene_matrices(scene, angular_velocity=record.speed),
         samples=record.samples,
         variance=variance,
-        mass_imbalance=(float(own.real), float(own.imag)),
+        masses=locked_masses(complex(own)),
     )
 
 

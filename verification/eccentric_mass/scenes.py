@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any, Final
@@ -12,7 +13,11 @@ import numpy.typing as npt
 
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.eccentric_models import EccentricScene, SpeedPoint
+from ringbalance.scene.keys.declaration import Entries, Key, keys_of
+from ringbalance.scene.keys.fields import Reader
+from ringbalance.scene.units import FieldError
 
 RPM: Final = 2 * math.pi / 60
 DRIVEN_SCENE: Final = "eccentric_mass_paper"
@@ -53,8 +58,48 @@ def _places(size: int, count: int) -> IntArray:
 
 
 def changed(scene: EccentricScene, table: str, **values: Any) -> EccentricScene:
-    """The scene with some values of one table replaced."""
-    return replace(scene, **{table: replace(getattr(scene, table), **values)})
+    """The scene with some values of one table replaced, and with the defaults that follow from them.
+
+    Args: `**values`: by key, SI.
+    Raises: FieldError: a value that a scene file may not have there.
+    """
+    keys = _keys(scene, table)
+    for name, value in values.items():
+        _check(keys[name].takes, value)
+    new: EccentricScene = replace(scene, **{table: replace(getattr(scene, table), **values)})
+    return _derived(new, {f"{table}.{name}" for name in values})
+
+
+def _keys(scene: EccentricScene, table: str) -> Mapping[str, Key]:
+    record: Any = getattr(scene, table).__class__
+    return keys_of(record)
+
+
+def _check(takes: Reader | Entries, value: Any) -> None:
+    """As a scene file would be: a number with its SI unit; of lists, that they are of finite numbers."""
+    numbers = [each for each in value if isinstance(each, float)] if isinstance(value, tuple) else []
+    if not all(map(math.isfinite, numbers)):
+        raise FieldError("it holds a number that is not finite", takes.allowed)
+    if isinstance(takes, Reader) and value is not None and not isinstance(value, tuple):
+        unit = next(iter(DIMENSIONS[takes.dimension].units)) if takes.dimension else None
+        takes.read(value if unit is None else f"{float(value)!r} {unit}")
+
+
+def _derived(scene: EccentricScene, changes: set[str]) -> EccentricScene:
+    """With the defaults worked out again that follow from changed values, directly or not."""
+    for path in scene.defaulted:
+        table, _, name = path.partition(".")
+        if not hasattr(scene, table):
+            continue
+        presence = _keys(scene, table)[name].presence
+        if presence.rule is not None and not changes.isdisjoint(presence.needs) and path not in changes:
+            needed = [
+                getattr(getattr(scene, part), key) for part, key in (p.split(".") for p in presence.needs)
+            ]
+            value = presence.rule(*needed)
+            scene = replace(scene, **{table: replace(getattr(scene, table), **{name: value})})
+            changes.add(path)
+    return scene
 
 
 def at_constant_speed(

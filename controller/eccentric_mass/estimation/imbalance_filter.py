@@ -1,8 +1,10 @@
 """The imbalance filter: a Kalman filter for rotor-fixed whirl with an unknown constant imbalance.
 
-It holds only while the masses are locked to the rotor and the speed is constant; `imbalance_filter_gate`
-is asked before every step.  The masses' own imbalance is known from their encoders and enters as an input,
-so they need not lie exactly opposite.
+It holds while the speed is constant, also for masses that move.  With p = b sum exp(j phi_i) their force on
+the rotor is b sum [(W + phi_i')^2 - j phi_i''] exp(j phi_i) = W^2 p - 2 j W p' - p''.  With v = z' + p'/M in
+place of z' no acceleration is left, and no noise of an encoder is differentiated:
+
+    z' = v - p'/M,    M v' + 2 j W M v - M W^2 z + C_B (v + j W z) + K_B z = W^2 (theta + p) + C_B p'/M.
 """
 
 from __future__ import annotations
@@ -22,49 +24,106 @@ from ringbalance.controller.eccentric_mass.estimation.imbalance_model import (
 )
 from ringbalance.scene.arrays import FloatArray
 
+Pair = tuple[float, float]
+
 
 class ImbalanceEstimate(NamedTuple):
     """Estimate of the imbalance filter."""
 
     state: FloatArray
-    """Shape (6,): x, y (m), x', y' (m/s), imbalance along x and y (kg m), rotor-fixed."""
+    """Shape (6,): z, v and the imbalance along x and y, rotor-fixed; v is z' while the masses rest."""
     covariance: FloatArray
     """Shape (6, 6)."""
 
 
-@compiled
-def predict(
-    estimate: ImbalanceEstimate, matrices: FilterMatrices, own_imbalance: FloatArray
-) -> ImbalanceEstimate:
-    """Carry the estimate one step on.
+class MassInput(NamedTuple):
+    """What the eccentric masses do within one step of the filter."""
 
-    Returns: The estimate before the next sample.
-    Source: Eqs. 14 and 15 of the paper on eccentric masses.
+    imbalance: complex
+    """p + C_B p'/(M W^2), mean over the step."""
+    drift: complex
+    """Integral of p'/M over the step, m."""
+    covariance: FloatArray
+    """That the encoders' angles give the imbalance, shape (2, 2)."""
+    drift_variance: float
+    """That the encoders' rates give each coordinate of the drift, m^2."""
+
+
+@compiled
+def locked_masses(imbalance: complex) -> MassInput:
+    """Masses at rest at angles that are known exactly."""
+    return MassInput(imbalance, 0.0j, np.zeros((2, 2)), 0.0)
+
+
+@compiled
+def mass_vector(moment: float, angle: Pair, rate: Pair) -> tuple[complex, complex]:
+    """p = b sum exp(j phi_i), kg m, and its time derivative."""
+    place, pace = 0.0j, 0.0j
+    for i in range(2):
+        arm = moment * complex(math.cos(angle[i]), math.sin(angle[i]))
+        place += arm
+        pace += complex(0.0, rate[i]) * arm
+    return place, pace
+
+
+@compiled
+def encoder_covariance(moment: float, angle: Pair, deviation: float) -> FloatArray:
+    """Of p, from encoders with this standard deviation, kg^2 m^2, shape (2, 2)."""
+    found = np.zeros((2, 2))
+    for i in range(2):
+        x, y = -moment * deviation * math.sin(angle[i]), moment * deviation * math.cos(angle[i])
+        found[0, 0] += x * x
+        found[1, 1] += y * y
+        found[0, 1] += x * y
+    found[1, 0] = found[0, 1]
+    return found
+
+
+@compiled
+def predict(estimate: ImbalanceEstimate, matrices: FilterMatrices, masses: MassInput) -> ImbalanceEstimate:
+    """Carry the estimate one step on; the drift acts half at its beginning and half at its end.
+
+    Source: Eqs. 14 and 15 of the paper on eccentric masses, with the whole force of moving masses.
     """
     x, a = estimate.state, matrices.transition
     drive = x.copy()
-    drive[4] += own_imbalance[0]
-    drive[5] += own_imbalance[1]
+    drive[0] -= 0.5 * masses.drift.real
+    drive[1] -= 0.5 * masses.drift.imag
+    drive[4] += masses.imbalance.real
+    drive[5] += masses.imbalance.imag
     state = np.zeros(6)
     for i in range(4):
         for k in range(6):
             state[i] += a[i, k] * drive[k]
+    state[0] -= 0.5 * masses.drift.real
+    state[1] -= 0.5 * masses.drift.imag
     state[4], state[5] = x[4], x[5]
-    return ImbalanceEstimate(state, sandwich(a, estimate.covariance) + matrices.process)
+    covariance = sandwich(a, estimate.covariance) + matrices.process
+    for i in range(4):
+        for k in range(4):
+            for m in range(2):
+                for n in range(2):
+                    covariance[i, k] += a[i, 4 + m] * masses.covariance[m, n] * a[k, 4 + n]
+    covariance[0, 0] += masses.drift_variance
+    covariance[1, 1] += masses.drift_variance
+    return ImbalanceEstimate(state, covariance)
 
 
 @compiled
 def correct(
     estimate: ImbalanceEstimate, matrices: FilterMatrices, sample: FloatArray, variance: FloatArray
-) -> ImbalanceEstimate:
-    """Take in one sample, one sensor after the other, in Joseph's form.
+) -> tuple[ImbalanceEstimate, float]:
+    """Take in one sample, one sensor after the other, in Joseph's form, and square its innovation.
+
+    The latter, normalised, has a chi-square distribution of four degrees of freedom, independent of earlier
+    samples, when the model is right.
 
     P+ = (I - k h) P (I - k h)^T + r k k^T stays symmetric and positive whatever rounding does to the gain.
     Source: Eqs. 16 to 21 of the paper on eccentric masses; Bucy and Joseph, "Filtering for Stochastic
     Processes with Applications to Guidance" (1968).
     """
     state, covariance = estimate.state.copy(), estimate.covariance.copy()
-    cross_covariance = np.zeros(6)
+    cross_covariance, surprise = np.zeros(6), 0.0
     for m in range(4):
         h, r = matrices.observation[m], variance[m]
         innovation, total = sample[m], r
@@ -75,10 +134,11 @@ def correct(
                 cross_covariance[i] += covariance[i, k] * h[k]
             total += h[i] * cross_covariance[i]
         if total > 0 and math.isfinite(innovation):
+            surprise += innovation * innovation / total
             for i in range(6):
                 state[i] += cross_covariance[i] / total * innovation
             _joseph(covariance, total, h, cross_covariance, r)
-    return ImbalanceEstimate(state, covariance)
+    return ImbalanceEstimate(state, covariance), surprise
 
 
 @compiled
@@ -112,16 +172,6 @@ def turned_back(sample: FloatArray, rotor_angle: float) -> FloatArray:
             c * sample[3] - s * sample[2],
         ]
     )
-
-
-@compiled
-def own_imbalance(moment: float, first: float, second: float) -> FloatArray:
-    """Imbalance of the two masses themselves, from their encoders.
-
-    Returns: Along the rotor's axes, kg m, shape (2,); zero when the masses lie opposite.
-    """
-    along, across = math.cos(first) + math.cos(second), math.sin(first) + math.sin(second)
-    return np.array([moment * along, moment * across])
 
 
 @compiled
@@ -164,7 +214,7 @@ def imbalance_history(
     matrices: FilterMatrices,
     samples: FloatArray,
     variance: FloatArray,
-    mass_imbalance: tuple[float, float] = (0.0, 0.0),
+    masses: MassInput | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Run the filter over a record: predict, then take in the sample, for each.
 
@@ -175,8 +225,13 @@ def imbalance_history(
     """
     if matrices.speed == 0:
         raise ValueError("a rotor at rest shows no imbalance: the speed must not be zero")
-    own = np.asarray(mass_imbalance, dtype=np.float64)
-    return _history(start, matrices, np.ascontiguousarray(samples, dtype=np.float64), variance, own)
+    return _history(
+        start,
+        matrices,
+        np.ascontiguousarray(samples, dtype=np.float64),
+        variance,
+        masses or locked_masses(0.0j),
+    )
 
 
 @compiled
@@ -185,13 +240,13 @@ def _history(
     matrices: FilterMatrices,
     samples: FloatArray,
     variance: FloatArray,
-    own: FloatArray,
+    masses: MassInput,
 ) -> tuple[FloatArray, FloatArray]:
     count = samples.shape[0]
     states, covariances = np.zeros((count, 6)), np.zeros((count, 6, 6))
     estimate = start
     for i in range(count):
-        estimate = correct(predict(estimate, matrices, own), matrices, samples[i], variance)
+        estimate, _ = correct(predict(estimate, matrices, masses), matrices, samples[i], variance)
         states[i], covariances[i] = estimate.state, estimate.covariance
     return states, covariances
 
@@ -206,6 +261,7 @@ def predicted_deviation(
     step: float,
     duration: float,
     laboratory: bool = False,
+    masses: MassInput | None = None,
 ) -> FloatArray:
     """How well the imbalance can be known, before anything is measured.
 
@@ -217,5 +273,7 @@ def predicted_deviation(
     """
     matrices = filter_matrices(model, noise, angular_velocity, step, laboratory, False)
     blank = np.zeros((max(round(duration / step), 1), 4))
-    _, covariances = imbalance_history(start, matrices=matrices, samples=blank, variance=variance)
+    _, covariances = imbalance_history(
+        start, matrices=matrices, samples=blank, variance=variance, masses=masses
+    )
     return np.array([imbalance_deviation(covariance) for covariance in covariances])

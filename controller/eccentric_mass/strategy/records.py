@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ringbalance.controller.eccentric_mass.estimation.friction_filter import FrictionEstimate, FrictionNoise
+from ringbalance.controller.eccentric_mass.estimation.friction_filter import (
+    FrictionEstimate,
+    FrictionNoise,
+    TrackModel,
+)
 from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import ImbalanceEstimate
 from ringbalance.controller.eccentric_mass.estimation.imbalance_model import FilterMatrices, ProcessNoise
 from ringbalance.controller.eccentric_mass.strategy.lqr_law import DriveLaw
@@ -44,6 +48,8 @@ class ImbalanceSettings(NamedTuple):
     """Standard deviation before the first sample, m."""
     start_velocity: float
     start_imbalance: float
+    encoder_deviation: float
+    encoder_rate_deviation: float
     euler: bool
     """The paper's transition in place of the exact one."""
     every: int
@@ -55,6 +61,10 @@ class FrictionSettings(NamedTuple):
 
     start: FrictionEstimate
     noise: FrictionNoise
+    track: TrackModel
+    """Whose inertia is less by b^2/M, as the rotor gives way."""
+    least_motion: float
+    """Smoothed rate below which a mass teaches the filter nothing."""
     euler: bool
     """The paper's transition in place of the exponential one."""
     every: int
@@ -99,6 +109,14 @@ class Whirl(NamedTuple):
     matrices: FilterMatrices
     running: bool
     """Whether the filter took in the last sample that was its turn."""
+    place: complex
+    """p = b sum exp(j phi_i) of the masses at that sample."""
+    pace: complex
+    """Its time derivative."""
+    surprise: float
+    """Sum of the normalised innovations squared."""
+    judged: int
+    """Samples in that sum."""
 
 
 class Beliefs(NamedTuple):
@@ -121,4 +139,6 @@ class StrategyState(NamedTuple):
     beliefs: Beliefs
     torque: Pair
     """Known torques summed over the samples since the friction filter's last step, N m."""
+    last_rate: Pair
+    """Of the masses, as measured at that step."""
     voltage: Pair

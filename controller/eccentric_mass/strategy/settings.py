@@ -19,7 +19,6 @@ from ringbalance.controller.eccentric_mass.strategy.records import (
     ImbalanceSettings,
     StrategySettings,
 )
-from ringbalance.scene.eccentric_control_models import FrictionFilter, ImbalanceFilter
 from ringbalance.scene.eccentric_models import EccentricScene
 
 SMOOTHING_TIME = 0.05
@@ -36,6 +35,8 @@ LONGEST_TRIAL_MOVE = 10.0
 """s."""
 SLOWEST_RATE = 1e-3
 """Below which a mass rests, however good the encoder, rad/s."""
+CERTAIN = 5.0
+"""Standard deviations of a smoothed rate beyond which a mass moves."""
 FRICTION_ERROR = 0.1
 """Share of the arrival angle that unknown friction may hold a mass off."""
 
@@ -65,12 +66,13 @@ def strategy_settings(scene: EccentricScene) -> StrategySettings:
         voltage_every=max(round(scene.lqr.step / step), 1),
         law=drive_law(scene),
         gates=_gates(scene),
-        imbalance=_imbalance(scene.imbalance_filter, step),
-        friction=_friction(scene.friction_filter, step),
+        imbalance=_imbalance(scene),
+        friction=_friction(scene),
     )
 
 
-def _imbalance(told: ImbalanceFilter, step: float) -> ImbalanceSettings:
+def _imbalance(scene: EccentricScene) -> ImbalanceSettings:
+    told, sensor = scene.imbalance_filter, scene.sensor
     return ImbalanceSettings(
         noise=ProcessNoise(told.velocity_walk**2, told.unbalance_walk**2),
         position_deviation=told.position_noise,
@@ -78,17 +80,27 @@ def _imbalance(told: ImbalanceFilter, step: float) -> ImbalanceSettings:
         start_position=told.initial_position,
         start_velocity=told.initial_velocity,
         start_imbalance=told.initial_unbalance,
+        encoder_deviation=sensor.encoder_noise,
+        encoder_rate_deviation=sensor.encoder_rate_noise,
         euler=told.discretisation == "euler",
-        every=max(round(told.step / step), 1),
+        every=max(round(told.step / sensor.step), 1),
     )
 
 
-def _friction(told: FrictionFilter, step: float) -> FrictionSettings:
+def _friction(scene: EccentricScene) -> FrictionSettings:
+    told, track, sensor = scene.friction_filter, track_model(scene), scene.sensor
+    given_way = track.moment**2 / believed_whirl(scene).mass
+    inertia = track.inertia - given_way
+    # The other mass's acceleration is a difference of two measured rates.
+    noise = told.rate_noise**2 * (1 + 2 * (given_way / inertia) ** 2)
+    smooth = sensor.encoder_rate_noise * math.sqrt(sensor.step / (2 * SMOOTHING_TIME))
     return FrictionSettings(
         start=FrictionEstimate(0.0, 0.0, told.initial_rate**2, 0.0, told.initial_friction**2),
-        noise=FrictionNoise(told.rate_noise**2, told.rate_walk**2, told.friction_walk**2),
+        noise=FrictionNoise(noise, told.rate_walk**2, told.friction_walk**2),
+        track=track._replace(inertia=inertia),
+        least_motion=max(CERTAIN * smooth, SLOWEST_RATE),
         euler=told.discretisation == "euler",
-        every=max(round(told.step / step), 1),
+        every=max(round(told.step / sensor.step), 1),
         drive_speed=told.drive_speed,
         speed_gain=told.speed_gain,
         pair_gain=told.pair_gain,

@@ -18,9 +18,11 @@ from ringbalance.controller.eccentric_mass.estimation.friction_filter import (
     friction_step,
 )
 from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import (
+    MassInput,
     correct,
+    encoder_covariance,
     imbalance_deviation,
-    own_imbalance,
+    mass_vector,
     predict,
     start_estimate,
     turned_back,
@@ -57,6 +59,8 @@ from ringbalance.controller.eccentric_mass.strategy.supervisor import (
 from ringbalance.controller.eccentric_mass.strategy.targets import wrapped
 from ringbalance.scene.arrays import FloatArray
 
+LARGEST_TURN: Final = 0.05
+"""Of a mass within one step of the imbalance filter, rad, which takes its path as straight."""
 STEADY: Final = 1e-6
 """Speed rate that counts as none, rad/s^2."""
 
@@ -66,11 +70,11 @@ def strategy_start(settings: StrategySettings, measurement: EccentricMeasurement
     """The state before the first sample. Returns: The state; the strategy waits for its start."""
     told, friction = settings.imbalance, settings.friction.start
     estimate = start_estimate(told.start_position, told.start_velocity, told.start_imbalance)
-    whirl = Whirl(estimate, _matrices(settings, measurement.speed), False)
+    whirl = Whirl(estimate, _matrices(settings, measurement.speed), False, 0.0j, 0.0j, 0.0, 0)
     beliefs = Beliefs(0.0j, told.start_imbalance, (friction, friction))
     smoothed = Smoothed(0.0j, 0.0j, measurement.angle, (0.0, 0.0))
     plan = first_plan(measurement.angle, measurement.time)
-    return StrategyState(0, plan, smoothed, whirl, beliefs, (0.0, 0.0), (0.0, 0.0))
+    return StrategyState(0, plan, smoothed, whirl, beliefs, (0.0, 0.0), measurement.rate, (0.0, 0.0))
 
 
 @compiled
@@ -81,9 +85,9 @@ def strategy_step(
 
     Returns: The next state and the voltages of both motors, V.
     """
-    count, old, smoothed, whirl, beliefs, torque, voltage = state
+    count, old, smoothed, whirl, beliefs, torque, rate, voltage = state
     if not _usable(measurement):
-        return StrategyState(count + 1, old, smoothed, whirl, beliefs, torque, voltage), voltage
+        return StrategyState(count + 1, old, smoothed, whirl, beliefs, torque, rate, voltage), voltage
     sample = measurement.vibration
     if settings.laboratory:
         sample = turned_back(sample, measurement.rotor_angle)
@@ -94,14 +98,16 @@ def strategy_step(
         whirl = _with_sample(settings, whirl, motion, sample, visible)
         beliefs = _with_imbalance(whirl, beliefs)
     if old.stage == FRICTION and count % settings.friction.every == 0:
-        beliefs, torque = _with_friction(settings, beliefs, torque, motion), (0.0, 0.0)
+        beliefs = _with_friction(settings, beliefs, torque, rate, motion, smoothed.rate)
+        torque, rate = (0.0, 0.0), motion.rate
     facts = _facts(settings.law, old, beliefs, motion, smoothed, visible and whirl.running, measurement.time)
     plan = supervise(settings.gates, old, facts)
-    asked, load = _torques(settings, plan, beliefs, motion, smoothed)
+    asked = _torques(settings, plan, beliefs, motion, smoothed)
     if count % settings.voltage_every == 0:
         voltage = (voltage_for(settings.law, asked[0]), voltage_for(settings.law, asked[1]))
-    torque = _known(settings.law, torque, load, voltage)
-    return StrategyState(count + 1, plan, smoothed, whirl, beliefs, torque, voltage), voltage
+    if plan.stage == FRICTION:
+        torque = _known(settings.law, torque, motion, beliefs.imbalance, voltage)
+    return StrategyState(count + 1, plan, smoothed, whirl, beliefs, torque, rate, voltage), voltage
 
 
 @compiled
@@ -149,10 +155,10 @@ def _smoothed(new: float, old: Smoothed, motion: Motion) -> Smoothed:
 
 @compiled
 def _visible(settings: StrategySettings, motion: Motion, smoothed: Smoothed) -> bool:
-    """Whether the imbalance filter's model holds: turning, at constant speed, with masses at rest."""
+    """Whether the imbalance filter's model holds: turning, at constant speed, with masses it can follow."""
     turning = abs(motion.speed) >= settings.gates.lowest_speed and abs(motion.speed_rate) < STEADY
     fastest = max(abs(smoothed.rate[0]), abs(smoothed.rate[1]))
-    return turning and fastest <= settings.law.slow
+    return turning and fastest * settings.step * settings.imbalance.every <= LARGEST_TURN
 
 
 @compiled
@@ -162,17 +168,42 @@ def _with_sample(
     """One step of the imbalance filter; after a gap in which its model did not hold the whirl starts
     again."""
     if not visible:
-        return Whirl(old.estimate, old.matrices, False)
+        return Whirl(old.estimate, old.matrices, False, 0.0j, 0.0j, old.surprise, old.judged)
     told, matrices, estimate = settings.imbalance, old.matrices, old.estimate
     if matrices.speed != motion.speed:
         matrices = _matrices(settings, motion.speed)
+    place, pace = mass_vector(settings.law.track.moment, motion.angle, motion.rate)
+    before, drift = old.place, old.pace
     if not old.running:
         start = start_estimate(told.start_position, told.start_velocity, told.start_imbalance)
-        estimate = with_fresh_whirl(estimate, start)
-    own = own_imbalance(settings.law.track.moment, motion.angle[0], motion.angle[1])
+        estimate, before, drift = with_fresh_whirl(estimate, start), place, pace
+    masses = _mass_input(settings, motion, 0.5 * (before + place), 0.5 * (drift + pace))
+    mass, shifted = settings.law.whirl.mass, sample.copy()
+    shifted[2] += pace.real / mass
+    shifted[3] += pace.imag / mass
+    ahead = predict(estimate, matrices, masses)
+    variance = _sample_variance(settings, motion)
+    estimate, surprise = correct(ahead, matrices, shifted, variance)
+    return Whirl(estimate, matrices, True, place, pace, old.surprise + surprise, old.judged + 1)
+
+
+@compiled
+def _mass_input(settings: StrategySettings, motion: Motion, place: complex, pace: complex) -> MassInput:
+    """Of one step of the imbalance filter, from the means of p and p' over it."""
+    law, told = settings.law, settings.imbalance
+    step, damped = settings.step * told.every, law.whirl.damping / (law.whirl.mass * motion.speed**2)
+    noise = law.track.moment * told.encoder_rate_deviation * step / law.whirl.mass
+    covariance = encoder_covariance(law.track.moment, motion.angle, told.encoder_deviation)
+    return MassInput(place + damped * pace, pace * step / law.whirl.mass, covariance, noise * noise)
+
+
+@compiled
+def _sample_variance(settings: StrategySettings, motion: Motion) -> FloatArray:
+    """Of each sensor; the encoders' rates are in the velocities."""
+    law, told = settings.law, settings.imbalance
     place, pace = told.position_deviation**2, told.velocity_deviation**2
-    variance = np.array([place, place, pace, pace])
-    return Whirl(correct(predict(estimate, matrices, own), matrices, sample, variance), matrices, True)
+    rates = encoder_covariance(law.track.moment, motion.angle, told.encoder_rate_deviation / law.whirl.mass)
+    return np.array([place, place, pace + rates[0, 0], pace + rates[1, 1]])
 
 
 @compiled
@@ -183,28 +214,45 @@ def _with_imbalance(whirl: Whirl, old: Beliefs) -> Beliefs:
 
 
 @compiled
-def _with_friction(settings: StrategySettings, old: Beliefs, torque: Pair, motion: Motion) -> Beliefs:
-    one, two = old.friction
-    first = _one_friction(settings, one, torque[0], motion.rate[0], motion.speed)
-    second = _one_friction(settings, two, torque[1], motion.rate[1], motion.speed)
-    return Beliefs(old.imbalance, old.deviation, (first, second))
+def _with_friction(
+    settings: StrategySettings, old: Beliefs, torque: Pair, last: Pair, motion: Motion, smooth: Pair
+) -> Beliefs:
+    """One step of both masses' filters; each one's load holds the acceleration that the other one had."""
+    told, whirl, (one, two) = settings.friction, settings.law.whirl, old.friction
+    first, second = motion.angle
+    lever = told.track.moment**2 / whirl.mass * math.cos(first - second) / (settings.step * told.every)
+    push_1 = torque[0] / told.every + lever * (motion.rate[1] - last[1])
+    push_2 = torque[1] / told.every + lever * (motion.rate[0] - last[0])
+    new_1 = _one_friction(settings, one, push_1, motion.rate[0], smooth[0], motion.speed)
+    new_2 = _one_friction(settings, two, push_2, motion.rate[1], smooth[1], motion.speed)
+    return Beliefs(old.imbalance, old.deviation, (new_1, new_2))
 
 
 @compiled
 def _one_friction(
-    settings: StrategySettings, estimate: FrictionEstimate, torque: float, rate: float, speed: float
+    settings: StrategySettings,
+    estimate: FrictionEstimate,
+    torque: float,
+    rate: float,
+    smooth: float,
+    speed: float,
 ) -> FrictionEstimate:
-    """One step of a mass's filter, if the mass moves and has not turned round."""
-    told, law = settings.friction, settings.law
-    if abs(rate) <= law.slow or estimate.rate * rate <= 0:
+    """One step of a mass's filter, if the mass certainly moves and has not turned round.
+
+    One noisy sample of the rate shows no motion; its mean over a while does.
+    """
+    told = settings.friction
+    moves = abs(smooth) > told.least_motion and smooth * rate > 0 and abs(rate) > settings.law.slow
+    if not moves or estimate.rate * rate <= 0:
         return friction_restart(estimate, told.noise, rate)
-    mean, step = torque / told.every, settings.step * told.every
-    return friction_step(estimate, law.track, told.noise, rate, speed, mean, step, told.euler)
+    step = settings.step * told.every
+    return friction_step(estimate, told.track, told.noise, rate, speed, torque, step, told.euler)
 
 
 @compiled
-def _known(law: DriveLaw, old: Pair, load: Pair, voltage: Pair) -> Pair:
-    """The torques that the friction filter knows of, one sample more."""
+def _known(law: DriveLaw, old: Pair, motion: Motion, imbalance: complex, voltage: Pair) -> Pair:
+    """The torques that the friction filter knows of, one sample more; accelerations are its own matter."""
+    load = rotor_load(law, motion, imbalance, (0.0, 0.0))
     return (
         old[0] + law.torque_per_volt * voltage[0] - load[0],
         old[1] + law.torque_per_volt * voltage[1] - load[1],
@@ -264,8 +312,8 @@ def _share_of_friction(
 @compiled
 def _torques(
     settings: StrategySettings, plan: Plan, beliefs: Beliefs, motion: Motion, smoothed: Smoothed
-) -> tuple[Pair, Pair]:
-    """What the motors should give at standstill, and what of it rotor and speed rate take."""
+) -> Pair:
+    """What the motors should give at standstill."""
     law = settings.law
     if plan.stage == FRICTION:
         asked = _pair_torques(settings, motion)
@@ -276,17 +324,17 @@ def _torques(
         )
     if plan.stage <= IMBALANCE:
         load = steady_load(law, motion)
-        return (asked[0] + load[0], asked[1] + load[1]), load
+        return asked[0] + load[0], asked[1] + load[1]
     wanted = (
         (asked[0] - law.track.damping * motion.rate[0]) / law.track.inertia,
         (asked[1] - law.track.damping * motion.rate[1]) / law.track.inertia,
     )
     load = rotor_load(law, motion, beliefs.imbalance, wanted)
     if plan.hold == RELEASED:
-        return (0.0, 0.0), load
+        return 0.0, 0.0
     one = _friction_of(settings, plan, beliefs, motion, smoothed, 0)
     two = _friction_of(settings, plan, beliefs, motion, smoothed, 1)
-    return (asked[0] + load[0] + one, asked[1] + load[1] + two), load
+    return asked[0] + load[0] + one, asked[1] + load[1] + two
 
 
 @compiled

@@ -94,7 +94,9 @@ def _friction(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     for i in range(2):
         torque = facts.arm_deviation[i] * gates.moment * facts.speed**2
         relative = facts.arm_deviation[i] <= gates.friction_gate * facts.arm[i]
-        known = known and (relative or torque <= gates.friction_torque)
+        # Friction does not drive: an arm well below zero contradicts the filter's model.
+        possible = facts.arm[i] >= -2 * facts.arm_deviation[i]
+        known = known and possible and (relative or torque <= gates.friction_torque)
     if known and elapsed >= gates.least_drive:
         return _towards(gates, now, facts)
     if elapsed < gates.friction_time:

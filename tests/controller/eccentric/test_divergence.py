@@ -25,6 +25,7 @@ def unlimited() -> EccentricScene:
     return replace(
         scene,
         lqr=replace(scene.lqr, state_weight=3.5),
+        friction_filter=replace(scene.friction_filter, speed_gain=2.0),
         motor=replace(scene.motor, maximum_voltage=None),
         run=replace(scene.run, time_limit=4.0),
     )
@@ -35,7 +36,7 @@ def test_a_diverging_run_is_a_status_with_finite_numbers(unlimited: EccentricSce
     assert run.outcome == "diverged"
     assert not run.settled
     assert run.time[-1] < 4.0
-    assert "lqr.state_weight = 3.5 to " in run.status
+    assert "lower lqr.state_weight from 3.5 to " in run.status
     json.dumps(eccentric_document(run), allow_nan=False)
     text = io.StringIO()
     show_eccentric(run, console=Console(file=text))

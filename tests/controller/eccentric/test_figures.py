@@ -17,6 +17,7 @@ from ringbalance.controller.eccentric_mass.strategy.lqr_law import friction_torq
 from ringbalance.controller.eccentric_mass.strategy.settings import drive_law
 from ringbalance.controller.eccentric_mass.strategy.targets import target_angles
 from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
+from ringbalance.scene.units import FieldError
 from ringbalance.verification.eccentric_mass.bound import motion_bound
 from ringbalance.verification.eccentric_mass.effort import figure_six, printed_compensation
 from ringbalance.verification.eccentric_mass.imbalance import (
@@ -216,3 +217,18 @@ def test_the_printed_compensation_takes_the_angle_for_the_rate(scene: EccentricS
 
 def test_changed_keeps_the_rest(scene: EccentricScene) -> None:
     assert changed(scene, "lqr", state_weight=2.0) == replace(scene, lqr=replace(scene.lqr, state_weight=2.0))
+
+
+def test_changed_validates_and_keeps_derived_values_up_to_date(scene: EccentricScene) -> None:
+    assert changed(scene, "rotor", stiffness=1300.0).imbalance_filter.assumed_stiffness == 1300.0
+    wrong: dict[str, dict[str, float]] = {
+        "rotor": {"damping": -1.0},
+        "masses": {"mass": 0.0},
+        "imbalance": {"phase": math.nan},
+        "run": {"time_limit": -2.0},
+    }
+    for table, values in wrong.items():
+        with pytest.raises(FieldError):
+            changed(scene, table, **values)
+    with pytest.raises(FieldError, match="finite"):
+        changed(scene, "masses", initial_angle=(0.0, math.inf))

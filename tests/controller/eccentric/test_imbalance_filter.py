@@ -6,14 +6,17 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.linalg import block_diag, expm
 
 from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import (
     ImbalanceEstimate,
+    MassInput,
     correct,
     imbalance_deviation,
     imbalance_history,
-    own_imbalance,
+    locked_masses,
+    mass_vector,
     predict,
     predicted_deviation,
     start_estimate,
@@ -186,7 +189,7 @@ def test_josephs_form_stays_symmetric_and_positive() -> None:
     told, estimate = matrices(noise=ProcessNoise(0.0, 0.0)), start()
     tiny = np.full(4, 1e-14)
     for _ in range(200):
-        estimate = correct(predict(estimate, told, np.zeros(2)), told, np.zeros(4), tiny)
+        estimate, _ = correct(predict(estimate, told, locked_masses(0.0j)), told, np.zeros(4), tiny)
         assert np.array_equal(estimate.covariance, estimate.covariance.T)
         assert np.min(np.linalg.eigvalsh(estimate.covariance)) >= 0
 
@@ -213,18 +216,52 @@ def _parts(values: ComplexArray) -> tuple[FloatArray, FloatArray]:
 
 
 def test_masses_that_are_not_opposite_are_taken_out() -> None:
-    own = own_imbalance(0.0414, 0.2, 2.9)
+    known, _ = mass_vector(0.0414, (0.2, 2.9), (0.0, 0.0))
+    own = np.array([known.real, known.imag])
     told = matrices(noise=ProcessNoise(0.0, 0.0))
     state, samples = np.concatenate([np.zeros(4), TRUE + own]), []
     for _ in range(3000):
         state = told.transition @ state
         samples.append(state[:4].copy())
-    known = (float(own[0]), float(own[1]))
-    for given, expected in ((known, TRUE), ((0.0, 0.0), TRUE + own)):
+    for given, expected in ((known, TRUE), (0.0j, TRUE + own)):
         found, _ = imbalance_history(
-            start(), matrices=told, samples=np.array(samples), variance=VARIANCE, mass_imbalance=given
+            start(), matrices=told, samples=np.array(samples), variance=VARIANCE, masses=locked_masses(given)
         )
         np.testing.assert_allclose(found[-1, 4:], expected, rtol=1e-3)
+
+
+def test_moving_masses_are_taken_out() -> None:
+    """Against the rotor in the fixed frame, driven by the acceleration of all that turns out of balance."""
+    moment, theta = 0.0414, complex(*TRUE)
+
+    def angles(time: float) -> tuple[tuple[float, float], tuple[float, float]]:
+        place = (0.3 + 0.2 * math.sin(3 * time), 3.0 - 0.4 * time)
+        return place, (0.6 * math.cos(3 * time), -0.4)
+
+    def slope(time: float, q: np.ndarray) -> list[complex]:
+        place, rate = angles(time)
+        force = SPEED**2 * theta * np.exp(1j * SPEED * time)
+        for i, angular in enumerate((-1.8 * math.sin(3 * time), 0.0)):
+            force += moment * ((SPEED + rate[i]) ** 2 - 1j * angular) * np.exp(1j * (SPEED * time + place[i]))
+        return [q[1], (force - MODEL.damping * q[1] - MODEL.stiffness * q[0]) / MODEL.mass]
+
+    time = STEP * np.arange(3001)
+    run = solve_ivp(slope, (0, 3), [0j, 0j], t_eval=time, rtol=1e-10, atol=1e-13, method="DOP853")
+    back = np.exp(-1j * SPEED * time)
+    z, v = run.y[0] * back, (run.y[1] - 1j * SPEED * run.y[0]) * back
+    estimate, told = start(), matrices(noise=ProcessNoise(0.0, 0.0))
+    before = mass_vector(moment, *angles(0.0))
+    for i in range(1, time.size):
+        now = mass_vector(moment, *angles(float(time[i])))
+        p, pace = 0.5 * (before[0] + now[0]), 0.5 * (before[1] + now[1])
+        damped = MODEL.damping / (MODEL.mass * SPEED**2)
+        masses = MassInput(p + damped * pace, pace * STEP / MODEL.mass, np.zeros((2, 2)), 0.0)
+        seen = v[i] + now[1] / MODEL.mass
+        sample = np.array([z[i].real, z[i].imag, seen.real, seen.imag])
+        estimate, _ = correct(predict(estimate, told, masses), told, sample, 1e-4 * VARIANCE)
+        before = now
+    # Of second order in the step: (3 rad/s * 1 ms)^2 of 0.04 kg m at most.
+    np.testing.assert_allclose(estimate.state[4:], TRUE, atol=4e-7)
 
 
 def test_a_resting_rotor_is_refused_and_a_slow_one_told() -> None:
@@ -250,8 +287,8 @@ def test_a_resting_rotor_is_refused_and_a_slow_one_told() -> None:
 
 def test_a_sample_that_is_not_a_number_is_passed_over() -> None:
     told = matrices()
-    ahead = predict(start(), told, np.zeros(2))
-    found = correct(ahead, told, np.full(4, np.nan), VARIANCE)
+    ahead = predict(start(), told, locked_masses(0.0j))
+    found, _ = correct(ahead, told, np.full(4, np.nan), VARIANCE)
     np.testing.assert_array_equal(found.state, ahead.state)
     np.testing.assert_array_equal(found.covariance, ahead.covariance)
 
@@ -275,7 +312,7 @@ def test_the_printed_process_noise_is_no_covariance() -> None:
     lowest = 0.0
     for _ in range(200):
         told = told._replace(process=np.diag(1e-6 * random.standard_normal(6)))
-        estimate = correct(predict(estimate, told, np.zeros(2)), told, np.zeros(4), VARIANCE)
+        estimate, _ = correct(predict(estimate, told, locked_masses(0.0j)), told, np.zeros(4), VARIANCE)
         lowest = min(lowest, float(np.min(np.linalg.eigvalsh(estimate.covariance))))
         if not np.all(np.isfinite(estimate.covariance)):
             break
@@ -307,9 +344,12 @@ def test_the_printed_magnitude_and_phase_fail() -> None:
 
 def test_block_structure_of_sensor_noise_is_kept() -> None:
     """Taking the sensors in one after the other is the same as all at once."""
-    told, estimate = matrices(laboratory=True), predict(start(), matrices(laboratory=True), np.zeros(2))
+    told, estimate = (
+        matrices(laboratory=True),
+        predict(start(), matrices(laboratory=True), locked_masses(0.0j)),
+    )
     sample = np.array([1e-3, -2e-3, 0.01, 0.02])
-    found = correct(estimate, told, sample, VARIANCE)
+    found, _ = correct(estimate, told, sample, VARIANCE)
     h, p = told.observation, estimate.covariance
     gain = p @ h.T @ np.linalg.inv(h @ p @ h.T + block_diag(*VARIANCE))
     np.testing.assert_allclose(found.state, estimate.state + gain @ (sample - h @ estimate.state), atol=1e-12)

@@ -18,10 +18,10 @@ from ringbalance.controller.cli import simulate as command
 from ringbalance.controller.eccentric_mass.document import eccentric_document, thinned
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
 from ringbalance.controller.eccentric_mass.plant.whirl import moment_vector
+from ringbalance.controller.eccentric_mass.remedies import expected_deviation
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, EccentricRun
 from ringbalance.controller.eccentric_mass.show import show_eccentric
-from ringbalance.controller.eccentric_mass.strategy.attainable import expected_deviation
 from ringbalance.controller.eccentric_mass.strategy.records import EccentricMeasurement
 from ringbalance.controller.eccentric_mass.strategy.settings import strategy_settings
 from ringbalance.controller.eccentric_mass.strategy.step import strategy_start, strategy_step

@@ -1,0 +1,226 @@
+"""What can be told before a run, and which changed values of the scene would mend one that failed."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import (
+    MassInput,
+    encoder_covariance,
+    predicted_deviation,
+    start_estimate,
+)
+from ringbalance.controller.eccentric_mass.estimation.imbalance_model import ProcessNoise
+from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
+from ringbalance.controller.eccentric_mass.plant.whirl import influence
+from ringbalance.controller.eccentric_mass.run_record import Remedy
+from ringbalance.controller.eccentric_mass.sampled_loops import SampledLoop, recommended_gains
+from ringbalance.controller.eccentric_mass.strategy.settings import (
+    FRICTION_ERROR,
+    believed_whirl,
+    drive_law,
+    track_model,
+)
+from ringbalance.scene.eccentric_models import EccentricScene
+
+_LONGEST_STEPS: Final = 2_000
+"""Steps in which a covariance is worked out; with fewer than the filter takes, each carries less noise."""
+_ATTAINED: Final = 0.3
+"""Share of what a gate allows that a filter should come down to when its walks are lowered."""
+_MARGIN: Final = 1.5
+_NO_GATE: Final = 0.5
+"""Relative standard deviation beyond which a gate lets anything pass."""
+
+
+def expected_deviation(scene: EccentricScene, *, speed: float, duration: float | None = None) -> float:
+    """Standard deviation of the imbalance that an estimation at constant speed comes to, kg m.
+
+    Divide by the imbalance, or by the balancing capacity 2 m_b r_b, to see whether it can be resolved at all.
+     At zero speed it is the earlier estimate, since a resting rotor shows nothing.
+    Args: `duration`: of the estimation, s; default the longest that the scene allows.
+    """
+    told, masses = scene.imbalance_filter, scene.masses
+    if speed == 0:
+        return told.initial_unbalance
+    longest = scene.supervisor.imbalance_time if duration is None else duration
+    step = max(told.step, longest / _LONGEST_STEPS)
+    fewer = told.step / step
+    moment = masses.mass * masses.guide_radius
+    encoders = encoder_covariance(moment, masses.initial_angle, scene.sensor.encoder_noise)
+    found = predicted_deviation(
+        start_estimate(told.initial_position, told.initial_velocity, told.initial_unbalance),
+        model=believed_whirl(scene),
+        noise=ProcessNoise(told.velocity_walk**2, told.unbalance_walk**2),
+        variance=np.repeat([told.position_noise**2, told.velocity_noise**2], 2) * fewer,
+        masses=MassInput(0.0j, 0.0j, encoders * fewer, 0.0),
+        angular_velocity=speed,
+        step=step,
+        duration=longest,
+        laboratory=scene.sensor.frame == "laboratory",
+    )
+    return float(found[-1])
+
+
+def friction_floor(scene: EccentricScene, *, speed: float) -> float:
+    """Standard deviation, m, that a friction arm's estimate keeps for ever.
+
+    sqrt(s_mu s_w (J + J_add)/(b W^2)) with the walks of arm and rate: Riccati's equation of both, sensors
+    perfect.
+    """
+    told, track = scene.friction_filter, track_model(scene)
+    if speed == 0:
+        return math.inf
+    return math.sqrt(told.friction_walk * told.rate_walk * track.inertia / (track.moment * speed**2))
+
+
+def friction_allowed(scene: EccentricScene, *, arm: float, speed: float) -> float:
+    """Standard deviation of a friction arm, m, that lets the strategy proceed."""
+    torque = FRICTION_ERROR * drive_law(scene).position_gain * scene.supervisor.arrival_angle
+    share = scene.friction_filter.gate * max(arm, 0.0)
+    return max(share, torque / (track_model(scene).moment * speed**2)) if speed != 0 else math.inf
+
+
+def found_beforehand(scene: EccentricScene) -> tuple[str, ...]:
+    """Loops that are unstable, drives too weak and gates that cannot be reached, each with what would do."""
+    if scene.supervisor.strategy == "locked":
+        return ()
+    gains = recommended_gains(scene)
+    found = [
+        f"the sampled loop of the {loop.name} is unstable (largest pole {loop.radius:.3g} per step): "
+        f"{_lowered(scene, loop).text}, or hold the voltage for {loop.recommended_step:.2g} s"
+        for loop in gains.loops
+        if not loop.stable and not (loop is gains.pair and not gains.speed.stable)
+    ]
+    speed = scene.rotor.speed_profile[0].speed
+    if speed != 0:
+        found += _weak_drive(scene) + _gates(scene, speed)
+    return tuple(found)
+
+
+def _weak_drive(scene: EccentricScene) -> list[str]:
+    missing = stall_remedy(scene, margin=1.0)
+    return (
+        [f"the drives cannot overcome the friction in the friction stage: {missing.text}"] if missing else []
+    )
+
+
+def _gates(scene: EccentricScene, speed: float) -> list[str]:
+    found, plant = [], plant_parameters(scene)
+    deviation = expected_deviation(scene, speed=speed)
+    reach = abs(influence(plant, speed)) if plant.damping > 0 else math.inf
+    needed = 2 * deviation * reach > 0.1 * scene.supervisor.limit
+    if needed and deviation > scene.imbalance_filter.gate * plant.unbalance:
+        remedy = imbalance_remedy(scene, deviation=deviation, imbalance=plant.unbalance, reach=reach)
+        found.append(f"the imbalance filter cannot reach its gate at this speed: {remedy.text}")
+    for arm in scene.masses.friction_arm:
+        allowed = friction_allowed(scene, arm=arm, speed=speed)
+        if friction_floor(scene, speed=speed) > allowed:
+            text = friction_remedy(scene, arm=arm, speed=speed).text
+            found.append(f"the friction filter cannot reach its gate: {text}")
+            break
+    return found
+
+
+def imbalance_remedy(scene: EccentricScene, *, deviation: float, imbalance: float, reach: float) -> Remedy:
+    """A gate that is reached, or an amplitude that makes no more precision necessary."""
+    share = _MARGIN * deviation / imbalance if imbalance > 0 else math.inf
+    if share < _NO_GATE:
+        return remedy(scene, ("imbalance_filter.gate", share))
+    return remedy(scene, ("supervisor.limit", _MARGIN * 20 * deviation * reach))
+
+
+def friction_remedy(scene: EccentricScene, *, arm: float, speed: float) -> Remedy:
+    """A slower walk of the rate if the filter's own floor is above the gate; else more time, and a wider
+    gate.
+    """
+    floor, allowed = friction_floor(scene, speed=speed), friction_allowed(scene, arm=arm, speed=speed)
+    told = scene.friction_filter
+    if floor > _ATTAINED * allowed:
+        return remedy(
+            scene, ("friction_filter.rate_walk", told.rate_walk * (_ATTAINED * allowed / floor) ** 2)
+        )
+    longer = 4 * scene.supervisor.friction_time
+    total = scene.run.time_limit + longer
+    return remedy(scene, ("supervisor.friction_time", longer), ("run.time_limit", total))
+
+
+def gain_remedy(scene: EccentricScene) -> Remedy | None:
+    """Stable values of all gains whose loops are not; None when all are stable."""
+    gains = recommended_gains(scene)
+    changes = [(loop.key, loop.recommended) for loop in gains.loops if not loop.stable]
+    if not gains.speed.stable and gains.pair.recommended >= gains.pair.value:
+        changes = [change for change in changes if change[0] != gains.pair.key]
+    if not gains.speed.stable and gains.drive_speed > scene.friction_filter.drive_speed:
+        changes.append(("friction_filter.drive_speed", gains.drive_speed))
+    return remedy(scene, *changes) if changes else None
+
+
+def stall_remedy(scene: EccentricScene, *, margin: float = _MARGIN) -> Remedy | None:
+    """Gain, drive speed and voltage whose torque is friction's with a margin; None when the scene's have
+    it.
+    """
+    plant, told, gains = plant_parameters(scene), scene.friction_filter, recommended_gains(scene)
+    speed = abs(scene.rotor.speed_profile[0].speed) + told.drive_speed
+    volts = max(scene.masses.friction_arm) * plant.moment * speed**2 / plant.drive_gain
+    changes: list[tuple[str, float]] = []
+    if told.speed_gain * told.drive_speed < margin * volts:
+        gain = min(max(_MARGIN * volts / told.drive_speed, told.speed_gain), gains.speed.recommended)
+        changes.append(("friction_filter.speed_gain", gain))
+        if gain * told.drive_speed < _MARGIN * volts * (1 - 1e-9):
+            changes.append(("friction_filter.drive_speed", 2 * _MARGIN * volts / gain))
+    # What the whirl asks for comes on top of friction.
+    if plant.maximum_voltage < 2 * margin * volts:
+        changes.append(("motor.maximum_voltage", 4 * _MARGIN * volts))
+    return remedy(scene, *changes) if changes else None
+
+
+def _lowered(scene: EccentricScene, loop: SampledLoop) -> Remedy:
+    return remedy(scene, (loop.key, loop.recommended))
+
+
+_UNITS: Final = {
+    "friction_filter.speed_gain": ("V*s/rad", 1.0),
+    "friction_filter.pair_gain": ("V/rad", 1.0),
+    "friction_filter.drive_speed": ("rpm", 2 * math.pi / 60),
+    "friction_filter.rate_walk": ("rad/s", 1.0),
+    "friction_filter.gate": ("%", 0.01),
+    "imbalance_filter.gate": ("%", 0.01),
+    "supervisor.limit": ("mm", 1e-3),
+    "supervisor.arrival_angle": ("deg", math.pi / 180),
+    "supervisor.arrival_rate": ("deg/s", math.pi / 180),
+    "supervisor.positioning_time": ("s", 1.0),
+    "supervisor.fine_tuning_time": ("s", 1.0),
+    "supervisor.friction_time": ("s", 1.0),
+    "supervisor.lowest_speed": ("rpm", 2 * math.pi / 60),
+    "fine_tuning.stop": ("deg", math.pi / 180),
+    "masses.mass": ("kg", 1.0),
+    "motor.maximum_voltage": ("V", 1.0),
+    "run.time_limit": ("s", 1.0),
+    "lqr.state_weight": ("", 1.0),
+}
+
+
+def remedy(scene: EccentricScene, *changes: tuple[str, float | str]) -> Remedy:
+    """Changes that are made together, each to three digits, with their text."""
+    rounded = [(key, value if isinstance(value, str) else _rounded(key, value)) for key, value in changes]
+    return Remedy(changes=tuple(rounded), text=" and ".join(_change_text(scene, *each) for each in rounded))
+
+
+def _rounded(key: str, value: float) -> float:
+    factor = _UNITS[key][1]
+    return float(f"{value / factor:.3g}") * factor
+
+
+def _change_text(scene: EccentricScene, key: str, value: float | str) -> str:
+    table, name = key.split(".")
+    old = getattr(getattr(scene, table), name)
+    if isinstance(value, str):
+        return f'set {key} = "{value}"'
+    unit, factor = _UNITS[key]
+    new = f"{value / factor:.3g} {unit}".rstrip()
+    if old is None:
+        return f"set {key} = {new}"
+    return f"{'raise' if value > old else 'lower'} {key} from {old / factor:.3g} to {new}"

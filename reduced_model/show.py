@@ -25,6 +25,7 @@ _MARKS: Final = MappingProxyType(
         Regime.SIPHON: "{:.1f}",
         Regime.SEPARATED: "{:.1f}*",
         Regime.REVERSE: "{:.1f}r",
+        Regime.UNDECIDED: "{:.1f}?",
     }
 )
 
@@ -197,7 +198,8 @@ def _law_table(calibration: Calibration) -> Table:
     x = np.linspace(0, calibration.flow_law.max_fill_ratio, 5)
     table = _table("Velocity from an empty tube, m/s (Eq. 19)", "MPa", *(f"x = {v:.3g}" for v in x))
     table.caption = (
-        "* separated at the siphon crest, r reverse, - blocked; x is the driven chamber's fill ratio"
+        "* separated at the siphon crest, ? siphon or separated cannot be told, r reverse, - blocked; "
+        "x is the driven chamber's fill ratio"
     )
     for factor in PRESSURE_FACTORS:
         p = factor * calibration.scene.gas.pressure

@@ -31,6 +31,7 @@ from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import FlowLaw
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.tables.hermite import HermiteTable
+from ringbalance.reduced_model.tube.path import crest_span
 from ringbalance.reduced_model.tube.regime import SiphonCrest, Truth, TubeEnds, column_flow
 from ringbalance.scene.models import Tube
 
@@ -97,8 +98,8 @@ class Column:
     """rho, kg/m^3."""
     length: float
     """L, m."""
-    hump_position: float
-    """Fraction of the path, from chamber 0, at which the crest lies."""
+    crest_ends: tuple[float, float]
+    """Fraction of the path to the end of the crest's arc, for flow out of chamber 0 and out of chamber 1."""
     hydrostatic: Callable[[float], float]
     """P(x), Pa."""
     head: _ScalarTable
@@ -177,7 +178,7 @@ class Column:
         full = (ends.driving_pressure() / self.density - loss) / self.length
         if self.crest is None:
             return full, math.inf
-        fraction = self.hump_position if direction > 0 else 1 - self.hump_position
+        fraction = self.crest_ends[direction < 0]
         loss = 0.0 if slow else math.exp(self._separation_head(direction)(log_speed))
         margin = self.crest.separation_margin(ends)
         return full, (margin / self.density - loss) / (fraction * self.length)
@@ -209,7 +210,7 @@ def _calibrated(law: CalibratedLaw, tube: Tube, gas_off: float) -> Column:
     return Column(
         density=law.density,
         length=tube.length,
-        hump_position=tube.hump_position,
+        crest_ends=(crest_span(tube)[1], 1 - crest_span(tube)[0]),
         hydrostatic=lambda x: max(hydrostatic(x), 0.0),
         head=_ScalarTable(law.heads.head),
         hump_heads=tables,
@@ -225,7 +226,7 @@ def _paper(law: PaperLaw, tube: Tube, gas_off: float) -> Column:
     return Column(
         density=law.density,
         length=tube.length,
-        hump_position=tube.hump_position,
+        crest_ends=(1.0, 1.0),
         hydrostatic=lambda x: law.pressure_per_fill_difference * x,
         head=_constant_drag(law.drag_coefficient),
         hump_heads=None,

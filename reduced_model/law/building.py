@@ -15,7 +15,7 @@ from ringbalance.reduced_model.chamber.moment import CalibratedMoment
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
 from ringbalance.reduced_model.tube.heads import TubeHeads
-from ringbalance.reduced_model.tube.regime import TubePath
+from ringbalance.reduced_model.tube.regime import RELEASED, TubePath
 from ringbalance.scene.models import Scene
 
 # Density and speed act on both wall pressures and on the tube at once, so the law handles them separately.
@@ -60,6 +60,8 @@ def tube_path(scene: Scene) -> TubePath:
         hump_pressure=None if hump is None else column_pressure(scene=scene, radius=hump),
         trapped=scene.tube.hump_gas == "trapped",
         vapour_pressure=scene.liquid.vapour_pressure - scene.gas.ambient_pressure,
+        released=RELEASED if scene.liquid.dissolved_gas == "saturated" else 0.0,
+        froude_velocity=abs(scene.rotor.speed) * math.sqrt((hump or 0.0) * scene.tube.bore),
     )
 
 

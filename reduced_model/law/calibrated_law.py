@@ -24,12 +24,13 @@ from ringbalance.scene.arrays import BoolArray, FloatArray
 class CalibratedLaw:
     """Flow of the tube for any fills, gas pressure and history: blocked, siphon, separated or reverse.
 
-    The velocity is continuous in fills and pressure, except where the physics jumps: when an unprimed
-    tube starts to flow, when a column separates at rest, and when a chamber's liquid leaves the port open.
+    The velocity is continuous in fills and pressure, except where the physics jumps: when a column separates
+    at rest, and when a chamber's liquid leaves the port open.
 
     `table()` holds `log_velocity` (ln m/s), `log_head`, `log_hump_head` and `log_return_hump_head`
     (ln m^2/s^2; the last two only with a crest), `fill_ratio`, `wall_pressure` (Pa), and, of shape (1,),
-    `density`, `port_pressure`, `hump_pressure` (only with a crest) and `vapour_pressure` (gauge, Pa).
+    `density`, `port_pressure`, `hump_pressure` (only with a crest), `vapour_pressure` (gauge, Pa), and
+    `released` and `froude_velocity` (m/s) of `SiphonCrest`.
     """
 
     name: str
@@ -119,9 +120,8 @@ class CalibratedLaw:
             inputs=self.inputs,
             drive=Drive(
                 ends=ends.reversed() if reverse else ends,
-                wall_pressure_uncertainty=np.hypot(
-                    self.wall_pressure_uncertainty(own), self.wall_pressure_uncertainty(other)
-                ),
+                upstream_uncertainty=self.wall_pressure_uncertainty(other if reverse else own),
+                downstream_uncertainty=self.wall_pressure_uncertainty(own if reverse else other),
                 primed=asked.primed,
                 allowed=allowed,
             ),
@@ -145,6 +145,8 @@ class CalibratedLaw:
             "port_pressure": self.path.port_pressure,
             "hump_pressure": self.path.hump_pressure,
             "vapour_pressure": self.path.vapour_pressure,
+            "released": self.path.released,
+            "froude_velocity": self.path.froude_velocity,
         }
         return (
             {"log_velocity": self.heads.head.nodes}
@@ -158,7 +160,8 @@ def _joined(forward: DirectedFlow, backward: DirectedFlow, reverse: BoolArray) -
     """One flow from both directions, of which at most one flows."""
     ahead = forward.velocity > 0
     regime = np.select(
-        [ahead & forward.separated, ahead, reverse], [Regime.SEPARATED, Regime.SIPHON, Regime.REVERSE]
+        [ahead & forward.undecided, ahead & forward.separated, ahead, reverse],
+        [Regime.UNDECIDED, Regime.SEPARATED, Regime.SIPHON, Regime.REVERSE],
     )
     return Flow(
         velocity=np.where(reverse, -backward.velocity, forward.velocity),

@@ -19,11 +19,13 @@ class Regime(IntEnum):
     SIPHON = 1
     SEPARATED = 2
     REVERSE = 3
+    UNDECIDED = 4
+    """Siphon or separated: the uncertainty of the pressure over the crest allows both."""
 
     @property
     def label(self) -> str:
-        """Lower-case name, as it stands in JSON."""
-        return self.name.lower()
+        """As it stands in JSON: the lower-case name, or "cannot be told"."""
+        return "cannot be told" if self is Regime.UNDECIDED else self.name.lower()
 
 
 @dataclass(frozen=True, kw_only=True)

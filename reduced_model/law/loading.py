@@ -38,15 +38,6 @@ _RECORDS: Final[Mapping[str, type]] = MappingProxyType(
         )
     }
 )
-_OLD_NAMES: Final[Mapping[str, str]] = MappingProxyType(
-    {
-        "InputSpread": "DriveUncertainty",
-        "wall_pressure_spread": "wall_pressure_uncertainty",
-        "spread": "uncertainty",
-        "hump_spread": "hump_uncertainty",
-    }
-)
-"""Types and keys of earlier files, with what they are called now."""
 _LAWS: Final = (CalibratedLaw, PaperLaw)
 _POSITIVE: Final = frozenset(
     {
@@ -60,7 +51,9 @@ _POSITIVE: Final = frozenset(
         "gas_factor",
     }
 )
-_NOT_NEGATIVE: Final = frozenset({"ambient_pressure", "drag_coefficient", "interpolation_error"})
+_NOT_NEGATIVE: Final = frozenset(
+    {"ambient_pressure", "drag_coefficient", "interpolation_error", "released", "froude_velocity"}
+)
 _LONGEST: Final = 40
 
 
@@ -80,7 +73,6 @@ class _Reader:
 
     def record(self, data: object, expected: tuple[type, ...], where: str) -> Any:
         """Build a record, or note why it cannot be built and return None."""
-        data = _renamed(data)
         names = ", ".join(t.__name__ for t in expected)
         if not isinstance(data, dict) or data.get("type") not in {t.__name__ for t in expected}:
             found = data.get("type") if isinstance(data, dict) else data
@@ -130,15 +122,6 @@ class _Reader:
         if kind == "FloatArray":
             return np.array(value, dtype=np.float64)
         return float(cast(float, value)) if kind == "float" else value
-
-
-def _renamed(data: object) -> object:
-    """A record of an earlier file under today's names."""
-    if not isinstance(data, dict):
-        return data
-    kind = data.get("type")
-    named = {_OLD_NAMES.get(key, key): value for key, value in data.items()}
-    return named | {"type": _OLD_NAMES.get(kind, kind)} if isinstance(kind, str) else named
 
 
 def _is_number(value: object) -> bool:
@@ -196,7 +179,10 @@ def _content(reader: _Reader, file: Path) -> Iterator[Mapping[str, object]]:
             reader.fault("format", _shown(found), "the file is not a saved law", f'"{FORMAT}", {wanted}')
         elif content.get("version") != VERSION:
             reader.fault(
-                "version", _shown(content.get("version")), "written by another release", str(VERSION)
+                "version",
+                _shown(content.get("version")),
+                "written by another release, whose law lacks what this one needs: calibrate again",
+                str(VERSION),
             )
         else:
             yield content

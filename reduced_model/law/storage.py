@@ -12,7 +12,7 @@ import numpy as np
 from ringbalance.scene.platform.files import write_whole
 
 FORMAT: Final = "ringbalance law"
-VERSION: Final = 1
+VERSION: Final = 2
 
 
 def save_record(*, path: Path, record: object) -> Path:

@@ -21,6 +21,7 @@ from ringbalance.physics.tube.rotation import (
 from ringbalance.physics.tube.rotation_table import ito_nanbu_laminar
 from ringbalance.physics.tube.state import tube_state, upstream_loss
 from ringbalance.reduced_model.paper.formulas import PAPER_DRAG_COEFFICIENT
+from ringbalance.reduced_model.tube.path import crest_span, head_behind_crest, loss_along, to_crest_end
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene, Tube
 
@@ -45,6 +46,8 @@ class Loss:
     """Between the giving chamber and the crest."""
     kinetic_factor: FloatArray
     """alpha."""
+    along: FloatArray
+    """What of k is spread evenly along the path."""
 
 
 LossFunction = Callable[[Scene, Tube, FloatArray], Loss]
@@ -70,7 +73,7 @@ def loss_at(scene: Scene, *, loss: str, velocity: npt.ArrayLike, tube: Tube | No
 def _constant(scene: Scene, tube: Tube, velocity: FloatArray) -> Loss:
     fixed = scene.tube.drag_coefficient
     k = np.full(velocity.shape, PAPER_DRAG_COEFFICIENT if fixed is None else fixed)
-    return Loss(k=k, upstream_k=tube.hump_position * k, kinetic_factor=np.ones(velocity.shape))
+    return Loss(k=k, upstream_k=crest_span(tube)[1] * k, kinetic_factor=np.ones(velocity.shape), along=k)
 
 
 def _correlations(scene: Scene, tube: Tube, velocity: FloatArray) -> Loss:
@@ -101,13 +104,14 @@ def _summed(tube: Tube, friction: FloatArray, along: FloatArray) -> Loss:
     """Entrance as in turbulent flow, bends, friction with or without rotation, extra; a turbulent profile."""
     bends = [turbulent_bend_loss(bend=b, bore=tube.bore, friction_factor=friction) for b in tube.bends]
     entrance = turbulent_entrance_loss(tube=tube)[0]
-    share = tube.hump_position
+    share = crest_span(tube)[1]
     before = [k for i, k in enumerate(bends) if (i + 0.5) / len(bends) < share]
     spread = along + tube.extra_loss
     return Loss(
         k=np.asarray(entrance + spread + sum(bends)),
         upstream_k=np.asarray(entrance + share * spread + sum(before)),
         kinetic_factor=np.full(along.shape, _TURBULENT_PROFILE),
+        along=np.asarray(spread),
     )
 
 
@@ -115,8 +119,9 @@ def _tables(scene: Scene, tube: Tube, velocity: FloatArray) -> Loss:
     state = tube_state(tube=tube, liquid=scene.liquid, angular_velocity=scene.rotor.speed, velocity=velocity)
     return Loss(
         k=state.k,
-        upstream_k=upstream_loss(tube=tube, state=state),
+        upstream_k=upstream_loss(tube=to_crest_end(tube), state=state),
         kinetic_factor=np.asarray(state.kinetic_factor),
+        along=loss_along(state.terms),
     )
 
 
@@ -142,6 +147,18 @@ _FUNCTIONS: Final[dict[str, LossFunction]] = {
 }
 
 
+def head_at(
+    scene: Scene, *, loss: str, velocity: FloatArray, to_crest: bool, tube: Tube | None = None
+) -> FloatArray:
+    """Head of a full tube, (k + 1) u^2/2, or of its column up to the crest's lowest pressure, m^2/s^2."""
+    at = loss_at(scene, loss=loss, velocity=velocity, tube=tube)
+    kinetic = velocity**2 / 2
+    if not to_crest:
+        return np.asarray((at.k + 1) * kinetic)
+    behind = head_behind_crest(tube=tube or scene.tube, along=at.along * kinetic, square=scene.rotor.speed**2)
+    return np.asarray((at.kinetic_factor + at.upstream_k) * kinetic + behind)
+
+
 def velocity_under_head(
     scene: Scene, *, loss: str, head: npt.ArrayLike, to_crest: bool = False
 ) -> FloatArray:
@@ -156,8 +173,6 @@ def velocity_under_head(
     for _ in range(60):
         middle = (low + high) / 2
         u = np.exp(middle)
-        at = loss_at(scene, loss=loss, velocity=u)
-        factor = at.kinetic_factor + at.upstream_k if to_crest else at.k + 1
-        below = factor * u**2 / 2 < target
+        below = head_at(scene, loss=loss, velocity=u, to_crest=to_crest) < target
         low, high = np.where(below, middle, low), np.where(below, high, middle)
     return np.asarray(np.exp((low + high) / 2))

@@ -196,7 +196,11 @@ def _crest(term: Term, scene: Scene, _: TermEstimate) -> Selection:
         return term.models[0], "Eq. 18 as it stands"
     moved = by_closed_form(scene, scene.disc.max_fill_ratio / 2).wall_pressure / 1e6
     threshold = f"vented or trapped moves the threshold by up to {moved:.3g} MPa"
-    return f"{term.models[-1]}, crest gas {scene.tube.hump_gas}", threshold
+    gas = "vapour" if scene.liquid.dissolved_gas == "none" else "vapour or released gas"
+    return (
+        f"{term.models[-1]}, {scene.tube.hump_shape}, {scene.tube.hump_gas} gas, cavity of {gas}",
+        threshold,
+    )
 
 
 def _tube_loss(term: Term, scene: Scene, _: TermEstimate) -> Selection:

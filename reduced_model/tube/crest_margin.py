@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from ringbalance.physics.tube.loss import TubeLoss, tube_loss
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.tube.directed_flow import Drive, siphon_margin
 from ringbalance.reduced_model.tube.heads import velocity_of
 from ringbalance.reduced_model.tube.regime import TubeEnds
-from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import Scene, Tube
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,63 +48,29 @@ def directed_state(
     )
 
 
-def siphon_margin(
-    *, scene: Scene, tube: Tube, law: CalibratedLaw, state: DirectedState
-) -> tuple[float, float] | tuple[None, None]:
-    """Crest pressure of a full siphon less the cavity pressure, with its expanded uncertainty (95 %).
+def margin_of(*, law: CalibratedLaw, state: DirectedState) -> tuple[float, float] | tuple[None, None]:
+    """`siphon_margin` of one state over the cavity of a primed tube, Pa; both None without a crest.
 
-    p_m - p_c = p_A - p_c + P_A - D_m - R p_d,  R = (alpha + k_up)/(k + 1), p_d the driving pressure; R = 0 at
-    rest
-    Args: `tube`: its tube, from the upstream end. `law`: its flow law. `state`: in the direction of the
-        driving pressure.
-    Returns: Margin and half-width, Pa; both None without a crest.
-    Source: energy balance from the upstream chamber to the crest; inputs by sensitivity, ASME V&V 20.
+    Args: `state`: in the direction of the driving pressure.
     """
-    crest = law.path.crest
-    if crest is None:
+    crest, head = law.path.crest, law.heads.return_hump_head if state.reverse else law.heads.hump_head
+    if crest is None or head is None:
         return None, None
-    driving, at_rest = state.ends.driving_pressure(), crest.separation_margin(state.ends)
-    if driving <= 0:
-        return at_rest, _half_width(law, state, 0.0, 0.0)
-    where = np.asarray(True)
-    velocity = float(velocity_of(table=law.heads.head, head=driving / law.density, where=where))
-    loss = tube_loss(
-        tube=tube,
-        liquid=scene.liquid,
-        angular_velocity=scene.rotor.speed,
-        velocity=velocity,
-        inputs=scene.uncertainty,
+    driving, (low, high) = np.asarray(state.ends.driving_pressure()), crest.cavity_bounds(state.ends)
+    margin, width = siphon_margin(
+        path=law.path,
+        heads=law.heads,
+        hump_head=head,
+        inputs=law.inputs,
+        drive=Drive(
+            ends=state.ends,
+            upstream_uncertainty=state.upstream_uncertainty,
+            downstream_uncertainty=state.downstream_uncertainty,
+            primed=np.asarray(True),
+            allowed=np.asarray(True),
+        ),
+        at_rest=np.asarray(crest.separation_margin(state.ends)),
+        spread=np.asarray(max(crest.released, 1 - crest.released) * (high - low)),
+        velocity=velocity_of(table=law.heads.head, head=driving / law.density, where=driving > 0),
     )
-    upstream = float(loss.kinetic_factor + loss.upstream_k)
-    fraction = upstream / (float(loss.k.value) + 1)
-    uncertainty_95 = _fraction_uncertainty(tube, loss, fraction) * driving
-    return at_rest - fraction * driving, _half_width(law, state, fraction, uncertainty_95)
-
-
-def _fraction_uncertainty(tube: Tube, loss: TubeLoss, fraction: float) -> float:
-    """Half-width of R, moved by (s_j - R)/(k + 1) by a part of k with a fraction s_j before the crest."""
-    total = float(loss.k.value) + 1
-    parts: Mapping[str, FloatArray] = loss.uncertainty_parts
-    squares = 0.0
-    for name, part in parts.items():
-        # Which end or bend is wrong is not known: then the worse of before and behind the crest.
-        lumped = name in {"ends", "bends"}
-        lever = max(fraction, 1 - fraction) if lumped else abs(tube.hump_position - fraction)
-        squares += (lever * float(part) / total) ** 2
-    return float(np.sqrt(squares))
-
-
-def _half_width(law: CalibratedLaw, state: DirectedState, fraction: float, uncertainty_95: float) -> float:
-    ends, crest = state.ends, law.path.hump_pressure or 0.0
-    liquid = ends.upstream_hydrostatic - crest + fraction * ends.stall_pressure()
-    parts = (
-        uncertainty_95,
-        (1 - fraction) * state.upstream_uncertainty,
-        fraction * state.downstream_uncertainty,
-        (1 - fraction) * law.inputs.relative_gas_pressure * ends.upstream_gas,
-        law.inputs.relative_density * liquid,
-        2 * law.inputs.relative_speed * liquid,
-        law.inputs.hump_pressure,
-        law.inputs.vapour_pressure,
-    )
-    return float(np.sqrt(sum(p**2 for p in parts)))
+    return float(margin), float(width)

@@ -7,12 +7,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from ringbalance.reduced_model.tables.hermite import HermiteTable
 from ringbalance.reduced_model.tube.heads import TubeHeads, velocity_of
-from ringbalance.reduced_model.tube.regime import SiphonCrest, Truth, TubeEnds, TubePath, column_flow
+from ringbalance.reduced_model.tube.regime import (
+    ColumnFlow,
+    SiphonCrest,
+    Truth,
+    TubeEnds,
+    TubePath,
+    column_flow,
+    separation_margins,
+)
 from ringbalance.scene.arrays import BoolArray, FloatArray
 
 
@@ -33,10 +42,12 @@ class DriveUncertainty:
 class Drive:
     """What acts on the tube in one direction; arrays of one shape."""
 
-    ends: TubeEnds[FloatArray]
+    ends: TubeEnds[Any]
     """Pressures at the tube's ends."""
-    wall_pressure_uncertainty: FloatArray
-    """Expanded uncertainty (95 %) of both hydrostatic pressures together, Pa."""
+    upstream_uncertainty: FloatArray | float
+    """Expanded uncertainty (95 %) of the upstream hydrostatic pressure, Pa."""
+    downstream_uncertainty: FloatArray | float
+    """The same downstream."""
     primed: BoolArray
     """Whether the tube holds a continuous column beforehand."""
     allowed: BoolArray
@@ -51,6 +62,8 @@ class DirectedFlow:
     """m/s, zero where nothing flows."""
     separated: BoolArray
     """Whether the column is separated at the siphon crest."""
+    undecided: BoolArray
+    """Whether the uncertainty of the separation allows both."""
     primed: BoolArray
     """Whether the tube holds a continuous column afterwards."""
     half_width: FloatArray
@@ -74,23 +87,44 @@ def directed_flow(
         return velocity_of(table=table, head=pressure / path.density, where=np.asarray(where))
 
     crest = path.crest if hump_head is not None else None
+    separation = partial(velocity, hump_head or heads.head)
     flow = column_flow(
         ends=drive.ends,
         crest=crest,
         primed=drive.primed,
         allowed=drive.allowed,
         siphon=partial(velocity, heads.head),
-        separation=partial(velocity, hump_head or heads.head),
+        separation=separation,
     )
     width = _siphon_width(heads, inputs, drive, flow.siphon_velocity)
+    undecided = np.zeros_like(drive.primed)
     if crest is not None and hump_head is not None:
-        separated_width = _separated_width(
-            hump_head, heads.hump_uncertainty, inputs, drive, crest, flow.separation_velocity
+        broken = _separated_width(hump_head, heads.hump_uncertainty, path.density, inputs, drive, crest, flow)
+        margins = separation_margins(
+            ends=drive.ends, crest=crest, primed=drive.primed, spill=flow.spill_velocity
         )
-        width = np.where(flow.separated, separated_width, width)
+        flows, full = flow.velocity > 0, flow.siphon_velocity
+        slowest, fastest = (separation(margin, flows & (margin > 0)) for margin in margins)
+        held = _head_at(hump_head, flow.separation_velocity) * path.density
+        margin, open_by = siphon_margin(
+            path=path,
+            heads=heads,
+            hump_head=hump_head,
+            inputs=inputs,
+            drive=drive,
+            at_rest=held,
+            spread=np.maximum(held - margins[0], margins[1] - held),
+            velocity=full,
+        )
+        undecided = flows & (np.abs(margin) < open_by)
+        spread = np.maximum(
+            flow.velocity - np.minimum(slowest, full), np.minimum(fastest, full) - flow.velocity
+        )
+        width = np.hypot(np.where(flow.separated, broken, width), np.where(flows, spread, 0.0))
     return DirectedFlow(
         velocity=flow.velocity,
         separated=np.asarray(flow.separated),
+        undecided=undecided,
         primed=np.asarray(flow.primed),
         half_width=width,
     )
@@ -103,7 +137,7 @@ def _siphon_width(
     ends = drive.ends
     gas = ends.upstream_gas - ends.downstream_gas
     parts = (
-        drive.wall_pressure_uncertainty,
+        np.hypot(drive.upstream_uncertainty, drive.downstream_uncertainty),
         inputs.relative_density * gas,
         inputs.relative_speed * 2 * (ends.upstream_hydrostatic - ends.back_pressure()),
         inputs.relative_gas_pressure * gas,
@@ -114,21 +148,66 @@ def _siphon_width(
 def _separated_width(
     head: HermiteTable,
     uncertainty_95: HermiteTable,
+    density: float,
     inputs: DriveUncertainty,
     drive: Drive,
     crest: SiphonCrest[FloatArray],
-    velocity: FloatArray,
+    flow: ColumnFlow[FloatArray],
 ) -> FloatArray:
-    ends = drive.ends
-    margin = crest.separation_margin(ends)
+    """Half-width at the pressure taken over the crest; what else that may be is not in it."""
+    ends, velocity = drive.ends, flow.separation_velocity
+    margin = _head_at(head, velocity) * density
     parts = (
-        drive.wall_pressure_uncertainty,
+        np.hypot(drive.upstream_uncertainty, drive.downstream_uncertainty),
         inputs.relative_density * (ends.upstream_gas - crest.cavity_pressure(ends)),
         inputs.relative_speed * 2 * (ends.upstream_hydrostatic - crest.column_pressure),
         inputs.relative_gas_pressure * ends.upstream_gas,
         np.full_like(margin, np.hypot(inputs.hump_pressure, inputs.vapour_pressure)),
     )
     return _width(head, uncertainty_95, margin, parts, velocity)
+
+
+def _head_at(head: HermiteTable, velocity: FloatArray) -> FloatArray:
+    """m^2/s^2; anything where nothing flows."""
+    return np.exp(head(np.log(np.where(velocity > 0, velocity, 1.0))))
+
+
+def siphon_margin(
+    *,
+    path: TubePath,
+    heads: TubeHeads,
+    hump_head: HermiteTable,
+    inputs: DriveUncertainty,
+    drive: Drive,
+    at_rest: FloatArray,
+    spread: FloatArray,
+    velocity: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Lowest pressure of a full siphon less what lies over the crest, with its expanded uncertainty, Pa.
+
+    p_m - p_c = p_A - p_c + P_A - D_m - R p_d,  R = (alpha + k_up)/(k + 1), p_d the driving pressure; R = 0 at
+    rest.
+    Args: `at_rest`: p_A - p_c + P_A - D_m, Pa. `spread`: by how much p_c may be off, Pa. `velocity`: of the
+        full siphon, m/s.
+    Source: energy balance from the upstream chamber to the crest; inputs by sensitivity, ASME V&V 20.
+    """
+    ends, flows = drive.ends, velocity > 0
+    log_u = np.log(np.where(flows, velocity, 1.0))
+    driving = np.where(flows, ends.driving_pressure(), 0.0)
+    fraction = np.where(flows, np.exp(hump_head(log_u) - heads.head(log_u)), 0.0)
+    liquid = ends.upstream_hydrostatic - (path.hump_pressure or 0.0) + fraction * ends.stall_pressure()
+    parts = (
+        heads.fraction_uncertainty(log_u) * driving,
+        (1 - fraction) * drive.upstream_uncertainty,
+        fraction * drive.downstream_uncertainty,
+        (1 - fraction) * inputs.relative_gas_pressure * ends.upstream_gas,
+        inputs.relative_density * liquid,
+        2 * inputs.relative_speed * liquid,
+        inputs.hump_pressure,
+        inputs.vapour_pressure,
+        spread,
+    )
+    return at_rest - fraction * driving, np.sqrt(np.asarray(sum(p**2 for p in parts), dtype=np.float64))
 
 
 def _width(

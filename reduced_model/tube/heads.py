@@ -12,9 +12,17 @@ import numpy.typing as npt
 
 from ringbalance.physics.tube.loss import TubeLoss, tube_loss
 from ringbalance.physics.tube.state import TubeState, tube_state, upstream_loss
+from ringbalance.reduced_model.chamber.inputs import half_widths
 from ringbalance.reduced_model.tables.fit import level_table, refined_table
 from ringbalance.reduced_model.tables.hermite import HermiteTable
-from ringbalance.reduced_model.tube.path import reversed_tube
+from ringbalance.reduced_model.tube.path import (
+    crest_end_uncertainty,
+    crest_span,
+    head_behind_crest,
+    loss_along,
+    reversed_tube,
+    to_crest_end,
+)
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Scene, Tube
 
@@ -34,13 +42,16 @@ class TubeHeads:
     head: HermiteTable
     """ln((k + 1) u^2/2): between the chambers."""
     hump_head: HermiteTable | None
-    """ln((alpha + k_up) u^2/2): from the driven chamber to the crest; None without a crest."""
+    """ln((alpha + k_up) u^2/2): from the driven chamber to the lowest pressure on the path, at the end of the
+    crest's arc or just behind it; None without a crest."""
     return_hump_head: HermiteTable | None
     """The same from the opposite chamber, for reverse flow."""
     uncertainty: HermiteTable
     """Expanded uncertainty (95 %) of k over k + 1."""
     hump_uncertainty: HermiteTable
-    """Expanded uncertainty (95 %) of k_up over alpha + k_up."""
+    """Expanded uncertainty (95 %) of k_up over alpha + k_up, with the place of the crest's end."""
+    fraction_uncertainty: HermiteTable
+    """Expanded uncertainty (95 %) of (alpha + k_up)/(k + 1)."""
     interpolation_error: float
     """Largest relative error of the head tables found between their nodes."""
 
@@ -64,22 +75,40 @@ def tube_heads(scene: Scene) -> TubeHeads:
     heads = _log_heads(scene)
     tables, errors = zip(*(_head_table(head, start, stop) for head in heads), strict=True)
     loss = _loss(scene, np.exp(np.linspace(start, stop, _UNCERTAINTY_NODES)))
+    place = crest_end_uncertainty(scene.tube, half_widths(scene).get("hump_position", 0.0))
     share = np.where(loss.k.value > 0, loss.upstream_k / np.where(loss.k.value > 0, loss.k.value, 1.0), 1.0)
     uncertainty = loss.k.uncertainty / (loss.k.value + 1)
-    hump_uncertainty = loss.k.uncertainty * share / (loss.kinetic_factor + loss.upstream_k)
+    moved = np.hypot(loss.k.uncertainty * share, loss_along(loss.terms) * place)
+    hump_uncertainty = moved / (loss.kinetic_factor + loss.upstream_k)
     return TubeHeads(
         head=tables[0],
         hump_head=tables[1] if len(tables) > 1 else None,
         return_hump_head=tables[2] if len(tables) > 1 else None,
         uncertainty=level_table(start=start, stop=stop, value=uncertainty),
         hump_uncertainty=level_table(start=start, stop=stop, value=hump_uncertainty),
+        fraction_uncertainty=level_table(
+            start=start, stop=stop, value=_fraction_uncertainty(crest_span(scene.tube)[1], loss, place)
+        ),
         interpolation_error=max(errors),
     )
 
 
+def _fraction_uncertainty(crest: float, loss: TubeLoss, place: float) -> FloatArray:
+    """(s_j - R)/(k + 1) of each part of k with a fraction s_j before the crest's end, and of its place."""
+    total = loss.k.value + 1
+    fraction = (loss.kinetic_factor + loss.upstream_k) / total
+    squares = (loss_along(loss.terms) * place / total) ** 2
+    for name, part in loss.uncertainty_parts.items():
+        # Which end or bend is wrong is not known: then the worse of before and behind the crest.
+        lumped = name in {"ends", "bends"}
+        lever = np.maximum(fraction, 1 - fraction) if lumped else np.abs(crest - fraction)
+        squares = squares + (lever * part / total) ** 2
+    return np.sqrt(squares)
+
+
 def _loss(scene: Scene, velocity: FloatArray) -> TubeLoss:
     return tube_loss(
-        tube=scene.tube,
+        tube=to_crest_end(scene.tube),
         liquid=scene.liquid,
         angular_velocity=scene.rotor.speed,
         velocity=velocity,
@@ -107,8 +136,12 @@ def _log_heads(scene: Scene) -> list[LogHead]:
         def head(log_velocity: FloatArray) -> FloatArray:
             there = state(log_velocity.tobytes())
             there = replace(there, bends=there.bends[::order])
-            factor = there.kinetic_factor + upstream_loss(tube=seen, state=there)
-            return np.asarray(np.log(factor / 2) + 2 * log_velocity)
+            factor = there.kinetic_factor + upstream_loss(tube=to_crest_end(seen), state=there)
+            kinetic = np.exp(2 * log_velocity) / 2
+            behind = head_behind_crest(
+                tube=seen, along=loss_along(there.terms) * kinetic, square=scene.rotor.speed**2
+            )
+            return np.asarray(np.log(factor * kinetic + behind))
 
         return head
 

@@ -1,11 +1,15 @@
 """The tube's path as a line of radii, and what of the loss lies before each place on it.
 
-The scene gives three radii and where the crest lies, so both legs run straight in r from port to crest; bends
-sit where they are when spread evenly along the path.  Without a crest the path stays at the port's radius.
+A crest shaped as an arc: straight legs from the ports touch the crest's circle, which the tube follows in
+between, as the shortest path between opposite ports does; a longer tube is taken as that path stretched.  A
+crest shaped as a point: both legs run straight in r.  Bends sit where they are when spread evenly along the
+path.  Without a crest the path stays at the port's radius.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +17,7 @@ import numpy.typing as npt
 
 from ringbalance.physics.tube.state import TubeState
 from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.scene.keys.derivations import shortest_path
 from ringbalance.scene.models import Tube
 
 _SAME = 1e-9
@@ -33,10 +38,81 @@ def reversed_tube(tube: Tube) -> Tube:
     return replace(tube, hump_position=1 - tube.hump_position, bends=tube.bends[::-1])
 
 
+def crest_span(tube: Tube) -> tuple[float, float]:
+    """Fractions of the path between which the tube lies on the crest's circle; equal for a point.
+
+    The arc takes r_m (pi - 2 acos(r_m/r_p)) of the shortest path, and `hump_position` divides what is left.
+    Friction goes on at the crest's radius, so the pressure falls up to the second of the two.
+    """
+    arc = _arc_fraction(tube)
+    return tube.hump_position * (1 - arc), tube.hump_position + (1 - tube.hump_position) * arc
+
+
+def _arc_fraction(tube: Tube) -> float:
+    if tube.hump_radius is None or tube.hump_shape == "point":
+        return 0.0
+    arc = tube.hump_radius * (math.pi - 2 * math.acos(tube.hump_radius / tube.port_radius))
+    return arc / _shortest(tube)
+
+
+def _shortest(tube: Tube) -> float:
+    return shortest_path(port_radius=tube.port_radius, hump_radius=tube.hump_radius, separation=math.pi)
+
+
+def to_crest_end(tube: Tube) -> Tube:
+    """The tube with its crest where the arc ends, for what the loss up to there depends on."""
+    return replace(tube, hump_position=crest_span(tube)[1], hump_shape="point")
+
+
+def crest_end_uncertainty(tube: Tube, position: float) -> float:
+    """Expanded uncertainty (95 %) of the fraction of the path at which the arc ends.
+
+    Args: `position`: that of `hump_position`.
+    Source: by how much the tube is longer than its shortest path, all of it before the arc's end or behind.
+    """
+    arc, end = _arc_fraction(tube), crest_span(tube)[1]
+    if arc == 0:
+        return position
+    slack = max(1 - _shortest(tube) / tube.length, 0.0)
+    return math.hypot((1 - arc) * position, slack * max(end, 1 - end))
+
+
+def head_behind_crest(*, tube: Tube, along: FloatArray, square: float | FloatArray) -> FloatArray:
+    """Head by which the pressure still falls behind the arc's end, where the leg rises slowest, m^2/s^2.
+
+    The far leg loses A o and gains B o^2/2, o from 0 on the circle to 1 at the port, so the fall is
+    A o - B o^2/2 at o = min(A/B, 1); A = `along` (1 - s), B = omega^2 (r_p^2 - r_m^2).
+    Args: `along`: head lost along the whole path. `square`: omega^2; both may be over the same u^2/2.
+    """
+    loss, rise = _far_leg(tube, along, square)
+    place = np.minimum(loss / rise, 1.0)
+    return np.asarray(loss * place - rise * place**2 / 2)
+
+
+def lowest_place(tube: Tube, along: float, square: float) -> float:
+    """Fraction s/L of the path at which the pressure of a full tube is lowest; as `head_behind_crest`."""
+    end, (loss, rise) = crest_span(tube)[1], _far_leg(tube, np.asarray(along), square)
+    return end + (1 - end) * min(float(loss / rise), 1.0)
+
+
+def _far_leg(
+    tube: Tube, along: FloatArray, square: float | FloatArray
+) -> tuple[FloatArray, float | FloatArray]:
+    """A and B; a leg that runs straight in r rises at once."""
+    if tube.hump_radius is None or tube.hump_shape == "point":
+        return np.zeros_like(along), 1.0
+    return along * (1 - crest_span(tube)[1]), square * (tube.port_radius**2 - tube.hump_radius**2)
+
+
 def _bend_shares(tube: Tube) -> FloatArray:
-    """Where the bends sit, (i + 1/2)/n. Returns: s/L, shape (number of bends,)."""
+    """Where the bends sit, s/L: (i + 1/2)/n, but not nearer to a crest's arc than to a port."""
     count = len(tube.bends)
-    return (np.arange(count) + 0.5) / max(count, 1)
+    even = (np.arange(count) + 0.5) / max(count, 1)
+    if tube.hump_radius is None or tube.hump_shape == "point":
+        return even
+    start, end = crest_span(tube)
+    before = np.where(even < start, np.minimum(even, start / 2), even)
+    return np.where(even > end, np.maximum(even, (1 + end) / 2), before)
 
 
 def places(*, tube: Tube, points: int, doubled: tuple[float, ...] = ()) -> Places:
@@ -45,7 +121,7 @@ def places(*, tube: Tube, points: int, doubled: tuple[float, ...] = ()) -> Place
     Args: `points`: number of even places. `doubled`: further shares at which something changes at once.
     """
     twice = np.unique(np.concatenate([[0.0, 1.0], _bend_shares(tube), doubled]))
-    kept = twice if tube.hump_radius is None else np.append(twice, tube.hump_position)
+    kept = twice if tube.hump_radius is None else np.append(twice, crest_span(tube))
     even = np.linspace(0.0, 1.0, points)
     # An even place that differs from another by rounding only would stand for nothing.
     even = even[np.min(np.abs(even[:, None] - kept), axis=1) > _SAME]
@@ -57,21 +133,36 @@ def places(*, tube: Tube, points: int, doubled: tuple[float, ...] = ()) -> Place
 
 
 def path_radius(*, tube: Tube, share: npt.ArrayLike) -> FloatArray:
-    """Radius along the path, straight from port to crest and back."""
+    """Radius at fractions s/L of the path, m."""
     if tube.hump_radius is None:
         return np.full(np.shape(share), tube.port_radius)
-    radii = [tube.port_radius, tube.hump_radius, tube.port_radius]
-    return np.asarray(
-        np.interp(np.asarray(share, dtype=np.float64), [0.0, tube.hump_position, 1.0], radii),
-        dtype=np.float64,
-    )
+    start, end = crest_span(tube)
+    outward = np.interp(np.asarray(share, dtype=np.float64), [0.0, start, end, 1.0], [1.0, 0.0, 0.0, 1.0])
+    if tube.hump_shape == "point":
+        return np.asarray(tube.hump_radius + (tube.port_radius - tube.hump_radius) * outward)
+    square = tube.port_radius**2 - tube.hump_radius**2
+    return np.asarray(np.sqrt(tube.hump_radius**2 + square * outward**2))
 
 
 def share_at_radius(*, tube: Tube, radius: float, far_leg: bool) -> float:
-    """Where a leg passes a radius, or its end when it does not reach there."""
-    hump = tube.port_radius if tube.hump_radius is None else tube.hump_radius
-    inward = float(np.clip((tube.port_radius - radius) / (tube.port_radius - hump), 0.0, 1.0))
-    return 1 - inward * (1 - tube.hump_position) if far_leg else inward * tube.hump_position
+    """Fraction s/L of the path where a leg passes a radius, or its end when it does not reach there.
+
+    Raises: ValueError: a tube without a crest.
+    """
+    crest, port = tube.hump_radius, tube.port_radius
+    if crest is None:
+        raise ValueError("a tube without a siphon crest has no legs")
+    out = (radius - crest) / (port - crest)
+    if tube.hump_shape == "arc":
+        out = math.sqrt(max(radius**2 - crest**2, 0.0) / (port**2 - crest**2))
+    inward, (start, end) = 1 - min(max(out, 0.0), 1.0), crest_span(tube)
+    return 1 - inward * (1 - end) if far_leg else inward * start
+
+
+def loss_along(terms: Mapping[str, FloatArray]) -> FloatArray:
+    """The part of k that is spread evenly along the path."""
+    spread = [terms[name] for name in ("friction", "rotation", "extra", "decree") if name in terms]
+    return np.asarray(sum(spread), dtype=np.float64)
 
 
 def loss_before(*, tube: Tube, state: TubeState, at: Places) -> FloatArray:
@@ -81,10 +172,9 @@ def loss_before(*, tube: Tube, state: TubeState, at: Places) -> FloatArray:
     flow the "+1" counts alpha as 1, so the pressure there rises by the small rest at the exit.
     Source: energy balance; at the crest it is alpha and `upstream_loss`.
     """
-    terms = {name: float(term) for name, term in state.terms.items()}
-    along = sum(terms.get(name, 0.0) for name in ("friction", "rotation", "extra", "decree"))
-    inside = float(state.kinetic_factor) + terms.get("entrance", 0.0) + along * at.share
-    if "decree" not in terms:
+    entrance = float(state.terms.get("entrance", np.zeros(())))
+    inside = float(state.kinetic_factor) + entrance + float(loss_along(state.terms)) * at.share
+    if "decree" not in state.terms:
         for share, bend in zip(_bend_shares(tube), state.bends, strict=True):
             inside = inside + float(bend) * ((at.share > share) | ((at.share == share) & at.after))
     entered = (at.share > 0) | at.after

@@ -12,10 +12,13 @@ from ringbalance.physics.tube.state import TubeState, tube_state
 from ringbalance.reduced_model.law.building import column_pressure
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Flow, Regime
-from ringbalance.reduced_model.tube.crest_margin import DirectedState, directed_state, siphon_margin
+from ringbalance.reduced_model.tube.crest_margin import DirectedState, directed_state, margin_of
 from ringbalance.reduced_model.tube.path import (
     Places,
+    crest_span,
+    loss_along,
     loss_before,
+    lowest_place,
     path_radius,
     places,
     reversed_tube,
@@ -46,7 +49,7 @@ class HumpProfile:
     velocity: float
     """u, m/s, negative in reverse; zero when blocked."""
     hump_path: float | None
-    """s of the crest, m; None without one."""
+    """s of the crest where the pressure is lowest, the end of its arc, m; None without one."""
     hump_pressure: float | None
     """Pressure over the crest, gauge, Pa; None without one."""
     cavity_pressure: float | None
@@ -85,7 +88,7 @@ def hump_profile(
         points: number of even places along the path; more stand where something changes.
     Raises: ValueError: a fill ratio outside the range, a NaN, a negative absolute pressure, or under 2
         points.
-    Range: the scene does not give the shape of the legs nor where the bends lie: straight in r, and evenly.
+    Range: legs as in `path`; the scene does not give where the bends lie: evenly.
     Source: Eqs. 13 to 18 of the liquid-ring paper, taken along the path.
     """
     if points < 2:
@@ -98,12 +101,11 @@ def hump_profile(
     )
     state = backward if forward.ends.driving_pressure() < 0 else forward
     tube = reversed_tube(scene.tube) if state.reverse else scene.tube
-    margin = siphon_margin(scene=scene, tube=tube, law=law, state=state)
+    margin = margin_of(law=law, state=state)
     if Regime(int(flow.regime)) is Regime.BLOCKED and not bool(flow.primed):
         line = _blocked(scene, law, forward, primed, points)
     else:
-        separated = margin[0] is not None and margin[0] < 0
-        cavity = _cavity_pressure(law, state) if separated else None
+        cavity = _pressure_over_crest(law, state, abs(float(flow.velocity)))
         line = _flowing(scene, tube, abs(float(flow.velocity)), state.ends, cavity, points)
         if state.reverse:
             line = _Line(share=1 - line.share[::-1], pressure=line.pressure[::-1], full=line.full[::-1])
@@ -128,7 +130,9 @@ def _profile(
     line: _Line,
 ) -> HumpProfile:
     tube, humped = scene.tube, scene.tube.hump_radius is not None
-    place = int(np.argmin(np.abs(line.share - tube.hump_position)))
+    start, end = crest_span(tube)
+    crest = start if state.reverse else end
+    place = int(np.argmin(np.abs(line.share - crest)))
     inside = line.pressure[1:-1][line.full[1:-1]]
     return HumpProfile(
         path=line.share * tube.length,
@@ -137,13 +141,24 @@ def _profile(
         full=line.full,
         regime=Regime(int(flow.regime)),
         velocity=float(flow.velocity),
-        hump_path=tube.hump_position * tube.length if humped else None,
+        hump_path=crest * tube.length if humped else None,
         hump_pressure=float(line.pressure[place]) if humped else None,
         cavity_pressure=_cavity_pressure(law, state),
         cavitation_margin=margin[0],
         cavitation_margin_uncertainty=margin[1],
         lowest_pressure=float(np.min(inside)) if inside.size else None,
     )
+
+
+def _pressure_over_crest(law: CalibratedLaw, state: DirectedState, velocity: float) -> float | None:
+    """Of the cavity or gas that the column spills into at a velocity; None where it is full, or at rest."""
+    crest, head = law.path.crest, law.heads.return_hump_head if state.reverse else law.heads.hump_head
+    if crest is None or head is None or velocity == 0:
+        return None
+    log_u, driving = np.log(velocity), state.ends.driving_pressure()
+    if law.density * float(np.exp(law.heads.head(log_u))) > driving * (1 - 1e-9):
+        return None
+    return float(crest.resting_pressure(state.ends) - law.density * np.exp(head(log_u)))
 
 
 def _cavity_pressure(law: CalibratedLaw, state: DirectedState) -> float | None:
@@ -197,13 +212,16 @@ def _separated(
         )
 
     first = places(tube=tube, points=points)
-    again = 1.0 if ends.downstream_open() else _full_again(first, behind, cavity, tube.hump_position)
-    at = places(tube=tube, points=points, doubled=(tube.hump_position, again))
+    crest = lowest_place(
+        tube, float(loss_along(terms.terms)) * head / scene.liquid.density, scene.rotor.speed**2
+    )
+    again = 1.0 if ends.downstream_open() else _full_again(first, behind, cavity, crest)
+    at = places(tube=tube, points=points, doubled=(crest, again))
     from_top = ends.upstream_pressure() - column_pressure(
         scene=scene, radius=path_radius(tube=tube, share=at.share)
     )
     ahead = from_top - head * loss_before(tube=tube, state=terms, at=at)
-    near = (at.share < tube.hump_position) | ((at.share == tube.hump_position) & ~at.after)
+    near = (at.share < crest) | ((at.share == crest) & ~at.after)
     far = (at.share > again) | ((at.share == again) & at.after)
     pressure = np.where(near, ahead, np.where(far, behind(at), cavity))
     return _Line(share=at.share, pressure=pressure, full=near | far)

@@ -11,11 +11,27 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Generic, TypeAlias, TypeVar
+from typing import Any, Final, Generic, TypeAlias, TypeVar
 
 import numpy as np
 
 from ringbalance.scene.arrays import BoolArray, FloatArray
+
+CLEARING: Final = (0.6, 1.1)
+"""Froude numbers u/sqrt(g_c d), g_c = omega^2 r_m, below which gas stays over the crest, and above which the
+flow carries it out: the span of what is measured on air pockets in pipes that slope down.
+
+Source: May, Allen and Nelson, "Hydraulic Investigation of Air in Small Diameter Pipes", Int. J. Hydraul. Eng.
+7 (2018) 51, doi:10.5923/j.ijhe.20180703.02; Pothof, "Co-current air-water flow in downward sloping pipes",
+thesis, Delft (2011), ISBN 978-90-8957-018-5.
+"""
+RELEASED: Final = 0.5
+"""Where between vapour pressure and the downstream gas the cavity is taken to lie with dissolved gas: the
+middle, with both ends in the uncertainty.
+
+A siphon of untreated water 1.5 m high choked with bubbles at 37.6 kPa, where vapour pressure alone allows
+17 kPa, and gas-free ran down to 23.8 kPa (Hughes, Sci. Rep. 4 (2014) 4741, doi:10.1038/srep04741).
+"""
 
 Truth: TypeAlias = bool | BoolArray
 Pressure = TypeVar("Pressure", float, FloatArray)
@@ -88,21 +104,54 @@ class SiphonCrest(Generic[Pressure]):
     """Pa, gauge."""
     trapped: bool
     """Whether the gas over the crest must be displaced through the downstream port."""
+    released: float = 0.0
+    """Where between the vapour pressure, 0, and the downstream gas, 1, the cavity's pressure is taken;
+    `RELEASED` with dissolved gas."""
+    froude_velocity: float = 0.0
+    """sqrt(g_c d), m/s; zero: gas over the crest leaves as soon as liquid flows."""
 
     def cavity_pressure(self, ends: TubeEnds[Pressure]) -> Pressure:
-        """Pressure of a cavity over the crest, Pa.
+        """Pressure of a cavity in a primed tube, Pa; over an open downstream port that of the gas there."""
+        low, high = self.cavity_bounds(ends)
+        return low + self.released * (high - low)
 
-        Returns: The vapour pressure, or the downstream gas pressure where the port there is open.
+    def cavity_bounds(self, ends: TubeEnds[Pressure]) -> tuple[Pressure, Pressure]:
+        """Lowest and highest pressure of a cavity in a primed tube, Pa.
+
+        Vapour alone, and, with dissolved gas, the downstream chamber's gas: more would leave into it.
         """
-        return _choose(ends.downstream_open(), ends.downstream_gas, self.vapour_pressure)
+        gas = ends.downstream_gas
+        low = _choose(ends.downstream_open(), gas, self.vapour_pressure)
+        return low, low if self.released == 0 else _larger(gas, low)
+
+    def resting_pressure(self, ends: TubeEnds[Pressure]) -> Pressure:
+        """Crest pressure of a column at rest, p_A + P_A - D_m, Pa."""
+        return ends.upstream_gas + ends.upstream_hydrostatic - self.column_pressure
+
+    def gas_pressure(self, ends: TubeEnds[Pressure]) -> Pressure:
+        """Pressure of gas not carried out, Pa: the downstream chamber's; trapped, what displaces it."""
+        if not self.trapped:
+            return ends.downstream_gas
+        return ends.downstream_gas + _larger(ends.downstream_hydrostatic - ends.port_pressure, 0.0)
 
     def separation_margin(self, ends: TubeEnds[Pressure]) -> Pressure:
         """Crest pressure of a column at rest less the cavity pressure, p_A - p_c + P_A - D_m, Pa.
 
-        Returns: What drives a separated column; where it is not positive, no column holds.
+        Returns: What drives a separated column of a primed tube; where it is not positive, no column holds.
         """
-        cavity = self.cavity_pressure(ends)
-        return ends.upstream_gas - cavity + ends.upstream_hydrostatic - self.column_pressure
+        return self.resting_pressure(ends) - self.cavity_pressure(ends)
+
+    def cleared(self, velocity: Pressure) -> Pressure:
+        """Fraction of the way from gas to cavity pressure over the crest, by the spilling liquid's velocity.
+
+        Zero below and one above `CLEARING`, smooth between: which of both holds there is not known.
+        """
+        if self.froude_velocity == 0:
+            return velocity * 0 + 1
+        low, high = CLEARING
+        part = (velocity / self.froude_velocity - low) / (high - low)
+        part = _larger(-_larger(-part, -1.0), 0.0)
+        return part * part * (3 - 2 * part)
 
     def priming_pressure(self, ends: TubeEnds[Pressure]) -> Pressure:
         """Difference of the gas pressures that lifts liquid over the crest of an unprimed tube, Pa.
@@ -110,13 +159,11 @@ class SiphonCrest(Generic[Pressure]):
         Returns: D_m - P_A, and P_C - D_p more where trapped gas is displaced through a covered port.
         """
         lift = self.column_pressure - ends.upstream_hydrostatic
-        if not self.trapped:
-            return lift
-        return lift + _larger(ends.downstream_hydrostatic - ends.port_pressure, 0.0)
+        return lift + (self.gas_pressure(ends) - ends.downstream_gas)
 
     def primes(self, ends: TubeEnds[Pressure]) -> Truth:
-        """Whether the gas starts a flow in an unprimed tube."""
-        return ends.upstream_gas - ends.downstream_gas > self.priming_pressure(ends)
+        """Whether the gas lifts liquid over the crest of an unprimed tube."""
+        return self.resting_pressure(ends) > self.gas_pressure(ends)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,6 +180,10 @@ class TubePath:
     """Whether the gas over the siphon crest must be displaced through the downstream port."""
     vapour_pressure: float
     """Gauge, Pa."""
+    released: float
+    """As in `SiphonCrest`."""
+    froude_velocity: float
+    """sqrt(omega^2 r_m d), m/s; zero without a crest."""
 
     @property
     def crest(self) -> SiphonCrest[Any] | None:
@@ -140,7 +191,11 @@ class TubePath:
         if self.hump_pressure is None:
             return None
         return SiphonCrest(
-            column_pressure=self.hump_pressure, vapour_pressure=self.vapour_pressure, trapped=self.trapped
+            column_pressure=self.hump_pressure,
+            vapour_pressure=self.vapour_pressure,
+            trapped=self.trapped,
+            released=self.released,
+            froude_velocity=self.froude_velocity,
         )
 
 
@@ -154,6 +209,8 @@ class ColumnFlow(Generic[Pressure]):
     """Of a full siphon, m/s."""
     separation_velocity: Pressure
     """Of a column that is separated at the crest, m/s; without a crest that of the siphon."""
+    spill_velocity: Pressure
+    """Of a column separated by what lay over the crest beforehand: gas in an unprimed tube, m/s."""
     separated: Truth
     """Whether the column is separated."""
     primed: Truth
@@ -168,12 +225,16 @@ def can_flow(*, ends: TubeEnds[Pressure], crest: SiphonCrest[Pressure] | None, p
 def _flows(
     ends: TubeEnds[Pressure], driving: Pressure, crest: SiphonCrest[Pressure] | None, primed: Truth
 ) -> tuple[Truth, Pressure]:
-    """Whether liquid flows, and the separation margin; without a crest the driving pressure in its place."""
+    """Whether liquid flows, and the crest pressure at rest less that of what lies over it beforehand.
+
+    Without a crest the driving pressure stands in for the latter.
+    """
     flows = ends.upstream_covered() & (driving > 0)
     if crest is None:
         return flows, driving
-    margin = crest.separation_margin(ends)
-    return flows & (primed | crest.primes(ends)) & (margin > 0), margin
+    cavity = crest.cavity_pressure(ends)
+    margin = crest.resting_pressure(ends) - _choose(primed, cavity, _larger(crest.gas_pressure(ends), cavity))
+    return flows & (margin > 0), margin
 
 
 def column_flow(
@@ -188,6 +249,8 @@ def column_flow(
     """Regime and velocity of the quasi-steady column, the smaller of siphon and separation velocity.
 
     siphon: (k + 1) rho u^2/2 = driving pressure; separated: (alpha + k_up) rho u^2/2 = separation margin.
+    An unprimed tube spills over a crest with gas on it, from zero at the priming pressure; the flow carries
+    the gas out as its Froude number passes `CLEARING`, and the pressure there falls to the cavity's.
     Where the siphon's velocity is the smaller one its crest pressure is above the cavity pressure, so the
     smaller of the two is continuous across the change.
     Args:
@@ -208,21 +271,46 @@ def column_flow(
             velocity=full,
             siphon_velocity=full,
             separation_velocity=full,
+            spill_velocity=full,
             separated=full < full,
             primed=flows | (primed & allowed),
         )
-    broken = separation(margin, flows)
+    spill = separation(margin, flows)
+    cleared = crest.cleared(spill)
+    broken = spill
+    if primed is not True:
+        gas = _larger(crest.separation_margin(ends) - margin, 0.0)
+        broken = _choose(primed, spill, separation(margin + cleared * gas, flows))
     separated = broken < full
     # At exact balance nothing flows, yet a column that holds is still there.
     rests = primed & (driving == 0) & (margin > 0) & ends.upstream_covered()
-    keeps = (broken >= full) | (ends.downstream_hydrostatic >= ends.port_pressure)
+    keeps = (broken >= full) | (
+        (ends.downstream_hydrostatic >= ends.port_pressure) & (primed | (cleared > 0.5))
+    )
     return ColumnFlow(
         velocity=_choose(separated, broken, full),
         siphon_velocity=full,
         separation_velocity=broken,
+        spill_velocity=spill,
         separated=separated,
         primed=(flows & keeps) | rests,
     )
+
+
+def separation_margins(
+    *, ends: TubeEnds[FloatArray], crest: SiphonCrest[FloatArray], primed: BoolArray, spill: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Smallest and largest separation margin that the cavity's pressure and the gas over the crest allow, Pa.
+
+    Args: `spill`: `ColumnFlow.spill_velocity`; within `CLEARING` the gas may be there or gone.
+    """
+    low, high = crest.cavity_bounds(ends)
+    gas = np.maximum(crest.gas_pressure(ends), high)
+    slowest, fastest = (number * crest.froude_velocity for number in CLEARING)
+    rest = crest.resting_pressure(ends)
+    highest = np.where(~primed & (spill < fastest), gas, high)
+    lowest = np.where(~primed & (spill < slowest), gas, low)
+    return rest - highest, rest - lowest
 
 
 def _larger(first: Pressure, second: Pressure | float) -> Pressure:

@@ -20,6 +20,7 @@ from ringbalance.physics.tube.uncertainty import input_parts, model_parts
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.heads import TABLE_VELOCITIES
+from ringbalance.reduced_model.tube.path import head_behind_crest, loss_along, to_crest_end
 from ringbalance.reduced_model.tube.regime import SiphonCrest, TubeEnds, can_flow
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.models import InputUncertainty, Liquid, Scene, Tube
@@ -157,7 +158,7 @@ def _drive(law: CalibratedLaw, batch: LiquidBatch) -> _Drive:
     )
     if crest is None:
         return full
-    margin = crest.separation_margin(ends)
+    margin, (low, high) = crest.separation_margin(ends), crest.cavity_bounds(ends)
     squares = (
         uncertainty_95**2
         + (batch.relative_density * (gas - batch.vapour_pressure)) ** 2
@@ -165,6 +166,7 @@ def _drive(law: CalibratedLaw, batch: LiquidBatch) -> _Drive:
         + (2 * inputs.relative_speed * (hydrostatic - crest.column_pressure)) ** 2
         + (ratio * inputs.hump_pressure) ** 2
         + inputs.vapour_pressure**2
+        + (max(crest.released, 1 - crest.released) * (high - low)) ** 2
     )
     return replace(
         full,
@@ -191,6 +193,7 @@ def _crest(law: CalibratedLaw, batch: LiquidBatch, ratio: FloatArray) -> SiphonC
         column_pressure=ratio * law.path.hump_pressure,
         vapour_pressure=batch.vapour_pressure,
         trapped=law.path.trapped,
+        released=law.path.released,
     )
 
 
@@ -208,7 +211,11 @@ def _siphon_factor(_tube: Tube, state: TubeState) -> FloatArray:
 
 
 def _separation_factor(tube: Tube, state: TubeState) -> FloatArray:
-    return np.asarray(state.kinetic_factor + upstream_loss(tube=tube, state=state), dtype=np.float64)
+    """As the head up to the lowest pressure, over u^2/2; R_Om/Re d is omega/u."""
+    turns = (state.rotation_reynolds / state.reynolds / tube.bore) ** 2
+    behind = head_behind_crest(tube=tube, along=loss_along(state.terms), square=2 * turns)
+    up = upstream_loss(tube=to_crest_end(tube), state=state)
+    return np.asarray(state.kinetic_factor + up + behind, dtype=np.float64)
 
 
 def _velocity(scene: Scene, tube: Tube, batch: LiquidBatch, drive: _Drive) -> tuple[FloatArray, FloatArray]:
@@ -306,7 +313,9 @@ def _half_widths(
     siphon = slope(_siphon_factor)
     ahead = np.where(separated, slope(_separation_factor), siphon)
     up = np.where(
-        state.k > 0, upstream_loss(tube=tube, state=state) / np.where(state.k > 0, state.k, 1.0), 1.0
+        state.k > 0,
+        upstream_loss(tube=to_crest_end(tube), state=state) / np.where(state.k > 0, state.k, 1.0),
+        1.0,
     )
     of_head = width * np.where(separated, up / _separation_factor(tube, state), 1 / (state.k + 1))
     driven = np.where(separated, drive.separation_uncertainty, drive.siphon_uncertainty)

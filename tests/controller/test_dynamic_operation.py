@@ -125,7 +125,10 @@ class Independent:
         return c * outside * self.phi(outside, p) if outside > p else -c * p * self.phi(p, outside)
 
     def push(self, x: float, u: float, p: float, q: float) -> float:
-        """du/dt: a full column first; if its crest would be below the vapour pressure, the separated one."""
+        """du/dt: a full column first; if its crest would be below the cavity's pressure, the separated one.
+
+        Gas released from the liquid fills the cavity: halfway from vapour to the opposite chamber's pressure.
+        """
         law, rho = self.law, self.law.density
         assert law.heads.hump_head is not None
         assert law.path.hump_pressure is not None
@@ -135,9 +138,10 @@ class Independent:
         upper = rho * math.exp(float(law.heads.hump_head(log_u)))
         full = (p - q + self.level(x) - self.level(0.5 - x) - whole) / (rho * self.length)
         over = p - AMBIENT + self.level(x) - law.path.hump_pressure - upper
-        if over - rho * hump * full >= law.path.vapour_pressure:
+        cavity = (law.path.vapour_pressure + max(q - AMBIENT, law.path.vapour_pressure)) / 2
+        if over - rho * hump * full >= cavity:
             return full
-        return (over - law.path.vapour_pressure) / (rho * hump)
+        return (over - cavity) / (rho * hump)
 
     def rates(self, y: FloatArray, *, opened: bool, moving: bool) -> list[float]:
         x, u, p, q, _ = y
@@ -194,7 +198,11 @@ def test_an_operation_with_all_terms_against_scipy(
     }
     terms = ("tube inertia", "gas filling", "valve lag")
     own = plant(calibrated, *terms, **asked)
-    known = Independent(calibrated, replace(scene.gas, **asked), length=0.12, share=0.5)
+    # Of a taut string from port to port over the crest's circle, what lies before the end of the arc.
+    tangent = math.acos(31.5 / 44.5)
+    leg, arc = 44.5 * math.sin(tangent), 31.5 * (math.pi - 2 * tangent)
+    share = (leg + arc) / (2 * leg + arc)
+    known = Independent(calibrated, replace(scene.gas, **asked), length=0.12, share=share)
     y, moving, stops = np.array([0.25, 0.0, AMBIENT, AMBIENT, 0.0]), False, []
     fills, clock = [], 0.01
     for opened, stop in ((True, 0.01 + duration), (False, 0.01 + duration + 0.15)):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import pytest
@@ -103,6 +104,22 @@ def table_1_scene() -> models.Scene:
         file="test.toml",
         sha256="0" * 64,
     )
+
+
+@pytest.fixture(scope="session")
+def point_scene(table_1_scene: models.Scene) -> models.Scene:
+    """The same with a crest that the tube touches at a point, and degassed liquid."""
+    return dataclasses.replace(
+        table_1_scene,
+        tube=dataclasses.replace(table_1_scene.tube, hump_shape="point"),
+        liquid=dataclasses.replace(table_1_scene.liquid, dissolved_gas="none"),
+    )
+
+
+@pytest.fixture(scope="session")
+def point_calibration(point_scene: models.Scene) -> Calibration:
+    """Calibration of that scene."""
+    return calibrate(point_scene)
 
 
 @pytest.fixture(scope="session")

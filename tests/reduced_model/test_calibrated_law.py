@@ -23,8 +23,8 @@ AMBIENT = 101325.0
 
 
 @pytest.fixture(scope="module")
-def law(table_1_calibration: Calibration) -> CalibratedLaw:
-    return table_1_calibration.flow_law
+def law(point_calibration: Calibration) -> CalibratedLaw:
+    return point_calibration.flow_law
 
 
 def variant(scene: Scene, *, speed: float | None = None, **tube: object) -> CalibratedLaw:
@@ -35,34 +35,34 @@ def variant(scene: Scene, *, speed: float | None = None, **tube: object) -> Cali
 
 
 @pytest.fixture(scope="module")
-def slow(table_1_scene: Scene) -> CalibratedLaw:
+def slow(point_scene: Scene) -> CalibratedLaw:
     """At 3000 rpm a column holds over the crest without gas."""
-    return variant(table_1_scene, speed=314.0)
+    return variant(point_scene, speed=314.0)
 
 
 @pytest.fixture(scope="module")
-def trapped(table_1_scene: Scene) -> CalibratedLaw:
-    return variant(table_1_scene, hump_gas="trapped")
+def trapped(point_scene: Scene) -> CalibratedLaw:
+    return variant(point_scene, hump_gas="trapped")
 
 
 @pytest.fixture(scope="module")
-def straight(table_1_scene: Scene) -> CalibratedLaw:
-    return variant(table_1_scene, hump_radius=None)
+def straight(point_scene: Scene) -> CalibratedLaw:
+    return variant(point_scene, hump_radius=None)
 
 
 @pytest.fixture(scope="module")
-def inner_port(table_1_scene: Scene) -> CalibratedLaw:
-    return variant(table_1_scene, port_radius=43.5e-3)
+def inner_port(point_scene: Scene) -> CalibratedLaw:
+    return variant(point_scene, port_radius=43.5e-3)
 
 
-def test_siphon_obeys_the_energy_balance(law: CalibratedLaw, table_1_scene: Scene) -> None:
+def test_siphon_obeys_the_energy_balance(law: CalibratedLaw, point_scene: Scene) -> None:
     x, p = np.array([0.1, 0.2, 0.3]), 1.2e6
     flow = law.evaluate(fill_ratio=x, gas_pressure=p)
     assert np.all(flow.regime == Regime.SIPHON)
     loss = tube_loss(
-        tube=table_1_scene.tube,
-        liquid=table_1_scene.liquid,
-        angular_velocity=table_1_scene.rotor.speed,
+        tube=point_scene.tube,
+        liquid=point_scene.liquid,
+        angular_velocity=point_scene.rotor.speed,
         velocity=flow.velocity,
     )
     surplus = p + law.wall_pressure(x) - law.wall_pressure(0.5 - x)
@@ -70,18 +70,18 @@ def test_siphon_obeys_the_energy_balance(law: CalibratedLaw, table_1_scene: Scen
 
 
 def test_separated_flow_obeys_the_humps_balance_and_forgets_the_receiving_chamber(
-    law: CalibratedLaw, table_1_scene: Scene
+    law: CalibratedLaw, point_scene: Scene
 ) -> None:
     flow = law.evaluate(fill_ratio=0.4, opposite_fill_ratio=[0.05, 0.1, 0.12], gas_pressure=0.6e6)
     assert np.all(flow.regime == Regime.SEPARATED)
     assert np.ptp(flow.velocity) == 0.0
     loss = tube_loss(
-        tube=table_1_scene.tube,
-        liquid=table_1_scene.liquid,
-        angular_velocity=table_1_scene.rotor.speed,
+        tube=point_scene.tube,
+        liquid=point_scene.liquid,
+        angular_velocity=point_scene.rotor.speed,
         velocity=flow.velocity,
     )
-    hump = column_pressure(scene=table_1_scene, radius=31.5e-3)
+    hump = column_pressure(scene=point_scene, radius=31.5e-3)
     margin = 0.6e6 + AMBIENT - 2339.0 + law.wall_pressure(0.4) - hump
     head = (loss.kinetic_factor + loss.upstream_k) * 1000 * flow.velocity**2 / 2
     np.testing.assert_allclose(head, margin, rtol=1e-8)
@@ -90,10 +90,11 @@ def test_separated_flow_obeys_the_humps_balance_and_forgets_the_receiving_chambe
 def test_velocity_is_continuous_where_siphon_turns_separated(law: CalibratedLaw) -> None:
     x = np.linspace(0.15, 0.35, 4001)
     flow = law.evaluate(fill_ratio=x, gas_pressure=0.7e6)
-    change = np.flatnonzero(np.diff(flow.regime))
-    assert change.size == 1
     jumps = np.abs(np.diff(flow.velocity))
-    assert jumps[change[0]] < 1.5 * np.median(jumps)
+    assert np.max(jumps) < 2 * np.median(jumps)
+    # Within its uncertainty of the change the regime cannot be told; beyond it on either side it can.
+    wide = law.evaluate(fill_ratio=[0.1, 0.25, 0.45], gas_pressure=[1.2e6, 0.7e6, 0.6e6])
+    assert list(wide.regime) == [Regime.SIPHON, Regime.UNDECIDED, Regime.SEPARATED]
 
 
 @pytest.mark.parametrize("factor", [1 - 1e-9, 1 + 1e-9])
@@ -110,7 +111,10 @@ def test_priming_thresholds_of_both_readings_are_0_54_mpa(
         assert round(float(threshold) / 1e6, 2) == 0.54
         flow = each.evaluate(**fills, gas_pressure=float(threshold) * factor)
         assert (float(flow.velocity) > 0) == (factor > 1)
-        assert bool(flow.primed) == (factor > 1)
+        assert float(flow.velocity) < 1e-3
+        assert not flow.primed  # it spills over; only a faster flow carries the gas out
+        above = each.evaluate(**fills, gas_pressure=float(threshold) + 0.3e6)
+        assert bool(above.primed)
 
 
 def test_stall_by_eq_19_is_0_381_mpa_and_by_finite_elements_a_tenth_more(law: CalibratedLaw) -> None:
@@ -160,8 +164,8 @@ def test_gas_off_a_fast_rotors_column_separates(law: CalibratedLaw) -> None:
     assert not np.any(flow.primed)
 
 
-def test_reverse_flow_is_judged_from_the_opposite_side(table_1_scene: Scene) -> None:
-    near, far = (variant(table_1_scene, speed=314.0, hump_position=s) for s in (0.2, 0.8))
+def test_reverse_flow_is_judged_from_the_opposite_side(point_scene: Scene) -> None:
+    near, far = (variant(point_scene, speed=314.0, hump_position=s) for s in (0.2, 0.8))
     forward = near.evaluate(fill_ratio=0.4, opposite_fill_ratio=0.05, gas_pressure=0.0, primed=True)
     backward = far.evaluate(fill_ratio=0.05, opposite_fill_ratio=0.4, gas_pressure=0.0, primed=True)
     assert float(backward.velocity) == pytest.approx(-float(forward.velocity), rel=1e-12)
@@ -230,13 +234,13 @@ def test_more_gas_never_means_less_flow(law: CalibratedLaw, x: float, p: float, 
 
 
 def test_uncertainty_of_a_turbulent_siphon_is_half_that_of_k_plus_1(
-    law: CalibratedLaw, table_1_scene: Scene
+    law: CalibratedLaw, point_scene: Scene
 ) -> None:
     flow = law.evaluate(fill_ratio=0.25, gas_pressure=1.5e6)
     loss = tube_loss(
-        tube=table_1_scene.tube,
-        liquid=table_1_scene.liquid,
-        angular_velocity=table_1_scene.rotor.speed,
+        tube=point_scene.tube,
+        liquid=point_scene.liquid,
+        angular_velocity=point_scene.rotor.speed,
         velocity=flow.velocity,
     )
     expected = 0.5 * float(loss.k.uncertainty / (loss.k.value + 1)) * float(flow.velocity)
@@ -265,14 +269,14 @@ def test_what_cannot_be_is_refused(law: CalibratedLaw, wrong: dict[str, float]) 
     ("bore", "viscosity", "speed"), [(1.2e-3, 1.4e-7, 1383.0), (0.2e-3, 2.9e-5, 3700.0), (5e-3, 1.3e-3, 60.0)]
 )
 def test_spread_of_the_heads_never_falls_below_that_of_k(
-    table_1_scene: Scene, bore: float, viscosity: float, speed: float
+    point_scene: Scene, bore: float, viscosity: float, speed: float
 ) -> None:
     """Where a source's range ends the half-width steps up; a table must not swing below on either side."""
     scene = dataclasses.replace(
-        table_1_scene,
-        tube=dataclasses.replace(table_1_scene.tube, bore=bore, bends=()),
-        liquid=dataclasses.replace(table_1_scene.liquid, kinematic_viscosity=viscosity),
-        rotor=dataclasses.replace(table_1_scene.rotor, speed=speed),
+        point_scene,
+        tube=dataclasses.replace(point_scene.tube, bore=bore, bends=()),
+        liquid=dataclasses.replace(point_scene.liquid, kinematic_viscosity=viscosity),
+        rotor=dataclasses.replace(point_scene.rotor, speed=speed),
     )
     heads = tube_heads(scene)
     u = np.geomspace(2e-5, 5e2, 20001)

@@ -55,7 +55,13 @@ def test_promised_keys_are_there_and_shapes_fit(document: dict[str, Any]) -> Non
     assert all(isinstance(value, bool) for value in tube["in_range"])
     shape = (len(law["gas_pressure_Pa"]), len(law["fill_ratio"]))
     assert all(np.array(law[key]).shape == shape for key in LAW)
-    assert set(np.array(law["regime"]).ravel()) <= {"blocked", "siphon", "separated", "reverse"}
+    assert set(np.array(law["regime"]).ravel()) <= {
+        "blocked",
+        "siphon",
+        "separated",
+        "reverse",
+        "cannot be told",
+    }
     assert all(
         set(term) == {"term", "model", "why", "estimated_contribution"} for term in document["models_used"]
     )

@@ -29,6 +29,7 @@ from ringbalance.reduced_model.selection.loss_models import (
     loss_at,
     velocity_under_head,
 )
+from ringbalance.reduced_model.tube.path import to_crest_end
 from ringbalance.scene import models
 from ringbalance.scene.models import Scene
 from ringbalance.verification.selection_studies.chamber_models import chamber_hierarchies
@@ -134,7 +135,7 @@ def test_a_broken_ring_is_a_status(table_1_scene: Scene) -> None:
 def test_the_top_of_k_is_the_calibrated_k(table_1_scene: Scene) -> None:
     u = np.array([0.5, 5.0, 20.0])
     top = tube_loss(
-        tube=table_1_scene.tube,
+        tube=to_crest_end(table_1_scene.tube),
         liquid=table_1_scene.liquid,
         angular_velocity=table_1_scene.rotor.speed,
         velocity=u,

@@ -38,18 +38,11 @@ def test_calibrated_law_comes_back_bit_for_bit(table_1_calibration: Calibration,
     np.testing.assert_array_equal(saved, loaded)
 
 
-def test_a_file_with_the_earlier_names_is_read(table_1_calibration: Calibration, tmp_path: Path) -> None:
+def test_a_law_of_the_earlier_format_is_refused(table_1_calibration: Calibration, tmp_path: Path) -> None:
     path = table_1_calibration.flow_law.save(tmp_path / "law.json")
-    text = path.read_text()
-    names = {"DriveUncertainty": "InputSpread", "uncertainty": "spread", "hump_uncertainty": "hump_spread"}
-    for now, before in {**names, "wall_pressure_uncertainty": "wall_pressure_spread"}.items():
-        assert f'"{now}"' in text
-        text = text.replace(f'"{now}"', f'"{before}"')
-    # Earlier laws knew no place of measurement either.
-    content = json.loads(text)
-    assert content["law"].pop("gas_factor") == 1.0
-    (tmp_path / "earlier.json").write_text(json.dumps(content))
-    assert load_law(tmp_path / "earlier.json").save(tmp_path / "again.json").read_bytes() == path.read_bytes()
+    path.write_text(path.read_text().replace('"version": 2', '"version": 1'))
+    with pytest.raises(SceneError, match=r"version = 1: .* calibrate again; allowed: 2"):
+        load_law(path)
 
 
 def test_paper_law_comes_back_whole(table_1_scene: Scene, tmp_path: Path) -> None:
@@ -78,8 +71,8 @@ def test_load_model_carries_moment_volumes_and_density(
         ("[1, 2]", "not a saved law"),
         ('{"format": "another"}', "not a saved law"),
         ('{"format": "ringbalance law", "version": 99}', "another release"),
-        ('{"format": "ringbalance law", "version": 1}', "law"),
-        ('{"format": "ringbalance law", "version": 1, "law": {"type": "TubePath"}}', "PaperLaw"),
+        ('{"format": "ringbalance law", "version": 2}', "law"),
+        ('{"format": "ringbalance law", "version": 2, "law": {"type": "TubePath"}}', "PaperLaw"),
         ("[" * 100000, "not JSON"),
     ],
 )

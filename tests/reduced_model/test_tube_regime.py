@@ -131,7 +131,15 @@ def test_arrays_agree_with_numbers(crest: SiphonCrest[float] | None) -> None:
 
 
 def test_a_path_without_crest_is_always_primed() -> None:
-    path = TubePath(density=1e3, port_pressure=2.0, hump_pressure=None, trapped=False, vapour_pressure=-1.0)
+    path = TubePath(
+        density=1e3,
+        port_pressure=2.0,
+        hump_pressure=None,
+        trapped=False,
+        vapour_pressure=-1.0,
+        released=0.0,
+        froude_velocity=0.0,
+    )
     assert path.crest is None
     assert can_flow(ends=ENDS, crest=path.crest, primed=False)
     assert replace(path, hump_pressure=9.0).crest is not None

@@ -15,7 +15,7 @@ from ringbalance.reduced_model.chamber.values import by_closed_form, by_paper, b
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.reduced_model.paper import formulas as paper
-from ringbalance.reduced_model.selection.loss_models import FORMULAS, loss_at
+from ringbalance.reduced_model.selection.loss_models import FORMULAS, head_at
 from ringbalance.reduced_model.tables.fit import refined_table, table_from_samples
 from ringbalance.reduced_model.tables.hermite import HermiteTable
 from ringbalance.reduced_model.tube.heads import TABLE_ERROR, TABLE_VELOCITIES, TubeHeads
@@ -168,9 +168,8 @@ def _loss_heads(scene: Scene, loss: str, *, base: TubeHeads) -> TubeHeads:
 
 def _table(scene: Scene, tube: Tube, loss: str, *, hump: bool) -> HermiteTable:
     def log_head(log_velocity: FloatArray) -> FloatArray:
-        found = loss_at(scene, loss=loss, velocity=np.exp(log_velocity), tube=tube)
-        factor = found.kinetic_factor + found.upstream_k if hump else found.k + 1
-        return np.asarray(np.log(factor / 2) + 2 * log_velocity, dtype=np.float64)
+        head = head_at(scene, loss=loss, velocity=np.exp(log_velocity), to_crest=hump, tube=tube)
+        return np.asarray(np.log(head), dtype=np.float64)
 
     start, stop = (float(v) for v in np.log(TABLE_VELOCITIES))
     return refined_table(function=log_head, start=start, stop=stop, tolerance=TABLE_ERROR)[0]

@@ -1,16 +1,22 @@
-"""Two balancers side by side on one rotor: time, what is left, energy, and the worst amplitude on the way."""
+"""Two balancers side by side on one rotor, both tuned: time, residual, energy and the worst amplitude."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
+from ringbalance.controller.algorithms.by_name import target_vector_of
 from ringbalance.controller.compare_rotor import OneRotor, own_scene, rotor_of, scene_on
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
+from ringbalance.controller.eccentric_mass.sampled_loops import recommended_gains
 from ringbalance.controller.loop import simulate
+from ringbalance.controller.simulation import Simulation
+from ringbalance.controller.tuning.loop_factor import loop_factor
+from ringbalance.controller.tuning.recommendation import recommended_gain
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.selection.registry import ModelUsed
 from ringbalance.scene.eccentric_models import EccentricScene
@@ -20,6 +26,24 @@ from ringbalance.scene.narrowing import AnyScene
 
 ModelOf = Callable[[Scene], BalancerModel]
 """Makes the model of a liquid ring from its scene on the common rotor."""
+RUNS: Final = 5
+"""Of each balancer, with the seeds that follow its scene's."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Result:
+    """What one run of a balancer comes to, over the common span."""
+
+    time: float
+    """s, from the start of balancing until the amplitude has settled; infinite when it has not."""
+    residual_ratio: float
+    """Amplitude at the end over the one before balancing."""
+    energy: float
+    """What the balancer took, J: compressing the gas that it used, or the motors' electrical energy."""
+    worst_amplitude: float
+    """Largest amplitude from the start of balancing on, m zero-to-peak."""
+    status: str
+    """How the run ended and what to do next."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,21 +51,40 @@ class Side:
     """One balancer of a comparison."""
 
     scene: AnyScene
-    """As it was run, on the common rotor."""
-    settled: bool
-    """Whether the amplitude comes below the common limit and stays there."""
-    time: float | None
-    """s, from the start of balancing until the amplitude stays below the limit; None when it does not."""
-    residual_ratio: float
-    """Amplitude at the end over the one before balancing."""
-    energy: float
-    """What the balancer took, J: the integral of p dV of the gas, or of the motors' electrical power."""
-    worst_amplitude: float
-    """Largest amplitude from the start of balancing on, m zero-to-peak."""
-    status: str
-    """How the run ended and what to do next."""
+    """As it was run, on the common rotor and tuned, with the seed of the first run."""
+    tuned: Mapping[str, float]
+    """Scene keys that tuning has changed, with their values, SI."""
+    results: tuple[Result, ...]
+    """One for each seed."""
     models_used: tuple[ModelUsed, ...] = ()
     """Of a liquid ring: every physical term, with its model and its estimated contribution."""
+
+    @property
+    def settled(self) -> bool:
+        """Whether every run settled."""
+        return all(math.isfinite(result.time) for result in self.results)
+
+    @property
+    def time(self) -> float | None:
+        """Median of all runs, s; None when fewer than half settled."""
+        return _finite(self.middle("time"))
+
+    @property
+    def status(self) -> str:
+        """Of the first run that did not settle, else of the first."""
+        return next((r for r in self.results if math.isinf(r.time)), self.results[0]).status
+
+    def middle(self, name: str) -> float:
+        """Median of one number of `Result` over the runs."""
+        return float(np.quantile(self._values(name), 0.5, method="inverted_cdf"))
+
+    def ends(self, name: str) -> tuple[float, float]:
+        """Smallest and largest of one number of `Result` over the runs."""
+        values = self._values(name)
+        return min(values), max(values)
+
+    def _values(self, name: str) -> list[float]:
+        return [getattr(result, name) for result in self.results]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,24 +93,36 @@ class Comparison:
 
     rotor: OneRotor
     """That of the first scene."""
+    span: float
+    """s, from the start of balancing, of every run: the longer time limit of both scenes."""
     sides: tuple[Side, Side]
     """In the order of the scenes."""
 
 
-def compare(first: AnyScene, second: AnyScene, *, model_of: ModelOf) -> Comparison:
-    """Put two balancers on the rotor of the first scene, and let each balance it.
+def compare(
+    first: AnyScene, second: AnyScene, *, model_of: ModelOf, runs: int = RUNS, tuned: bool = True
+) -> Comparison:
+    """Put two balancers on the rotor of the first scene, tune each, and let each balance it over one span.
 
-    Of the second scene its balancer alone counts; `model_of` makes the model of a liquid ring.
+    Of the second scene its balancer alone counts; `model_of` makes the model of a liquid ring.  `tuned`: with
+    the gain that `tune` recommends for the target-vector algorithm, and gains of eccentric masses lowered to
+    the recommended ones.
     Raises: SceneError: a balancer that cannot work on that rotor.
     """
     rotor = rotor_of(first)
     try:
         # Whether the second can work there at all is known before anything is run.
-        guest = scene_on(rotor, second)
-        one, other = _side(rotor, own_scene(first), model_of), _side(rotor, guest, model_of)
+        scenes = own_scene(first), scene_on(rotor, second)
+        span = max(_span(scene) for scene in scenes)
+        one, other = (_side(rotor, scene, model_of, span=span, runs=runs, tuned=tuned) for scene in scenes)
     except SceneError as error:
         raise SceneError(_placed(first, fault) for fault in error.faults) from error
-    return Comparison(rotor=rotor, sides=(one, other))
+    return Comparison(rotor=rotor, span=span, sides=(one, other))
+
+
+def _span(scene: AnyScene) -> float:
+    start = scene.supervisor.start if isinstance(scene, EccentricScene) else 0.0
+    return scene.run.time_limit - start
 
 
 def _placed(first: AnyScene, fault: Fault) -> Fault:
@@ -76,43 +131,95 @@ def _placed(first: AnyScene, fault: Fault) -> Fault:
     return replace(fault, problem=f"on the rotor of {first.source}: {fault.problem}")
 
 
-def _side(rotor: OneRotor, scene: AnyScene, model_of: ModelOf) -> Side:
+def _side(
+    rotor: OneRotor, scene: AnyScene, model_of: ModelOf, *, span: float, runs: int, tuned: bool
+) -> Side:
     if isinstance(scene, EccentricScene):
-        return _driven_side(rotor, scene)
-    return _liquid_side(scene, model_of(scene))
+        return _driven_side(rotor, scene, span=span, runs=runs, tuned=tuned)
+    return _liquid_side(scene, model_of(scene), span=span, runs=runs, tuned=tuned)
 
 
-def _liquid_side(scene: Scene, model: BalancerModel) -> Side:
-    run = simulate(scene, model)
-    return Side(
-        scene=scene,
-        settled=run.settled,
-        time=run.settling_time,
-        residual_ratio=float(run.amplitude[-1] / run.amplitude[0]),
-        energy=run.energy,
-        worst_amplitude=float(np.max(run.amplitude)),
-        status=run.status,
-        models_used=run.models_used,
+def _liquid_side(scene: Scene, model: BalancerModel, *, span: float, runs: int, tuned: bool) -> Side:
+    changes: dict[str, float] = {}
+    ready = replace(scene, run=replace(scene.run, time_limit=span))
+    if tuned and scene.controller.kind == "target_vector":
+        gain = recommended_gain(scene, model, loop=loop_factor(scene, model, target_vector_of(scene)))
+        if gain > 0:
+            changes = {"controller.proportional": gain}
+            ready = replace(ready, controller=replace(ready.controller, proportional=gain))
+    done = [
+        simulate(replace(ready, run=replace(ready.run, seed=ready.run.seed + i)), model, to_time_limit=True)
+        for i in range(runs)
+    ]
+    results = tuple(
+        Result(
+            time=math.inf if run.settling_time is None else run.settling_time,
+            residual_ratio=float(run.amplitude[-1] / run.amplitude[0]),
+            energy=_gas_energy(run, scene, model),
+            worst_amplitude=float(np.max(run.amplitude)),
+            status=run.status,
+        )
+        for run in done
     )
+    return Side(scene=ready, tuned=changes, results=results, models_used=done[0].models_used)
 
 
-def _driven_side(rotor: OneRotor, scene: EccentricScene) -> Side:
-    run, start = simulate_eccentric(scene), scene.supervisor.start
-    balancing = run.time >= start
-    settled = run.settled and run.settling_time is not None
-    return Side(
-        scene=scene,
-        settled=settled,
-        time=max(0.0, run.settling_time - start) if settled and run.settling_time is not None else None,
-        residual_ratio=run.final_amplitude / rotor.amplitude,
-        energy=run.electrical_energy,
-        worst_amplitude=float(np.max(run.amplitude[balancing])),
-        status=run.status,
+def _gas_energy(run: Simulation, scene: Scene, model: BalancerModel) -> float:
+    """Least work that compresses the gas of a run, p1 V ln(p1/p0) for each filling of a chamber, J.
+
+    Every injection counts as a whole filling of the space above its liquid; p1 is the absolute gas pressure.
+    """
+    ambient, dead = scene.gas.ambient_pressure, scene.gas.dead_volume or 0.0
+    pressure = scene.gas.pressure + ambient
+    space = math.fsum(
+        model.chamber_volume * (1.0 - injection.operation.fill_after) + dead for injection in run.injections
     )
+    return pressure * space * math.log(pressure / ambient)
+
+
+def _driven_side(rotor: OneRotor, scene: EccentricScene, *, span: float, runs: int, tuned: bool) -> Side:
+    start = scene.supervisor.start
+    ready = replace(scene, run=replace(scene.run, time_limit=span + start))
+    changes: dict[str, float] = {}
+    if tuned:
+        high = [loop for loop in recommended_gains(ready).loops if loop.value > loop.recommended]
+        changes = {loop.key: loop.recommended for loop in high}
+        for key, value in changes.items():
+            table, name = key.split(".")
+            changed: dict[str, Any] = {table: replace(getattr(ready, table), **{name: value})}
+            ready = replace(ready, **changed)
+    results = []
+    for i in range(runs):
+        run = simulate_eccentric(replace(ready, run=replace(ready.run, seed=ready.run.seed + i)))
+        settled = run.settled and run.settling_time is not None
+        time = run.settling_time if settled and run.settling_time is not None else math.inf
+        results.append(
+            Result(
+                time=max(0.0, time - start),
+                residual_ratio=run.final_amplitude / rotor.amplitude,
+                energy=run.electrical_energy,
+                worst_amplitude=float(np.max(run.amplitude[run.time >= start])),
+                status=run.status,
+            )
+        )
+    return Side(scene=ready, tuned=changes, results=tuple(results))
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+_NUMBERS: Final = {
+    "time_s": "time",
+    "residual_ratio": "residual_ratio",
+    "energy_J": "energy",
+    "worst_amplitude_m": "worst_amplitude",
+}
+"""Keys of the document, each with its number of `Result`."""
 
 
 def comparison_document(comparison: Comparison) -> dict[str, Any]:
-    """A comparison as a JSON document in SI; lists run along `scenes`; null: it did not settle."""
+    """A comparison as a JSON document in SI; lists run along `scenes`; null: not settled."""
     sides, rotor = comparison.sides, comparison.rotor
     return {
         "scenes": [
@@ -122,9 +229,17 @@ def comparison_document(comparison: Comparison) -> dict[str, Any]:
         "balancer": [side.scene.balancer for side in sides],
         "settled": [side.settled for side in sides],
         "time_s": [side.time for side in sides],
-        "residual_ratio": [side.residual_ratio for side in sides],
-        "energy_J": [side.energy for side in sides],
-        "worst_amplitude_m": [side.worst_amplitude for side in sides],
+        "residual_ratio": [side.middle("residual_ratio") for side in sides],
+        "energy_J": [side.middle("energy") for side in sides],
+        "worst_amplitude_m": [side.middle("worst_amplitude") for side in sides],
+        "spread": [
+            {key: [_finite(end) for end in side.ends(name)] for key, name in _NUMBERS.items()}
+            for side in sides
+        ],
+        "runs": [len(side.results) for side in sides],
+        "runs_settled": [sum(math.isfinite(r.time) for r in side.results) for side in sides],
+        "tuned": [dict(side.tuned) for side in sides],
+        "span_s": comparison.span,
         "status": [side.status for side in sides],
         "models_used": [[asdict(used) for used in side.models_used] for side in sides],
         "rotor": {

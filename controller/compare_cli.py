@@ -35,7 +35,7 @@ def compare(
     tolerance: str | None = None,
     models: Models | None = None,
 ) -> int:
-    """Run two balancers on one rotor, that of the first scene.
+    """Run two balancers, both tuned, on one rotor: that of the first scene, over one span and several seeds.
 
     Args:
         first: a scene file; its rotor, vibration sensor and limit hold for both.
@@ -73,16 +73,19 @@ def _show(comparison: Comparison, console: Console) -> None:
     console.print(
         f"rotor of {rotor.source}: {rotor.speed * 30 / math.pi:.6g} rpm, "
         f"{abs(rotor.influence):.4g} m/(kg m) at a lag of {lag:.4g} deg, "
-        f"{1e6 * rotor.amplitude:.4g} um before balancing, limit {1e6 * rotor.limit:.4g} um",
+        f"{1e6 * rotor.amplitude:.4g} um before balancing, limit {1e6 * rotor.limit:.4g} um; "
+        f"over {comparison.span:.4g} s, medians (smallest to largest)",
         highlight=False,
     )
     table = Table("", *(side.scene.name for side in comparison.sides))
     rows = {
         "balancer": [side.scene.balancer.replace("_", " ") for side in comparison.sides],
-        "time to the limit": [_time(side) for side in comparison.sides],
-        "left over": [f"{100 * side.residual_ratio:.3g} %" for side in comparison.sides],
-        "energy": [f"{side.energy:.4g} J" for side in comparison.sides],
-        "worst on the way": [f"{1e6 * side.worst_amplitude:.4g} um" for side in comparison.sides],
+        "tuned": [_tuned(side) for side in comparison.sides],
+        "settled": [_settled(side) for side in comparison.sides],
+        "time to the limit": [_cell(side, "time", 1.0, "s") for side in comparison.sides],
+        "left over": [_cell(side, "residual_ratio", 100.0, "%") for side in comparison.sides],
+        "energy": [_cell(side, "energy", 1.0, "J") for side in comparison.sides],
+        "worst on the way": [_cell(side, "worst_amplitude", 1e6, "um") for side in comparison.sides],
     }
     for name, cells in rows.items():
         table.add_row(name, *cells)
@@ -91,5 +94,21 @@ def _show(comparison: Comparison, console: Console) -> None:
         console.print(f"{side.scene.source}: {side.status}", markup=False, highlight=False)
 
 
-def _time(side: Side) -> str:
-    return "did not settle" if side.time is None else f"{side.time:.4g} s"
+def _cell(side: Side, name: str, factor: float, unit: str) -> str:
+    """Median, and in brackets the smallest and the largest of the runs."""
+    low, high = side.ends(name)
+
+    def shown(value: float) -> str:
+        return f"{factor * value:.4g}" if math.isfinite(value) else "not settled"
+
+    middle = side.middle(name)
+    text = f"{shown(middle)} {unit}" if math.isfinite(middle) else shown(middle)
+    return text if low == high else f"{text} ({shown(low)} to {shown(high)})"
+
+
+def _settled(side: Side) -> str:
+    return f"{sum(math.isfinite(r.time) for r in side.results)} of {len(side.results)} runs"
+
+
+def _tuned(side: Side) -> str:
+    return ", ".join(f"{key} = {value:.4g} (SI)" for key, value in side.tuned.items()) or "as it is"

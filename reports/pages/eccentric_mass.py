@@ -23,7 +23,7 @@ def _collect(work: Work) -> Record:
     """Both balancers on the scene's rotor."""
     rival = load_scene(bundled_scene(RIVAL))
     try:
-        found = compare(work.scene, rival, model_of=lambda _: work.calibration.model)
+        found = compare(work.scene, rival, model_of=lambda _: work.calibration.model, runs=3)
     except SceneError as error:
         # Without folders: the evidence is the same wherever the files stand.
         faults = (replace(fault, file=PurePath(fault.file).name) for fault in error.faults)

@@ -156,23 +156,49 @@ def test_two_liquid_rings(paper_scene: Scene) -> None:
     assert [scene["source"] for scene in found["scenes"]] == ["liquid_ring_paper.toml"] * 2
 
 
+def test_a_comparison_has_both_tuned_over_one_span_and_several_seeds(
+    paper_scene: Scene, small: EccentricScene
+) -> None:
+    noisy = replace(paper_scene, run=replace(paper_scene.run, time_limit=20.0))
+    brief = replace(small, run=replace(small.run, time_limit=10.0))
+    found = compare(noisy, brief, model_of=paper_model, runs=3)
+    ring, masses = found.sides
+    assert found.span == pytest.approx(20.0) == ring.scene.run.time_limit
+    told = eccentric_scene(masses.scene)
+    assert told.run.time_limit - told.supervisor.start == pytest.approx(20.0)
+    gain = liquid_ring_scene(ring.scene).controller.proportional
+    assert ring.tuned == {"controller.proportional": gain}
+    assert set(masses.tuned) == {"friction_filter.speed_gain"}
+    assert told.friction_filter.speed_gain < small.friction_filter.speed_gain
+    low, high = ring.ends("energy")
+    assert low <= ring.middle("energy") <= high
+    assert low < high
+    # Each injection fills at least the 33.8 ml that no liquid of the pair can reach with gas of 0.7 MPa.
+    least = 0.801325e6 * 33.8e-6 * math.log(0.801325 / 0.101325)
+    assert low > 5 * least
+    document = comparison_document(found)
+    assert document["runs"] == [3, 3]
+    assert document["spread"][0]["energy_J"] == [low, high]
+    json.dumps(document, allow_nan=False)
+
+
 def test_two_pairs_of_eccentric_masses(driven: EccentricScene) -> None:
     """A second pair of half the mass cannot undo the imbalance of the first one's rotor."""
     strong = replace(driven, run=replace(driven.run, time_limit=40.0))
     weak = replace(strong, masses=replace(driven.masses, mass=0.06), source="weak.toml")
-    found = compare(strong, weak, model_of=paper_model)
+    found = compare(strong, weak, model_of=paper_model, runs=1)
     good, poor = found.sides
     assert good.settled
     assert good.time is not None
     assert 0 < good.time < 40
-    assert good.energy > 0
+    assert good.middle("energy") > 0
     # From the steady vibration the worst amplitude is no less than that.
-    assert good.worst_amplitude > 0.95 * found.rotor.amplitude
+    assert good.middle("worst_amplitude") > 0.95 * found.rotor.amplitude
     assert not poor.settled
     assert poor.time is None
     # What two masses of 0.06 kg leave of 0.18 kg at the same radius, their centres one length apart.
     pair = 2 * 0.06 * math.cos(0.05 / 0.23 / 2)
-    assert poor.residual_ratio == pytest.approx((0.18 - pair) / 0.18, abs=0.02)
+    assert poor.middle("residual_ratio") == pytest.approx((0.18 - pair) / 0.18, abs=0.02)
 
 
 def test_the_command(capsys: pytest.CaptureFixture[str]) -> None:

@@ -188,7 +188,7 @@ def _the_denser_liquid_stops_where_its_column_stops(numbers: Mapping[str, float]
     def fill(pull: float) -> float:
         a = math.sqrt(crest**2 + 2 * (scene.gas.pressure + pull) / (2 * scene.liquid.density * omega**2))
         section, _ = quad(lambda r: 2 * r * float(half_angle(disc=disc, radius=r)), a, disc.outer_radius)
-        return section * disc.axial_width / chamber_volume(disc=disc)
+        return float(section) * disc.axial_width / chamber_volume(disc=disc)
 
     best, least = (disc.max_fill_ratio - fill(pull) for pull in (101325.0, 0.0))
     assert least - 0.002 <= numbers["reach_dense"] <= best

@@ -16,7 +16,12 @@ from ringbalance.verification.comparison import from_half_width, from_range
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
 from ringbalance.verification.loops import calibration_of
 from ringbalance.verification.paper_numbers import plate_uncertainty
-from ringbalance.verification.reference.tube_running import driving_head, running_tube, tube_curve
+from ringbalance.verification.reference.tube_running import (
+    driving_head,
+    running_tube,
+    second_reading,
+    tube_curve,
+)
 
 _PRESSURES: Final = np.geomspace(0.77, 2.53, 9)
 """In units of the scene's."""
@@ -30,6 +35,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     low, high = _hump_bounds(scene)
     at_low, at_high = (_siphon_share(_with_hump(scene, radius)) for radius in (low, high))
     excess, by_exit = _exit(scene)
+    bare = second_reading(scene)
     return Evidence(
         found={
             "one_k": _one_k(scene),
@@ -42,6 +48,8 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "hump_high": high,
             "share_low": at_low,
             "share_high": at_high,
+            "bare_bore": bare.tube.bore,
+            "share_bare": _siphon_share(bare),
         },
         series=(_figure(scene),),
     )

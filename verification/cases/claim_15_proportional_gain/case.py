@@ -15,6 +15,7 @@ from ringbalance.scene.models import Scene
 from ringbalance.verification.comparison import from_range
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table
 from ringbalance.verification.loops import amplitude_series, calibration_of, loop_scene, run_loop, settling
+from ringbalance.verification.reference.tube_running import second_reading
 
 _GAINS: Final = (0.04e6, 0.08e6, 0.12e6, 0.16e6, 0.20e6)
 """Kp of Fig. 7, s/m."""
@@ -36,7 +37,8 @@ reference = {
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     runs = {gain: _run(scene, gain) for gain in _GAINS}
     rate = _rate(scene, paper_model(scene))
-    calibrated = _rate(scene, calibration_of(scene).model)
+    bare = second_reading(scene)
+    calibrated = _rate(bare, calibration_of(bare).model)
     onset = _onset(scene)
     return Evidence(
         found={
@@ -45,6 +47,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         },
         numbers={
             "rate_um": rate * 1e6,
+            "bore": bare.tube.bore,
             "calibrated_rate_um": calibrated * 1e6,
             "onset_rule": 1e-6 / rate,
             "onset_um": onset * 1e-6,

@@ -8,19 +8,18 @@ from collections.abc import Mapping
 from typing import Final
 
 from ringbalance.controller.simulation import Simulation
-from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.scene.models import Scene
 from ringbalance.verification.comparison import from_range
 from ringbalance.verification.evidence import Evidence, Found, Level, Table
 from ringbalance.verification.loops import (
     AMPLITUDES,
     amplitude_series,
-    calibration_of,
     loop_scene,
     mistaken_lag,
     run_loop,
     settling,
 )
+from ringbalance.verification.reference.tube_running import second_reading
 
 _PERIODS: Final = (0.25, 0.5, 1.0)
 _BOUND: Final = 5.0
@@ -31,7 +30,8 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     runs = {period: _runs(given, period) for period in _PERIODS}
     slowest = [min(max(map(settling, group)), scene.run.time_limit) for group in runs.values()]
     rises = [max(run.misadjustments for run in group) for group in runs.values()]
-    calibrated = _short_runs(given)
+    bare = second_reading(given)
+    calibrated = _short_runs(bare)
     return Evidence(
         found={
             # The period may be any of these: the spread over them is the input's.
@@ -43,7 +43,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "middle": slowest[1],
             "slowest": slowest[2],
             "rises_slow": float(rises[2]),
-            "ratio": _flow_ratio(scene),
+            "bore": bare.tube.bore,
             "calibrated_settled": float(sum(settling(run) <= _BOUND for run in calibrated)),
             "calibrated_overshoots": float(sum(run.overshoots for run in calibrated)),
         },
@@ -71,16 +71,6 @@ def _short_runs(scene: Scene) -> list[Simulation]:
         run_loop(loop_scene(brief, kind="target_vector", amplitude=amplitude, period=0.5), "calibrated")
         for amplitude in (AMPLITUDES[0], AMPLITUDES[-1])
     ]
-
-
-def _flow_ratio(scene: Scene) -> float:
-    """Velocity of the calibrated law over the paper's, equal fills, the scene's gas pressure."""
-    laws = (calibration_of(scene).flow_law, paper_law(scene))
-    velocity = [
-        float(law.evaluate(fill_ratio=law.max_fill_ratio / 2, gas_pressure=scene.gas.pressure).velocity)
-        for law in laws
-    ]
-    return velocity[0] / velocity[1]
 
 
 def _table(runs: Mapping[float, list[Simulation]]) -> Table:

@@ -34,6 +34,7 @@ _RUNS: Final = {
     "siphon": "runs as a full siphon",
     "separated": "runs separated",
     "reverse": "runs in reverse",
+    "cannot be told": "runs full or separated, which cannot be told",
 }
 
 

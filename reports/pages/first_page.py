@@ -110,7 +110,8 @@ def _loop_lead(evidence: Record) -> list[str]:
 
 
 def _gains(evidence: Record, tuned: Record) -> tuple[float, float | None]:
-    own = next((run for run in evidence["consequences"]["runs"] if run.get("name") == "calibrated"), {})
+    runs = evidence["consequences"]["runs"]
+    own: Record = next((run for run in runs if run.get("name") == "calibrated"), {})
     return tuned["proportional_s_per_m"], own.get("proportional_s_per_m")
 
 

@@ -8,6 +8,7 @@ from typing import Final
 
 from rich.console import Console
 
+from ringbalance.reports.pages.first_page import loop_sentences
 from ringbalance.reports.pictures.process import (
     FOLDERS,
     finish_drawing,
@@ -17,7 +18,7 @@ from ringbalance.reports.pictures.process import (
 )
 from ringbalance.reports.report import Report, write_report
 from ringbalance.reports.section import Level
-from ringbalance.reports.summary import lead_sentence, loop_sentence
+from ringbalance.reports.summary import lead_sentence
 from ringbalance.scene import liquid_ring_scene, load_scene, read_scene
 from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.platform.files import staged
@@ -101,7 +102,7 @@ def plot(scene: Path, *, out: Path = Path("out")) -> int:
 
 def _summarise(console: Console, finished: Report) -> None:
     evidence = finished.evidence
-    for line in (lead_sentence(evidence), loop_sentence(evidence)):
+    for line in (*loop_sentences(evidence), lead_sentence(evidence)):
         console.print(line, markup=False, highlight=False)
     if not evidence["pictures"]["drawn"]:
         console.print(evidence["pictures"]["text"], markup=False, highlight=False)

@@ -228,8 +228,6 @@ def _summary(evidence: Record, claims: list[Record]) -> Record:
         "checks": summary.verdict_counts(summary.checks(evidence), summary.CHECK_VERDICTS),
         "numbers": summary.key_numbers(evidence),
         "headlines": [case for case in claims if case["id"] in chosen],
-        "loop_sentence": summary.loop_sentence(evidence),
-        "loop": summary.loop_table(evidence),
     }
 
 

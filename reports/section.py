@@ -5,14 +5,18 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from functools import cached_property, lru_cache
+from typing import Any, Final, Literal
 
+from ringbalance.controller.tuning.tune import Tuning, tune
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reports.numbers import MISSING
 from ringbalance.scene import Scene
+from ringbalance.verification.loops import calibration_of
 
 Record = dict[str, Any]
 Cells = Sequence[str]
+_TUNING_RUNS: Final = 500
 Level = Literal["light", "heavy"]
 
 
@@ -45,6 +49,17 @@ class Work:
     scene: Scene
     calibration: Calibration
     level: Level
+
+    @cached_property
+    def tuning(self) -> Tuning:
+        """The recommended gain of the scene's controller under the calibrated law."""
+        return tuning_of(self.scene)
+
+
+@lru_cache(maxsize=4)
+def tuning_of(scene: Scene) -> Tuning:
+    """One tuning serves every report of a scene within a process."""
+    return tune(scene, model_of=lambda asked: calibration_of(asked).model, members=_TUNING_RUNS)
 
 
 def _nothing(_work: Work) -> None:

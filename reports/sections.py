@@ -11,7 +11,7 @@ from ringbalance.reports.figures.style import Drawing
 from ringbalance.reports.pages import consequences as consequence_view
 from ringbalance.reports.pages import drag_coefficient as fifty
 from ringbalance.reports.pages import eccentric_mass as driven
-from ringbalance.reports.pages import extremes, sloshing
+from ringbalance.reports.pages import extremes, first_page, sloshing
 from ringbalance.reports.pages import model_selection as trade
 from ringbalance.reports.pages import paper_figures as paper_again
 from ringbalance.reports.pages import siphon_crest as hump
@@ -19,7 +19,7 @@ from ringbalance.reports.pages import tube_flow as inside
 from ringbalance.reports.section import Record, Section, Work
 
 SECTIONS: Final[tuple[Section, ...]] = (
-    Section(name="summary", title="In short"),
+    first_page.SECTION,
     Section(name="disc", title="The disc and its liquid"),
     Section(name="pressure", title="Pressure of the liquid"),
     Section(name="moment", title="Balancing moment and λ"),

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable
 from typing import Final
 
 from ringbalance.reports.numbers import (
-    MISSING,
     PLUS_MINUS,
     THIN_SPACE,
     given,
@@ -18,7 +16,7 @@ from ringbalance.reports.numbers import (
     shown,
     shown_apart,
 )
-from ringbalance.reports.section import Cells, Record, Table
+from ringbalance.reports.section import Record
 
 CLAIM_VERDICTS: Final = ("confirmed", "confirmed with correction", "refuted", "inconclusive", "not run")
 CHECK_VERDICTS: Final = ("passed", "failed", "inconclusive", "not run")
@@ -31,12 +29,12 @@ _TONES: Final = {
     "inconclusive": "open",
     "not run": "idle",
 }
-_LAWS: Final = ("calibrated", "paper")
 _RUNS: Final = {
     "blocked": "is blocked",
     "siphon": "runs as a full siphon",
     "separated": "runs separated",
     "reverse": "runs in reverse",
+    "cannot be told": "runs full or separated, which cannot be told",
 }
 
 
@@ -187,53 +185,3 @@ def _stall_number(point: Record) -> Record:
     parts = shown_apart(point["stall_pressure_Pa"], "Pa", point["stall_uncertainty"])
     said = f"{shown(point['stall_pressure_paper_Pa'], 'Pa')} by Eq. 19"
     return _key("Stall pressure", parts, said, "Below it a full siphon stops before the chamber is empty.")
-
-
-def _settling(run: Record) -> str:
-    return shown(run["settling_time_s"], "s", digits=3) if run["settled"] else "does not settle"
-
-
-def _regimes(run: Record) -> str:
-    return ", ".join(dict.fromkeys(item["regime"] for item in run["injections"])) or MISSING
-
-
-def _gas_time(run: Record) -> str:
-    return shown(math.fsum(item["duration_s"] for item in run["injections"]), "s", digits=3)
-
-
-def loop_table(evidence: Record) -> Table:
-    """The closed loop under both laws, line by line; a law that was not run shows a dash."""
-    runs = evidence["closed_loop"]
-
-    def row(label: str, read: Callable[[Record], str]) -> Cells:
-        return label, *(read(runs[law]) if law in runs else MISSING for law in _LAWS)
-
-    rows = [
-        row("Settling time", _settling),
-        row("Gas operations", lambda run: str(len(run["injections"]))),
-        row("Valve-open time in all", _gas_time),
-        row("Final amplitude", lambda run: shown(run["amplitude_m"][-1], "m", digits=2)),
-        row("Overshoots", lambda run: str(run["overshoots"])),
-        row("Misadjustments", lambda run: str(run["misadjustments"])),
-        row("Regime of the tube", _regimes),
-    ]
-    return Table(heads=("", "Calibrated law", "The paper’s law"), rows=rows)
-
-
-def loop_sentence(evidence: Record) -> str:
-    """What changes in the closed loop, in one sentence."""
-    runs = evidence["closed_loop"]
-    if not set(_LAWS) <= runs.keys():
-        return "The closed loop was not run under both laws."
-    found, paper = runs["calibrated"], runs["paper"]
-    if not (found["settled"] and paper["settled"] and paper["settling_time_s"]):
-        return f"Under the calibrated law the run {_ending(found)}; under the paper’s it {_ending(paper)}."
-    ratio = number(found["settling_time_s"] / paper["settling_time_s"], digits=2)
-    return (
-        f"With the calibrated law the loop settles in {_settling(found)}, "
-        f"{ratio} times the {_settling(paper)} that the paper’s law predicts."
-    )
-
-
-def _ending(run: Record) -> str:
-    return f"settles in {_settling(run)}" if run["settled"] else "does not settle"

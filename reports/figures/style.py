@@ -39,7 +39,13 @@ SURFACE: Final = "#090909"
 
 AS_PAPER: Final[dict[str, Any]] = {"color": PAPER, "linestyle": (0, (5, 2))}
 """A line of the paper's formulas."""
-REGIME_COLOURS: Final = {"siphon": FOUND, "separated": THIRD, "blocked": FIFTH, "reverse": FOURTH}
+REGIME_COLOURS: Final = {
+    "siphon": FOUND,
+    "separated": THIRD,
+    "blocked": FIFTH,
+    "reverse": FOURTH,
+    "cannot be told": MUTED,
+}
 MAP: Final = tuple(f"#0a0a{step:02x}" for step in range(1, 13))
 """Twelve shades from low to high, for a field in colour."""
 

@@ -143,6 +143,7 @@ _REGIME_LINES: Final[dict[str, Record]] = {
     "separated": {"linestyle": "-", "marker": "o", "markersize": 3.2, "markevery": 5},
     "blocked": {"linestyle": ":"},
     "reverse": {"linestyle": "-."},
+    "cannot be told": {"linestyle": "-", "marker": "x", "markersize": 3.2, "markevery": 5},
 }
 
 

@@ -16,9 +16,9 @@ from ringbalance.reports.studies.consequences import consequences_document, find
 
 _MEMBERS: Final = MappingProxyType({"light": 500, "heavy": 20_000})
 """Runs of each ensemble, by level: at 500 a probability is known to about four per cent."""
-_COLUMNS: Final = ("the paper’s law", "the calibrated law", "the calibrated law, gain re-tuned")
+_COLUMNS: Final = ("the paper’s law", "the calibrated law", "the calibrated law, recommended gain")
 _CHANCES: Final = (
-    ("not_settled", "does not settle in time"),
+    ("not_settled", "not settled by the time limit"),
     ("overshoot", "overshoots"),
     ("misadjustment", "raises the vibration"),
 )
@@ -26,7 +26,8 @@ _CHANCES: Final = (
 
 def _collect(work: Work) -> Record:
     members = _MEMBERS[work.level]
-    return consequences_document(find_consequences(work.scene, work.calibration.model, members=members))
+    found = find_consequences(work.scene, work.calibration.model, retuned=work.tuning.gain, members=members)
+    return consequences_document(found)
 
 
 def _view(found: Record, _evidence: Record) -> Record:
@@ -37,6 +38,7 @@ def _view(found: Record, _evidence: Record) -> Record:
         "runs": _run_table(found["runs"]),
         "chances": _chance_table(found["ensembles"]),
         "figure": _gain_margin(found["gain"][-1]) if found["gain"] else None,
+        "settling": _settling(found["ensembles"]),
     }
 
 
@@ -75,15 +77,15 @@ def _run_table(runs: list[Record]) -> Table:
         (
             run["title"],
             MISSING if run["proportional_s_per_m"] is None else _gain(run["proportional_s_per_m"]),
-            shown(run["settling_time_s"], "s", digits=3) if run["settled"] else "does not settle",
-            *(short(run[key]) for key in ("operations", "overshoots", "misadjustments")),
+            shown(run["settling_time_s"], "s", digits=3) if run["settled"] else run["verdict"],
+            *(short(run[key]) for key in ("injections", "overshoots", "misadjustments")),
         )
         for run in runs
     ]
     return Table(
         caption="One run each, with the scene’s noise. The law-based controller computes its valve-open "
         "times from a law and needs no gain.",
-        heads=("Run", "Kc", "Settled after", "Operations", "Overshoots", "Misadjustments"),
+        heads=("Run", "Kc", "Within the limit from", "Injections", "Overshoots", "Misadjustments"),
         rows=rows,
         style="",
     )
@@ -99,7 +101,7 @@ def _chance_table(ensembles: list[Record]) -> Table:
         caption="Probabilities over the uncertainty of k, λ, influence coefficient, lag angle and noise: "
         f"{members} runs each, 95 % intervals in brackets.",
         heads=("", *_COLUMNS[: len(ensembles)]),
-        rows=[*chances, ("settling time, median (5 % to 95 %)", *times)],
+        rows=[*chances, ("half of all runs settled by (5 %; 95 %)", *times)],
         style="",
     )
 
@@ -115,7 +117,36 @@ def _times(quantiles: Record | None) -> str:
         "not reached" if quantiles[key] is None else shown(quantiles[key], "s", digits=3)
         for key in ("0.05", "0.5", "0.95")
     )
-    return f"{middle} ({low} to {high})"
+    return f"{middle} ({low}; {high})"
+
+
+def _settling(ensembles: list[Record]) -> Drawing | None:
+    """Fraction of all runs that have settled by a time: those that never do are counted with the rest."""
+    if not all("settled_fraction" in ensemble["settling_time_s"] for ensemble in ensembles) or not ensembles:
+        return None
+    lines: tuple[Record, ...] = (style.AS_PAPER, {"color": style.FOUND}, {"color": style.THIRD})
+
+    def paint(axes: Axes) -> None:
+        for ensemble, title, line in zip(ensembles, _COLUMNS, lines, strict=False):
+            times = ensemble["settling_time_s"]
+            axes.plot(times["edges"], [0.0, *times["settled_fraction"]], label=title, **line)
+        axes.set(xlim=(0, None), ylim=(0, 1.02))
+
+    ends = "; ".join(
+        f"{percent(ensemble['settling_time_s']['settled_fraction'][-1])} under {title}"
+        for ensemble, title in zip(ensembles, _COLUMNS, strict=False)
+    )
+    return draw(
+        name="settled-fraction",
+        paint=paint,
+        x="time in s",
+        y="fraction of all runs settled",
+        columns=3,
+        wide=True,
+        height=3.0,
+        alt=f"Fraction of the runs that have settled, over time; by the time limit {ends}.",
+        caption=f"Fraction of all runs that have settled by a time. By the time limit: {ends}.",
+    )
 
 
 def _gain_margin(gain: Record) -> Drawing:

@@ -17,6 +17,7 @@ from ringbalance.reports.numbers import number
 from ringbalance.reports.section import Cells, Record, Section, Table
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.extremes.axes import Axis, axis_of
+from ringbalance.verification.extremes.design import PERIODS
 from ringbalance.verification.extremes.point import Ending
 from ringbalance.verification.extremes.study import MAP_PREFIX
 
@@ -138,7 +139,8 @@ def _map(name: str, columns: Record) -> Drawing:
         height=3.4,
         alt=f"Where the program answers over {x.title} and {y.title}, and where it refuses with a message.",
         caption=f"{x.title[0].upper()}{x.title[1:]} and {y.title}, all else as in the scene. "
-        "Unmarked: the loop ends in another way, most often because its time is up.",
+        f"Unmarked: the loop ends in another way, most often because its time of {PERIODS} control periods, "
+        "which need not be the scene’s, is up.",
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.algorithms.by_name import law_based_of, target_vector_of
+from ringbalance.controller.document import simulation_document
 from ringbalance.controller.ensemble.monte_carlo import (
     Ensemble,
     ensemble_document,
@@ -18,6 +19,8 @@ from ringbalance.controller.ensemble.monte_carlo import (
 from ringbalance.controller.ensemble.transfer import PairTransfer
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Simulation
+from ringbalance.controller.tuning.loop_factor import loop_factor
+from ringbalance.controller.tuning.recommendation import recommended_gain
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reports.studies.consequences_gain import GainCurve, LoopGain, loop_gain
@@ -27,8 +30,6 @@ MEMBERS: Final = 2000
 """Of each ensemble at the light level."""
 POINTS: Final = 50
 """Most entries of any array in the document."""
-FIRST_GAIN: Final = 0.5
-"""Gain per operation aimed at where the paper's law gives none, or one that overshoots."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +56,7 @@ class Consequences:
     gains: tuple[LoopGain, ...]
     """The paper's law, then the calibrated one; a law that does not flow at equal fills is missing."""
     retuned_proportional: float | None
-    """Kc for the calibrated law with the gain per operation that was meant, s/m; None when nothing flows."""
+    """Kc recommended for the calibrated law, s/m; None when nothing flows."""
     ensembles: tuple[Ensemble, ...]
     """The paper's law, the calibrated one, and the calibrated one with the re-tuned gain."""
     notes: tuple[str, ...]
@@ -65,14 +66,17 @@ class Consequences:
 
 
 def find_consequences(
-    scene: Scene, calibrated: BalancerModel, *, paper: BalancerModel | None = None, members: int = MEMBERS
+    scene: Scene,
+    calibrated: BalancerModel,
+    *,
+    paper: BalancerModel | None = None,
+    retuned: float | None = None,
+    members: int = MEMBERS,
 ) -> Consequences:
     """Run a scene's target-vector controller under both laws, with its margins, re-tuned, and law-based.
 
-    The re-tuned gain gives the calibrated loop the gain per operation that the scene's gain has under the
-    paper's law, Kc' = Kc (dA/dt)_paper/(dA/dt)_calibrated, or 0.5 where that is none or would overshoot.
     Args: `scene`: the scene; its controller's `kind` is not looked at. `paper`: by the paper's law; default
-    `paper_model(scene)`.
+    `paper_model(scene)`. `retuned`: Kc, s/m; default `recommended_gain`.
     Raises: SceneError: a rotor too slow to form a ring, or a model made for another disc.
     Source: sections 5 and 6 of the liquid-ring paper; the comparison is this program's.
     """
@@ -80,7 +84,7 @@ def find_consequences(
     notes: list[str] = []
     transfers = {m.name: _transfer(scene, m, notes) for m in (nominal, calibrated)}
     gains = {m.name: _gain(scene, m, transfers[m.name], notes) for m in (nominal, calibrated)}
-    retuned = _retuned(gains[nominal.name], gains[calibrated.name])
+    retuned = retuned or _recommended(scene, calibrated)
     tuned = scene if retuned is None else _with_gain(scene, retuned)
     asked = [(scene, nominal), (scene, calibrated)] + ([(tuned, calibrated)] if retuned else [])
     ensembles = [
@@ -121,11 +125,9 @@ def _gain(
     return found
 
 
-def _retuned(nominal: LoopGain | None, calibrated: LoopGain | None) -> float | None:
-    if calibrated is None:
-        return None
-    meant = FIRST_GAIN if nominal is None or nominal.per_operation >= 1 else nominal.per_operation
-    return meant / calibrated.slope
+def _recommended(scene: Scene, model: BalancerModel) -> float | None:
+    loop = loop_factor(scene, model, target_vector_of(scene))
+    return recommended_gain(scene, model, loop=loop) or None
 
 
 def _runs(
@@ -146,7 +148,7 @@ def _runs(
         run("calibrated", "the calibrated law, same controller", vector, scene, calibrated, same),
     ]
     if tuned is not None:
-        title = "the calibrated law, gain re-tuned"
+        title = "the calibrated law, recommended gain"
         runs.append(run("calibrated_retuned", title, vector, tuned, calibrated, target_vector_of(tuned)))
     title = "the calibrated law, no gain to tune"
     runs.append(run("law_based", title, law, scene, calibrated, law_based_of(scene, calibrated)))
@@ -171,9 +173,9 @@ def _findings(
             f"residual away in one operation, not {nominal.per_operation:.0%}: {_stability(calibrated)}.",
         ]
     if retuned is not None:
-        told.append(f"Re-tuned for the calibrated law the gain is {retuned * 1e-6:.3g} s/um.")
+        told.append(f"Recommended for the calibrated law is a gain of {retuned * 1e-6:.3g} s/um.")
     told += [f"Run under {run.title}: {_ending(run.simulation)}." for run in runs]
-    for ensemble, of in zip(ensembles, ("", "", " with the re-tuned gain"), strict=False):
+    for ensemble, of in zip(ensembles, ("", "", " with the recommended gain"), strict=False):
         told.append(
             f"Of {ensemble.members} runs under the {ensemble.law} law{of}, {ensemble.overshoot.value:.1%} "
             "overshoot, "
@@ -187,15 +189,14 @@ def _stability(gain: LoopGain) -> str:
     h = gain.per_operation
     if h >= 2:
         return "the residual grows"
-    return (
-        f"it turns round each time, {2 / h:.3g} times below instability" if h > 1 else "it does not overshoot"
-    )
+    turns = f"it turns round each time, and from a gain {2 / h:.3g} times as large it grows"
+    return turns if h > 1 else "it does not overshoot"
 
 
 def _ending(simulation: Simulation) -> str:
     turns = f"{simulation.overshoots} overshoots, {simulation.misadjustments} misadjustments"
     if simulation.settling_time is None:
-        return f"not settled ({simulation.outcome.value.replace('_', ' ')}), {turns}"
+        return f"{simulation.verdict.value} ({simulation.outcome.value.replace('_', ' ')}), {turns}"
     return f"settled after {simulation.settling_time:.3g} s, {turns}"
 
 
@@ -214,6 +215,7 @@ def consequences_document(found: Consequences) -> dict[str, Any]:
 
 def _run_document(run: Run) -> dict[str, Any]:
     simulation = run.simulation
+    whole = simulation_document(simulation)
     closed = [i.time + i.operation.duration for i in simulation.injections]
     end = min(float(simulation.time[-1]), 1.2 * max(closed, default=np.inf))
     known = np.flatnonzero(simulation.time <= end)
@@ -226,11 +228,16 @@ def _run_document(run: Run) -> dict[str, Any]:
         "law": simulation.law,
         "settled": simulation.settled,
         "settling_time_s": simulation.settling_time,
+        "verdict": simulation.verdict.value,
         "outcome": simulation.outcome.value,
+        "loop_factor": simulation.loop.value,
+        "stationary_deviation_m": whole["stationary_deviation_m"],
         "status": simulation.status,
         "overshoots": simulation.overshoots,
         "misadjustments": simulation.misadjustments,
         "operations": len({injection.time for injection in simulation.injections}),
+        "injections": len(simulation.injections),
+        "gas": whole.get("gas"),
         "gas_time_s": float(sum(i.operation.duration for i in simulation.injections)),
         "limit_m": simulation.limit,
         "time_s": simulation.time[shown].tolist(),

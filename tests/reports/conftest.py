@@ -140,6 +140,12 @@ def _calibration() -> dict[str, Any]:
                 "estimated_contribution": 0.08,
             },
         ],
+        "residual_liquid": {
+            "pair_moment_kg_m": 1238e-6,
+            "usable_pair_moment_kg_m": 922e-6,
+            "usable_pair_moment_uncertainty": 100e-6,
+        },
+        "status": {"code": "ok", "text": "solved"},
         "statistics": {"unknowns": 784.0},
     }
 
@@ -153,6 +159,7 @@ def _run(settling: float, steps: int, law: str) -> dict[str, Any]:
             "duration_s": 0.8 / (i + 1),
             "regime": "siphon" if law == "paper" else "separated",
             "regime_end": "siphon",
+            "event": "none",
             "fill_before": 0.25 - 0.01 * i,
             "fill_after": 0.24 - 0.01 * i,
         }
@@ -163,6 +170,10 @@ def _run(settling: float, steps: int, law: str) -> dict[str, Any]:
         "law": law,
         "settled": True,
         "settling_time_s": settling,
+        "verdict": "settled",
+        "loop_factor": 0.8 if law == "calibrated" else 0.575,
+        "loop_factor_limit": 2.0,
+        "stationary_deviation_m": 9e-9,
         "status": "settled below the limit",
         "time_s": _floats(time),
         "amplitude_m": _floats(1e-5 * np.exp(-time / settling * 5.3) + 4e-8),
@@ -321,6 +332,13 @@ def document() -> dict[str, Any]:
             ],
         },
         "seeds": {"run": 0},
+        "summary": {
+            "needed_moment_kg_m": 700e-6,
+            "bore_m": 1.5e-3,
+            "bore_uncertainty_stated": False,
+            "time_limit_s": 120.0,
+            "other_reading": None,
+        },
         "limit_m": 5e-8,
         "paper": {
             "drag_coefficient": 50.0,

@@ -49,8 +49,9 @@ def _consequences() -> Record:
         "title": "the calibrated law, same controller",
         "proportional_s_per_m": 0.08e6,
         "settled": False,
+        "verdict": "hovering",
         "settling_time_s": None,
-        "operations": 115,
+        "injections": 115,
         "overshoots": 96,
         "misadjustments": 2,
     }
@@ -69,7 +70,7 @@ def test_every_number_is_the_evidences_own() -> None:
     assert list(view["gains"].heads) == ["", "the paper’s law", "the calibrated law"]
     shares = next(row for row in view["gains"].rows if row[0].startswith("share"))
     assert [cell.replace("\u202f", " ") for cell in shares[1:]] == ["60.0 %", "194 %"]
-    assert view["runs"].rows[0][2] == "does not settle"
+    assert view["runs"].rows[0][2] == "hovering"
     assert view["runs"].rows[0][4] == "96"
     assert "4.2" in view["chances"].rows[-1][1]
     assert "40" in view["chances"].rows[1][2]
@@ -88,7 +89,7 @@ def test_the_page_has_the_section_only_with_its_evidence(evidence: Record) -> No
     assert 'href="#consequences"' not in without
     page = render({**evidence, "consequences": _consequences()})
     assert page.count('href="#consequences"') == 1
-    assert "does not settle" in page
+    assert "hovering" in page
     assert "gain-margin" in page
 
 

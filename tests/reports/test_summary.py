@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import pytest
-
 from ringbalance.reports.summary import (
     CHECK_VERDICTS,
     CLAIM_VERDICTS,
@@ -14,8 +12,6 @@ from ringbalance.reports.summary import (
     headlines,
     key_numbers,
     lead_sentence,
-    loop_sentence,
-    loop_table,
     tone,
     verdict_counts,
 )
@@ -69,23 +65,3 @@ def test_numbers_come_with_their_bars(evidence: Record) -> None:
     assert shown["Drag coefficient k"]["paper"] == "about 50"
     assert shown["Velocity in the tube"]["half_width"] == "±\u202f0.3"
     assert all(item["half_width"] for item in shown.values())
-
-
-@pytest.mark.parametrize(
-    ("calibrated", "paper", "said"),
-    [
-        (True, True, "0.74 times the 4.60\u202fs"),
-        (False, True, "it does not settle"),
-        (True, False, "the paper’s it does not settle"),
-    ],
-)
-def test_the_loops_are_compared(evidence: Record, calibrated: bool, paper: bool, said: str) -> None:
-    for law, settled in (("calibrated", calibrated), ("paper", paper)):
-        evidence["closed_loop"][law].update(settled=settled)
-        if not settled:
-            evidence["closed_loop"][law]["settling_time_s"] = None
-    assert said.replace("it does", "the run does" if not calibrated else "it does") in loop_sentence(evidence)
-    rows = {row[0]: row for row in loop_table(evidence).rows}
-    assert (rows["Settling time"][1] == "does not settle") is not calibrated
-    assert rows["Gas operations"][1] == "6"
-    assert rows["Regime of the tube"][2] == "siphon"

@@ -115,7 +115,7 @@ def remedies_of(facts: RunFacts, outcome: EccentricOutcome) -> tuple[Remedy, ...
     """What would mend the run, the likeliest first.  An unstable loop comes before all else."""
     if outcome in {EccentricOutcome.SETTLED, EccentricOutcome.LOCKED}:
         return ()
-    own = _REMEDIES.get(outcome, lambda _: ())(facts)
+    own = _REMEDIES[outcome](facts) if outcome in _REMEDIES else ()
     gains = None if outcome is EccentricOutcome.TIME_LIMIT else gain_remedy(facts.scene)
     return (gains, *own) if gains else own
 

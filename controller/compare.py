@@ -14,7 +14,6 @@ from ringbalance.controller.compare_rotor import OneRotor, own_scene, rotor_of, 
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.sampled_loops import recommended_gains
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.simulation import Simulation
 from ringbalance.controller.tuning.loop_factor import loop_factor
 from ringbalance.controller.tuning.recommendation import recommended_gain
 from ringbalance.reduced_model.law.model import BalancerModel
@@ -155,26 +154,13 @@ def _liquid_side(scene: Scene, model: BalancerModel, *, span: float, runs: int, 
         Result(
             time=math.inf if run.settling_time is None else run.settling_time,
             residual_ratio=float(run.amplitude[-1] / run.amplitude[0]),
-            energy=_gas_energy(run, scene, model),
+            energy=run.gas.energy,
             worst_amplitude=float(np.max(run.amplitude)),
             status=run.status,
         )
         for run in done
     )
     return Side(scene=ready, tuned=changes, results=results, models_used=done[0].models_used)
-
-
-def _gas_energy(run: Simulation, scene: Scene, model: BalancerModel) -> float:
-    """Least work that compresses the gas of a run, p1 V ln(p1/p0) for each filling of a chamber, J.
-
-    Every injection counts as a whole filling of the space above its liquid; p1 is the absolute gas pressure.
-    """
-    ambient, dead = scene.gas.ambient_pressure, scene.gas.dead_volume or 0.0
-    pressure = scene.gas.pressure + ambient
-    space = math.fsum(
-        model.chamber_volume * (1.0 - injection.operation.fill_after) + dead for injection in run.injections
-    )
-    return pressure * space * math.log(pressure / ambient)
 
 
 def _driven_side(rotor: OneRotor, scene: EccentricScene, *, span: float, runs: int, tuned: bool) -> Side:

@@ -15,6 +15,7 @@ from ringbalance.controller.tuning.eccentric import eccentric_tuning_document, s
 from ringbalance.controller.tuning.tune import Tuning, tuning_document
 from ringbalance.controller.tuning.tune import tune as tune_scene
 from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.gas_line import line_text, line_warning
 from ringbalance.reduced_model.law.loading import load_model
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
@@ -84,6 +85,9 @@ def _eccentric_masses(scene: EccentricScene, *, json: bool) -> int:
 
 def _show(tuning: Tuning, console: Console) -> None:
     console.print(Text(tuning.status, style=f"bold {'green' if tuning.succeeded else 'yellow'}"))
+    warning = line_warning(tuning.gas_line)
+    if warning:
+        console.print(Text(warning, style="yellow"))
     table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
     table.add_column(style="dim")
     table.add_column()
@@ -122,7 +126,8 @@ def _rows(tuning: Tuning) -> dict[str, str]:
             f"{tuning.first_gas_time:.3g} s at first, {tuning.last_gas_time * 1e3:.3g} ms at the limit; the "
             f"valve's shortest is {settings.minimum_gas_time * 1e3:.3g} ms"
         )
-    rows["smallest correction"] = f"{tuning.smallest_correction * _UM:.4g} um"
+    rows["smallest correction of the valve"] = f"{tuning.smallest_correction * _UM:.4g} um"
+    rows["gas line"] = line_text(tuning.gas_line)
     return rows | _settling(tuning)
 
 

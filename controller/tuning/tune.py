@@ -19,6 +19,7 @@ from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor, v
 from ringbalance.controller.tuning.margins import Margins, loop_margins
 from ringbalance.controller.tuning.recommendation import factor_uncertainty, recommended_gain
 from ringbalance.reduced_model.chamber.gravity import check_ring
+from ringbalance.reduced_model.gas_line import LineAnswer, line_answers, line_document
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.selection.registry import ModelUsed
 from ringbalance.scene.arrays import FloatArray
@@ -83,16 +84,19 @@ class Tuning:
     """Change of the vibration by the shortest valve-open time in the fastest chamber, m."""
     dead_zone: float
     """Largest amplitude at which no valve may open any more, m."""
-    reachable: bool
-    """Whether the valves' shortest time can bring the amplitude below the limit."""
+    reachable: bool | None
+    """Whether valves and gas line can bring the amplitude below the limit; None: the line is not known."""
+    gas_line: tuple[LineAnswer, ...]
+    """What the gas line can deliver, or both ends of a default range of lines."""
     settling: SettlingTimes | None
     models_used: tuple[ModelUsed, ...]
     status: str
 
     @property
     def succeeded(self) -> bool:
-        """Whether 95 % of the runs settle within the scene's time limit."""
-        return self.reachable and self.settling is not None and self.settling.quantiles["p95"] is not None
+        """Whether 95 % of the runs settle in time, and nothing that is known stands against it."""
+        reached = self.settling is not None and self.settling.quantiles["p95"] is not None
+        return reached and self.reachable is not False
 
 
 def tune(
@@ -124,7 +128,8 @@ def tune(
     loop = loop_factor(tuned, model, controller_of(tuned, model))
     smallest = float(np.max(vibration_rates(scene, model))) * scene.controller.minimum_gas_time
     dead = _dead_zone(tuned, smallest)
-    reachable = wanted > 0 and loop.stays and max(dead, smallest / 2) <= scene.controller.limit
+    lines = line_answers(scene, model)
+    within = wanted > 0 and loop.stays and max(dead, smallest / 2) <= scene.controller.limit
     told("settling times ...")
     settling = _settling(tuned, model, widths, members=members, runs=runs, told=told) if wanted > 0 else None
     amplitude, limit = scene.rotor.initial_amplitude, scene.controller.limit
@@ -140,11 +145,20 @@ def tune(
         last_gas_time=wanted * limit if wanted > 0 else None,
         smallest_correction=smallest,
         dead_zone=dead,
-        reachable=reachable,
+        reachable=within and _line_reaches(lines),
+        gas_line=lines,
         settling=settling,
         models_used=run_models(scene=scene, model=model),
         status=_status(tuned, loop, dead=dead, smallest=smallest, settling=settling, flows=present.rate > 0),
     )
+
+
+def _line_reaches(lines: tuple[LineAnswer, ...]) -> bool | None:
+    """Whether a given line can; of a default range: True when all can, None when that is not sure."""
+    above = [answer.above_limit for answer in lines]
+    if not any(above):
+        return True
+    return False if all(answer.end == "given" for answer in lines) else None
 
 
 def _silent(_: str) -> None:
@@ -344,6 +358,7 @@ def tuning_document(tuning: Tuning) -> dict[str, Any]:
         "dead_zone_m": tuning.dead_zone,
         "limit_m": scene.controller.limit,
         "reachable": tuning.reachable,
+        "gas_line": line_document(tuning.gas_line),
         "settling_time_s": None if settling is None else settling.quantiles,
         "fraction_settled": None if settling is None else settling.settled.value,
         "fraction_settled_95": None if settling is None else [settling.settled.low, settling.settled.high],

@@ -45,7 +45,11 @@ def test_the_smallest_correction_is_that_of_the_plant(
         moved = 0.25 - pulse(dynamics, 1.0001 * opening, end).fill
         moment = calibrated.moment.pair_moment(fill_ratio=0.25 - moved, opposite_fill_ratio=0.25 + moved)
         change = abs(float(moment)) * scene.rotor.influence_coefficient
-        assert answer.smallest_correction == pytest.approx(change, rel=0.1)
+        assert answer.smallest_correction is not None
+        if not inertia:
+            assert answer.smallest_correction == pytest.approx(change, rel=0.1)
+        # A column with mass does not reach the quasi-steady velocity in so short an injection.
+        assert 0 < change < 1.1 * answer.smallest_correction
 
 
 def test_a_line_that_is_not_given_is_a_range(calibrated: BalancerModel, scene: Scene) -> None:
@@ -55,7 +59,7 @@ def test_a_line_that_is_not_given_is_a_range(calibrated: BalancerModel, scene: S
     assert slow.filling_time == pytest.approx(5 * fast.filling_time)
     assert slow.smallest_correction == pytest.approx(5 * (fast.smallest_correction or 0.0), rel=0.1)
     assert slow.above_limit
-    assert "over its default range" in line_warning((slow, fast))
+    assert "above the limit" in line_warning((slow, fast))
     assert "not in the scene" in line_text((slow, fast))
 
 

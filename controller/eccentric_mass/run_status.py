@@ -259,7 +259,8 @@ _REASONS: Final[dict[EccentricOutcome, _Text]] = {
     ),
     EccentricOutcome.IMBALANCE_UNCERTAIN: _imbalance_uncertain,
     EccentricOutcome.FRICTION_UNCERTAIN: lambda facts: (
-        f"the friction did not become known to {100 * facts.scene.friction_filter.gate:.3g} %"
+        "the friction did not become known to friction_filter.gate, "
+        f"{100 * facts.scene.friction_filter.gate:.3g} %"
     ),
     EccentricOutcome.STALLED: lambda _: "the drives stalled, so that friction could not be found",
     EccentricOutcome.NOT_ARRIVED: lambda facts: (

@@ -102,7 +102,7 @@ def test_claims_come_out_with_these_verdicts(results: Mapping[str, CaseResult]) 
         if result.definition.kind == "claim" and result.definition.paper == "liquid_ring"
     }
     confirmed = {1, 2, 13, 17, 20}
-    inconclusive = {7, 9, 14, 15, 16}
+    inconclusive = {9, 14, 15, 16}
     assert {number for number, verdict in verdicts.items() if verdict == "confirmed"} == confirmed
     assert {number for number, verdict in verdicts.items() if verdict == "inconclusive"} == inconclusive
     assert {number for number, verdict in verdicts.items() if verdict == "refuted"} == (
@@ -155,10 +155,13 @@ def _with_bore(scene: Scene, bore: float) -> Scene:
 
 
 def _departures_are_the_law_s(numbers: Mapping[str, float], scene: Scene) -> None:
-    """One k beside the law's own k(u), which moves by a few hundredths over the range."""
+    """By hand for a full tube: rho omega^2 (R2^2 - a^2)/2 with R2 = 44.5 mm and a = 34.89 mm."""
+    level = 1000 * scene.rotor.speed**2 * (44.5e-3**2 - 34.89e-3**2) / 2
     for name, pressure in (("low", 0.7e6), ("high", 1.5e6)):
-        law = 1 - _velocity(scene, 0.0, pressure) / _velocity(scene, 0.5, pressure)
-        assert numbers[f"departure_{name}"] == pytest.approx(law, abs=0.03)
+        full = 1 - math.sqrt((pressure - level) / (pressure + level))
+        own = 1 - _velocity(scene, 0.0, pressure) / _velocity(scene, 0.5, pressure)
+        assert numbers[f"departure_{name}"] == pytest.approx(full, abs=1e-3)
+        assert numbers[f"law_{name}"] == pytest.approx(own, abs=2e-3)
 
 
 def _the_gas_needs_more_pressure_than_eq_12_gives(numbers: Mapping[str, float], scene: Scene) -> None:
@@ -177,7 +180,7 @@ def _both_bores_move_the_liquid_equally_fast(numbers: Mapping[str, float], scene
     oil = liquid_at(name="silicone oil 350 cSt", temperature=298.15)
     slow = _velocity(dataclasses.replace(scene, liquid=oil), middle, scene.gas.pressure)
     k = 2 * scene.gas.pressure / oil.density / slow**2 - 1
-    assert numbers["liquid_high"] >= 0.9 * k > 10 * numbers["liquid_low"]
+    assert k > 0.9 * numbers["liquid_high"] > 10 * numbers["liquid_low"]
 
 
 def _the_denser_liquid_stops_where_its_column_stops(numbers: Mapping[str, float], scene: Scene) -> None:

@@ -14,10 +14,11 @@ from scipy.optimize import brentq
 from ringbalance.physics.tube.loss import TubeLoss, tube_loss
 from ringbalance.reduced_model.paper.formulas import PAPER_DRAG_COEFFICIENT
 from ringbalance.scene.models import Scene
+from ringbalance.verification.loops import calibration_of
 from ringbalance.verification.reference.exact_chamber import wall_pressure_of
 
 _VELOCITIES: Final = (1e-4, 3000.0, 401)
-_NARROWEST: Final = 0.1
+_NARROWEST: Final = 0.4
 """Smallest bore looked at, in units of the scene's."""
 _LEAST: Final = 0.05
 """Smallest head asked for, in units of the gas pressure's: below it lies a stall."""
@@ -91,18 +92,20 @@ def with_bore(scene: Scene, factor: float) -> Scene:
 
 @lru_cache(maxsize=16)
 def second_reading(scene: Scene) -> Scene:
-    """The scene with the bore of a bare tube that carries what the scene's own would carry with k = 50.
+    """The scene with the bore in which the calibrated law moves what the scene's own moves with k = 50.
 
     Fig. 7 fixes only the product of influence coefficient, lambda, tube area and velocity. The paper's disc
-    has its bore from k = 50; this bore gives the same flow at equal fills with the tube's own k. A scene
+    has its bore from k = 50; this bore gives the same flow at equal fills under the calibrated law. A scene
     whose k is prescribed, or whose tube carries less than with k = 50, is returned as it is.
     """
     head = scene.gas.pressure / scene.liquid.density
     target = math.sqrt(2 * head / (PAPER_DRAG_COEFFICIENT + 1))
 
     def excess(factor: float) -> float:
-        return factor**2 * running_tube(with_bore(scene, factor), head=head).velocity - target
+        law = calibration_of(with_bore(scene, factor)).flow_law
+        flow = law.evaluate(fill_ratio=law.max_fill_ratio / 2, gas_pressure=scene.gas.pressure, primed=True)
+        return factor**2 * float(flow.velocity) - target
 
     if scene.tube.drag_coefficient is not None or excess(1.0) <= 0:
         return scene
-    return with_bore(scene, float(brentq(excess, _NARROWEST, 1.0, xtol=1e-6)))
+    return with_bore(scene, float(brentq(excess, _NARROWEST, 1.0, xtol=1e-4)))

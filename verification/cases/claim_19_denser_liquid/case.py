@@ -46,6 +46,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     if reach_light <= scene.disc.max_fill_ratio / 2:
         raise NotRunError("the gas pressure of this scene does not start the flow from equal fills")
     gain = _ability(scene, dense, reach_dense) / _ability(scene, light, reach_light)
+    full_tube = _reach(laws[1], scene.gas.pressure, full=True)
     return Evidence(
         found={
             "pressure_ratio": Found(value=ratio, numerical=standard_uncertainty),
@@ -57,6 +58,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "gas": scene.gas.pressure,
             "reach_light": reach_light,
             "reach_dense": reach_dense,
+            "gain_full": _ability(scene, dense, full_tube) / _ability(scene, light, reach_light),
             "prime_light": _priming(scene, light),
             "prime_dense": _priming(scene, felt),
         },
@@ -78,14 +80,14 @@ def _law(scene: Scene, density: float) -> FlowLaw:
     return calibration_of(dataclasses.replace(scene, liquid=liquid)).flow_law
 
 
-def _reach(law: FlowLaw, gas_pressure: float) -> float:
+def _reach(law: FlowLaw, gas_pressure: float, *, full: bool = False) -> float:
     """Largest fill of the opposite chamber that a law reaches from equal fills and an empty tube."""
     largest = law.max_fill_ratio
-    start = law.evaluate(fill_ratio=largest / 2, gas_pressure=gas_pressure, primed=False)
+    start = law.evaluate(fill_ratio=largest / 2, gas_pressure=gas_pressure, primed=full)
     low, high = 0.0, largest / 2
     for _ in range(_REFINEMENTS):
         fill = np.linspace(high, low, _POINTS)
-        flow = law.evaluate(fill_ratio=fill, gas_pressure=gas_pressure, primed=bool(start.primed))
+        flow = law.evaluate(fill_ratio=fill, gas_pressure=gas_pressure, primed=full or bool(start.primed))
         stopped = np.flatnonzero(flow.velocity <= 0)
         if not stopped.size:
             return largest - low

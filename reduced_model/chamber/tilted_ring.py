@@ -129,7 +129,9 @@ class _Search:
     def narrowed(self, excess: FloatArray, opening: FloatArray) -> _Search:
         """After the liquid's area exceeded its target by `excess`, which falls with b^2 like `opening`."""
         if not self.halved:
-            return replace(self, value=self.value + excess / opening)
+            # No opening: the surface has left the chamber, and the bound is the next place to look.
+            step = excess / np.maximum(opening, np.finfo(float).tiny ** 0.5)
+            return replace(self, value=np.clip(self.value + step, self.low, self.high))
         low = np.where(excess > 0, self.value, self.low)
         high = np.where(excess > 0, self.high, self.value)
         return replace(self, value=(low + high) / 2, low=low, high=high)
@@ -198,9 +200,15 @@ def _across(disc: Disc, length: float, fills: FloatArray, turn: int, cut: bool) 
     return _Turned(
         wall_pressure=np.sum(weight * np.maximum(depth, 0.0), axis=2),
         moment=np.sum(weight * _moment_on_rays(disc, radius, eta), axis=2),
-        moment_per_volume=np.sum(share * radius * np.cos(eta * half), axis=2) / np.sum(share, axis=2),
+        moment_per_volume=_mean(radius * np.cos(eta * half), share),
         closed=np.all(depth > 0, axis=2),
     )
+
+
+def _mean(values: FloatArray, share: FloatArray) -> FloatArray:
+    """Weighted by shares of the surface; 0 where none of it is wet."""
+    wet = np.sum(share, axis=2)
+    return np.asarray(np.divide(np.sum(share * values, axis=2), wet, out=np.zeros_like(wet), where=wet > 0))
 
 
 def _level(

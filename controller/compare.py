@@ -168,8 +168,10 @@ def _driven_side(rotor: OneRotor, scene: EccentricScene, *, span: float, runs: i
     ready = replace(scene, run=replace(scene.run, time_limit=span + start))
     changes: dict[str, float] = {}
     if tuned:
-        high = [loop for loop in recommended_gains(ready).loops if loop.value > loop.recommended]
-        changes = {loop.key: loop.recommended for loop in high}
+        advice = recommended_gains(ready)
+        changes = {loop.key: loop.recommended for loop in advice.loops if loop.value > loop.recommended}
+        if advice.drive_speed > ready.friction_filter.drive_speed:
+            changes["friction_filter.drive_speed"] = advice.drive_speed
         for key, value in changes.items():
             table, name = key.split(".")
             changed: dict[str, Any] = {table: replace(getattr(ready, table), **{name: value})}

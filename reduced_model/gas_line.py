@@ -195,8 +195,10 @@ def _venting(model: BalancerModel, fill: float, line: GasLine, volume: float, pr
     """
     alone = _metres(model, fill, pressure - line.ambient_pressure, line.venting_time(pressure, volume=volume))
     middle = (pressure[1:] + pressure[:-1]) / 2
-    given_way = middle * model.tube_area * alone / (volume * np.diff(pressure))
-    return float(np.sum(alone / (1 + given_way)))
+    by_line, by_liquid = volume * np.diff(pressure), middle * model.tube_area * alone
+    # Where the pressure does not fall, nothing passes.
+    total = np.where(by_line > 0, by_line + by_liquid, 1.0)
+    return float(np.sum(alone * by_line / total))
 
 
 def line_text(answers: tuple[LineAnswer, ...]) -> str:

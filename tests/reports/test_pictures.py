@@ -118,8 +118,10 @@ def test_the_tube_is_coloured_by_its_own_pressures(paper_scene: Scene) -> None:
     assert radius[field["hump"]] == pytest.approx(paper_scene.tube.hump_radius)
     np.testing.assert_allclose(points[0, :2], -points[-1, :2], atol=1e-12)
     assert np.all(np.linalg.norm(np.diff(points, axis=0), axis=1) > 0)
-    # Separated at the crest: the lowest pressure begins there.
-    assert pressure[field["hump"]] == pytest.approx(pressure.min(), abs=1.0)
+    # The tube follows the circle of the crest, with friction: the lowest pressure begins where the arc ends.
+    arc_end = np.flatnonzero(np.isclose(radius, radius.min()))[-1]
+    assert pressure[field["hump"]] > pressure[arc_end]
+    assert pressure[arc_end] == pytest.approx(pressure.min(), abs=0.01 * np.ptp(pressure))
     assert not all(field["full"])
 
 

@@ -92,11 +92,11 @@ def _derived(scene: EccentricScene, changes: set[str]) -> EccentricScene:
         if not hasattr(scene, table):
             continue
         presence = _keys(scene, table)[name].presence
-        if presence.rule is not None and not changes.isdisjoint(presence.needs) and path not in changes:
+        if not changes.isdisjoint(presence.needs) and path not in changes:
             needed = [
                 getattr(getattr(scene, part), key) for part, key in (p.split(".") for p in presence.needs)
             ]
-            value = presence.rule(*needed)
+            value = presence.value(*needed)
             scene = replace(scene, **{table: replace(getattr(scene, table), **{name: value})})
             changes.add(path)
     return scene

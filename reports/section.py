@@ -11,12 +11,14 @@ from typing import Any, Final, Literal
 from ringbalance.controller.tuning.tune import Tuning, tune
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reports.numbers import MISSING
+from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene import Scene
 from ringbalance.verification.loops import calibration_of
 
 Record = dict[str, Any]
 Cells = Sequence[str]
 _TUNING_RUNS: Final = 500
+_TERM_RUNS: Final = 10
 Level = Literal["light", "heavy"]
 
 
@@ -59,7 +61,11 @@ class Work:
 @lru_cache(maxsize=4)
 def tuning_of(scene: Scene) -> Tuning:
     """One tuning serves every report of a scene within a process."""
-    return tune(scene, model_of=lambda asked: calibration_of(asked).model, members=_TUNING_RUNS)
+    return tune(scene, model_of=_model_of, members=_TUNING_RUNS, runs=_TERM_RUNS)
+
+
+def _model_of(scene: Scene) -> BalancerModel:
+    return calibration_of(scene).model
 
 
 def _nothing(_work: Work) -> None:

@@ -114,7 +114,22 @@ def percent(fraction: float) -> str:
 @lru_cache(maxsize=8)
 def term_estimates(scene: Scene) -> Mapping[str, TermEstimate]:
     """Estimates of all terms of a scene, by term."""
-    return MappingProxyType({**_chamber(scene), **_tube(scene), **injection_estimates(scene)})
+    return MappingProxyType({**_steady(_without_loop(scene)), **injection_estimates(scene)})
+
+
+@lru_cache(maxsize=8)
+def _steady(scene: Scene) -> Mapping[str, TermEstimate]:
+    return {**_chamber(scene), **_tube(scene)}
+
+
+def _without_loop(scene: Scene) -> Scene:
+    """The scene with one value of all that tunes a loop or draws its runs; a steady flow knows none of it."""
+    return replace(
+        scene,
+        rotor=replace(scene.rotor, influence_coefficient=1.0, lag_angle=0.0),
+        controller=replace(scene.controller, proportional=1.0),
+        run=replace(scene.run, seed=0, time_limit=1.0),
+    )
 
 
 def _by_term(scene: Scene, *rows: Row) -> dict[str, TermEstimate]:
@@ -193,7 +208,7 @@ def injection_estimates(scene: Scene) -> Mapping[str, TermEstimate]:
         that the deciding injection moves, at most 1.
     Source: `time_scales`.
     """
-    flow, deciding = range_flow(scene), injection_time(scene)
+    flow, deciding = range_flow(_without_loop(scene)), injection_time(scene)
     within = f"in the shortest injection that matters, {1e3 * deciding:.3g} ms"
     slowest = float(np.min(flow.velocity[flow.starts], initial=np.inf))
     held = None if not np.isfinite(slowest) else min(scene.tube.length / max(slowest * deciding, 1e-300), 1.0)
@@ -262,7 +277,7 @@ def injection_time(scene: Scene) -> float:
     """
     equal = by_closed_form(scene, scene.disc.max_fill_ratio / 2)
     area = np.pi / 4 * scene.tube.bore**2
-    flow = scene.liquid.density * area * flow_estimate(scene).velocity
+    flow = scene.liquid.density * area * flow_estimate(_without_loop(scene)).velocity
     return deciding_gas_time(scene, rate=scene.rotor.influence_coefficient * equal.moment_per_mass * flow)
 
 

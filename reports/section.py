@@ -10,8 +10,8 @@ from typing import Any, Final, Literal
 
 from ringbalance.controller.tuning.tune import Tuning, tune
 from ringbalance.reduced_model.calibration import Calibration
-from ringbalance.reports.numbers import MISSING
 from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reports.numbers import MISSING
 from ringbalance.scene import Scene
 from ringbalance.verification.loops import calibration_of
 

@@ -39,7 +39,8 @@ class GasUse:
     def text(self) -> str:
         """Consumption in one phrase."""
         litres = self.normal_volume / _LITRE
-        return f"{litres:.3g} normal litres, {self.energy:.3g} J of compression in {self.fillings} fillings"
+        work = f"{self.energy / 1e3:.1f} kJ of compression"
+        return f"{litres:.1f} normal litres, {work} in {self.fillings} fillings"
 
     @property
     def warning(self) -> str:

@@ -12,14 +12,10 @@ from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.show import show_eccentric
 from ringbalance.controller.loop import simulate as run_loop
 from ringbalance.controller.show import show
-from ringbalance.reduced_model.calibration import calibrate
-from ringbalance.reduced_model.law.loading import load_model
-from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.law.paper_law import paper_model
+from ringbalance.reduced_model.law_by_name import law_by_name
 from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.loader import load_scene
-from ringbalance.scene.models import Scene
 from ringbalance.scene.platform.progress import Activity, activity
 from ringbalance.scene.platform.terminal import results_console
 
@@ -55,8 +51,7 @@ def simulate(
     if isinstance(told, EccentricScene):
         return _eccentric_masses(told, json=json)
     with activity("simulate", f"flow law: {law} ...") as shown:
-        model = _model(told, law)
-        found = run_loop(told, model, progress=_clock(shown))
+        found = run_loop(told, law_by_name(told, law), progress=_clock(shown))
     if json:
         print(json_format.dumps(simulation_document(found), allow_nan=False))
     else:
@@ -78,9 +73,3 @@ def _eccentric_masses(scene: EccentricScene, *, json: bool) -> int:
 def _clock(shown: Activity) -> Callable[[float, float], None]:
     """Shows the simulated time, s, of the time limit, s."""
     return lambda time, limit: shown.show(f"{time:.1f} s of {limit:g} s simulated", done=time, total=limit)
-
-
-def _model(scene: Scene, law: str) -> BalancerModel:
-    if law == "calibrated":
-        return calibrate(scene).model
-    return paper_model(scene) if law == "paper" else load_model(Path(law))

@@ -12,13 +12,9 @@ from rich.table import Table
 
 from ringbalance.controller.compare import Comparison, Side, comparison_document
 from ringbalance.controller.compare import compare as compare_scenes
-from ringbalance.reduced_model.calibration import calibrate
-from ringbalance.reduced_model.law.loading import load_model
-from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.law.paper_law import paper_model
+from ringbalance.reduced_model.law_by_name import law_by_name
 from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.loader import load_scene
-from ringbalance.scene.models import Scene
 from ringbalance.scene.platform.progress import activity
 from ringbalance.scene.platform.terminal import results_console
 
@@ -51,15 +47,9 @@ def compare(
     Raises:
         SceneError: a scene that cannot be used, or a balancer that cannot work on that rotor.
     """
-
-    def model_of(scene: Scene) -> BalancerModel:
-        if law == "calibrated":
-            return calibrate(scene).model
-        return paper_model(scene) if law == "paper" else load_model(Path(law))
-
     told = [with_tolerance(load_scene(path), tolerance=tolerance, models=models) for path in (first, second)]
     with activity("compare", "both balancers on one rotor ..."):
-        found = compare_scenes(*told, model_of=model_of)
+        found = compare_scenes(*told, model_of=lambda scene: law_by_name(scene, law))
     if json:
         print(json_format.dumps(comparison_document(found), allow_nan=False))
     else:

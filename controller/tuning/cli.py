@@ -14,15 +14,11 @@ from ringbalance.controller.eccentric_mass.sampled_loops import recommended_gain
 from ringbalance.controller.tuning.eccentric import eccentric_tuning_document, show_eccentric_tuning
 from ringbalance.controller.tuning.tune import Tuning, tuning_document
 from ringbalance.controller.tuning.tune import tune as tune_scene
-from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.gas_line import line_text, line_warning
-from ringbalance.reduced_model.law.loading import load_model
-from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.law.paper_law import paper_model
+from ringbalance.reduced_model.law_by_name import law_by_name
 from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.loader import load_scene
-from ringbalance.scene.models import Scene
 from ringbalance.scene.platform.progress import activity
 from ringbalance.scene.platform.terminal import results_console
 
@@ -56,17 +52,11 @@ def tune(
     Raises:
         SceneError: a scene or a law that cannot be used.
     """
-
-    def model_of(asked: Scene) -> BalancerModel:
-        if law == "calibrated":
-            return calibrate(asked).model
-        return paper_model(asked) if law == "paper" else load_model(Path(law))
-
     given = with_tolerance(load_scene(scene), tolerance=tolerance, models=models)
     if isinstance(given, EccentricScene):
         return _eccentric_masses(given, json=json)
     with activity("tune", f"flow law: {law} ...") as shown:
-        found = tune_scene(given, model_of=model_of, progress=shown.show)
+        found = tune_scene(given, model_of=lambda asked: law_by_name(asked, law), progress=shown.show)
     if json:
         print(json_format.dumps(tuning_document(found), allow_nan=False))
     else:

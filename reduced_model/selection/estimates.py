@@ -123,7 +123,7 @@ def _steady(scene: Scene) -> Mapping[str, TermEstimate]:
 
 
 def _without_loop(scene: Scene) -> Scene:
-    """The scene with one value of all that tunes a loop or draws its runs; a steady flow knows none of it."""
+    """The scene with fixed values of what tunes a loop or draws its runs: no steady flow depends on them."""
     return replace(
         scene,
         rotor=replace(scene.rotor, influence_coefficient=1.0, lag_angle=0.0),

@@ -309,9 +309,21 @@ def whole() -> dict[str, Any]:
 
 
 @pytest.fixture(scope="session")
-def page() -> str:
-    """The page of that document, without 3-D pictures."""
+def pages() -> dict[str, str]:
+    """Report and annex of that document, without 3-D pictures."""
     return render(document())
+
+
+@pytest.fixture(scope="session")
+def page(pages: dict[str, str]) -> str:
+    """The report of that document."""
+    return pages["report.html"]
+
+
+@pytest.fixture(scope="session")
+def annex(pages: dict[str, str]) -> str:
+    """The annex of that document."""
+    return pages["annex.html"]
 
 
 def document() -> dict[str, Any]:

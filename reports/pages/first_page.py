@@ -274,4 +274,6 @@ def _reach_table(found: Record, rest: Record | None) -> Table | None:
     )
 
 
-SECTION: Final = Section(name="summary", title="In short", collect=_collect, show=_view, always=True)
+SECTION: Final = Section(
+    name="summary", title="Decision", place="report", collect=_collect, show=_view, always=True
+)

@@ -309,9 +309,24 @@ def whole() -> dict[str, Any]:
 
 
 @pytest.fixture(scope="session")
-def page() -> str:
-    """The page of that document, without 3-D pictures."""
+def pages() -> dict[str, str]:
+    """Report and annex of that document, without 3-D pictures."""
     return render(document())
+
+
+@pytest.fixture(scope="session")
+def page(pages: dict[str, str]) -> str:
+    """The report of that document."""
+    return pages["report.html"]
+
+
+@pytest.fixture(scope="session")
+def annex(pages: dict[str, str]) -> str:
+    """The annex of that document."""
+    return pages["annex.html"]
+
+
+ROW = {"group": "Disc", "note": "", "origin": "given"}
 
 
 def document() -> dict[str, Any]:
@@ -327,21 +342,9 @@ def document() -> dict[str, Any]:
             "values_sha256": "ba" * 32,
             "text": 'name = "sample"\n',
             "table": [
-                {
-                    "group": "Disc",
-                    "quantity": "outer radius R2",
-                    "value": "44.5 mm",
-                    "note": "",
-                    "origin": "given",
-                },
-                {
-                    "group": "Disc",
-                    "quantity": "plate thickness t",
-                    "value": "2.777 mm",
-                    "note": "each side",
-                    "origin": "inferred",
-                },
-                {"group": "Liquid", "quantity": "liquid", "value": "water", "note": "", "origin": "given"},
+                {**ROW, "quantity": "outer radius R2", "value": "44.5 mm"},
+                {**ROW, "quantity": "plate thickness t", "value": "2.777 mm", "note": "each side"},
+                {**ROW, "group": "Liquid", "quantity": "liquid", "value": "water"},
             ],
         },
         "seeds": {"run": 0},

@@ -309,9 +309,21 @@ def whole() -> dict[str, Any]:
 
 
 @pytest.fixture(scope="session")
-def page() -> str:
-    """The page of that document, without 3-D pictures."""
+def pages() -> dict[str, str]:
+    """Report and annex of that document, without 3-D pictures."""
     return render(document())
+
+
+@pytest.fixture(scope="session")
+def page(pages: dict[str, str]) -> str:
+    """The report of that document."""
+    return pages["report.html"]
+
+
+@pytest.fixture(scope="session")
+def annex(pages: dict[str, str]) -> str:
+    """The annex of that document."""
+    return pages["annex.html"]
 
 
 def document() -> dict[str, Any]:
@@ -324,11 +336,24 @@ def document() -> dict[str, Any]:
             "name": "Pan's liquid-ring disc",
             "file": "sample.toml",
             "sha256": "ab" * 32,
+            "values_sha256": "ba" * 32,
             "text": 'name = "sample"\n',
             "table": [
-                {"group": "Disc", "quantity": "outer radius R2", "value": "44.5 mm", "note": ""},
-                {"group": "Disc", "quantity": "plate thickness t", "value": "2.777 mm", "note": "each side"},
-                {"group": "Liquid", "quantity": "liquid", "value": "water", "note": "given"},
+                {
+                    "group": "Disc",
+                    "quantity": "outer radius R2",
+                    "value": "44.5 mm",
+                    "note": "",
+                    "origin": "given",
+                },
+                {
+                    "group": "Disc",
+                    "quantity": "plate thickness t",
+                    "value": "2.777 mm",
+                    "note": "each side",
+                    "origin": "inferred",
+                },
+                {"group": "Liquid", "quantity": "liquid", "value": "water", "note": "", "origin": "given"},
             ],
         },
         "seeds": {"run": 0},

@@ -326,11 +326,9 @@ def annex(pages: dict[str, str]) -> str:
     return pages["annex.html"]
 
 
-ROW = {"group": "Disc", "note": "", "origin": "given"}
-
-
 def document() -> dict[str, Any]:
     """A whole evidence document."""
+    row = {"group": "Disc", "note": "", "origin": "given"}
     return {
         "format": 1,
         "level": "light",
@@ -342,9 +340,9 @@ def document() -> dict[str, Any]:
             "values_sha256": "ba" * 32,
             "text": 'name = "sample"\n',
             "table": [
-                {**ROW, "quantity": "outer radius R2", "value": "44.5 mm"},
-                {**ROW, "quantity": "plate thickness t", "value": "2.777 mm", "note": "each side"},
-                {**ROW, "group": "Liquid", "quantity": "liquid", "value": "water"},
+                {**row, "quantity": "outer radius R2", "value": "44.5 mm"},
+                {**row, "quantity": "plate thickness t", "value": "2.777 mm", "note": "each side"},
+                {**row, "group": "Liquid", "quantity": "liquid", "value": "water"},
             ],
         },
         "seeds": {"run": 0},

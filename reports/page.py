@@ -175,7 +175,12 @@ def _mesh_facts(mesh: Record) -> Facts:
 
 def _version_facts(evidence: Record) -> Facts:
     seeds = ", ".join(f"{name} {value}" for name, value in evidence["seeds"].items())
-    hashes = (("Scene hash (SHA-256)", evidence["scene"]["sha256"]), ("Seeds", seeds))
+    scene = evidence["scene"]
+    hashes = (
+        ("Scene file (SHA-256)", scene["sha256"]),
+        ("Scene values (SHA-256), by which cases name their scene", scene["values_sha256"]),
+        ("Seeds", seeds),
+    )
     return (*hashes, *evidence["versions"].items())
 
 

@@ -14,7 +14,7 @@ from ringbalance.reports.figures.style import Drawing
 from ringbalance.reports.pages import consequences as consequence_view
 from ringbalance.reports.pages import drag_coefficient as fifty
 from ringbalance.reports.pages import eccentric_mass as driven
-from ringbalance.reports.pages import extremes, first_page, sloshing
+from ringbalance.reports.pages import extremes, first_page, operation, sloshing
 from ringbalance.reports.pages import model_selection as trade
 from ringbalance.reports.pages import paper_figures as paper_again
 from ringbalance.reports.pages import siphon_crest as hump
@@ -23,7 +23,8 @@ from ringbalance.reports.section import Place, Record, Section, Work
 
 SECTIONS: Final[tuple[Section, ...]] = (
     first_page.SECTION,
-    Section(name="loop", title="Loop and tuning", place="report"),
+    operation.SECTION,
+    operation.LOOP,
     Section(name="claims", title="Claims of the liquid-ring paper", place="report"),
     Section(name="parameters", title="Parameters and their origin", place="report"),
     Section(name="disc", title="The disc and its liquid"),

@@ -105,7 +105,7 @@ def test_a_law_that_does_not_flow_leaves_its_tables_out() -> None:
 def test_claims_judged_on_another_disc_are_distinguished(evidence: Record) -> None:
     changed = copy.deepcopy(evidence)
     for case in changed["verification"]:
-        case["scene_sha256"] = changed["scene"]["sha256"]
+        case["scene_sha256"] = changed["scene"]["values_sha256"]
     assert "judged on it, not on this one" not in summary.lead_sentence(changed)
     marked = next(case for case in summary.claims(changed) if case in summary.headlines(changed))
     marked["scene_sha256"] = "0" * 64

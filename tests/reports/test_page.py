@@ -172,6 +172,8 @@ CHANGES: tuple[tuple[tuple[Any, ...], Any, str], ...] = (
     (("verification", 0, "doubts"), ["Nobody has seen it."], "Nobody has seen it."),
     (("scene", "name"), "Another disc", "Another disc"),
     (("scene", "sha256"), "cd" * 32, "cd" * 32),
+    (("scene", "values_sha256"), "dc" * 32, "dc" * 32),
+    (("scene", "table", 0, "origin"), "measured", "measured"),
     (("versions", "numpy"), "9.9.9", "9.9.9"),
     (("pressure", "mesh", "unknowns"), 12345, "12 345"),
     (("calibration", "models_used", 0, "estimated_contribution"), 0.0777, "7.8 %"),

@@ -37,11 +37,11 @@ class FrictionPoints:
 
     def predicted(self) -> FloatArray:
         """The program's friction factor of each point."""
-        return self._each(friction_factor)
+        return predicted_friction(self.reynolds, self.relative_roughness)
 
     def stated(self) -> FloatArray:
         """Expanded uncertainty (95 %) that the program states for it."""
-        return self._each(friction_uncertainty)
+        return _each(friction_uncertainty, self.reynolds, self.relative_roughness)
 
     def statistics(self, predicted: FloatArray) -> ModelStatistics:
         """How predicted friction factors stand to the measured ones."""
@@ -53,13 +53,18 @@ class FrictionPoints:
             measurement_uncertainty=self.measurement_uncertainty,
         )
 
-    def _each(self, formula: Formula) -> FloatArray:
-        walls = np.unique(self.relative_roughness)
-        found = np.empty_like(self.friction)
-        for wall in walls:
-            here = self.relative_roughness == wall
-            found[here] = formula(reynolds=self.reynolds[here], relative_roughness=float(wall))
-        return found
+
+def predicted_friction(reynolds: FloatArray, relative_roughness: FloatArray) -> FloatArray:
+    """The program's friction factor of several straight tubes at rest, one a point."""
+    return _each(friction_factor, reynolds, relative_roughness)
+
+
+def _each(formula: Formula, reynolds: FloatArray, relative_roughness: FloatArray) -> FloatArray:
+    found = np.empty_like(reynolds)
+    for wall in np.unique(relative_roughness):
+        here = relative_roughness == wall
+        found[here] = formula(reynolds=reynolds[here], relative_roughness=float(wall))
+    return found
 
 
 def friction_points(*names: str) -> FrictionPoints:

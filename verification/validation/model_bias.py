@@ -27,7 +27,7 @@ class ModelStatistics:
     standard_deviation: float
     """Of the model alone: the scatter less the measurements' own."""
     share_within: float
-    """Share of the points whose deviation lies within both 95 % uncertainties, the model's stated one and U_D."""
+    """Of the points whose deviation lies within both 95 % uncertainties, the model's stated one and U_D."""
 
 
 def model_statistics(
@@ -41,8 +41,8 @@ def model_statistics(
     """Statistics of ln(predicted/measured) over a data set.
 
     bias = exp(mean) - 1; s_model^2 = s^2 - (U_D/2)^2, zero where the measurements alone explain the scatter.
-    The points of a series share their systematic errors, so the bias is known to t s/sqrt(n) of the n means of
-    the series; from fewer than three series to U_D.
+    The points of a series share their systematic errors, so the bias is known to t s/sqrt(n) of the n means
+    of the series; from fewer than three series to U_D.
     Args: `stated`: expanded uncertainty (95 %) of the predicted values, in their unit.
         `measurement_uncertainty`: U_D, relative.
     Source: McGrattan and Toman, Metrologia 48 (2011) 173, for the split of the scatter.

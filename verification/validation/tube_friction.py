@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from ringbalance.physics.tube.friction import friction_factor, friction_uncertainty
-from ringbalance.scene.arrays import BoolArray, FloatArray, StringArray
+from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, StringArray
 from ringbalance.verification.validation.measurements import measurements
 from ringbalance.verification.validation.model_bias import ModelStatistics, model_statistics
 
@@ -31,7 +31,7 @@ class FrictionPoints:
     """U_D (95 %), relative."""
     series: StringArray
 
-    def where(self, chosen: slice | BoolArray) -> FrictionPoints:
+    def where(self, chosen: slice | BoolArray | IntArray) -> FrictionPoints:
         """Some of the points."""
         return FrictionPoints(**{name: column[chosen] for name, column in vars(self).items()})
 
@@ -79,6 +79,8 @@ def friction_points(*names: str) -> FrictionPoints:
         measurement_uncertainty=np.concatenate(
             [np.full(len(each), each.source.uncertainty) for each in sets]
         ),
-        series=np.concatenate([np.char.add(f"{name}: ", each.series) for name, each in zip(names, sets, strict=True)]),
+        series=np.concatenate(
+            [np.char.add(f"{name}: ", each.series) for name, each in zip(names, sets, strict=True)]
+        ),
     )
     return joined.where(np.argsort(joined.reynolds, kind="stable"))

@@ -1,4 +1,4 @@
-"""The blend of laminar and turbulent friction: exact in laminar flow, without a jump, one velocity for each head."""
+"""The blend of laminar and turbulent friction: exact where laminar, without a jump, one velocity a head."""
 
 from __future__ import annotations
 

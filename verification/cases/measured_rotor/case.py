@@ -46,7 +46,9 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
                 "vibration of a rotor, measured and predicted",
                 ("unbalance", "kg*m", _WASHER * np.arange(5)),
                 Curve("predicted", "m", predicted),
-                Curve("measured", "m", np.array([_amplitude(run, "plain", n) for n in range(5)]), style="points"),
+                Curve(
+                    "measured", "m", np.array([_amplitude(run, "plain", n) for n in range(5)]), style="points"
+                ),
             ),
         ),
     )

@@ -30,7 +30,9 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             **{key: float(value) for key, value in vars(statistics).items() if key != "share_within"},
             "worst": float(np.max(deviation)),
         },
-        series=tuple(_figure(points, predicted, wall) for wall in np.unique(points.relative_roughness)[[0, -1]]),
+        series=tuple(
+            _figure(points, predicted, wall) for wall in np.unique(points.relative_roughness)[[0, -1]]
+        ),
     )
 
 

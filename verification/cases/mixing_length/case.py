@@ -52,7 +52,10 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         return np.array([flow.friction_factor for flow in flows])
 
     stride = _MEASURED[level]
-    sand, every = friction_points("nikuradse_1933").where(slice(None, None, stride)), friction_points("mckeon_2004")
+    sand, every = (
+        friction_points("nikuradse_1933").where(slice(None, None, stride)),
+        friction_points("mckeon_2004"),
+    )
     smooth = every.where(every.reynolds >= _HIGH).where(slice(None, None, -stride))
     even = np.array(_LOW + _EVEN[level])
     apart = by_length(even, np.zeros_like(even)) / predicted_friction(even, np.zeros_like(even)) - 1

@@ -114,6 +114,7 @@ def _scene(scene: Scene, text: str) -> Record:
         "name": scene.name,
         "file": scene.source,
         "sha256": scene.sha256,
+        "values_sha256": scene.values_sha256,
         "text": text,
         "table": [asdict(row) for row in scene_table(scene)],
     }

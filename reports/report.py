@@ -10,7 +10,7 @@ from typing import Final
 
 from ringbalance.reports.evidence import Progress, collect_evidence
 from ringbalance.reports.figures.style import standalone
-from ringbalance.reports.page import page_content
+from ringbalance.reports.page import DOCUMENTS, page_content
 from ringbalance.reports.pictures.opengl import OpenGL
 from ringbalance.reports.pictures.process import (
     FOLDERS,
@@ -19,13 +19,13 @@ from ringbalance.reports.pictures.process import (
     stop_drawing,
     write_fields,
 )
-from ringbalance.reports.render import render_page
+from ringbalance.reports.render import render_pages
 from ringbalance.reports.saved import saved_cases
 from ringbalance.reports.section import Level, Record
 from ringbalance.scene import AnyScene, liquid_ring_scene
 from ringbalance.scene.platform.files import staged
 
-FILES: Final = ("evidence.json", "report.html")
+FILES: Final = ("evidence.json", *DOCUMENTS)
 """Of a report, the page last: where it is, all else is."""
 
 
@@ -106,5 +106,6 @@ def _write_page(evidence: Record, stage: Path) -> Record:
     content = page_content(kept, pictures=pictures)
     for drawing in content.drawings:
         (figures / f"{drawing.name}.svg").write_text(standalone(drawing), encoding="utf-8")
-    (stage / "report.html").write_text(render_page(content), encoding="utf-8")
+    for name, page in render_pages(content).items():
+        (stage / name).write_text(page, encoding="utf-8")
     return kept

@@ -20,6 +20,7 @@ Cells = Sequence[str]
 _TUNING_RUNS: Final = 500
 _TERM_RUNS: Final = 10
 Level = Literal["light", "heavy"]
+Place = Literal["report", "annex"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,6 +86,8 @@ class Section:
     """Its id on the page, its key in the evidence, and the stem of its template."""
     title: str
     """In the contents."""
+    place: Place = "annex"
+    """Which of the two documents it stands in."""
     collect: Callable[[Work], Record | None] = _nothing
     """Plain numbers and texts for the evidence, under the section's name; None: nothing there."""
     last: bool = False

@@ -97,7 +97,7 @@ def elsewhere(case: Record, evidence: Record) -> bool:
     Returns: True when its numbers are not those of the report's scene.
     """
     judged = case.get("scene_sha256")
-    return bool(judged) and judged != evidence["scene"]["sha256"]
+    return bool(judged) and judged != evidence["scene"]["values_sha256"]
 
 
 def headlines(evidence: Record) -> list[Record]:

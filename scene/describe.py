@@ -27,7 +27,9 @@ class Row:
     value: str
     """With its unit."""
     note: str
-    """Where the value comes from, or what it means; may be empty."""
+    """What the value means, and its expanded uncertainty; may be empty."""
+    origin: str
+    """"given", "inferred", "assumed", "measured" or "default"."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,6 +48,7 @@ _GROUPS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "Gas": ("gas",),
         "Rotor": ("rotor.speed", "environment", "rotor", "sensor"),
         "Controller": ("controller",),
+        "Requirement": ("requirement",),
         "Run": ("run", "tolerance"),
     }
 )
@@ -107,9 +110,14 @@ def _rows(scene: Scene, group: str, line: _Line) -> Iterator[Row]:
     if value is None and not line.shown.absent:
         return
     written = line.shown.absent if value is None else _written(line, value)
-    notes = [line.shown.note, _origin(scene, line.path), _spread(scene, line)]
+    source = scene.liquid.source if line.path == "liquid.name" else ""
+    notes = [line.shown.note, source, _spread(scene, line)]
     yield Row(
-        group=group, quantity=line.shown.name, value=written, note="; ".join(note for note in notes if note)
+        group=group,
+        quantity=line.shown.name,
+        value=written,
+        note="; ".join(note for note in notes if note),
+        origin=scene.origin_of(line.path),
     )
 
 
@@ -133,17 +141,6 @@ def _written(line: _Line, value: Any) -> str:
 def _bend(bend: Bend) -> str:
     radius = format_quantity(bend.radius, "length", "mm")
     return f"{format_quantity(bend.angle, 'angle', 'deg')} on {radius}"
-
-
-def _origin(scene: Scene, path: str) -> str:
-    if path == "liquid.name":
-        return scene.liquid.source
-    names = {
-        "rotor.initial_amplitude": "rotor.initial_vibration",
-        "rotor.initial_phase": "rotor.initial_vibration",
-        "tolerance": "accuracy.tolerance",
-    }
-    return "default" if names.get(path, path) in scene.defaulted else ""
 
 
 def _spread(scene: Scene, line: _Line) -> str:

@@ -7,7 +7,7 @@ field's key takes and means stands in its annotation, see `ringbalance.scene.key
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from ringbalance.scene.eccentric_control_models import (
@@ -36,7 +36,7 @@ from ringbalance.scene.keys.quantities import (
     Turn,
     Velocity,
 )
-from ringbalance.scene.loop_models import RunSettings
+from ringbalance.scene.origins import SceneFile
 
 Frame = Literal["rotor", "laboratory"]
 
@@ -131,10 +131,9 @@ class EccentricSensor:
 
 
 @dataclass(frozen=True, kw_only=True)
-class EccentricScene:
+class EccentricScene(SceneFile):
     """All that a run with two eccentric masses needs, in SI units."""
 
-    name: str
     rotor: EccentricRotor
     imbalance: Imbalance
     masses: EccentricMasses
@@ -145,17 +144,6 @@ class EccentricScene:
     lqr: Lqr
     fine_tuning: FineTuning
     supervisor: Supervisor
-    run: RunSettings
-    tolerance: float
-    """Relative: bounds the discretisation in time."""
-    source: str
-    """File name without its folder; for the evidence, which is the same wherever the file stands."""
-    file: str = field(compare=False)
-    """The file as it was named; for messages."""
-    sha256: str
-    """Of the scene file's bytes."""
-    defaulted: tuple[str, ...] = ()
-    """Paths such as "lqr.state_weight" whose value is a default, because the file does not give it."""
 
     @property
     def balancer(self) -> Literal["eccentric_mass"]:

@@ -4,26 +4,29 @@ from __future__ import annotations
 
 import hashlib
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields
 from importlib import resources
 from os import PathLike
 from pathlib import Path, PurePath
-from typing import Any
+from typing import Any, Literal
 
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.faults import Fault, SceneError, closest, did_you_mean, toml_text
 from ringbalance.scene.keys.completion import completed, missing_faults
 from ringbalance.scene.keys.reading import Reading, read_document
-from ringbalance.scene.keys.schema import BALANCERS, ECCENTRIC_MASS, LIQUID_RING, Schema
+from ringbalance.scene.keys.schema import BALANCERS, ECCENTRIC_MASS, LIQUID_RING, ORIGIN, Schema
 from ringbalance.scene.models import InputUncertainty, Scene
 from ringbalance.scene.narrowing import AnyScene
+from ringbalance.scene.origins import Origin
 from ringbalance.scene.rules import eccentric, shape, working
 from ringbalance.scene.rules.check import failed_checks
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 from ringbalance.scene.working_liquid import with_liquid
 
 _LARGEST_FILE = 2**20
+_DECIDE_NOTHING = ("requirement.", "rotor.mass", "liquid.source")
+"""Values that no result depends on."""
 
 
 def load_scene(path: str | PathLike[str]) -> AnyScene:
@@ -56,6 +59,7 @@ def scene_from(*, content: bytes, file: str) -> AnyScene:
     """
     document = _document(content, file)
     reading, found = _READ[_kind(document)](document, file=file)
+    found = (*found, *_origin_faults(reading, found))
     if found:
         raise SceneError(_sorted(found, reading.schema))
     parts: dict[str, Any] = {
@@ -65,7 +69,9 @@ def scene_from(*, content: bytes, file: str) -> AnyScene:
         "source": PurePath(file).name,
         "file": file,
         "sha256": hashlib.sha256(content).hexdigest(),
+        "values_sha256": _values_hash(reading),
         "defaulted": _defaulted(reading),
+        "origins": tuple(_origins(reading)),
     }
     if reading.schema is ECCENTRIC_MASS:
         return EccentricScene(**parts)
@@ -104,6 +110,42 @@ def _defaulted(reading: Reading) -> tuple[str, ...]:
         for path in reading.values
         if not reading.given(path) and (not path.startswith("liquid.") or path == "liquid.dissolved_gas")
     )
+
+
+def _values_hash(reading: Reading) -> str:
+    """SHA-256 of the values that decide results."""
+    values = {
+        path: value
+        for path, value in reading.values.items()
+        if path != "name" and not path.endswith(f".{ORIGIN}") and not path.startswith(_DECIDE_NOTHING)
+    }
+    return hashlib.sha256(repr(sorted(values.items())).encode()).hexdigest()
+
+
+def _origins(reading: Reading) -> Iterator[tuple[str, Origin | Literal["default"]]]:
+    """Origin of each key, by path."""
+    for name, table in reading.schema.tables.items():
+        stated = reading.values.get(f"{name}.{ORIGIN}", {})
+        for key in table.keys:
+            path = f"{name}.{key}"
+            if key != ORIGIN:
+                yield path, stated.get(key, "given") if reading.given(path) else "default"
+
+
+def _origin_faults(reading: Reading, found: Iterable[Fault]) -> Iterator[Fault]:
+    """One error for each origin of a value that does not stand in the file, unless the value has one."""
+    told = {(fault.table, fault.key) for fault in found}
+    for name in reading.schema.tables:
+        for key, origin in reading.values.get(f"{name}.{ORIGIN}", {}).items():
+            if not reading.given(f"{name}.{key}") and (name, key) not in told:
+                yield Fault(
+                    file=reading.file,
+                    table=name,
+                    key=f"{ORIGIN}.{key}",
+                    value=toml_text(origin),
+                    problem=f"the file gives no {key}, so it has no origin",
+                    allowed=f"a table with {key}, or no origin of it",
+                )
 
 
 def _read_liquid_ring(document: Mapping[str, Any], *, file: str) -> tuple[Reading, tuple[Fault, ...]]:

@@ -13,7 +13,10 @@ from ringbalance.scene.keys.quantities import (
     Influence,
     Length,
     PositiveLength,
+    PositiveMass,
     PositiveTime,
+    PositiveUnbalance,
+    PositiveVelocity,
     Time,
     Turn,
 )
@@ -65,6 +68,11 @@ class Rotor:
     """m, zero-to-peak."""
     initial_phase: Annotated[float, shown("its phase", "deg", dimension="angle")]
     """rad, of the vibration."""
+    mass: Annotated[
+        PositiveMass | None,
+        unused("no balance quality grade is stated", "of the rotor; for grades of ISO 21940-11 only"),
+        shown("mass", "kg"),
+    ] = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -191,3 +199,29 @@ class RunSettings:
         int, whole(0, 2**63 - 1, highest_text="2^63 - 1"), standard(0, "of all random numbers"), shown("seed")
     ]
     time_limit: Annotated[PositiveTime, standard("120 s", "end of a simulation"), shown("time limit", "s")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Requirement:
+    """What the balancer is wanted for; None where nothing is required. No result depends on it."""
+
+    settling_time: Annotated[
+        PositiveTime | None,
+        unused("none is required", "time within which the run must have settled"),
+        shown("settling time required", "s"),
+    ] = None
+    residual: Annotated[
+        PositiveLength | None,
+        unused("limit of [controller]", "vibration amplitude (zero-to-peak) that may remain"),
+        shown("residual amplitude allowed", "um"),
+    ] = None
+    grade: Annotated[
+        PositiveVelocity | None,
+        unused("none is required", 'balance quality grade of ISO 21940-11: "2.5 mm/s" for G 2.5'),
+        shown("balance quality grade", "mm/s"),
+    ] = None
+    correction_moment: Annotated[
+        PositiveUnbalance | None,
+        unused("none is required", "largest unbalance that must be corrected"),
+        shown("unbalance to be corrected", "g*mm"),
+    ] = None

@@ -31,7 +31,8 @@ from ringbalance.scene.keys.quantities import (
     Temperature,
     Time,
 )
-from ringbalance.scene.loop_models import ControllerSettings, Rotor, RunSettings, Sensor
+from ringbalance.scene.loop_models import ControllerSettings, Requirement, Rotor, Sensor
+from ringbalance.scene.origins import SceneFile
 
 HumpGas = Literal["vented", "trapped"]
 HumpShape = Literal["arc", "point"]
@@ -369,10 +370,9 @@ class InputUncertainty:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Scene:
+class Scene(SceneFile):
     """All that a run needs, in SI units."""
 
-    name: str
     disc: Disc
     liquid: Liquid
     tube: Tube
@@ -382,17 +382,7 @@ class Scene:
     sensor: Sensor
     controller: ControllerSettings
     uncertainty: tuple[InputUncertainty, ...]
-    run: RunSettings
-    tolerance: Annotated[float, shown("tolerance", "%", dimension="share")]
-    """Relative: bounds discretisation and left-out terms."""
-    source: str
-    """File name without its folder; for the evidence, which is the same wherever the file stands."""
-    file: str = field(compare=False)
-    """The file as it was named; for messages."""
-    sha256: str
-    """Of the scene file's bytes."""
-    defaulted: tuple[str, ...] = ()
-    """Paths such as "rotor.lag_angle" whose value is a default, because the file does not give it."""
+    requirement: Requirement = field(default_factory=Requirement)
 
     @property
     def balancer(self) -> Literal["liquid_ring"]:

@@ -15,7 +15,7 @@ from ringbalance.scene import known_liquids, write_whole
 from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.faults import toml_text
 from ringbalance.scene.keys.declaration import Entries, Key
-from ringbalance.scene.keys.schema import ECCENTRIC_MASS, LIQUID_RING, Schema
+from ringbalance.scene.keys.schema import ECCENTRIC_MASS, LIQUID_RING, ORIGIN, Schema
 from ringbalance.scene.units import unit_names
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "scene-file.md"
@@ -30,7 +30,7 @@ def key_reference(schema: Schema, title: str) -> str:
         parts += [f"\n### [{name}]", f"{table.text[0].upper()}{table.text[1:]}.\n", *rows(table.keys)]
     for name, table in schema.tables.items():
         for key, declared in table.keys.items():
-            if isinstance(declared.takes, Entries):
+            if isinstance(declared.takes, Entries) and key != ORIGIN:
                 each = ", each entry" if declared.takes.example else ""
                 parts += [f"\n### [{name}] {key}{each}", *rows(declared.takes.keys)]
     return "\n".join(parts)
@@ -60,12 +60,13 @@ def unit_reference() -> str:
 
 
 def rows(keys: Mapping[str, Key]) -> list[str]:
-    """Head and rows of the table of some keys."""
+    """Head and rows of the table of some keys; the text of the page has what every table takes."""
     return [
         HEAD,
         *(
             f"| `{name}` | {key.takes.summary} | {when_left_out(key)} | {key.presence.meaning} |"
             for name, key in keys.items()
+            if name != ORIGIN
         ),
     ]
 

@@ -100,7 +100,7 @@ def _outcome(
         status=status,
         level=level,
         scene_name=judged.name,
-        scene_sha256=judged.sha256,
+        scene_sha256=judged.values_sha256,
     )
 
 

@@ -40,7 +40,7 @@ def _collect(work: Work) -> Record:
 
 def _other_reading(work: Work) -> Record | None:
     """The paper's disc with the other bore that Fig. 7 allows; None for any other disc."""
-    if work.scene.sha256 != paper_scene().sha256:
+    if work.scene.values_sha256 != paper_scene().values_sha256:
         return None
     try:
         scene = liquid_ring_scene(load_scene(bundled_scene(_OTHER_READING)))
@@ -274,4 +274,6 @@ def _reach_table(found: Record, rest: Record | None) -> Table | None:
     )
 
 
-SECTION: Final = Section(name="summary", title="In short", collect=_collect, show=_view, always=True)
+SECTION: Final = Section(
+    name="summary", title="Decision", place="report", collect=_collect, show=_view, always=True
+)

@@ -33,7 +33,7 @@ _SEARCH: Final = tuple((np.arange(4, 41) * 5e3).tolist())
 def _collect(work: Work) -> Record:
     """Velocities of Fig. 4 and the runs of Figs. 6 to 8, all under the paper's law on the paper's disc."""
     scene = paper_scene()
-    own = work.scene.sha256 == scene.sha256
+    own = work.scene.values_sha256 == scene.values_sha256
     calibration = work.calibration if own else calibration_of(scene)
     model = paper_model(scene)
     return {

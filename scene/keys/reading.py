@@ -120,7 +120,7 @@ def _read_keys(
     for name, key in keys.items():
         at = (*place, name)
         if name not in content and key.presence.default is None:
-            if len(place) > 1:
+            if len(place) > 1 and key.presence.kind == "needed":
                 rejected.append(_Rejected(place=at, content=content, kind="missing"))
             continue
         value, wrong = _read_value(content.get(name, key.presence.default), key, at)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Literal, get_args
 
@@ -19,10 +19,13 @@ from ringbalance.scene.keys.declaration import (
     unused,
 )
 from ringbalance.scene.keys.fields import Bounds, Reader, choice, half_width, share, text
+from ringbalance.scene.origins import Origin
 
 Balancer = Literal["liquid_ring", "eccentric_mass"]
 BALANCERS: tuple[str, ...] = get_args(Balancer)
 Place = tuple[int | str, ...]
+ORIGIN = "origin"
+"""Key of every table that says where its values come from."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,6 +110,22 @@ def _uncertainty(tables: Mapping[str, Table]) -> Table:
     return Table(text="Expanded uncertainties (95 %) of the inputs", keys=keys)
 
 
+def _with_origins(tables: Mapping[str, Table]) -> Mapping[str, Table]:
+    """The tables, each with the key that says where its values come from."""
+    return MappingProxyType(
+        {name: replace(table, keys={**table.keys, ORIGIN: _origins(table)}) for name, table in tables.items()}
+    )
+
+
+def _origins(table: Table) -> Key:
+    meaning = unused("given", "where the value comes from")
+    each = Key(takes=choice(Origin), presence=meaning)
+    return Key(
+        takes=Entries(record=dict, keys=dict.fromkeys(table.keys, each), example=""),
+        presence=unused("every value that stands here is given", "where values come from, by key"),
+    )
+
+
 _TOLERANCE = Key(
     takes=share(Bounds(above=0, below=1), example=0.01),
     presence=standard("1 %", "relative bound on discretisation and left-out terms, against the top model"),
@@ -124,6 +143,9 @@ _LIQUID_RING = {
     "rotor": _rotor(),
     "sensor": _of(loop_models.Sensor, "the vibration sensor; exact when left out"),
     "controller": _of(loop_models.ControllerSettings, "the control algorithm"),
+    "requirement": _of(
+        loop_models.Requirement, "what is required of the balancer; reports compare it with what is reached"
+    ),
 }
 _ECCENTRIC = {
     "rotor": _of(eccentric_models.EccentricRotor, "the rotor on its bearing, and its speed"),
@@ -144,11 +166,11 @@ _ECCENTRIC = {
 
 LIQUID_RING = Schema(
     top=MappingProxyType(_top(standard("liquid_ring", "kind of balancer"))),
-    tables=MappingProxyType({**_LIQUID_RING, "uncertainty": _uncertainty(_LIQUID_RING), **_RUN}),
+    tables=_with_origins({**_LIQUID_RING, "uncertainty": _uncertainty(_LIQUID_RING), **_RUN}),
 )
 """A scene whose balancer is a liquid ring."""
 ECCENTRIC_MASS = Schema(
     top=MappingProxyType(_top(needed('"eccentric_mass" for eccentric masses'))),
-    tables=MappingProxyType({**_ECCENTRIC, **_RUN}),
+    tables=_with_origins({**_ECCENTRIC, **_RUN}),
 )
 """A scene whose balancer is two eccentric masses."""

@@ -20,7 +20,7 @@ from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.loop import MAX_SAMPLES, simulate
 from ringbalance.controller.simulation import Outcome, Simulation, Verdict
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.law.paper_law import paper_model
+from ringbalance.reduced_model.law.paper_law import paper_law, paper_model
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 from ringbalance.verification.reference.adaptive_ode import adaptive_ode
@@ -381,3 +381,14 @@ def test_gas_into_both_chambers_of_a_pair_is_refused(scene: Scene, model: Balanc
     plant = LiquidRing(model=model, chambers=4, gas_pressure=1e5, integrator=quadrature)
     with pytest.raises(ValueError, match="one pair"):
         plant.advance(initial_state(disc=scene.disc), gas_times={1: 0.2, 3: 0.2}, duration=0.2, points=1)
+
+
+def test_python_takes_a_model_or_a_law(scene: Scene, model: BalancerModel) -> None:
+    law = paper_law(scene)
+    by_law, by_model = simulate(scene, flow_law=law), simulate(scene, model)
+    assert by_law.status == by_model.status
+    assert by_law.time.tolist() == by_model.time.tolist()
+    with pytest.raises(ValueError, match="flow_law"):
+        simulate(scene)
+    with pytest.raises(ValueError, match="flow_law"):
+        simulate(scene, model, flow_law=law)

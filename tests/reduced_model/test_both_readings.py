@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import fig_7_bore
 import pytest
@@ -24,8 +25,13 @@ def calibrated() -> Scene:
 
 def test_the_bore_is_all_in_which_the_scenes_differ(printed: Scene, calibrated: Scene) -> None:
     tube = replace(printed.tube, bore=calibrated.tube.bore)
-    names = {"name": calibrated.name, "source": calibrated.source, "sha256": calibrated.sha256}
-    assert replace(printed, tube=tube, **names) == calibrated  # type: ignore[arg-type]
+    names = ("name", "source", "sha256", "values_sha256", "origins")
+    own: dict[str, Any] = {name: getattr(calibrated, name) for name in names}
+    assert replace(printed, tube=tube, **own) == calibrated
+    assert set(printed.origins) ^ set(calibrated.origins) == {
+        ("tube.bore", "assumed"),
+        ("tube.bore", "inferred"),
+    }
 
 
 def test_rate_under_k_50(printed: Scene) -> None:

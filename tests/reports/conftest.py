@@ -309,13 +309,26 @@ def whole() -> dict[str, Any]:
 
 
 @pytest.fixture(scope="session")
-def page() -> str:
-    """The page of that document, without 3-D pictures."""
+def pages() -> dict[str, str]:
+    """Report and annex of that document, without 3-D pictures."""
     return render(document())
+
+
+@pytest.fixture(scope="session")
+def page(pages: dict[str, str]) -> str:
+    """The report of that document."""
+    return pages["report.html"]
+
+
+@pytest.fixture(scope="session")
+def annex(pages: dict[str, str]) -> str:
+    """The annex of that document."""
+    return pages["annex.html"]
 
 
 def document() -> dict[str, Any]:
     """A whole evidence document."""
+    row = {"group": "Disc", "note": "", "origin": "given"}
     return {
         "format": 1,
         "level": "light",
@@ -324,11 +337,12 @@ def document() -> dict[str, Any]:
             "name": "Pan's liquid-ring disc",
             "file": "sample.toml",
             "sha256": "ab" * 32,
+            "values_sha256": "ba" * 32,
             "text": 'name = "sample"\n',
             "table": [
-                {"group": "Disc", "quantity": "outer radius R2", "value": "44.5 mm", "note": ""},
-                {"group": "Disc", "quantity": "plate thickness t", "value": "2.777 mm", "note": "each side"},
-                {"group": "Liquid", "quantity": "liquid", "value": "water", "note": "given"},
+                {**row, "quantity": "outer radius R2", "value": "44.5 mm"},
+                {**row, "quantity": "plate thickness t", "value": "2.777 mm", "note": "each side"},
+                {**row, "group": "Liquid", "quantity": "liquid", "value": "water"},
             ],
         },
         "seeds": {"run": 0},

@@ -25,6 +25,7 @@ from ringbalance.scene.keys.declaration import (
 from ringbalance.scene.keys.quantities import Length, PositiveLength
 from ringbalance.scene.keys.reading import Reading, read_document
 from ringbalance.scene.keys.schema import LIQUID_RING, Schema, Table
+from ringbalance.scene.loop_models import Requirement
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,6 +129,7 @@ def test_every_description_of_a_scene_reaches_its_table() -> None:
         for entry in descriptions_of(table.record).values()
     }
     described = {row.quantity for row in scene_table(trial)}
-    optional = {"critical pressure ratio b", "dead volume", "valve lag", "gas inlet radius"}
+    optional = {"critical pressure ratio b", "dead volume", "valve lag", "gas inlet radius", "mass"}
+    optional |= {entry.name for entry in descriptions_of(Requirement).values()}
     assert names - described <= optional
     assert described - names == {"tolerance"}

@@ -153,8 +153,8 @@ def test_an_exact_input_is_not_evaluated() -> None:
 
 def test_the_plates_inherit_the_rounding_of_the_volume(paper_scene: Scene) -> None:
     # dV/dt = 2 (R2 - R1) B = 2.976 ml/mm; 67.7 ml is rounded to 0.1.
-    assert plate_uncertainty(paper_scene) == pytest.approx(0.05 / math.sqrt(3) / 2.976 * 1e-3, rel=1e-3)
-    other = dataclasses.replace(
-        paper_scene, disc=dataclasses.replace(paper_scene.disc, plate_thickness=1e-3), uncertainty=()
-    )
+    silent = dataclasses.replace(paper_scene, uncertainty=())
+    assert plate_uncertainty(silent) == pytest.approx(0.05 / math.sqrt(3) / 2.976 * 1e-3, rel=1e-3)
+    assert plate_uncertainty(paper_scene) > plate_uncertainty(silent)
+    other = dataclasses.replace(silent, disc=dataclasses.replace(paper_scene.disc, plate_thickness=1e-3))
     assert plate_uncertainty(other) == 0.0

@@ -156,7 +156,7 @@ def test_an_unknown_defect_is_refused(claim: CaseDefinition, made_up_code: Any, 
 def test_a_claim_on_the_papers_numbers_ignores_the_scene_at_hand(paper_scene: Scene) -> None:
     other = overridden(paper_scene, {"disc.outer_radius": 0.06})
     result = run_case("claim_02_ring_radius", scene=other)
-    assert result.scene_sha256 == paper_scene.sha256
+    assert result.scene_sha256 == paper_scene.values_sha256
     assert result.verdict is Verdict.CONFIRMED
     assert result.numbers["ring_radius"] == pytest.approx(34.9e-3, abs=0.05e-3)
 

@@ -328,6 +328,7 @@ def annex(pages: dict[str, str]) -> str:
 
 def document() -> dict[str, Any]:
     """A whole evidence document."""
+    row = {"group": "Disc", "note": "", "origin": "given"}
     return {
         "format": 1,
         "level": "light",
@@ -339,21 +340,9 @@ def document() -> dict[str, Any]:
             "values_sha256": "ba" * 32,
             "text": 'name = "sample"\n',
             "table": [
-                {
-                    "group": "Disc",
-                    "quantity": "outer radius R2",
-                    "value": "44.5 mm",
-                    "note": "",
-                    "origin": "given",
-                },
-                {
-                    "group": "Disc",
-                    "quantity": "plate thickness t",
-                    "value": "2.777 mm",
-                    "note": "each side",
-                    "origin": "inferred",
-                },
-                {"group": "Liquid", "quantity": "liquid", "value": "water", "note": "", "origin": "given"},
+                {**row, "quantity": "outer radius R2", "value": "44.5 mm"},
+                {**row, "quantity": "plate thickness t", "value": "2.777 mm", "note": "each side"},
+                {**row, "group": "Liquid", "quantity": "liquid", "value": "water"},
             ],
         },
         "seeds": {"run": 0},

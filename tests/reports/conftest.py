@@ -145,6 +145,12 @@ def _calibration() -> dict[str, Any]:
             "usable_pair_moment_kg_m": 922e-6,
             "usable_pair_moment_uncertainty": 100e-6,
         },
+        "budgets": {
+            "lambda": budget(0.07204, "m", numerical=2e-8, input=1.1e-4, model=2e-6),
+            "drag_coefficient": budget(3.6, "1", numerical=1e-6, input=0.3, model=0.4),
+            "velocity": budget(5.4, "m/s", numerical=1e-6, input=0.5, model=0.2),
+            "wall_pressure": budget(4.184e5, "Pa", numerical=0.02, input=1700.0, model=280.0),
+        },
         "status": {"code": "ok", "text": "solved"},
         "statistics": {"unknowns": 784.0},
     }
@@ -326,6 +332,18 @@ def annex(pages: dict[str, str]) -> str:
     return pages["annex.html"]
 
 
+def _row(group: str, quantity: str, value: str, **more: str) -> dict[str, str]:
+    rest = {"note": "", "origin": "given", "uncertainty": "", "path": "", **more}
+    return {"group": group, "quantity": quantity, "value": value, **rest}
+
+
+def budget(value: float, unit: str, **parts: float) -> dict[str, Any]:
+    """The budget of a quantity; parts in its unit."""
+    inputs = {"tube.bore": parts["input"], "rotor.speed": 0.0}
+    total = math.hypot(*parts.values())
+    return {"value": value, "unit": unit, **parts, "total": total, "inputs": inputs}
+
+
 def document() -> dict[str, Any]:
     """A whole evidence document."""
     return {
@@ -338,27 +356,27 @@ def document() -> dict[str, Any]:
             "sha256": "ab" * 32,
             "values_sha256": "ba" * 32,
             "text": 'name = "sample"\n',
+            "origins": {"tube.bore": "assumed", "disc.plate_thickness": "inferred"},
             "table": [
-                {
-                    "group": "Disc",
-                    "quantity": "outer radius R2",
-                    "value": "44.5 mm",
-                    "note": "",
-                    "origin": "given",
-                },
-                {
-                    "group": "Disc",
-                    "quantity": "plate thickness t",
-                    "value": "2.777 mm",
-                    "note": "each side",
-                    "origin": "inferred",
-                },
-                {"group": "Liquid", "quantity": "liquid", "value": "water", "note": "", "origin": "given"},
+                _row("Disc", "outer radius R2", "44.5 mm", path="disc.outer_radius", uncertainty="0.05 mm"),
+                _row("Disc", "plate thickness t", "2.777 mm", note="each side", origin="inferred"),
+                _row("Liquid", "liquid", "water"),
             ],
         },
         "seeds": {"run": 0},
         "summary": {
             "needed_moment_kg_m": 700e-6,
+            "needed_uncertainty_kg_m": 0.0,
+            "requirement": {
+                "settling_time_s": None,
+                "residual_m": 5e-8,
+                "grade_m_s": None,
+                "correction_moment_kg_m": None,
+                "rotor_mass_kg": None,
+                "rotor_speed_rad_s": OMEGA,
+                "grade_at_residual_m_s": None,
+                "residual_moment_kg_m": 4.63e-6,
+            },
             "bore_m": 1.5e-3,
             "bore_uncertainty_stated": False,
             "time_limit_s": 120.0,
@@ -405,6 +423,13 @@ def document() -> dict[str, Any]:
         "calibration": _calibration(),
         "closed_loop": {"calibrated": _run(3.4, 6, "calibrated"), "paper": _run(4.6, 7, "paper")},
         "verification": verification(),
+        "provenance": {
+            "commit": "0123456789abcdef",
+            "dirty": False,
+            "lock_sha256": "ef" * 32,
+            "command": "ringbalance report sample.toml",
+            "machine": "Linux x86_64, 2 logical processors",
+        },
         "pictures": {"drawn": False, "text": "The 3-D pictures were left out: no OpenGL.", "files": []},
         "times": {"date": "2030-01-01", "total_s": 30.0},
     }

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
 
 from ringbalance.physics.tube.loss import TubeLoss, tube_loss
 from ringbalance.physics.tube.range import VELOCITIES
+from ringbalance.reduced_model.budget import Budget, budgets
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, calibrate_chamber
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.chamber.instability import AsynchronousInstability, asynchronous_instability
@@ -60,6 +62,11 @@ class Calibration:
     """What measurements can and cannot identify."""
     statistics: Mapping[str, float]
     """Counted work and measured interpolation errors; no wall times, so they reproduce."""
+
+    @cached_property
+    def budgets(self) -> Mapping[str, Budget]:
+        """Uncertainty budget of every main quantity, made when it is first asked for."""
+        return budgets(scene=self.scene, calibration=self)
 
     @property
     def model(self) -> BalancerModel:

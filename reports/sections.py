@@ -11,7 +11,16 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from ringbalance.reports.figures.style import Drawing
-from ringbalance.reports.pages import conditions, credibility, document, extremes, first_page, loop, sloshing
+from ringbalance.reports.pages import (
+    conditions,
+    credibility,
+    document,
+    extremes,
+    first_page,
+    loop,
+    operation,
+    sloshing,
+)
 from ringbalance.reports.pages import consequences as consequence_view
 from ringbalance.reports.pages import drag_coefficient as fifty
 from ringbalance.reports.pages import eccentric_mass as driven
@@ -24,6 +33,7 @@ from ringbalance.reports.section import Place, Record, Section, Work
 SECTIONS: Final[tuple[Section, ...]] = (
     first_page.SECTION,
     conditions.SECTION,
+    operation.SECTION,
     loop.SECTION,
     Section(name="claims", title="Claims of the liquid-ring paper", place="report"),
     credibility.SECTION,

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
+from ringbalance.reports.figures.operation import tornado
+from ringbalance.reports.figures.style import Drawing
 from ringbalance.reports.numbers import MISSING, display_unit, given, number, percent, shown
 from ringbalance.reports.pages.requirements import input_name, resting
 from ringbalance.reports.section import Cells, Record, Section, Table
@@ -20,6 +22,7 @@ _NAMES: Final = {
     "crest_pressure": "Pressure over the siphon crest",
     "cavitation_margin": "Cavitation margin",
 }
+_DRAWN: Final = ("velocity", "usable_moment", "lambda")
 _REGIMES: Final = {
     "blocked": "is blocked",
     "siphon": "runs as a full siphon",
@@ -30,7 +33,7 @@ _REGIMES: Final = {
 
 
 def _view(_own: Record, evidence: Record) -> Record:
-    return {"state": _state(evidence), "budgets": _budget_table(evidence)}
+    return {"state": _state(evidence), "budgets": _budget_table(evidence), "tornado": _tornado(evidence)}
 
 
 def _state(evidence: Record) -> str:
@@ -56,6 +59,11 @@ def _budget_table(evidence: Record) -> Table:
         rows=[_row(evidence, name) for name in _NAMES if name in budgets],
         style="",
     )
+
+
+def _tornado(evidence: Record) -> Drawing | None:
+    titles = {name: _NAMES[name] for name in _DRAWN}
+    return tornado(evidence["calibration"].get("budgets") or {}, titles)
 
 
 def _row(evidence: Record, name: str) -> Cells:

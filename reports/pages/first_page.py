@@ -15,6 +15,7 @@ from ringbalance.reports.pages.requirements import (
     Requirement,
     decision,
     input_name,
+    requirement_figure,
     requirement_record,
     requirement_table,
     requirements,
@@ -92,9 +93,11 @@ def _view(found: Record, evidence: Record) -> Record:
         "loop_lead": loop_sentences(evidence),
         "alerts": [*_dry(evidence), *_gas_line(evidence), *_chamber(evidence)],
         "requirements": requirement_table(rows),
+        "bars": requirement_figure(rows),
         "actions": _actions(evidence, rows),
         "dominant": dominant(evidence),
-        "rests": [*_bore(found, evidence), _NO_MEASUREMENT],
+        "unmeasured": _NO_MEASUREMENT,
+        "rests": _bore(found, evidence),
     }
 
 

@@ -5,15 +5,51 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
+from ringbalance.reports.figures.operation import residual_polar, settling_histogram
 from ringbalance.reports.numbers import MISSING, given, number, shown
 from ringbalance.reports.pages.first_page import chance, retuned
-from ringbalance.reports.section import Cells, Record, Section, Table
+from ringbalance.reports.section import Cells, Record, Section, Table, Work
 
 _MICROMETRE: Final = 1e6
+_GAINS: Final = {1: "with the scene’s gain", 2: "with the recommended gain"}
+"""Titles of the calibrated law's ensembles, by their place in the evidence."""
 
 
-def _view(_own: Record, evidence: Record) -> Record:
-    return {"chance": chance(evidence), "table": _loop_table(evidence)}
+def _reach(work: Work) -> Record:
+    """What a pair cancels at the most, as a vibration; where the first pair's lies, by the sensor's phase."""
+    scene, moment = work.scene, work.calibration.residual.usable_pair_moment
+    return {
+        "pairs": scene.disc.chambers // 2,
+        "vibration_m": moment * scene.rotor.influence_coefficient,
+        "direction_rad": -scene.rotor.lag_angle,
+        "time_limit_s": scene.run.time_limit,
+    }
+
+
+def _view(found: Record, evidence: Record) -> Record:
+    run = evidence["closed_loop"].get("calibrated")
+    return {
+        "chance": chance(evidence),
+        "table": _loop_table(evidence),
+        "polar": residual_polar(run, found) if run and found else None,
+        "settling": settling_histogram(_samples(found, evidence)) if found else None,
+    }
+
+
+def _samples(found: Record, evidence: Record) -> list[Record]:
+    ensembles = (evidence.get("consequences") or {}).get("ensembles", [])
+    return [
+        {
+            "title": title,
+            "edges_s": ensembles[place]["settling_time_s"]["edges"],
+            "counts": ensembles[place]["settling_time_s"]["counts"],
+            "runs": ensembles[place]["members"],
+            "not_settled": ensembles[place]["probability"]["not_settled"]["value"],
+            "time_limit_s": found["time_limit_s"],
+        }
+        for place, title in _GAINS.items()
+        if place < len(ensembles)
+    ]
 
 
 def _loop_table(evidence: Record) -> Table:
@@ -60,4 +96,6 @@ def _injections(run: Record) -> int:
     return run["injections"] if isinstance(run["injections"], int) else len(run["injections"])
 
 
-SECTION: Final = Section(name="loop", title="Loop and tuning", place="report", show=_view)
+SECTION: Final = Section(
+    name="loop", title="Loop and tuning", place="report", collect=_reach, show=_view, always=True
+)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
 from ringbalance.controller.tuning.loop_factor import STAYING_DEVIATIONS
+from ringbalance.reports.figures.operation import requirement_bars
+from ringbalance.reports.figures.style import Drawing
 from ringbalance.reports.numbers import given, number, percent, shown
 from ringbalance.reports.section import Record, Table
-from ringbalance.reports.traces import evidence_at, read, traced
+from ringbalance.reports.traces import evidence_at, read, traced, untraced
 from ringbalance.scene import Scene
 
 MET: Final = "met"
@@ -31,6 +34,13 @@ class Requirement:
     verdict: str
     rests: str
     """Inputs behind it that nobody gave, with their origin."""
+    required: float | None = None
+    """As a number of `unit`; None where there is none to draw."""
+    reached: float | None = None
+    uncertainty: float = 0.0
+    unit: str = "1"
+    at_least: bool = True
+    """Whether more than required is better."""
 
 
 def requirement_record(scene: Scene) -> Record:
@@ -77,6 +87,21 @@ def requirement_table(rows: Iterable[Requirement]) -> Table:
     )
 
 
+def requirement_figure(rows: Iterable[Requirement]) -> Drawing | None:
+    """What is required against what is reached; None without numbers."""
+    return requirement_bars(
+        {
+            "label": untraced(row.name),
+            "required": row.required,
+            "reached": row.reached,
+            "uncertainty": row.uncertainty,
+            "unit": row.unit,
+            "at_least": row.at_least,
+        }
+        for row in rows
+    )
+
+
 def decision(rows: Iterable[Requirement]) -> str:
     """One sentence: how many requirements are met, and which are not."""
     judged = [row for row in rows if row.verdict in {MET, MISSED, OPEN}]
@@ -107,15 +132,18 @@ def _capacity(evidence: Record) -> Requirement | None:
     path = "summary.requirement.correction_moment_kg_m" if stated else "summary.needed_moment_kg_m"
     width = 0.0 if stated else own.get("needed_uncertainty_kg_m") or 0.0
     usable = "calibration.residual_liquid.usable_pair_moment_kg_m"
-    total = _usable_width(evidence)
+    total, needed = _usable_width(evidence), evidence_at(evidence, path)
+    both = math.hypot(total, width)
     return Requirement(
         name="Correction capacity of one pair",
         wanted=f"at least {read(evidence, path, 'kg m', width=width)}",
         result=read(evidence, usable, "kg m", width=total),
-        verdict=_above(
-            rest["usable_pair_moment_kg_m"], evidence_at(evidence, path), (total**2 + width**2) ** 0.5
-        ),
+        verdict=_above(rest["usable_pair_moment_kg_m"], needed, both),
         rests=resting(evidence, "rotor.influence_coefficient", "disc.plate_thickness", "tube.bore"),
+        required=needed,
+        reached=rest["usable_pair_moment_kg_m"],
+        uncertainty=both,
+        unit="kg m",
     )
 
 
@@ -144,6 +172,10 @@ def _gas_pressure(evidence: Record) -> Requirement | None:
         result=traced(given(point["gas_pressure_Pa"], "Pa"), "operating_point.gas_pressure_Pa"),
         verdict=_above(point["gas_pressure_Pa"], point[key], width),
         rests=resting(evidence, "tube.hump_radius", "tube.port_radius", "tube.hump_gas"),
+        required=point[key],
+        reached=point["gas_pressure_Pa"],
+        uncertainty=width,
+        unit="Pa",
     )
 
 
@@ -158,6 +190,9 @@ def _scene_gain(evidence: Record) -> Requirement | None:
         result=read(evidence, "closed_loop.calibrated.loop_factor", "1"),
         verdict=MET if run["loop_factor"] <= _staying_value(run) else MISSED,
         rests=resting(evidence, "tube.bore", "rotor.influence_coefficient", "sensor.amplitude_noise"),
+        required=_staying_value(run),
+        reached=run["loop_factor"],
+        at_least=False,
     )
 
 
@@ -187,6 +222,10 @@ def _recommended_gain(evidence: Record) -> Requirement | None:
         result=read(evidence, "summary.tuning.loop_factor", "1", width=width),
         verdict=_above(bound, tuning["loop_factor"], width),
         rests=resting(evidence, "tube.bore", "rotor.influence_coefficient"),
+        required=bound,
+        reached=tuning["loop_factor"],
+        uncertainty=width,
+        at_least=False,
     )
 
 
@@ -209,6 +248,10 @@ def _settling(evidence: Record) -> Requirement | None:
         f"{tuning['runs']} runs, with 95 % confidence {percent(low)} to {percent(high)}",
         verdict=UNASKED if wanted is None else judged,
         rests=resting(evidence, "tube.bore", "rotor.influence_coefficient", "controller.period"),
+        required=wanted,
+        reached=times["p95"],
+        unit="s",
+        at_least=False,
     )
 
 
@@ -229,6 +272,10 @@ def _residual_row(evidence: Record) -> Requirement | None:
         f"{STAYING_DEVIATIONS:g} standard deviations",
         verdict=MET if noise <= limit else MISSED,
         rests=resting(evidence, "sensor.amplitude_noise", "rotor.influence_coefficient"),
+        required=limit,
+        reached=noise,
+        unit="m",
+        at_least=False,
     )
 
 
@@ -263,4 +310,8 @@ def _grade_row(evidence: Record) -> Requirement | None:
         result=f"G {traced(number(1e3 * reached, digits=2), path)}, in mm/s",
         verdict=UNASKED if bound is None else (MET if reached <= bound else MISSED),
         rests=resting(evidence, "rotor.mass", "rotor.influence_coefficient"),
+        required=bound,
+        reached=reached,
+        unit="m/s",
+        at_least=False,
     )

@@ -1,7 +1,8 @@
-"""A finished run as the JSON document that scripts rely on."""
+"""A finished run as the JSON document that scripts rely on, and as a table of its histories."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -61,6 +62,34 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         "neglected": asdict(neglected_in_injections(simulation.models_used)),
         "model_status": {"code": str(simulation.model_status.code), "text": simulation.model_status.text},
     }
+
+
+def simulation_history(simulation: Simulation) -> dict[str, Sequence[Any]]:
+    """Every instant of a run, by name of its column; None at those at which the sensor shows nothing."""
+    time = simulation.time
+    shown = {sample.time: sample.measurement for sample in simulation.samples}
+    seen = [shown.get(instant) for instant in time.tolist()]
+    columns: dict[str, Sequence[Any]] = {
+        "time_s": time.tolist(),
+        "amplitude_m": simulation.amplitude.tolist(),
+        "phase_rad": simulation.phase.tolist(),
+        "measured_amplitude_m": [None if m is None else _finite(m.amplitude) for m in seen],
+        "measured_phase_rad": [None if m is None else _finite(m.phase) for m in seen],
+    }
+    for letter, fill in simulation.fill_ratio.items():
+        gas = np.zeros(time.size, dtype=np.int64)
+        for injection in simulation.injections:
+            if injection.chamber == letter:
+                end = injection.time + injection.operation.duration
+                gas[(time >= injection.time) & (time <= end)] = 1
+        columns |= {f"fill_ratio_{letter}": fill.tolist(), f"valve_open_{letter}": gas.tolist()}
+    return columns
+
+
+def csv_text(columns: Mapping[str, Sequence[Any]]) -> str:
+    """Columns of one length as a table with its names in the first line; None is an empty cell."""
+    texts = [["" if value is None else str(value) for value in values] for values in columns.values()]
+    return "\n".join([",".join(columns), *map(",".join, zip(*texts, strict=True))]) + "\n"
 
 
 def _injection(injection: Injection) -> dict[str, Any]:

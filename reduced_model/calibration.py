@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
 
 from ringbalance.physics.tube.loss import TubeLoss, tube_loss
 from ringbalance.physics.tube.range import VELOCITIES
+from ringbalance.reduced_model.budget import Budget, budgets
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, calibrate_chamber
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.chamber.instability import AsynchronousInstability, asynchronous_instability
@@ -61,6 +63,11 @@ class Calibration:
     statistics: Mapping[str, float]
     """Counted work and measured interpolation errors; no wall times, so they reproduce."""
 
+    @cached_property
+    def budgets(self) -> Mapping[str, Budget]:
+        """Uncertainty budget of every main quantity, made when it is first asked for."""
+        return budgets(scene=self.scene, calibration=self)
+
     @property
     def model(self) -> BalancerModel:
         """The balancer as the closed loop takes it."""
@@ -76,10 +83,8 @@ def calibrate(scene: AnyScene) -> Calibration:
         laminar tube, correlations beyond; see the parts.
     """
     scene = liquid_ring_scene(scene)
-    check_ring(scene)
-    chamber, heads = calibrate_chamber(scene), tube_heads(scene)
-    law = calibrated_law(scene=scene, chamber=chamber, heads=heads)
-    point = operating_point(scene=scene, law=law)
+    chamber, law = _chamber_and_law(scene)
+    heads, point = law.heads, operating_point(scene=scene, law=law)
     return Calibration(
         scene=scene,
         chamber=chamber,
@@ -103,6 +108,20 @@ def calibrate(scene: AnyScene) -> Calibration:
             "moment_table_error_kg_m": chamber.moment.interpolation,
         },
     )
+
+
+def calibrated_model(scene: Scene) -> BalancerModel:
+    """The balancer that `calibrate` finds, without what it reports beside: half the work.
+
+    Raises: SceneError, ValueError: as `calibrate`.
+    """
+    return balancer_model(_chamber_and_law(scene)[1])
+
+
+def _chamber_and_law(scene: Scene) -> tuple[ChamberCalibration, CalibratedLaw]:
+    check_ring(scene)
+    chamber = calibrate_chamber(scene)
+    return chamber, calibrated_law(scene=scene, chamber=chamber, heads=tube_heads(scene))
 
 
 def _tube(scene: Scene, velocity: FloatArray) -> TubeLoss:

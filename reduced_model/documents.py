@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from ringbalance.reduced_model.budget import Budget
 from ringbalance.reduced_model.calibration import Calibration, lambda_over_fill, lambda_variation
 from ringbalance.reduced_model.chamber.calibration import Curve
 from ringbalance.reduced_model.chamber.element_check import CHECKED, ElementCheck
@@ -29,7 +30,8 @@ def calibration_document(calibration: Calibration) -> dict[str, Any]:
     scene's inputs as they stand (rounding, quadrature, what the check by finite elements contradicts,
     left-out gravity and terms without a model); what uncertain inputs add stands beside them
     (`*_input_uncertainty`), and the two combine as the root of the sum of squares.  Those of k and of
-    velocities hold everything.  The law's rows run along
+    velocities hold everything.  `budgets` divides the uncertainty of each main quantity into its causes.
+    The law's rows run along
     `gas_pressure_Pa`, its columns along `fill_ratio`, for a tube that is empty beforehand.
     Returns: The document, in SI units and gauge pressures; no value is NaN or infinite.
     Source: combination after ASME V&V 20-2009.
@@ -42,6 +44,7 @@ def calibration_document(calibration: Calibration) -> dict[str, Any]:
         "lambda": _lambda(calibration),
         "tube": _tube(calibration),
         "law": _law(calibration),
+        "budgets": {name: _budget(budget) for name, budget in calibration.budgets.items()},
         "operating_point": _operating_point(calibration),
         "residual_liquid": _residual(calibration),
         "asynchronous_instability": _instability(calibration),
@@ -182,17 +185,33 @@ def _law(calibration: Calibration) -> dict[str, Any]:
     }
 
 
+def _budget(budget: Budget) -> dict[str, Any]:
+    return {
+        "value": budget.value,
+        "unit": budget.unit,
+        "numerical": budget.numerical,
+        "input": budget.input,
+        "model": budget.model,
+        "total": budget.total,
+        "inputs": dict(budget.inputs),
+    }
+
+
 def _operating_point(calibration: Calibration) -> dict[str, Any]:
-    point = calibration.operating_point
+    point, told = calibration.operating_point, calibration.budgets
+
+    def total(name: str, otherwise: float | None) -> float | None:
+        return told[name].total if name in told else otherwise
+
     return {
         "fill_ratio": point.fill_ratio,
         "gas_pressure_Pa": point.gas_pressure,
         "regime": point.regime.label,
         "velocity_m_s": point.velocity,
-        "velocity_uncertainty": point.velocity_uncertainty,
+        "velocity_uncertainty": told["velocity"].total,
         "k_at_velocity_m_s": point.loss_velocity,
         "k": point.k,
-        "k_uncertainty": point.k_uncertainty,
+        "k_uncertainty": total("drag_coefficient", point.k_uncertainty),
         "priming_pressure_vented_Pa": point.priming_vented,
         "priming_pressure_trapped_Pa": point.priming_trapped,
         "stall_pressure_Pa": point.stall,
@@ -200,7 +219,7 @@ def _operating_point(calibration: Calibration) -> dict[str, Any]:
         "hump_pressure_Pa": point.hump_pressure,
         "cavity_pressure_Pa": point.cavity_pressure,
         "cavitation_margin_Pa": point.cavitation_margin,
-        "cavitation_margin_uncertainty": point.cavitation_margin_uncertainty,
+        "cavitation_margin_uncertainty": total("cavitation_margin", point.cavitation_margin_uncertainty),
     }
 
 
@@ -217,7 +236,7 @@ def _residual(calibration: Calibration) -> dict[str, float]:
         "usable_volume_uncertainty": rest.usable_volume_uncertainty,
         "pair_moment_kg_m": rest.pair_moment,
         "usable_pair_moment_kg_m": rest.usable_pair_moment,
-        "usable_pair_moment_uncertainty": rest.usable_pair_moment_uncertainty,
+        "usable_pair_moment_uncertainty": calibration.budgets["usable_moment"].total,
     }
 
 

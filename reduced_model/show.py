@@ -12,20 +12,19 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from ringbalance.reduced_model.budget import Budget, rounded
 from ringbalance.reduced_model.calibration import Calibration, lambda_variation
 from ringbalance.reduced_model.chamber.row_status import REMEDIES, row_status
 from ringbalance.reduced_model.documents import PRESSURE_FACTORS, paper_columns
 from ringbalance.reduced_model.gas_line import line_text, line_warning
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.tube.operating_point import OperatingPoint
 
 _MARKS: Final = MappingProxyType(
     {
-        Regime.BLOCKED: "-",
-        Regime.SIPHON: "{:.1f}",
-        Regime.SEPARATED: "{:.1f}*",
-        Regime.REVERSE: "{:.1f}r",
-        Regime.UNDECIDED: "{:.1f}?",
+        Regime.SIPHON: "",
+        Regime.SEPARATED: "*",
+        Regime.REVERSE: "r",
+        Regime.UNDECIDED: "?",
     }
 )
 
@@ -58,8 +57,14 @@ def _table(title: str, *columns: str, left: int = 1) -> Table:
     return table
 
 
-def _mpa(pressure: float | None) -> str:
-    return "none" if pressure is None else f"{pressure / 1e6:.3f} MPa"
+def _measured(value: float, total: float, unit: str, *, scale: float = 1.0) -> str:
+    """Value ± uncertainty and unit, both to the second digit of the uncertainty."""
+    width = scale * total
+    return f"{rounded(scale * value, width)} ± {rounded(width, width)} {unit}".rstrip()
+
+
+def _shown(budget: Budget, unit: str, *, scale: float = 1.0) -> str:
+    return _measured(budget.value, budget.total, unit, scale=scale)
 
 
 def _summary(calibration: Calibration) -> Table:
@@ -74,29 +79,30 @@ def _summary(calibration: Calibration) -> Table:
 
 
 def _summary_rows(calibration: Calibration) -> Iterator[tuple[str, str]]:
-    chamber, point = calibration.chamber, calibration.operating_point
-    lam = chamber.moment_per_mass
-    width = float(np.hypot(lam.uncertainty, chamber.moment_per_mass_inputs))
-    yield "chamber", f"{1e6 * chamber.volume:.2f} ml"
+    chamber, point, told = calibration.chamber, calibration.operating_point, calibration.budgets
+    lam = told["lambda"]
+    yield "chamber", _shown(told["chamber_volume"], "ml", scale=1e6)
     yield (
         "lambda",
-        f"{1e3 * float(lam.value):.3f} mm ± {1e3 * width:.2g} mm per transferred mass "
-        f"({1e3 * float(lam.value) / 2:.3f} mm per mass difference), "
+        f"{_shown(lam, 'mm', scale=1e3)} per transferred mass "
+        f"({rounded(1e3 * lam.value / 2, 1e3 * lam.total / 2)} mm per mass difference), "
         f"varies by {100 * lambda_variation(calibration=calibration):.2g} % over the fill range",
     )
     yield "usable", _usable_text(calibration)
-    yield "operating point", _point_text(point)
-    if point.k is not None and point.k_uncertainty is not None:
-        yield "k there", f"{point.k:.2f} ± {point.k_uncertainty:.2f} at {point.loss_velocity:.3g} m/s"
-    yield "full siphon stalls", f"at {_mpa(point.stall)} when empty (Eq. 19: {_mpa(point.stall_paper)})"
-    if point.priming_vented is not None:
+    yield "operating point", _point_text(calibration)
+    if "drag_coefficient" in told:
+        yield "k there", f"{_shown(told['drag_coefficient'], '')} at {point.loss_velocity:.3g} m/s"
+    stall = told["stall_pressure"]
+    paper = rounded(point.stall_paper / 1e6, stall.total / 1e6)
+    yield "full siphon stalls", f"at {_mpa(stall)} when empty (Eq. 19: {paper} MPa)"
+    if "priming_pressure_vented" in told:
         yield (
             "over the siphon crest",
-            f"{_mpa(point.priming_vented)} vented, driven chamber empty; "
-            f"{_mpa(point.priming_trapped)} trapped, equal fills",
+            f"{_mpa(told['priming_pressure_vented'])} vented, driven chamber empty; "
+            f"{_mpa(told['priming_pressure_trapped'])} trapped, equal fills",
         )
     if point.cavitation_margin is not None:
-        yield "cavitation margin", _margin_text(point)
+        yield "cavitation margin", _margin_text(calibration)
     yield "gas line", line_text(calibration.gas_line)
     if line_warning(calibration.gas_line):
         yield "note", line_warning(calibration.gas_line)
@@ -106,39 +112,51 @@ def _summary_rows(calibration: Calibration) -> Iterator[tuple[str, str]]:
         yield "warning", calibration.instability.warning
 
 
+def _mpa(budget: Budget) -> str:
+    return _shown(budget, "MPa", scale=1e-6)
+
+
 def _usable_text(calibration: Calibration) -> str:
-    rest = calibration.residual
+    rest, told = calibration.residual, calibration.budgets["usable_moment"]
+    moment = f"{_shown(told, 'g mm', scale=1e6)} a pair"
     if rest.fill_ratio == 0:
-        return f"{1e6 * rest.pair_moment:.0f} g mm a pair; no gas enters the port before a chamber is empty"
+        return f"{moment}; no gas enters the port before a chamber is empty"
     return (
-        f"{1e6 * rest.usable_pair_moment:.0f} ± {1e6 * rest.usable_pair_moment_uncertainty:.0f} g mm a pair "
-        f"({1e6 * rest.pair_moment:.0f} by geometry) and {1e6 * rest.usable_volume:.1f} ± "
-        f"{1e6 * rest.usable_volume_uncertainty:.2g} ml, fills {rest.fill_ratio:.3f} ± "
-        f"{rest.fill_ratio_uncertainty:.2g} to {rest.largest_fill_ratio:.3f}: below, with "
-        f"{1e3 * rest.depth:.2f} ± {1e3 * rest.depth_uncertainty:.2g} mm of liquid over the port, gas passes "
-        "through"
+        f"{moment} ({rounded(1e6 * rest.pair_moment, 1e6 * told.total)} by geometry) and "
+        f"{_measured(rest.usable_volume, rest.usable_volume_uncertainty, 'ml', scale=1e6)}, fills "
+        f"{_measured(rest.fill_ratio, rest.fill_ratio_uncertainty, '')} to "
+        f"{rounded(rest.largest_fill_ratio, rest.fill_ratio_uncertainty)}: below, with "
+        f"{_measured(rest.depth, rest.depth_uncertainty, 'mm', scale=1e3)} of liquid over the port, gas "
+        "passes through"
     )
 
 
-def _point_text(point: OperatingPoint) -> str:
-    where = f"{_mpa(point.gas_pressure)}, equal fills of {point.fill_ratio:g}"
+def _point_text(calibration: Calibration) -> str:
+    point, told = calibration.operating_point, calibration.budgets
+    where = f"{point.gas_pressure / 1e6:.4g} MPa, equal fills of {point.fill_ratio:g}"
     if point.regime is Regime.BLOCKED:
-        needed = [p for p in (point.priming_vented, point.stall) if p is not None]
-        return f"{where}: blocked; raise gas.pressure towards {_mpa(max(needed))}"
-    return f"{where}: {point.regime.label}, {point.velocity:.2f} ± {point.velocity_uncertainty:.2f} m/s"
+        names = ("priming_pressure_vented", "stall_pressure")
+        needed = max((told[name] for name in names if name in told), key=lambda budget: budget.value)
+        return f"{where}: blocked; raise gas.pressure towards {_mpa(needed)}"
+    return f"{where}: {point.regime.label}, {_shown(told['velocity'], 'm/s')}"
 
 
-def _margin_text(point: OperatingPoint) -> str:
+def _margin_text(calibration: Calibration) -> str:
     """How far a full siphon's pressure over the crest is from separation there."""
+    point, budget = calibration.operating_point, calibration.budgets.get("cavitation_margin")
     margin, width = point.cavitation_margin or 0.0, point.cavitation_margin_uncertainty or 0.0
-    told = (
+    width = width if budget is None else budget.total
+    verdict = (
         "the column holds over the siphon crest"
         if margin > 0
         else "a full siphon would separate over the siphon crest"
     )
     if abs(margin) < width:
-        told += ", within its uncertainty either way"
-    return f"{margin / 1e6:+.3f} ± {width / 1e6:.3f} MPa above {_mpa(point.cavity_pressure)}: {told}"
+        verdict += ", within its uncertainty either way"
+    shown = _measured(margin, width, "MPa", scale=1e-6)
+    sign = "+" if margin > 0 else ""
+    cavity = rounded((point.cavity_pressure or 0.0) / 1e6, width / 1e6)
+    return f"{sign}{shown} above {cavity} MPa: {verdict}"
 
 
 def _chamber_table(calibration: Calibration) -> Table:
@@ -151,16 +169,20 @@ def _chamber_table(calibration: Calibration) -> Table:
         table.caption = "; ".join(f"{state}: {REMEDIES[state]}" for state in limited)
     columns = paper_columns(calibration, chamber.fill_ratio[at])
     paper_pressure, paper_moment = columns["wall_pressure_paper_Pa"], columns["moment_paper_kg_m"]
+    pressure_total, moment_total = (
+        np.maximum(np.hypot(curve.uncertainty, curve.inputs), 1e-9 * np.max(curve.value))
+        for curve in (chamber.wall_pressure, chamber.moment)
+    )
     for row, i in enumerate(at):
         p, u = float(chamber.wall_pressure.value[i]), float(chamber.moment.value[i])
         table.add_row(
             f"{chamber.fill_ratio[i]:g}",
             f"{1e3 * chamber.ring.surface_radius[i]:.2f}",
-            f"{p / 1e6:.4f}",
-            f"{paper_pressure[row] / 1e6:.4f}",
+            rounded(p / 1e6, pressure_total[i] / 1e6),
+            rounded(paper_pressure[row] / 1e6, pressure_total[i] / 1e6),
             _off(float(paper_pressure[row]), p),
-            f"{1e6 * u:.1f}",
-            f"{1e6 * paper_moment[row]:.1f}",
+            rounded(1e6 * u, 1e6 * moment_total[i]),
+            rounded(1e6 * paper_moment[row], 1e6 * moment_total[i]),
             _off(float(paper_moment[row]), u),
             *([str(states[row])] if limited else []),
         )
@@ -180,8 +202,7 @@ def _tube_table(calibration: Calibration) -> Table:
         table.add_row(
             f"{tube.velocity[i]:.3g}",
             f"{tube.reynolds[i]:.0f}",
-            _short(float(tube.k.value[i])),
-            _short(float(tube.k.uncertainty[i])),
+            *(rounded(float(v[i]), float(tube.k.uncertainty[i])) for v in (tube.k.value, tube.k.uncertainty)),
             f"{tube.flow_state[i]}{'' if tube.in_range[i] else '*'}",
             *(_short(float(term[i])) for term in terms.values()),
         )
@@ -206,11 +227,16 @@ def _law_table(calibration: Calibration) -> Table:
         flow = calibration.flow_law.evaluate(fill_ratio=x, gas_pressure=p)
         by_paper = calibration.paper_law.evaluate(fill_ratio=x, gas_pressure=p).velocity
         cells = (
-            f"{_MARKS[Regime(int(r))].format(u)} ({v:.1f})"
-            for u, r, v in zip(flow.velocity, flow.regime, by_paper, strict=True)
+            _cell(Regime(int(r)), *values)
+            for r, *values in zip(flow.regime, flow.velocity, flow.uncertainty, by_paper, strict=True)
         )
         table.add_row(f"{p / 1e6:.3g}", *cells)
     return table
+
+
+def _cell(regime: Regime, velocity: float, total: float, by_paper: float) -> str:
+    shown = "-" if regime is Regime.BLOCKED else f"{rounded(velocity, total)}{_MARKS[regime]}"
+    return f"{shown} ({by_paper:.1f})"
 
 
 def _models_table(calibration: Calibration) -> Table:

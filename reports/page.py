@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import base64
+import io
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import groupby
+from types import MappingProxyType
 from typing import Final
+
+from PIL import Image
 
 from ringbalance.reports import summary
 from ringbalance.reports.equations import equation_svg, equations
@@ -23,8 +27,26 @@ from ringbalance.reports.sections import drawings_in, viewed
 Facts = tuple[tuple[str, str], ...]
 """Labels and texts."""
 
-FIRST_OPERATIONS: Final = 12
-"""Gas operations that are listed without being asked for."""
+ANNEX: Final = "annex.html"
+DOCUMENTS: Final[Mapping[str, Record]] = MappingProxyType(
+    {
+        ANNEX: {
+            "place": "annex",
+            "kind": "Verification annex",
+            "other": {"file": "report.html", "title": "The report"},
+        },
+        "report.html": {
+            "place": "report",
+            "kind": "Verification report",
+            "other": {"file": ANNEX, "title": "Annex: evidence and details"},
+        },
+    }
+)
+"""The documents by file name; the report last, for where it is, all else is."""
+_FIRST_INJECTIONS: Final = 12
+"""Injections that are listed."""
+_PICTURE_WIDTH: Final = 1200
+_PICTURE_QUALITY: Final = 80
 
 
 def _page_figures(evidence: Record) -> Record:
@@ -105,15 +127,15 @@ def _drag_table(tube: Record, point: Record) -> Table:
     )
 
 
-def _operation_tables(run: Record | None) -> dict[str, Table]:
-    """The operations of a run: the first ones, and the rest for whoever wants them."""
+def _injections(run: Record | None) -> Table:
     rows = [_injection(row) for row in (run or {"injections": []})["injections"]]
-    heads = ("Time", "Chamber", "Gas on for", "Regime", "Fill before", "after")
-    title = "Gas operations under the calibrated law"
-    return {
-        "first": Table(caption=f"{title}.", heads=heads, rows=rows[:FIRST_OPERATIONS]),
-        "rest": Table(caption=f"{title}, continued.", heads=heads, rows=rows[FIRST_OPERATIONS:]),
-    }
+    rest = len(rows) - _FIRST_INJECTIONS
+    return Table(
+        caption="Injections under the calibrated law"
+        + (f"; {rest} more in the evidence." if rest > 0 else "."),
+        heads=("Time", "Chamber", "Gas on for", "Regime", "Fill before", "after"),
+        rows=rows[:_FIRST_INJECTIONS],
+    )
 
 
 def _injection(row: Record) -> Cells:
@@ -190,13 +212,14 @@ def page_content(evidence: Record, *, pictures: Mapping[str, bytes] | None = Non
         "scene": evidence["scene"],
         "sections": sections,
         "stamp": _stamp(evidence),
-        "summary": _summary(evidence, claims),
+        "running_head": _running_head(evidence),
+        "tallies": _tallies(evidence),
         "equations": _equations(),
         "figures": figures,
         "pictures": _pictures(evidence["pictures"], pictures or {}),
         "chamber": _chamber_table(calibration["chamber"]),
         "drag_at": _drag_table(calibration["tube"], evidence["operating_point"]),
-        "injections": _operation_tables(runs.get("calibrated")),
+        "injections": _injections(runs.get("calibrated")),
         "loop_notes": _loop_notes(runs),
         "claims": claims,
         "checks": checks,
@@ -225,14 +248,16 @@ def _stamp(evidence: Record) -> Facts:
     )
 
 
-def _summary(evidence: Record, claims: list[Record]) -> Record:
-    chosen = {case["id"] for case in summary.headlines(evidence)}
+def _running_head(evidence: Record) -> str:
+    scene = evidence["scene"]
+    return f"{scene['name']}, scene {scene['sha256'][:12]}, {evidence['times']['date']}"
+
+
+def _tallies(evidence: Record) -> Record:
     return {
         "lead": summary.lead_sentence(evidence),
         "claims": summary.verdict_counts(summary.claims(evidence), summary.CLAIM_VERDICTS),
         "checks": summary.verdict_counts(summary.checks(evidence), summary.CHECK_VERDICTS),
-        "numbers": summary.key_numbers(evidence),
-        "headlines": [case for case in claims if case["id"] in chosen],
     }
 
 
@@ -244,7 +269,12 @@ def _equations() -> Record:
 
 
 def _data_address(content: bytes) -> str:
-    return "data:image/png;base64," + base64.b64encode(content).decode("ascii")
+    """A picture as part of the page, packed: a quarter of the bytes, and no difference to the eye."""
+    packed = io.BytesIO()
+    with Image.open(io.BytesIO(content)) as picture:
+        picture.thumbnail((_PICTURE_WIDTH, _PICTURE_WIDTH))
+        picture.save(packed, format="WEBP", quality=_PICTURE_QUALITY)
+    return "data:image/webp;base64," + base64.b64encode(packed.getvalue()).decode("ascii")
 
 
 def _pictures(record: Record, contents: Mapping[str, bytes]) -> Record:

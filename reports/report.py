@@ -10,7 +10,8 @@ from typing import Final
 
 from ringbalance.reports.evidence import Progress, collect_evidence
 from ringbalance.reports.figures.style import standalone
-from ringbalance.reports.page import page_content
+from ringbalance.reports.page import DOCUMENTS, page_content
+from ringbalance.reports.pages.document import evidence_text
 from ringbalance.reports.pictures.opengl import OpenGL
 from ringbalance.reports.pictures.process import (
     FOLDERS,
@@ -19,13 +20,13 @@ from ringbalance.reports.pictures.process import (
     stop_drawing,
     write_fields,
 )
-from ringbalance.reports.render import render_page
+from ringbalance.reports.render import render_pages
 from ringbalance.reports.saved import saved_cases
 from ringbalance.reports.section import Level, Record
 from ringbalance.scene import AnyScene, liquid_ring_scene
 from ringbalance.scene.platform.files import staged
 
-FILES: Final = ("evidence.json", "report.html")
+FILES: Final = ("evidence.json", *DOCUMENTS)
 """Of a report, the page last: where it is, all else is."""
 
 
@@ -97,14 +98,15 @@ def _tell(progress: Progress | None, stage: str) -> None:
 
 def _write_page(evidence: Record, stage: Path) -> Record:
     """Evidence, figures and page; the page is made of the evidence as it reads back from its file."""
-    text = json.dumps(evidence, allow_nan=False, indent=1, ensure_ascii=False)
+    text = evidence_text(evidence)
     kept: Record = json.loads(text)
-    (stage / "evidence.json").write_text(text + "\n", encoding="utf-8")
+    (stage / "evidence.json").write_text(text, encoding="utf-8")
     figures = stage / "figures"
     names = [item[theme] for item in evidence["pictures"]["files"] for theme in ("light", "dark")]
     pictures = {name: (figures / name).read_bytes() for name in names}
     content = page_content(kept, pictures=pictures)
     for drawing in content.drawings:
         (figures / f"{drawing.name}.svg").write_text(standalone(drawing), encoding="utf-8")
-    (stage / "report.html").write_text(render_page(content), encoding="utf-8")
+    for name, page in render_pages(content).items():
+        (stage / name).write_text(page, encoding="utf-8")
     return kept

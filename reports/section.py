@@ -10,7 +10,6 @@ from typing import Any, Final, Literal
 
 from ringbalance.controller.tuning.tune import Tuning, tune
 from ringbalance.reduced_model.calibration import Calibration
-from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reports.numbers import MISSING
 from ringbalance.scene import Scene
 from ringbalance.verification.loops import calibration_of
@@ -20,6 +19,7 @@ Cells = Sequence[str]
 _TUNING_RUNS: Final = 500
 _TERM_RUNS: Final = 10
 Level = Literal["light", "heavy"]
+Place = Literal["report", "annex"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,11 +61,7 @@ class Work:
 @lru_cache(maxsize=4)
 def tuning_of(scene: Scene) -> Tuning:
     """One tuning serves every report of a scene within a process."""
-    return tune(scene, model_of=_model_of, members=_TUNING_RUNS, runs=_TERM_RUNS)
-
-
-def _model_of(scene: Scene) -> BalancerModel:
-    return calibration_of(scene).model
+    return tune(scene, calibration_of(scene).model, members=_TUNING_RUNS, runs=_TERM_RUNS)
 
 
 def _nothing(_work: Work) -> None:
@@ -85,6 +81,8 @@ class Section:
     """Its id on the page, its key in the evidence, and the stem of its template."""
     title: str
     """In the contents."""
+    place: Place = "annex"
+    """Which of the two documents it stands in."""
     collect: Callable[[Work], Record | None] = _nothing
     """Plain numbers and texts for the evidence, under the section's name; None: nothing there."""
     last: bool = False

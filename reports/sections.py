@@ -5,21 +5,40 @@ A new one is a module with its `SECTION`, a template of its name, and a line in 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from itertools import count
+from types import MappingProxyType
 from typing import Any, Final
 
 from ringbalance.reports.figures.style import Drawing
+from ringbalance.reports.pages import (
+    conditions,
+    credibility,
+    document,
+    extremes,
+    first_page,
+    loop,
+    operation,
+    sloshing,
+)
 from ringbalance.reports.pages import consequences as consequence_view
 from ringbalance.reports.pages import drag_coefficient as fifty
 from ringbalance.reports.pages import eccentric_mass as driven
-from ringbalance.reports.pages import extremes, first_page, sloshing
 from ringbalance.reports.pages import model_selection as trade
 from ringbalance.reports.pages import paper_figures as paper_again
 from ringbalance.reports.pages import siphon_crest as hump
 from ringbalance.reports.pages import tube_flow as inside
-from ringbalance.reports.section import Record, Section, Work
+from ringbalance.reports.section import Place, Record, Section, Work
 
 SECTIONS: Final[tuple[Section, ...]] = (
     first_page.SECTION,
+    conditions.SECTION,
+    operation.SECTION,
+    loop.SECTION,
+    Section(name="claims", title="Claims of the liquid-ring paper", place="report"),
+    credibility.SECTION,
+    Section(name="parameters", title="Parameters and their origin", place="report"),
+    document.SECTION,
     Section(name="disc", title="The disc and its liquid"),
     Section(name="pressure", title="Pressure of the liquid"),
     Section(name="moment", title="Balancing moment and λ"),
@@ -29,17 +48,19 @@ SECTIONS: Final[tuple[Section, ...]] = (
     Section(name="law", title="The flow law"),
     hump.SECTION,
     fifty.SECTION,
-    Section(name="loop", title="The closed loop"),
+    Section(name="injections", title="The closed loop, injection by injection"),
     paper_again.SECTION,
     consequence_view.SECTION,
-    Section(name="claims", title="Claims of the liquid-ring paper"),
+    Section(name="cases", title="Claims: evidence and doubts"),
     driven.SECTION,
     Section(name="numerics", title="Numerical verification"),
     extremes.SECTION,
     trade.SECTION,
     Section(name="models", title="Models used, and why"),
-    Section(name="scene", title="Scene and provenance"),
+    Section(name="scene", title="Scene file, mesh and versions"),
 )
+PREFIXES: Final[Mapping[Place, str]] = MappingProxyType({"report": "", "annex": "A"})
+"""Before the number of every section, figure, table and equation of a document."""
 
 
 def collected(work: Work, *, last: bool) -> Record:
@@ -49,12 +70,20 @@ def collected(work: Work, *, last: bool) -> Record:
 
 
 def viewed(evidence: Record) -> list[Record]:
-    """What each section shows, in the page's order, without those that have nothing to show."""
+    """What each section shows, in order and numbered, without those that have nothing to show."""
     views = [(section, section.view(evidence)) for section in SECTIONS]
+    shown = [(section, view) for section, view in views if view is not None]
+    counts = {"report": count(1), "annex": count(1)}
     return [
-        {"name": s.name, "title": s.title, "template": s.template, "view": view}
-        for s, view in views
-        if view is not None
+        {
+            "name": s.name,
+            "title": s.title,
+            "template": s.template,
+            "place": s.place,
+            "number": f"{PREFIXES[s.place]}{next(counts[s.place])}",
+            "view": view,
+        }
+        for s, view in shown
     ]
 
 

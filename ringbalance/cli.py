@@ -34,7 +34,7 @@ COMMANDS = {
         "ringbalance.reduced_model.cli:calibrate",
         "lambda, k and the flow law of a disc, with uncertainties.",
     ),
-    "simulate": ("ringbalance.controller.cli:simulate", "One closed-loop balancing run."),
+    "simulate": ("ringbalance.reports.simulate_cli:simulate", "One closed-loop balancing run."),
     "tune": (
         "ringbalance.controller.tuning.cli:tune",
         "Recommended gain, its margins, and the settling times under it.",

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Final, Literal, TypeVar
 
 from ringbalance.scene.eccentric_models import EccentricScene
-from ringbalance.scene.faults import Fault, SceneError, toml_text
+from ringbalance.scene.faults import SceneError, option_error
 from ringbalance.scene.models import Scene
 from ringbalance.scene.units import FieldError, parse_quantity
 
@@ -55,15 +55,4 @@ def _read_tolerance(text: str) -> float:
 
 
 def _error(value: str, problem: str, allowed: str) -> SceneError:
-    return SceneError(
-        [
-            Fault(
-                file="command line",
-                table="",
-                key="--tolerance",
-                value=toml_text(value),
-                problem=problem,
-                allowed=allowed,
-            )
-        ]
-    )
+    return option_error(option="--tolerance", value=value, problem=problem, allowed=allowed)

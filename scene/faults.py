@@ -67,6 +67,14 @@ class SceneError(Exception):
         return type(self), (self.faults,)
 
 
+def option_error(*, option: str, value: object, problem: str, allowed: str) -> SceneError:
+    """The error of a command-line option that cannot be used."""
+    fault = Fault(
+        file="command line", table="", key=option, value=toml_text(value), problem=problem, allowed=allowed
+    )
+    return SceneError([fault])
+
+
 def closest(word: str, known: Iterable[str]) -> str:
     """Find the known word that was probably meant.
 

@@ -16,7 +16,7 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.comparison import from_range
 
 Level = Literal["light", "heavy"]
-CurveStyle = Literal["paper", "found", "reference"]
+CurveStyle = Literal["paper", "found", "reference", "points"]
 
 
 @dataclass(frozen=True, kw_only=True)

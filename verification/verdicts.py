@@ -15,7 +15,7 @@ from typing import Literal
 from ringbalance.verification.comparison import Comparison, compare
 from ringbalance.verification.evidence import Found, Reference
 
-Kind = Literal["code_verification", "solution_verification", "claim"]
+Kind = Literal["validation", "code_verification", "solution_verification", "claim"]
 Metric = Literal["validation", "within_uncertainty", "relative", "absolute", "at_most", "at_least"]
 Role = Literal["number", "idea", "reading"]
 """What a quantity of a claim decides: a number of the paper's, the idea behind it, or one of several
@@ -42,6 +42,7 @@ VOCABULARY: dict[Kind, tuple[Verdict, ...]] = {
         Verdict.CONFIRMED,
         Verdict.NOT_RUN,
     ),
+    "validation": (Verdict.REFUTED, Verdict.INCONCLUSIVE, Verdict.CONFIRMED, Verdict.NOT_RUN),
     "code_verification": (Verdict.FAILED, Verdict.INCONCLUSIVE, Verdict.PASSED, Verdict.NOT_RUN),
     "solution_verification": (Verdict.FAILED, Verdict.INCONCLUSIVE, Verdict.PASSED, Verdict.NOT_RUN),
 }
@@ -93,7 +94,7 @@ def judge_quantity(
 
 
 def _yes_or_no(kind: Kind, holds: bool) -> Verdict:
-    if kind == "claim":
+    if kind in ("claim", "validation"):
         return Verdict.CONFIRMED if holds else Verdict.REFUTED
     return Verdict.PASSED if holds else Verdict.FAILED
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
 
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
-from ringbalance.scene.arrays import IntArray
+from ringbalance.scene.arrays import FloatArray, IntArray
 
 MOST_ROWS: Final = 2500
 """Instants in the document; a run has a hundred times as many."""
@@ -53,6 +54,44 @@ def eccentric_document(run: EccentricRun, *, rows: int = MOST_ROWS) -> dict[str,
             "friction_variance": run.estimates.friction_variance[kept].T.tolist(),
         },
     }
+
+
+def eccentric_history(run: EccentricRun) -> dict[str, Sequence[Any]]:
+    """Every sample of a run, by name of its column.
+
+    Whirl and imbalance lie along the rotor's axes; angles are not wrapped.
+    """
+    told = run.estimates
+    stages = np.searchsorted([stage.start for stage in run.stages], run.time, side="right") - 1
+    columns: dict[str, FloatArray] = {
+        "time_s": run.time,
+        "speed_rad_s": run.speed,
+        "whirl_x_m": run.whirl.real,
+        "whirl_y_m": run.whirl.imag,
+        "amplitude_m": run.amplitude,
+        "phase_rad": run.phase,
+        **_each("mass_angle_{}_rad", run.mass_angle),
+        **_each("mass_rate_{}_rad_s", run.mass_rate),
+        **_each("goal_{}_rad", run.goal),
+        **_each("voltage_{}_V", run.voltage),
+        "energy_J": run.energy,
+        "imbalance_x_kg_m": told.imbalance[:, 0],
+        "imbalance_y_kg_m": told.imbalance[:, 1],
+        "imbalance_variance_xx_kg2_m2": told.imbalance_covariance[:, 0, 0],
+        "imbalance_variance_xy_kg2_m2": told.imbalance_covariance[:, 0, 1],
+        "imbalance_variance_yy_kg2_m2": told.imbalance_covariance[:, 1, 1],
+        **_each("friction_arm_{}_m", told.friction_arm.T),
+        **_each("friction_variance_{}_m2", told.friction_variance.T),
+    }
+    return {
+        **{name: values.tolist() for name, values in columns.items()},
+        "drive_off": run.drive_off.astype(int).tolist(),
+        "stage": [run.stages[place].name for place in stages],
+    }
+
+
+def _each(name: str, values: FloatArray) -> dict[str, FloatArray]:
+    return {name.format(mass): row for mass, row in enumerate(values, start=1)}
 
 
 def thinned(run: EccentricRun, *, rows: int = MOST_ROWS) -> IntArray:

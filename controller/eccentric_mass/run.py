@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -115,6 +116,12 @@ def simulate_eccentric(
         targets=_targets(scene, record),
         unbalanced_amplitude=_unbalanced(scene, float(speed[-1])),
     )
+
+
+def locked_run(scene: EccentricScene, *, progress: Progress | None = None) -> EccentricRun:
+    """The run of the same rotor with the masses clamped where they start: without balancing."""
+    clamped = replace(scene, supervisor=replace(scene.supervisor, strategy="locked"))
+    return simulate_eccentric(clamped, progress=progress)
 
 
 def _silent(_: float, __: float) -> None:

@@ -43,6 +43,8 @@ class SampledLoop:
     """Of that key; empty for the weight q, which has none."""
     poles: ComplexArray
     """Per step, shape (1,) or (2,)."""
+    gain_margin: float
+    """Factor by which the loop's own gain could grow before a pole leaves the unit circle."""
     recommended: float
     """Largest value of the key that leaves a gain margin of two."""
     recommended_step: float
@@ -107,6 +109,7 @@ def _regulator(scene: EccentricScene) -> SampledLoop:
         value=weight,
         unit="",
         poles=poles(weight, scene.lqr.step, 1.0),
+        gain_margin=_largest(lambda factor: _inside(poles(weight, scene.lqr.step, factor))),
         recommended=_largest(lambda q: _inside(poles(q, scene.lqr.step, GAIN_MARGIN))),
         recommended_step=_step(scene, lambda step: _inside(poles(weight, step, GAIN_MARGIN))),
     )
@@ -125,6 +128,7 @@ def _speed(scene: EccentricScene) -> SampledLoop:
         value=gain,
         unit="V*s/rad",
         poles=poles(gain, scene.lqr.step),
+        gain_margin=_largest(lambda factor: _inside(poles(factor * gain, scene.lqr.step))),
         recommended=_largest(lambda value: _inside(poles(GAIN_MARGIN * value, scene.lqr.step))),
         recommended_step=_step(scene, lambda step: _inside(poles(GAIN_MARGIN * gain, step))),
     )
@@ -147,6 +151,9 @@ def _pair(scene: EccentricScene) -> SampledLoop:
         value=told.pair_gain,
         unit="V/rad",
         poles=poles(told.pair_gain, told.speed_gain, scene.lqr.step),
+        gain_margin=_largest(
+            lambda factor: _inside(poles(factor * told.pair_gain, told.speed_gain, scene.lqr.step))
+        ),
         recommended=_largest(lambda pair: _inside(poles(GAIN_MARGIN * pair, slower, scene.lqr.step))),
         recommended_step=_step(
             scene,

@@ -40,6 +40,7 @@ def eccentric_tuning_document(scene: EccentricScene, gains: RecommendedGains) ->
                 "poles": [[pole.real, pole.imag] for pole in loop.poles.tolist()],
                 "radius": loop.radius,
                 "stable": loop.stable,
+                "gain_margin": loop.gain_margin,
                 "recommended": loop.recommended,
                 "recommended_step_s": loop.recommended_step,
             }

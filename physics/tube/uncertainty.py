@@ -19,6 +19,8 @@ from ringbalance.scene.models import InputUncertainty, Liquid, Tube
 
 ASSUMED_ROUGHNESS_UNCERTAINTY: Final = 0.5
 """Relative expanded uncertainty (95 %) of a roughness for which the scene states none."""
+INPUT_PART: Final = "input: "
+"""What the names of parts by inputs begin with."""
 TUBE_INPUTS: Final = ("bore", "length", "roughness", "extra_loss", "drag_coefficient")
 
 
@@ -121,7 +123,7 @@ def input_parts(
         return np.asarray(np.max(np.abs(np.array(changes)), axis=0), dtype=np.float64)
 
     widths = _half_widths(tube, liquid, angular_velocity, {i.quantity: i for i in inputs})
-    return {f"input: {name}": effect(name, width) for name, width in widths.items()}
+    return {f"{INPUT_PART}{name}": effect(name, width) for name, width in widths.items()}
 
 
 def _half_widths(

@@ -89,6 +89,8 @@ class ChamberCalibration:
     """U, kg m."""
     moment_per_mass: Estimate
     """lambda at equal fills, per transferred mass, m, shape (); half-width without the inputs."""
+    moment_per_mass_numerical: float
+    """Its numerical part, m."""
     moment_per_mass_inputs: float
     """Expanded uncertainty (95 %) of lambda by the scene's uncertain inputs, m."""
     input_effects: Mapping[str, InputEffect]
@@ -137,6 +139,15 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
     pressure, moment = (scale * np.abs(e) for e in (effect.wall_pressure, effect.moment))
     pressures = [e.wall_pressure for e in effects.values()]
     moments = [e.moment for e in effects.values()]
+    central, numerical = _central(
+        scene,
+        nodes,
+        replace(ring.moment_per_volume, status=status),
+        check.excess,
+        scale * effect.moment,
+        unmodelled["moments"],
+        ring.moment.value,
+    )
     return ChamberCalibration(
         volume=chamber_volume(disc=scene.disc),
         fill_ratio=fills,
@@ -155,15 +166,8 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
         moment=_curve(
             nodes, replace(ring.moment, status=status), check.excess, moment, unmodelled["moments"], moments
         ),
-        moment_per_mass=_central(
-            scene,
-            nodes,
-            replace(ring.moment_per_volume, status=status),
-            check.excess,
-            scale * effect.moment,
-            unmodelled["moments"],
-            ring.moment.value,
-        ),
+        moment_per_mass=central,
+        moment_per_mass_numerical=numerical,
         moment_per_mass_inputs=math.hypot(*(e.moment_per_mass for e in effects.values())),
         input_effects=effects,
         gravity=effect,
@@ -206,16 +210,20 @@ def _central(
     gravity: FloatArray,
     unmodelled: FloatArray,
     moment: FloatArray,
-) -> Estimate:
-    """lambda at equal fills, 2 (dU/dV')/rho; shares of the moment count by how they change with the fill."""
+) -> tuple[Estimate, float]:
+    """lambda at equal fills, 2 (dU/dV')/rho, and the numerical part of its uncertainty.
+
+    Shares of the moment count by how they change with the fill.
+    """
     m, density = nodes.size // 2, scene.liquid.density
     value = 2 * float(slope.value[m]) / density
     numerical = 2 * float(slope.uncertainty[m]) / density + (ROUND_OFF + excess) * value
     mass = density * chamber_volume(disc=scene.disc) * float(nodes[m + 1] - nodes[m - 1])
     left_out, missing = (2 * abs(float(u[m + 1] - u[m - 1])) / mass for u in (gravity, unmodelled * moment))
     missing = max(missing, float(unmodelled[m]) * value)
-    return Estimate(
+    central = Estimate(
         value=np.asarray(value),
         uncertainty=np.asarray(math.hypot(numerical, left_out, missing)),
         status=slope.status,
     )
+    return central, numerical

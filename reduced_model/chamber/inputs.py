@@ -1,7 +1,8 @@
-"""What uncertain inputs do to wall pressure, moment and lambda: linear sensitivities of the closed forms."""
+"""What uncertain inputs do to volume, wall pressure, moment and lambda of a chamber, by its closed forms."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
@@ -9,8 +10,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.mesh.geometry import half_angle, liquid_first_moment, surface_radius
+from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_first_moment, surface_radius
 from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
+from ringbalance.physics.tube.uncertainty import ASSUMED_ROUGHNESS_UNCERTAINTY
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import InputUncertainty, Scene
 from ringbalance.scene.uncertain import nominal_value, with_value
@@ -24,13 +26,14 @@ CHAMBER_INPUTS: Final = (
     "density",
     "speed",
 )
-_STEP: Final = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
 class InputEffect:
     """Expanded uncertainties (95 %) by input; arrays along the fill ratio."""
 
+    volume: float
+    """V, m^3."""
     wall_pressure: FloatArray
     """Pa."""
     moment: FloatArray
@@ -46,6 +49,7 @@ def half_widths(scene: Scene) -> Mapping[str, float]:
     """
     liquid = scene.liquid
     found = {
+        "roughness": ASSUMED_ROUGHNESS_UNCERTAINTY * scene.tube.roughness,
         "density": liquid.density_uncertainty * liquid.density,
         "kinematic_viscosity": liquid.viscosity_uncertainty * liquid.kinematic_viscosity,
     }
@@ -67,26 +71,50 @@ def input_effects(*, scene: Scene, fill_ratio: FloatArray) -> Mapping[str, Input
     """Effect of each uncertain input of the chamber, at a fixed fill ratio.
 
     Returns: InputEffect by quantity; empty when every input is exact.
-    Source: ASME V&V 20-2009, propagation of input uncertainty by local sensitivities.
+    Source: ASME V&V 20-2009, one input at a time; steps of the half-width to both sides, of which the larger
+        change counts, because a sensitivity at the value itself misses what bends within the interval.
     """
     widths = {name: w for name, w in half_widths(scene).items() if name in CHAMBER_INPUTS}
     return {name: _effect(scene, fill_ratio, name, width) for name, width in widths.items()}
 
 
 def _effect(scene: Scene, fill_ratio: FloatArray, quantity: str, width: float) -> InputEffect:
+    fills = np.append(fill_ratio, scene.disc.max_fill_ratio / 2)
+    here, *sides = (
+        (*chamber_closed_forms(scene=s, fill_ratio=fills), chamber_volume(disc=s.disc))
+        for s in (scene, *(shifted(scene=scene, quantity=quantity, change=c) for c in (-width, width)))
+    )
+    pressure, moment, ratio, volume = (
+        np.maximum(np.abs(low - at), np.abs(high - at)) for at, low, high in zip(here, *sides, strict=True)
+    )
+    return InputEffect(
+        volume=float(volume),
+        wall_pressure=pressure[:-1],
+        moment=moment[:-1],
+        moment_per_mass=float(ratio[-1]),
+    )
+
+
+def shifted(*, scene: Scene, quantity: str, change: float) -> Scene:
+    """The scene with one of its quantities changed, as far as a device can have it.
+
+    An interval that would reach zero or below reports "unknown"; a tenth of the value already shows that.
+    """
     value = nominal_value(scene=scene, quantity=quantity)
     if value is None:
         raise ValueError(f"the scene has no {quantity}")
-    fills = np.append(fill_ratio, scene.disc.max_fill_ratio / 2)
-    sides = [
-        chamber_closed_forms(
-            scene=with_value(scene=scene, quantity=quantity, value=value + s * _STEP * width),
-            fill_ratio=fills,
-        )
-        for s in (-1.0, 1.0)
-    ]
-    pressure, moment, ratio = (np.abs(b - a) / (2 * _STEP) for a, b in zip(*sides, strict=True))
-    return InputEffect(wall_pressure=pressure[:-1], moment=moment[:-1], moment_per_mass=float(ratio[-1]))
+    low, high = 0.1 * value, math.inf
+    if quantity == "length":
+        low = max(low, sum(b.angle * b.radius for b in scene.tube.bends))
+    if quantity == "hump_position":
+        low, high = 0.0, 1.0
+    if quantity == "hump_radius":
+        high = scene.tube.port_radius
+    if quantity == "port_radius":
+        low = scene.tube.hump_radius or low
+    if value <= 0:
+        low = min(value, 0.0)
+    return with_value(scene=scene, quantity=quantity, value=min(max(value + change, low), high))
 
 
 def chamber_closed_forms(

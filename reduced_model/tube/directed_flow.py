@@ -29,12 +29,12 @@ from ringbalance.scene.arrays import BoolArray, FloatArray
 class DriveUncertainty:
     """Expanded uncertainties (95 %) of what drives the flow."""
 
-    relative_density: float
-    relative_speed: float
-    relative_gas_pressure: float
-    hump_pressure: float
+    relative_density: float = 0.0
+    relative_speed: float = 0.0
+    relative_gas_pressure: float = 0.0
+    hump_pressure: float = 0.0
     """Pa."""
-    vapour_pressure: float
+    vapour_pressure: float = 0.0
     """Pa."""
 
 

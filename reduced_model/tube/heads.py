@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final
@@ -10,14 +10,13 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.physics.tube.loss import TubeLoss, tube_loss
 from ringbalance.physics.tube.state import TubeState, tube_state, upstream_loss
+from ringbalance.physics.tube.uncertainty import model_parts, uncertainty_parts
 from ringbalance.reduced_model.chamber.inputs import half_widths
 from ringbalance.reduced_model.tables.fit import level_table, refined_table
 from ringbalance.reduced_model.tables.hermite import HermiteTable
 from ringbalance.reduced_model.tube.path import (
     crest_end_uncertainty,
-    crest_span,
     head_behind_crest,
     loss_along,
     reversed_tube,
@@ -72,52 +71,78 @@ def tube_heads(scene: Scene) -> TubeHeads:
     Source: definition of k; the crest's energy balance with the profile's kinetic-energy factor alpha.
     """
     start, stop = (float(v) for v in np.log(TABLE_VELOCITIES))
-    heads = _log_heads(scene)
-    tables, errors = zip(*(_head_table(head, start, stop) for head in heads), strict=True)
-    loss = _loss(scene, np.exp(np.linspace(start, stop, _UNCERTAINTY_NODES)))
+    tables, errors = zip(*(_head_table(head, start, stop) for head in log_heads(scene)[:3]), strict=True)
     place = crest_end_uncertainty(scene.tube, half_widths(scene).get("hump_position", 0.0))
-    share = np.where(loss.k.value > 0, loss.upstream_k / np.where(loss.k.value > 0, loss.k.value, 1.0), 1.0)
-    uncertainty = loss.k.uncertainty / (loss.k.value + 1)
-    moved = np.hypot(loss.k.uncertainty * share, loss_along(loss.terms) * place)
-    hump_uncertainty = moved / (loss.kinetic_factor + loss.upstream_k)
+    widths = _widths(scene, np.linspace(start, stop, _UNCERTAINTY_NODES), place=place)
     return TubeHeads(
         head=tables[0],
         hump_head=tables[1] if len(tables) > 1 else None,
         return_hump_head=tables[2] if len(tables) > 1 else None,
-        uncertainty=level_table(start=start, stop=stop, value=uncertainty),
-        hump_uncertainty=level_table(start=start, stop=stop, value=hump_uncertainty),
-        fraction_uncertainty=level_table(
-            start=start, stop=stop, value=_fraction_uncertainty(crest_span(scene.tube)[1], loss, place)
-        ),
         interpolation_error=max(errors),
+        **widths,
     )
 
 
-def _fraction_uncertainty(crest: float, loss: TubeLoss, place: float) -> FloatArray:
+def without_inputs(heads: TubeHeads, *, scene: Scene, velocity: float) -> TubeHeads:
+    """The heads with the uncertainties of models alone, for velocities within a factor of e^4 of one, m/s."""
+    place = crest_end_uncertainty(scene.tube, 0.0)
+    log_velocity = np.log(velocity) + np.linspace(-4.0, 4.0, 33)
+    widths = _widths(scene, log_velocity, place=place, by_inputs=False)
+    return replace(heads, **widths)  # type: ignore[arg-type]
+
+
+def _widths(
+    scene: Scene, log_velocity: FloatArray, *, place: float, by_inputs: bool = True
+) -> dict[str, HermiteTable]:
+    """Uncertainties of `TubeHeads` over even places in ln u; `place`: that of the crest's end."""
+    tube, u = to_crest_end(scene.tube), np.exp(log_velocity)
+    state = tube_state(tube=tube, liquid=scene.liquid, angular_velocity=scene.rotor.speed, velocity=u)
+    parts: Mapping[str, FloatArray] = (
+        {} if tube.drag_coefficient is not None else model_parts(tube=tube, state=state)
+    )
+    if by_inputs:
+        parts = uncertainty_parts(
+            tube=tube,
+            liquid=scene.liquid,
+            angular_velocity=scene.rotor.speed,
+            velocity=u,
+            state=state,
+            inputs=scene.uncertainty,
+        )
+    k, upstream = state.k, upstream_loss(tube=tube, state=state)
+    width = np.sqrt(sum((part**2 for part in parts.values()), start=np.zeros_like(k)))
+    share = np.where(k > 0, upstream / np.where(k > 0, k, 1.0), 1.0)
+    moved = np.hypot(width * share, loss_along(state.terms) * place)
+    found = {
+        "uncertainty": width / (k + 1),
+        "hump_uncertainty": moved / (state.kinetic_factor + upstream),
+        "fraction_uncertainty": _fraction_uncertainty(tube, state, parts, place),
+    }
+    ends = float(log_velocity[0]), float(log_velocity[-1])
+    return {name: level_table(start=ends[0], stop=ends[1], value=value) for name, value in found.items()}
+
+
+def _fraction_uncertainty(
+    tube: Tube, state: TubeState, parts: Mapping[str, FloatArray], place: float
+) -> FloatArray:
     """(s_j - R)/(k + 1) of each part of k with a fraction s_j before the crest's end, and of its place."""
-    total = loss.k.value + 1
-    fraction = (loss.kinetic_factor + loss.upstream_k) / total
-    squares = (loss_along(loss.terms) * place / total) ** 2
-    for name, part in loss.uncertainty_parts.items():
+    total = state.k + 1
+    fraction = (state.kinetic_factor + upstream_loss(tube=tube, state=state)) / total
+    squares = (loss_along(state.terms) * place / total) ** 2
+    for name, part in parts.items():
         # Which end or bend is wrong is not known: then the worse of before and behind the crest.
         lumped = name in {"ends", "bends"}
-        lever = np.maximum(fraction, 1 - fraction) if lumped else np.abs(crest - fraction)
+        lever = np.maximum(fraction, 1 - fraction) if lumped else np.abs(tube.hump_position - fraction)
         squares = squares + (lever * part / total) ** 2
-    return np.sqrt(squares)
+    return np.asarray(np.sqrt(squares))
 
 
-def _loss(scene: Scene, velocity: FloatArray) -> TubeLoss:
-    return tube_loss(
-        tube=to_crest_end(scene.tube),
-        liquid=scene.liquid,
-        angular_velocity=scene.rotor.speed,
-        velocity=velocity,
-        inputs=scene.uncertainty,
-    )
+def log_heads(scene: Scene) -> list[LogHead]:
+    """Heads over ln u, natural logarithms, from shared states.
 
-
-def _log_heads(scene: Scene) -> list[LogHead]:
-    """Heads between the chambers and, with a crest, from either chamber to it, from shared states."""
+    Returns: Between the chambers and, with a crest, from either chamber to the lowest pressure at it, and
+        from the driven chamber to the end of its arc.
+    """
     tube = scene.tube
 
     @lru_cache(maxsize=32)
@@ -132,22 +157,24 @@ def _log_heads(scene: Scene) -> list[LogHead]:
     def between(log_velocity: FloatArray) -> FloatArray:
         return np.asarray(np.log((state(log_velocity.tobytes()).k + 1) / 2) + 2 * log_velocity)
 
-    def to_hump(seen: Tube, order: int) -> LogHead:
+    def to_crest(seen: Tube, order: int, *, lowest: bool = True) -> LogHead:
         def head(log_velocity: FloatArray) -> FloatArray:
             there = state(log_velocity.tobytes())
             there = replace(there, bends=there.bends[::order])
             factor = there.kinetic_factor + upstream_loss(tube=to_crest_end(seen), state=there)
             kinetic = np.exp(2 * log_velocity) / 2
-            behind = head_behind_crest(
-                tube=seen, along=loss_along(there.terms) * kinetic, square=scene.rotor.speed**2
-            )
-            return np.asarray(np.log(factor * kinetic + behind))
+            fall = factor * kinetic
+            if lowest:
+                fall = fall + head_behind_crest(
+                    tube=seen, along=loss_along(there.terms) * kinetic, square=scene.rotor.speed**2
+                )
+            return np.asarray(np.log(fall))
 
         return head
 
     if tube.hump_radius is None:
         return [between]
-    return [between, to_hump(tube, 1), to_hump(reversed_tube(tube), -1)]
+    return [between, to_crest(tube, 1), to_crest(reversed_tube(tube), -1), to_crest(tube, 1, lowest=False)]
 
 
 def _head_table(log_head: LogHead, start: float, stop: float) -> tuple[HermiteTable, float]:

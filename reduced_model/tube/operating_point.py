@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -9,11 +10,13 @@ from types import MappingProxyType
 import numpy as np
 
 from ringbalance.physics.tube.loss import tube_loss
+from ringbalance.physics.tube.uncertainty import INPUT_PART
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.reduced_model.tube.pressure_profile import hump_profile
 from ringbalance.reduced_model.tube.thresholds import priming_pressure, siphon_stall_pressure
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
 
@@ -37,6 +40,8 @@ class OperatingPoint:
     """Loss coefficient there; None without any velocity."""
     k_uncertainty: float | None
     """Expanded uncertainty (95 %)."""
+    k_model_uncertainty: float | None
+    """Its part by correlations, without the inputs."""
     k_parts: Mapping[str, float]
     """Terms of k, by name."""
     priming_vented: float | None
@@ -87,6 +92,7 @@ def operating_point(*, scene: Scene, law: CalibratedLaw) -> OperatingPoint:
         loss_velocity=u,
         k=None if loss is None else float(loss.k.value),
         k_uncertainty=None if loss is None else float(loss.k.uncertainty),
+        k_model_uncertainty=None if loss is None else _model_part(loss.uncertainty_parts),
         k_parts=MappingProxyType({} if loss is None else {n: float(k) for n, k in loss.terms.items()}),
         priming_vented=None if vented is None else float(vented),
         priming_trapped=None if trapped is None else float(trapped),
@@ -101,3 +107,7 @@ def operating_point(*, scene: Scene, law: CalibratedLaw) -> OperatingPoint:
         cavitation_margin=hump.cavitation_margin,
         cavitation_margin_uncertainty=hump.cavitation_margin_uncertainty,
     )
+
+
+def _model_part(parts: Mapping[str, FloatArray]) -> float:
+    return math.hypot(*(float(part) for name, part in parts.items() if not name.startswith(INPUT_PART)))

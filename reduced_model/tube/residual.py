@@ -62,7 +62,7 @@ def residual_liquid(scene: Scene, *, law: CalibratedLaw) -> ResidualLiquid:
     """
     x, top = _residual(scene, law, 1.0), scene.disc.max_fill_ratio
     rate, width = _flow_rate(scene, law, np.array([x]))
-    relative = math.hypot(DRAW_DOWN_UNCERTAINTY, 0.4 * float(width[0] / rate[0]) if rate[0] > 0 else 0.0)
+    relative = _depth_uncertainty(rate, width)
     low, high = (_residual(scene, law, 1 + s * min(relative, 0.99)) for s in (-1, 1))
     volume = chamber_volume(disc=scene.disc)
 
@@ -87,6 +87,23 @@ def residual_liquid(scene: Scene, *, law: CalibratedLaw) -> ResidualLiquid:
             (moment(min(low, top / 2)) - moment(min(high, top / 2))) / 2, *ends
         ),
     )
+
+
+def usable_moment_uncertainty(scene: Scene, *, rest: ResidualLiquid, law: CalibratedLaw) -> float:
+    """That of the usable pair moment with the law's own uncertainties in place of those it was found with."""
+    top, x = scene.disc.max_fill_ratio, rest.fill_ratio
+    ends = np.hypot(*law.moment.half_width(np.array([x, top - x])))
+    if rest.depth_uncertainty == 0:
+        return float(ends)
+    relative = _depth_uncertainty(*_flow_rate(scene, law, np.array([x])))
+    by_depth = math.sqrt(max(rest.usable_pair_moment_uncertainty**2 - ends**2, 0.0))
+    return math.hypot(by_depth * relative * rest.depth / rest.depth_uncertainty, ends)
+
+
+def _depth_uncertainty(rate: FloatArray, width: FloatArray) -> float:
+    """Relative: that of the correlation, and of the flow to the power 2/5."""
+    by_flow = 0.4 * float(width[0] / rate[0]) if rate[0] > 0 else 0.0
+    return math.hypot(DRAW_DOWN_UNCERTAINTY, by_flow)
 
 
 def _acceleration(scene: Scene) -> float:

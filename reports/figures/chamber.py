@@ -32,7 +32,6 @@ def pressure_profile(profile: Record) -> Drawing:
             textcoords="offset points",
             color=style.MUTED,
             va="top",
-            fontsize=7.5,
         )
         axes.set_xlim(right=radius[-1])
         axes.set_ylim(bottom=0)

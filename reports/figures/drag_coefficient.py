@@ -87,7 +87,7 @@ def _lines(axes: Axes, told: Record, bore: FloatArray, nu: FloatArray) -> None:
     levels = [level for level in _LEVELS if k.min() < np.log10(level) < k.max()]
     thin = axes.contour(bore, nu, k, levels=np.log10(levels), colors=[style.FOUND], linewidths=0.7)
     names = dict(zip(thin.levels, (_level(level) for level in levels), strict=True))
-    texts = axes.clabel(thin, fmt=names, fontsize=7.5, inline=True, inline_spacing=3)
+    texts = axes.clabel(thin, fmt=names, inline=True, inline_spacing=3)
     for text in texts:
         text.set_color(style.FOUND)
     if k.min() < np.log10(_PAPER) < k.max():
@@ -149,7 +149,7 @@ def _name_liquids(axes: Axes, found: Record) -> None:
         )
         figure.add_artist(leader)
         text = f"{typeset(record['name'])}, k {number(record['k'], digits=2)}"
-        figure.text(edge + 0.026, place, text, fontsize=7.5, va="center", ha="left", color=style.INK)
+        figure.text(edge + 0.026, place, text, va="center", ha="left", color=style.INK)
 
 
 def _spread(wanted: list[float], apart: float) -> list[float]:

@@ -17,7 +17,7 @@ _LAWS: Final[dict[str, dict[str, Any]]] = {
     "calibrated": {"color": style.FOUND, "label": "the calibrated law"},
     "paper": {**style.AS_PAPER, "label": "the paper’s law"},
 }
-_CHAMBER_COLOURS: Final = (style.FOUND, style.PAPER, style.THIRD, style.FOURTH, style.FIFTH, style.MUTED)
+CHAMBER_COLOURS: Final = (style.FOUND, style.PAPER, style.THIRD, style.FOURTH, style.FIFTH, style.MUTED)
 
 
 def early_time(runs: Record) -> float:
@@ -148,7 +148,7 @@ def fill_ratios(run: Record, until: float) -> Drawing:
     def paint(axes: Axes) -> None:
         for index, (letter, values) in enumerate(run["fill_ratio"].items()):
             axes.plot(
-                run["time_s"], values, color=_CHAMBER_COLOURS[index % len(_CHAMBER_COLOURS)], label=letter
+                run["time_s"], values, color=CHAMBER_COLOURS[index % len(CHAMBER_COLOURS)], label=letter
             )
         axes.set_xlim(0, until)
 

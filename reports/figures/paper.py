@@ -67,7 +67,6 @@ def _velocities(velocity: list[Record], other: str, *, name: str, caption: str) 
                 xytext=(0, 7),
                 textcoords="offset points",
                 ha="center",
-                fontsize=7.5,
                 color=style.MUTED,
             )
         axes.set_xlim(0, fill[-1])

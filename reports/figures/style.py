@@ -7,6 +7,7 @@ no date and no fixed colour remains, so the same data gives the same bytes.
 from __future__ import annotations
 
 import io
+import math
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -46,6 +47,9 @@ REGIME_COLOURS: Final = {
     "reverse": FOURTH,
     "cannot be told": MUTED,
 }
+_DASHES: Final = ("-", (0, (5, 1.6)), (0, (1.2, 1.2)), (0, (6, 1.6, 1.2, 1.6)), (0, (3, 1)), (0, (9, 3)))
+_LINE_COLOURS: Final = (FOUND, THIRD, FOURTH, FIFTH, PAPER, MUTED)
+_MARKERS: Final = ("o", "s", "^", "D", "v", "P")
 MAP: Final = tuple(f"#0a0a{step:02x}" for step in range(1, 13))
 """Twelve shades from low to high, for a field in colour."""
 
@@ -96,15 +100,17 @@ DARK: Final = {
     **{f"--fig-map-{step}": shade for step, shade in enumerate(_MAP_DARK)},
 }
 
+_TEXT: Final = 8.8
+"""Size of all text, pt: 8 pt where two narrow figures share the width of an A4 page, 13 px on a screen."""
 _RC: Final = {
     "svg.fonttype": "none",
     "svg.hashsalt": "ringbalance",
     "font.family": ["DejaVu Sans"],
-    "font.size": 8.5,
+    "font.size": _TEXT,
     "axes.edgecolor": MUTED,
     "axes.facecolor": "none",
     "axes.labelcolor": INK,
-    "axes.labelsize": 8.5,
+    "axes.labelsize": _TEXT,
     "axes.linewidth": 0.7,
     "axes.spines.right": False,
     "axes.spines.top": False,
@@ -116,7 +122,7 @@ _RC: Final = {
     "figure.facecolor": "none",
     "savefig.facecolor": "none",
     "legend.frameon": False,
-    "legend.fontsize": 8,
+    "legend.fontsize": _TEXT,
     "legend.labelcolor": INK,
     "legend.handlelength": 1.8,
     "lines.linewidth": 1.6,
@@ -126,8 +132,8 @@ _RC: Final = {
     "ytick.color": MUTED,
     "xtick.labelcolor": INK,
     "ytick.labelcolor": INK,
-    "xtick.labelsize": 8,
-    "ytick.labelsize": 8,
+    "xtick.labelsize": _TEXT,
+    "ytick.labelsize": _TEXT,
     "xtick.major.width": 0.7,
     "ytick.major.width": 0.7,
     "xtick.minor.visible": False,
@@ -135,6 +141,16 @@ _RC: Final = {
 }
 
 Draw = Callable[[Axes], None]
+
+
+def line(index: int, *, size: float | None = None) -> dict[str, Any]:
+    """Properties of one of several curves: a colour and dashes of its own, or markers of a size."""
+    place = index % len(_LINE_COLOURS)
+    if size is None:
+        return {"color": _LINE_COLOURS[place], "linestyle": _DASHES[place]}
+    return {"color": _LINE_COLOURS[place], "marker": _MARKERS[place], "markersize": size}
+
+
 Curve = tuple[ArrayLike, FloatArray, dict[str, Any]]
 """Time, s, amplitude, m, and the line's properties."""
 
@@ -154,9 +170,9 @@ class Drawing:
     """Whether it takes the page's whole width."""
 
 
-WIDE: Final = 9.3
+WIDE: Final = 7.5
 """Width, in, of a figure that takes the page's whole width: its text then has the size of a narrow one's."""
-NARROW: Final = 4.5
+NARROW: Final = 3.6
 _LEFT: Final = 0.62
 _RIGHT: Final = 0.08
 _BOTTOM: Final = 0.42
@@ -182,6 +198,18 @@ def decade(value: float, _position: object = None) -> str:
     return power_of_ten(int(exponent[1])) if exponent[0] == "1" else ""
 
 
+def nice_span(span: float) -> list[float]:
+    """Two to five round ticks on either side of zero, and zero, within plus and minus a span."""
+    step = next(
+        step * 10.0**exponent
+        for exponent in range(math.floor(math.log10(span)) - 1, 99)
+        for step in (1, 2, 5)
+        if span / (step * 10.0**exponent) < 3
+    )
+    count = int(span / step)
+    return [step * place for place in range(-count, count + 1)]
+
+
 def logarithmic(
     axes: Axes, axis: str, *, ticks: list[float] | None = None, within: tuple[float, float] | None = None
 ) -> None:
@@ -201,9 +229,9 @@ def amplitudes(
     axes: Axes, curves: Iterable[tuple[ArrayLike, FloatArray, dict[str, Any]]], limit: float
 ) -> None:
     """Vibration amplitudes over time and the limit, m, on a logarithmic axis in um."""
-    drawn = [(time, 1e6 * amplitude, line) for time, amplitude, line in curves]
-    for time, values, line in drawn:
-        axes.plot(time, values, **line)
+    drawn = [(time, 1e6 * amplitude, drawn_as) for time, amplitude, drawn_as in curves]
+    for time, values, drawn_as in drawn:
+        axes.plot(time, values, **drawn_as)
     axes.axhline(limit * 1e6, color=MUTED, linewidth=1, linestyle=":", label="limit")
     every = np.append(np.concatenate([values for _, values, _ in drawn]), limit * 1e6)
     low, high = 0.7 * every[every > 0].min(), 1.4 * every.max()
@@ -226,9 +254,14 @@ def _to_page(text: str, name: str, alt: str) -> str:
     for sentinel, variable in _VARIABLES.items():
         body = body.replace(sentinel, f"var({variable})")
     body = body.replace("<svg ", f'<svg role="img" aria-label="{escape(alt, quote=True)}" ', 1)
-    # A hundredth of a point is finer than any screen, and a third of the bytes.
-    body = re.sub(r' (?:d|x|y|transform)="[^"]*"', lambda m: re.sub(r"(\.\d\d)\d+", r"\1", m[0]), body)
-    return "\n".join(line.rstrip() for line in body.splitlines())
+    # A tenth of a point is finer than the eye; what is small, as a marker, keeps another digit.
+    body = re.sub(r' (?:d|x|y|transform)="[^"]*"', lambda m: _rounded(m[0]), body)
+    return "\n".join(text.rstrip() for text in body.splitlines())
+
+
+def _rounded(attribute: str) -> str:
+    short = re.sub(r"(\d\d\.\d)\d+", r"\1", re.sub(r"(\.\d\d)\d+", r"\1", attribute))
+    return re.sub(r"\.(?!\d)", "", re.sub(r"(\.\d*?)0+(?!\d)", r"\1", short))
 
 
 def draw(
@@ -241,7 +274,7 @@ def draw(
     y: str = "",
     columns: int = 2,
     wide: bool = False,
-    height: float = 3.0,
+    height: float = 2.7,
 ) -> Drawing:
     """Draws one figure with one axis, its labels, and the legend of what is labelled above it.
 
@@ -252,7 +285,8 @@ def draw(
         width = WIDE if wide else NARROW
         figure = Figure(figsize=(width, height))
         # Margins in inches, the same in every figure, so that neighbours line up.
-        axes = figure.add_axes((_LEFT / width, _BOTTOM / height, 1 - (_LEFT + _RIGHT) / width, 0.5))
+        sizes = 1 - (_LEFT + _RIGHT) / width, 1 - (_BOTTOM + _TOP) / height
+        axes = figure.add_axes((_LEFT / width, _BOTTOM / height, *sizes))
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_formatter(FuncFormatter(plain_number))
         axes.set(xlabel=x, ylabel=y)
@@ -275,21 +309,25 @@ def figure_of(axes: Axes) -> Figure:
 
 
 def legend_above(axes: Axes, *, columns: int) -> None:
-    """Puts the legend above the axes and gives the axes the height that is left; call it last."""
+    """Puts the legend above the axes, in columns that fit, and gives these the height left; call it last."""
     figure = figure_of(axes)
     handles, labels = axes.get_legend_handles_labels()
-    figure.legend(
-        handles,
-        labels,
-        loc="upper left",
-        bbox_to_anchor=(0, 1),
-        ncols=columns,
-        columnspacing=1.4,
-        borderaxespad=0.0,
-        borderpad=0.1,
-        labelspacing=0.35,
-    )
-    rows = -(-len(labels) // columns)
+    for fitting in range(max(columns, 1), 0, -1):
+        legend = figure.legend(
+            handles,
+            labels,
+            loc="upper left",
+            bbox_to_anchor=(0, 1),
+            ncols=fitting,
+            columnspacing=1.4,
+            borderaxespad=0.0,
+            borderpad=0.1,
+            labelspacing=0.35,
+        )
+        if fitting == 1 or not labels or legend.get_window_extent().width <= figure.bbox.width:
+            break
+        legend.remove()
+    rows = -(-len(labels) // fitting)
     top = _TOP + _LEGEND_ROW * rows + (_TOP_AXIS if axes.child_axes else 0.0)
     box, height = axes.get_position(), figure.get_figheight()
     axes.set_position((box.x0, box.y0, box.width, 1 - (_BOTTOM + top) / height))

@@ -38,7 +38,6 @@ def _view(found: Record, _evidence: Record) -> Record:
         "runs": _run_table(found["runs"]),
         "chances": _chance_table(found["ensembles"]),
         "figure": _gain_margin(found["gain"][-1]) if found["gain"] else None,
-        "settling": _settling(found["ensembles"]),
     }
 
 
@@ -118,35 +117,6 @@ def _times(quantiles: Record | None) -> str:
         for key in ("0.05", "0.5", "0.95")
     )
     return f"{middle} ({low}; {high})"
-
-
-def _settling(ensembles: list[Record]) -> Drawing | None:
-    """Fraction of all runs that have settled by a time: those that never do are counted with the rest."""
-    if not all("settled_fraction" in ensemble["settling_time_s"] for ensemble in ensembles) or not ensembles:
-        return None
-    lines: tuple[Record, ...] = (style.AS_PAPER, {"color": style.FOUND}, {"color": style.THIRD})
-
-    def paint(axes: Axes) -> None:
-        for ensemble, title, line in zip(ensembles, _COLUMNS, lines, strict=False):
-            times = ensemble["settling_time_s"]
-            axes.plot(times["edges"], [0.0, *times["settled_fraction"]], label=title, **line)
-        axes.set(xlim=(0, None), ylim=(0, 1.02))
-
-    ends = "; ".join(
-        f"{percent(ensemble['settling_time_s']['settled_fraction'][-1])} under {title}"
-        for ensemble, title in zip(ensembles, _COLUMNS, strict=False)
-    )
-    return draw(
-        name="settled-fraction",
-        paint=paint,
-        x="time in s",
-        y="fraction of all runs settled",
-        columns=3,
-        wide=True,
-        height=3.0,
-        alt=f"Fraction of the runs that have settled, over time; by the time limit {ends}.",
-        caption=f"Fraction of all runs that have settled by a time. By the time limit: {ends}.",
-    )
 
 
 def _gain_margin(gain: Record) -> Drawing:

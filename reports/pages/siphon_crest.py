@@ -41,9 +41,7 @@ def _path_figure(found: Record) -> Drawing:
         axes.set_xlim(-0.015 * length, 1.015 * length)
         low, high = axes.get_ylim()
         axes.set_ylim(low - 0.04 * (high - low), high)
-        axes.annotate(
-            "hump", (hump, high), xytext=(5, -9), textcoords="offset points", color=style.MUTED, fontsize=8
-        )
+        axes.annotate("hump", (hump, high), xytext=(5, -9), textcoords="offset points", color=style.MUTED)
 
     told = "; ".join(f"{_told(state)}" for state in states)
     return draw(
@@ -98,7 +96,6 @@ def _margin(axes: Axes, states: list[Record], hump: float) -> None:
         xytext=(10, 26),
         textcoords="offset points",
         color=style.FOUND,
-        fontsize=8,
         arrowprops={"arrowstyle": "-", "color": style.FOUND, "linewidth": 0.7},
     )
     axes.plot([hump, hump], [low, high], color=style.FOUND, linewidth=3, alpha=0.6, solid_capstyle="butt")

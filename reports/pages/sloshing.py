@@ -128,7 +128,6 @@ def _frequencies(found: Record) -> Drawing:
                 textcoords="offset points",
                 color=style.FOUND,
                 va="center",
-                fontsize=7.5,
             )
         axes.axhline(
             1.0, color=style.PAPER, linewidth=1.2, linestyle=(0, (5, 2)), label="gravity, once a turn"

@@ -75,13 +75,11 @@ def _colour_bar(axes: Axes, levels: FloatArray, title: str) -> None:
     bar.set_yticks([])
     bar.set_xticks(levels[::4])
     bar.xaxis.set_major_formatter(FuncFormatter(style.plain_number))
-    bar.tick_params(length=2, pad=1.5, labelsize=7.5)
+    bar.tick_params(length=2, pad=1.5)
     bar.grid(visible=False)
     for spine in bar.spines.values():
         spine.set_visible(False)
-    figure.text(
-        _LEFT / style.NARROW + 0.49, 1 - 0.25 / total, title, fontsize=8, va="center", color=style.INK
-    )
+    figure.text(_LEFT / style.NARROW + 0.49, 1 - 0.25 / total, title, va="center", color=style.INK)
 
 
 def _levels(values: FloatArray) -> FloatArray:

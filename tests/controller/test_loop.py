@@ -18,9 +18,9 @@ from ringbalance.controller.document import simulation_document
 from ringbalance.controller.liquid_ring.plant import LiquidRing, initial_state
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.loop import MAX_SAMPLES, simulate
-from ringbalance.controller.simulation import Outcome, Simulation
+from ringbalance.controller.simulation import Outcome, Simulation, Verdict
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.law.paper_law import paper_model
+from ringbalance.reduced_model.law.paper_law import paper_law, paper_model
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 from ringbalance.verification.reference.adaptive_ode import adaptive_ode
@@ -278,7 +278,9 @@ def test_dipping_below_the_limit_at_the_end_is_not_settling(scene: Scene, model:
     end = settled.settling_time + 1.2
     cut = simulate(replace(with_noise(scene), run=replace(scene.run, time_limit=end)), model)
     assert cut.amplitude[-1] <= cut.limit
-    assert cut.outcome is Outcome.HOVERING
+    assert cut.outcome is Outcome.HOLD_INCOMPLETE
+    assert cut.verdict is Verdict.NOT_SETTLED
+    assert "raise run.time_limit" in cut.status
     assert not cut.settled
 
 
@@ -379,3 +381,14 @@ def test_gas_into_both_chambers_of_a_pair_is_refused(scene: Scene, model: Balanc
     plant = LiquidRing(model=model, chambers=4, gas_pressure=1e5, integrator=quadrature)
     with pytest.raises(ValueError, match="one pair"):
         plant.advance(initial_state(disc=scene.disc), gas_times={1: 0.2, 3: 0.2}, duration=0.2, points=1)
+
+
+def test_python_takes_a_model_or_a_law(scene: Scene, model: BalancerModel) -> None:
+    law = paper_law(scene)
+    by_law, by_model = simulate(scene, flow_law=law), simulate(scene, model)
+    assert by_law.status == by_model.status
+    assert by_law.time.tolist() == by_model.time.tolist()
+    with pytest.raises(ValueError, match="flow_law"):
+        simulate(scene)
+    with pytest.raises(ValueError, match="flow_law"):
+        simulate(scene, model, flow_law=law)

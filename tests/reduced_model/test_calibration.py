@@ -163,9 +163,9 @@ def test_inputs_are_propagated_apart(table_1_scene: Scene) -> None:
     none = calibrate(dataclasses.replace(table_1_scene, liquid=exact)).chamber
     some = calibrate(dataclasses.replace(table_1_scene, liquid=exact, uncertainty=stated)).chamber
     assert np.all(none.wall_pressure.inputs == 0)
-    # Pressure: density once, speed twice, no width.  Moment: density and width, no speed.
+    # Pressure: density once, the speed's square, no width.  Moment: density and width, no speed.
     np.testing.assert_allclose(
-        some.wall_pressure.inputs[1:] / some.wall_pressure.value[1:], math.hypot(0.02, 0.02), rtol=1e-3
+        some.wall_pressure.inputs[1:] / some.wall_pressure.value[1:], math.hypot(0.02, 1.01**2 - 1), rtol=1e-6
     )
     np.testing.assert_allclose(
         some.moment.inputs[1:] / some.moment.value[1:], math.hypot(0.02, 0.05), rtol=1e-3

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from typing import Any
 
 import numpy as np
@@ -79,6 +80,27 @@ def test_numbers_agree_with_each_other(document: dict[str, Any]) -> None:
     )
     velocity, regime = np.array(document["law"]["velocity_m_s"]), np.array(document["law"]["regime"])
     assert np.all((velocity == 0) == (regime == "blocked"))
+
+
+def test_budgets_are_the_uncertainties_of_the_rest(document: dict[str, Any]) -> None:
+    told, chamber, point = document["budgets"], document["chamber"], document["operating_point"]
+    for budget in told.values():
+        assert set(budget) == {"value", "unit", "numerical", "input", "model", "total", "inputs"}
+        parts = [budget[part] for part in ("numerical", "input", "model")]
+        assert budget["total"] == pytest.approx(math.hypot(*parts))
+        assert budget["input"] == pytest.approx(math.hypot(*budget["inputs"].values()))
+    assert told["moment"]["value"] == chamber["moment_kg_m"][-1]
+    assert told["moment"]["total"] == pytest.approx(
+        math.hypot(chamber["moment_uncertainty"][-1], chamber["moment_input_uncertainty"][-1])
+    )
+    assert told["lambda"]["input"] == pytest.approx(document["lambda"]["input_uncertainty_m"], abs=1e-15)
+    assert told["velocity"]["total"] == point["velocity_uncertainty"]
+    # The law's own, by sensitivities, in the row and column of the same state.
+    law = document["law"]
+    same = law["velocity_uncertainty"][2][5]
+    assert (law["velocity_m_s"][2][5], same) == pytest.approx(
+        (point["velocity_m_s"], point["velocity_uncertainty"]), rel=0.02
+    )
 
 
 def test_wall_pressure_of_the_paper_is_eq_12(document: dict[str, Any], table_1_scene: Scene) -> None:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import io
 import re
 from html.parser import HTMLParser
 from importlib.resources import files
 from itertools import pairwise
 from typing import Any
+
+import pytest
+from PIL import Image
 
 from ringbalance.reports.figures.style import DARK, LIGHT
 from ringbalance.reports.pictures.theme import THEMES
@@ -55,17 +59,37 @@ def words(page: str) -> str:
     return re.sub(r"\s+", " ", " ".join(read(page).text))
 
 
-def test_the_page_is_well_formed(page: str) -> None:
-    reader = read(page)
+def ids_of(page: str) -> list[str]:
+    return [str(attributes["id"]) for _, attributes in read(page).tags if "id" in attributes]
+
+
+def both(evidence: Record) -> str:
+    """Everything that report and annex say."""
+    return " ".join(words(page) for page in render(evidence).values())
+
+
+@pytest.mark.parametrize("name", ["report.html", "annex.html"])
+def test_the_page_is_well_formed(pages: dict[str, str], name: str) -> None:
+    reader = read(pages[name])
     assert reader.faults == []
     assert reader.open == []
-    ids = [attributes["id"] for _, attributes in reader.tags if "id" in attributes]
+    ids = ids_of(pages[name])
     assert len(ids) == len(set(ids))
-    wanted = {str(a["href"])[1:] for _, a in reader.tags if str(a.get("href", "")).startswith("#")}
-    assert wanted <= set(ids)
 
 
-def test_the_page_needs_nothing_else(page: str) -> None:
+@pytest.mark.parametrize("name", ["report.html", "annex.html"])
+def test_every_link_leads_somewhere(pages: dict[str, str], name: str) -> None:
+    links = [str(a["href"]) for tag, a in read(pages[name]).tags if tag in {"a", "use"} and "href" in a]
+    assert links
+    for link in links:
+        file, _, place = link.partition("#")
+        assert not place or place in ids_of(pages[file or name]), link
+        assert (file or name) in pages, link
+
+
+@pytest.mark.parametrize("name", ["report.html", "annex.html"])
+def test_the_page_needs_nothing_else(pages: dict[str, str], name: str) -> None:
+    page = pages[name]
     bare = page.replace('xmlns="http://www.w3.org/2000/svg"', "").replace(
         'xmlns:xlink="http://www.w3.org/1999/xlink"', ""
     )
@@ -73,12 +97,14 @@ def test_the_page_needs_nothing_else(page: str) -> None:
     for tag, attributes in read(page).tags:
         for name in ("src", "srcset", "href", "xlink:href"):
             value = attributes.get(name)
-            assert value is None or value.startswith(("#", "data:image/png;base64,")), (tag, value)
+            own = value is None or value.partition("#")[0] in {"", *pages}
+            assert own or str(value).startswith("data:image/webp;base64,"), (tag, value)
     assert all(target.startswith("#") for target in re.findall(r"url\(([^)]*)\)", page))
 
 
-def test_headings_come_in_order(page: str) -> None:
-    levels = [int(tag[1]) for tag, _ in read(page).tags if re.fullmatch(r"h[1-6]", tag)]
+@pytest.mark.parametrize("name", ["report.html", "annex.html"])
+def test_headings_come_in_order(pages: dict[str, str], name: str) -> None:
+    levels = [int(tag[1]) for tag, _ in read(pages[name]).tags if re.fullmatch(r"h[1-6]", tag)]
     assert levels.count(1) == 1
     assert levels[0] == 1
     assert all(after <= before + 1 for before, after in pairwise(levels))
@@ -99,42 +125,43 @@ def pictures() -> tuple[Record, dict[str, bytes]]:
         }
         for name in names
     ]
-    contents = {
-        f"{name}-{theme}.png": f"{name}{theme}".encode() for name in names for theme in ("light", "dark")
-    }
+    png = io.BytesIO()
+    Image.new("RGB", (3, 2)).save(png, format="PNG")
+    contents = {f"{name}-{theme}.png": png.getvalue() for name in names for theme in ("light", "dark")}
     return {"drawn": True, "text": "", "files": listed}, contents
 
 
 def test_pictures_come_in_both_schemes_and_can_be_read_aloud(evidence: Record) -> None:
     evidence["pictures"], contents = pictures()
-    page = render(evidence, pictures=contents)
+    page = render(evidence, pictures=contents)["annex.html"]
     assert page.count('<source media="screen and (prefers-color-scheme: dark)"') == 2
-    assert page.count("data:image/png;base64,") == 4
+    assert page.count("data:image/webp;base64,") == 4
     assert all(attributes.get("alt") for tag, attributes in read(page).tags if tag == "img")
 
 
-def test_tables_and_drawings_can_be_read_aloud(page: str) -> None:
-    tags = read(page).tags
+@pytest.mark.parametrize("name", ["report.html", "annex.html"])
+def test_tables_and_drawings_can_be_read_aloud(pages: dict[str, str], name: str) -> None:
+    tags = read(pages[name]).tags
     assert all(attributes.get("scope") for tag, attributes in tags if tag == "th")
     assert all(a.get("aria-label") or a.get("aria-hidden") for tag, a in tags if tag == "svg")
     assert [a.get("lang") for tag, a in tags if tag == "html"] == ["en"]
     assert all(a.get("aria-labelledby") for tag, a in tags if tag == "section")
 
 
-def test_without_pictures_the_page_says_so(evidence: Record, page: str) -> None:
-    assert evidence["pictures"]["text"] in words(page)
-    assert "<img" not in page
+def test_without_pictures_the_page_says_so(evidence: Record, annex: str) -> None:
+    assert evidence["pictures"]["text"] in words(annex)
+    assert "<img" not in annex
 
 
-def test_the_same_evidence_gives_the_same_page(evidence: Record, page: str) -> None:
-    assert render(evidence) == page
+def test_the_same_evidence_gives_the_same_pages(evidence: Record, pages: dict[str, str]) -> None:
+    assert render(evidence) == pages
 
 
 CHANGES: tuple[tuple[tuple[Any, ...], Any, str], ...] = (
-    (("calibration", "lambda", "per_transferred_mass_m"), 0.06543, "65.430"),
-    (("operating_point", "k"), 7.77, "7.8"),
+    (("calibration", "budgets", "lambda", "value"), 0.06543, "65.43"),
+    (("calibration", "budgets", "drag_coefficient", "value"), 7.77, "7.8"),
     (("operating_point", "priming_pressure_vented_Pa"), 0.611e6, "0.611"),
-    (("operating_point", "stall_pressure_Pa"), 0.333e6, "0.3330"),
+    (("operating_point", "stall_pressure_Pa"), 0.379e6, "0.379"),
     (("paper", "drag_coefficient"), 41.0, "about 41"),
     (("closed_loop", "calibrated", "settling_time_s"), 9.87, "9.87"),
     (("closed_loop", "paper", "overshoots"), 1717, "1717"),
@@ -155,15 +182,15 @@ CHANGES: tuple[tuple[tuple[Any, ...], Any, str], ...] = (
 )
 
 
-def test_the_page_says_what_the_evidence_says(evidence: Record, page: str) -> None:
-    before = words(page).replace("\u202f", " ")
+def test_the_pages_say_what_the_evidence_says(evidence: Record) -> None:
+    before = both(evidence).replace("\u202f", " ")
     for path, value, said in CHANGES:
         place: Any = evidence
         for key in path[:-1]:
             place = place[key]
         place[path[-1]] = value
         assert said not in before
-    after = words(render(evidence)).replace("\u202f", " ")
+    after = both(evidence).replace("\u202f", " ")
     assert [said for _, _, said in CHANGES if said not in after] == []
 
 
@@ -176,17 +203,44 @@ def test_no_result_is_typed_into_a_template() -> None:
             assert set(numbers) <= {"95", "3"}, (item.name, numbers)
 
 
-def test_every_verdict_is_a_word(page: str) -> None:
+def test_every_verdict_is_a_word(pages: dict[str, str]) -> None:
+    page = "".join(pages.values())
     text = words(page)
     for verdict in ("confirmed", "confirmed with correction", "refuted", "inconclusive", "not run", "passed"):
         assert f'">{verdict}</span>' in page
         assert verdict in text
 
 
+@pytest.mark.parametrize("name", ["report.html", "annex.html"])
+def test_numbers_of_figures_tables_and_equations_stand_in_the_text(pages: dict[str, str], name: str) -> None:
+    prefix = "A" if name == "annex.html" else ""
+    for kind, form in (("Figure", r"<b>Figure ([A\d]+)\.</b>"), ("Table", r"<b>Table ([A\d]+)\.</b>")):
+        found = re.findall(form, pages[name])
+        assert found == [f"{prefix}{place}" for place in range(1, len(found) + 1)], kind
+    sections = re.findall(r'<h2 id="[\w]+-title"><span class="no">([A\d]+)</span>', pages[name])
+    assert sections == [f"{prefix}{place}" for place in range(1, len(sections) + 1)]
+    assert pages[name].count("<caption") == len(re.findall(r"<b>Table", pages[name]))
+
+
+def test_no_number_is_counted_by_the_style_sheet() -> None:
+    css = files("ringbalance.reports").joinpath("templates", "style.css").read_text(encoding="utf-8")
+    assert "counter-" not in css
+
+
+def test_a_link_to_a_case_opens_its_box(pages: dict[str, str]) -> None:
+    """A place inside a closed box is opened by the browser on the way to it; one outside is not."""
+    links = set(re.findall(r'href="(?:annex\.html)?#(case-[\w-]+)"', "".join(pages.values())))
+    assert links
+    boxes = re.findall(
+        r'<details class="case-box"><summary>[^<]+</summary><div id="(case-[\w-]+)">', pages["annex.html"]
+    )
+    assert links <= set(boxes)
+
+
 def test_what_was_not_run_is_said(evidence: Record) -> None:
     evidence["verification"][-1]["status"] = "heavy: run with --level heavy"
     evidence["closed_loop"] = {}
-    text = words(render(evidence))
+    text = both(evidence)
     assert "Coverage of the bars" in text
     assert "heavy: run with --level heavy" in text
     assert "Trial algorithm in 40 s" in text
@@ -196,9 +250,9 @@ def test_what_was_not_run_is_said(evidence: Record) -> None:
 def test_markup_in_texts_is_shown_not_obeyed(evidence: Record) -> None:
     evidence["scene"]["name"] = '<b onclick="x()">disc</b> & "co"'
     evidence["verification"][0]["doubts"] = ["<script>alert()</script>"]
-    page = render(evidence)
-    assert "<b onclick" not in page
-    assert "<script" not in page
+    for page in render(evidence).values():
+        assert "<b onclick" not in page
+        assert "<script" not in page
 
 
 def test_nothing_flows(evidence: Record) -> None:
@@ -207,9 +261,9 @@ def test_nothing_flows(evidence: Record) -> None:
         velocity_m_s=0.0, velocity_uncertainty=0.0, k=None, k_uncertainty=None, k_at_velocity_m_s=0.0
     )
     point.update(regime="blocked", priming_pressure_vented_Pa=None, priming_pressure_trapped_Pa=None)
-    text = words(render(evidence))
-    assert "Nothing flows" in text
-    assert "Priming pressure" not in text
+    text = both(evidence)
+    assert "nothing flows" in text
+    assert "lifts the liquid over the siphon crest" not in text
 
 
 def luminance(colour: str) -> float:

@@ -14,7 +14,6 @@ import pytest
 from rich.console import Console
 
 import ringbalance
-from ringbalance.controller.cli import simulate as command
 from ringbalance.controller.eccentric_mass.document import eccentric_document, thinned
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
 from ringbalance.controller.eccentric_mass.plant.whirl import moment_vector
@@ -25,6 +24,7 @@ from ringbalance.controller.eccentric_mass.show import show_eccentric
 from ringbalance.controller.eccentric_mass.strategy.records import EccentricMeasurement
 from ringbalance.controller.eccentric_mass.strategy.settings import strategy_settings
 from ringbalance.controller.eccentric_mass.strategy.step import strategy_start, strategy_step
+from ringbalance.reports.simulate_cli import simulate as command
 from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.eccentric_models import SpeedPoint
 from ringbalance.verification.eccentric_mass.scenes import RPM, at_constant_speed, changed

@@ -1,0 +1,238 @@
+"""One uncertainty budget for every main quantity of a calibration: numerical, input and model parts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from decimal import ROUND_HALF_EVEN, Decimal
+from typing import Final, Protocol
+
+import numpy as np
+
+from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, Curve
+from ringbalance.reduced_model.chamber.inputs import half_widths, shifted
+from ringbalance.reduced_model.device import HEAD_INPUTS, Device, device_of
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.tube.crest_margin import directed_state, margin_of
+from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
+from ringbalance.reduced_model.tube.heads import without_inputs
+from ringbalance.reduced_model.tube.operating_point import OperatingPoint
+from ringbalance.reduced_model.tube.residual import ResidualLiquid, usable_moment_uncertainty
+from ringbalance.scene.models import Scene
+from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
+
+UNITS: Final = {
+    "chamber_volume": "m^3",
+    "wall_pressure": "Pa",
+    "moment": "kg m",
+    "usable_moment": "kg m",
+    "lambda": "m",
+    "velocity": "m/s",
+    "drag_coefficient": "1",
+    "crest_pressure": "Pa",
+    "cavitation_margin": "Pa",
+    "priming_pressure_vented": "Pa",
+    "priming_pressure_trapped": "Pa",
+    "stall_pressure": "Pa",
+}
+_DIGITS: Final = 9
+_NEGLIGIBLE: Final = 1e-12
+"""Relative change of a quantity that counts as rounding, not as an effect of an input."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Budget:
+    """A quantity with its expanded uncertainties (95 %) by cause, all in the quantity's SI unit."""
+
+    quantity: str
+    unit: str
+    value: float
+    numerical: float
+    """Rounding, quadrature, interpolation, and what finite elements contradict."""
+    model: float
+    """Correlations, terms that are left out or have no model, and what over the crest cannot be told."""
+    inputs: Mapping[str, float]
+    """By path in the scene file, such as "tube.bore"; those without any effect are not listed."""
+
+    @property
+    def input(self) -> float:
+        """Of all inputs, which are independent."""
+        return math.hypot(*self.inputs.values())
+
+    @property
+    def total(self) -> float:
+        """Root of the sum of the squares of the three parts (ASME V&V 20-2009)."""
+        return math.hypot(self.numerical, self.input, self.model)
+
+
+class Calibrated(Protocol):
+    """What a budget needs of a calibration."""
+
+    @property
+    def chamber(self) -> ChamberCalibration:
+        """Wall pressure, moment and lambda."""
+
+    @property
+    def flow_law(self) -> CalibratedLaw:
+        """With its own uncertainties."""
+
+    @property
+    def operating_point(self) -> OperatingPoint:
+        """Of that law."""
+
+    @property
+    def residual(self) -> ResidualLiquid:
+        """Under that law."""
+
+
+def rounded(value: float, total: float) -> str:
+    """A value, or its uncertainty, to the place of the second digit of the total uncertainty.
+
+    Nine digits of the value at most, and that many without an uncertainty.
+    """
+    if not total > 0:
+        return f"{value:.{_DIGITS}g}"
+    exact, width = Decimal(repr(float(value))), Decimal(repr(float(total)))
+    # Twice, because 0.0996 becomes 0.10 and then its second digit is another one.
+    place = width.quantize(Decimal(1).scaleb(width.adjusted() - 1)).adjusted() - 1
+    place = max(place, exact.adjusted() - _DIGITS + 1)
+    shown = exact.quantize(Decimal(1).scaleb(place), rounding=ROUND_HALF_EVEN)
+    plain = shown if shown else abs(shown)
+    return f"{plain:f}" if place > -_DIGITS else f"{plain:e}"
+
+
+def budgets(*, scene: Scene, calibration: Calibrated) -> Mapping[str, Budget]:
+    """Budget of each of `UNITS`; wall pressure and moment at the largest fill, flow at the operating point.
+
+    Every uncertain input is moved by its half-width to both sides, with the chamber and the tube solved
+    again, and the larger change counts. An operating point without any velocity has no drag coefficient, and
+    one without a flow over a crest neither crest pressure nor margin.
+    """
+    parts = _chamber_parts(calibration.chamber) | _flow_parts(scene, calibration)
+    effects = _input_effects(scene, calibration.operating_point)
+    return {
+        name: Budget(
+            quantity=name,
+            unit=UNITS[name],
+            value=value,
+            numerical=numerical,
+            model=model,
+            inputs={
+                path: change[name]
+                for path, change in effects.items()
+                if change.get(name, 0.0) > _NEGLIGIBLE * abs(value)
+            },
+        )
+        for name, (value, numerical, model) in parts.items()
+    }
+
+
+_Parts = tuple[float, float, float]
+
+
+def _chamber_parts(chamber: ChamberCalibration) -> dict[str, _Parts]:
+    """Value, numerical and model part of the quantities of the chamber."""
+    at = chamber.reported[-1]
+    central, numerical = chamber.moment_per_mass, chamber.moment_per_mass_numerical
+    model = math.sqrt(max(float(central.uncertainty) ** 2 - numerical**2, 0.0))
+    return {
+        "chamber_volume": (chamber.volume, _NEGLIGIBLE * chamber.volume, 0.0),
+        "wall_pressure": _curve_parts(chamber.wall_pressure, at),
+        "moment": _curve_parts(chamber.moment, at),
+        "lambda": (float(central.value), numerical, model),
+    }
+
+
+def _curve_parts(curve: Curve, at: int) -> _Parts:
+    model = math.hypot(float(curve.left_out[at]), float(curve.unmodelled[at]))
+    return float(curve.value[at]), float(curve.numerical[at]), model
+
+
+def _flow_parts(scene: Scene, calibration: Calibrated) -> dict[str, _Parts]:
+    """Value, numerical and model part of the quantities of the flow at the operating point."""
+    point, rest = calibration.operating_point, calibration.residual
+    law = _law_without_inputs(scene, calibration)
+    fills = (point.fill_ratio, point.fill_ratio)
+    flow = law.evaluate(fill_ratio=fills[0], opposite_fill_ratio=fills[1], gas_pressure=point.gas_pressure)
+    error = calibration.flow_law.heads.interpolation_error
+    levels = _level_parts(calibration)
+    found = levels | {
+        "usable_moment": (
+            rest.usable_pair_moment,
+            calibration.chamber.moment.interpolation,
+            usable_moment_uncertainty(scene, rest=rest, law=law),
+        ),
+        "velocity": (point.velocity, error * abs(point.velocity), float(flow.uncertainty)),
+    }
+    if point.k is not None and point.k_model_uncertainty is not None:
+        found["drag_coefficient"] = (point.k, error * (point.k + 1), point.k_model_uncertainty)
+    if point.cavitation_margin is None or point.hump_pressure is None or point.velocity == 0:
+        return found
+    state = directed_state(law=law, fills=fills, gas_pressure=point.gas_pressure, reverse=point.velocity < 0)
+    margin = margin_of(law=law, state=state)[1] or 0.0
+    rounding = error * abs(point.gas_pressure)
+    return found | {
+        "crest_pressure": (point.hump_pressure, rounding, _crest_part(law, point, margin)),
+        "cavitation_margin": (point.cavitation_margin, rounding, margin),
+    }
+
+
+def _level_parts(calibration: Calibrated) -> dict[str, _Parts]:
+    """The same of the gas pressures that hydrostatics alone give, for which two wall pressures count."""
+    point, chamber = calibration.operating_point, calibration.chamber
+    _, numerical, model = _curve_parts(chamber.wall_pressure, chamber.reported[-1])
+    values = {
+        "stall_pressure": point.stall,
+        "priming_pressure_vented": point.priming_vented,
+        "priming_pressure_trapped": point.priming_trapped,
+    }
+    width = math.sqrt(2) * math.hypot(numerical, chamber.wall_pressure.interpolation)
+    return {name: (value, width, math.sqrt(2) * model) for name, value in values.items() if value is not None}
+
+
+def _crest_part(law: CalibratedLaw, point: OperatingPoint, margin: float) -> float:
+    """Model part of the crest's pressure, the larger of a cavity's, which has bounds, and a full siphon's."""
+    fills = (point.fill_ratio, point.fill_ratio)
+    state = directed_state(law=law, fills=fills, gas_pressure=point.gas_pressure, reverse=point.velocity < 0)
+    crest = law.path.crest
+    if crest is None or point.cavitation_margin is None or point.cavity_pressure is None:
+        return 0.0
+    low, high = (float(bound) for bound in crest.cavity_bounds(state.ends))
+    gas = max(float(crest.gas_pressure(state.ends)), high)
+    pressure = point.hump_pressure or 0.0
+    full = point.cavity_pressure + point.cavitation_margin
+    highest = max(gas if pressure > high else high, full + margin)
+    return max(highest - pressure, pressure - max(low, full - margin), 0.0)
+
+
+def _law_without_inputs(scene: Scene, calibration: Calibrated) -> CalibratedLaw:
+    """The law with the uncertainties of numerics and models alone."""
+    chamber, law, point = calibration.chamber, calibration.flow_law, calibration.operating_point
+    return replace(
+        law,
+        heads=without_inputs(law.heads, scene=scene, velocity=point.loss_velocity or 1.0),
+        inputs=DriveUncertainty(),
+        wall_pressure_uncertainty=chamber.wall_pressure.uncertainty_table(
+            inputs=np.zeros_like(chamber.fill_ratio)
+        ),
+    )
+
+
+def _input_effects(scene: Scene, point: OperatingPoint) -> dict[str, dict[str, float]]:
+    """Larger change of every quantity to either side, by the input's path in the scene."""
+    here = device_of(scene, near=point.loss_velocity or 1.0)
+    values, found = here.values(), {}
+    for quantity, width in half_widths(scene).items():
+        sides = [_moved(here, quantity, change).values() for change in (-width, width)]
+        found[f"{UNCERTAIN_QUANTITIES[quantity]}.{quantity}"] = {
+            name: max(abs(side[name] - value) for side in sides if name in side)
+            for name, value in values.items()
+            if any(name in side for side in sides)
+        }
+    return found
+
+
+def _moved(device: Device, quantity: str, change: float) -> Device:
+    scene = shifted(scene=device.scene, quantity=quantity, change=change)
+    return device_of(scene, near=device.near, heads=None if quantity in HEAD_INPUTS else device.heads)

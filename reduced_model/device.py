@@ -1,0 +1,163 @@
+"""A device at given inputs, solved at its operating point: what a calibration tabulates, at single states."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Final
+
+import numpy as np
+
+from ringbalance.mesh.geometry import chamber_volume, liquid_area
+from ringbalance.physics.gas.column import pressure_factor
+from ringbalance.physics.tube.draw_down import draw_down_depth
+from ringbalance.reduced_model.chamber.inputs import chamber_closed_forms
+from ringbalance.reduced_model.law.building import tube_path
+from ringbalance.reduced_model.tube.heads import log_heads
+from ringbalance.reduced_model.tube.regime import ColumnFlow, TubeEnds, TubePath, column_flow
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Scene
+
+HEAD_INPUTS: Final = frozenset(
+    {
+        "bore",
+        "length",
+        "roughness",
+        "extra_loss",
+        "drag_coefficient",
+        "kinematic_viscosity",
+        "speed",
+        "hump_position",
+        "hump_radius",
+        "port_radius",
+    }
+)
+"""Inputs that change the tube's heads; for others they may be passed on."""
+_SPAN: Final = (-5.0, 2.5)
+"""Of the tabulated velocities, ln(u/near)."""
+_NODES: Final = 121
+_ROUNDS: Final = 12
+"""Of the fixed point of the residual fill, each of which multiplies the error by less than a half."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Device:
+    """Chamber by closed forms without gravity, tube by its loss, at single states."""
+
+    scene: Scene
+    path: TubePath
+    gas_factor: float
+    near: float
+    """Velocity that the heads are tabulated around, m/s."""
+    heads: tuple[FloatArray, ...]
+    """Those of `log_heads`."""
+
+    def values(self) -> dict[str, float]:
+        """The quantities of an uncertainty budget, SI; those of a flow only where there is one."""
+        disc = self.scene.disc
+        half = disc.max_fill_ratio / 2
+        pressure, moment, ratio = chamber_closed_forms(
+            scene=self.scene, fill_ratio=np.array([disc.max_fill_ratio, half])
+        )
+        return (
+            {
+                "chamber_volume": chamber_volume(disc=disc),
+                "wall_pressure": float(pressure[0]),
+                "moment": float(moment[0]),
+                "lambda": float(ratio[1]),
+                "usable_moment": self._usable_moment(),
+                "stall_pressure": max(self._ends(0.0, disc.max_fill_ratio).stall_pressure(), 0.0)
+                / self.gas_factor,
+            }
+            | self._priming(half)
+            | self._flow_values(half)
+        )
+
+    def _priming(self, fill: float) -> dict[str, float]:
+        """With the driven chamber empty and the crest's gas vented; at equal fills and with it trapped."""
+        crest = self.path.crest
+        if crest is None:
+            return {}
+        vented, trapped = (replace(crest, trapped=kept) for kept in (False, True))
+        empty, equal = self._ends(0.0, self.scene.disc.max_fill_ratio), self._ends(fill, fill)
+        return {
+            "priming_pressure_vented": vented.priming_pressure(empty) / self.gas_factor,
+            "priming_pressure_trapped": trapped.priming_pressure(equal) / self.gas_factor,
+        }
+
+    def _flow_values(self, fill: float) -> dict[str, float]:
+        ends = self._ends(fill, fill)
+        flow = self._flow(ends, primed=False)
+        found = {"velocity": flow.velocity}
+        u = flow.velocity or self._flow(ends, primed=True).velocity
+        if u > 0:
+            found["drag_coefficient"] = 2 * self._head(0, u) / u**2 - 1
+        crest = self.path.crest
+        if flow.velocity > 0 and crest is not None:
+            rho, rest = self.path.density, crest.resting_pressure(ends)
+            found["crest_pressure"] = rest - rho * self._head(3, flow.velocity)
+            full = rest - rho * self._head(1, flow.siphon_velocity)
+            found["cavitation_margin"] = full - crest.cavity_pressure(ends)
+        return found
+
+    def _ends(self, own: float, other: float) -> TubeEnds[float]:
+        pressure, _, _ = chamber_closed_forms(scene=self.scene, fill_ratio=np.array([own, other]))
+        return TubeEnds(
+            upstream_gas=self.gas_factor * self.scene.gas.pressure,
+            downstream_gas=0.0,
+            upstream_hydrostatic=float(pressure[0]),
+            downstream_hydrostatic=float(pressure[1]),
+            port_pressure=self.path.port_pressure,
+        )
+
+    def _flow(self, ends: TubeEnds[float], *, primed: bool) -> ColumnFlow[float]:
+        return column_flow(
+            ends=ends,
+            crest=self.path.crest,
+            primed=primed,
+            allowed=self.path.crest is not None or ends.upstream_gas > 0,
+            siphon=partial(self._velocity, 0),
+            separation=partial(self._velocity, 1),
+        )
+
+    def _velocity(self, which: int, pressure: float, where: bool) -> float:
+        if not where or pressure <= 0:
+            return 0.0
+        log_head = math.log(pressure / self.path.density)
+        return math.exp(float(np.interp(log_head, self.heads[which], _log_velocities(self.near))))
+
+    def _head(self, which: int, velocity: float) -> float:
+        return math.exp(float(np.interp(math.log(velocity), _log_velocities(self.near), self.heads[which])))
+
+    def _usable_moment(self) -> float:
+        """Largest moment of a pair that no gas passes through, kg m; as `residual_liquid`."""
+        disc, top = self.scene.disc, self.scene.disc.max_fill_ratio
+        area = float(liquid_area(disc=disc, surface_radius=disc.inner_radius))
+        acceleration = self.scene.rotor.speed**2 * self.scene.tube.port_radius
+        section, x = math.pi / 4 * self.scene.tube.bore**2, top
+        for _ in range(_ROUNDS):
+            u = self._flow(self._ends(x, top - x), primed=True).velocity
+            depth = float(draw_down_depth(flow_rate=section * u, acceleration=acceleration))
+            level = min(max(self.scene.tube.port_radius - depth, disc.inner_radius), disc.outer_radius)
+            x = min(float(liquid_area(disc=disc, surface_radius=level)) / area, top)
+        rest = min(x, top / 2)
+        _, moment, _ = chamber_closed_forms(scene=self.scene, fill_ratio=np.array([top - rest, rest]))
+        return float(moment[0] - moment[1])
+
+
+def device_of(scene: Scene, *, near: float, heads: tuple[FloatArray, ...] | None = None) -> Device:
+    """Set a device up from a scene.
+
+    Args: `near`: velocity around which the heads are tabulated, m/s. `heads`: those of a device that differs
+        in none of `HEAD_INPUTS`.
+    """
+    if heads is None:
+        heads = tuple(head(_log_velocities(near)) for head in log_heads(scene))
+    return Device(
+        scene=scene, path=tube_path(scene), gas_factor=pressure_factor(scene), near=near, heads=heads
+    )
+
+
+def _log_velocities(near: float) -> FloatArray:
+    return math.log(near) + np.linspace(*_SPAN, _NODES)

@@ -1,0 +1,202 @@
+"""The dimensioned section of the disc: across the shaft and along it, with the tube's path."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle, Rectangle
+
+from ringbalance.reports.figures import style
+from ringbalance.reports.figures.style import Drawing, draw
+from ringbalance.reports.numbers import given, number
+from ringbalance.reports.section import Record
+from ringbalance.scene.arrays import FloatArray
+
+_MILLIMETRES: Final = 1e3
+_HEIGHT: Final = 4.1
+_REACH: Final = 1.42
+"""Half the height of the picture over the outer radius: room for the dimensions."""
+_TUBE: Final[dict[str, Any]] = {"color": style.PAPER, "linewidth": 2.0}
+
+
+def disc_section(found: Record) -> Drawing:
+    """Section of the disc with its dimensions.
+
+    Args: `found`: `disc` of the evidence: lengths in m, angles in rad, the fill that is drawn.
+    """
+    size = {
+        key.removesuffix("_m"): value * _MILLIMETRES
+        for key, value in found.items()
+        if key.endswith("_m") and value is not None
+    }
+    reach = _REACH * size["outer_radius"]
+
+    def paint(axes: Axes) -> None:
+        axes.set_axis_off()
+        figure = style.figure_of(axes)
+        across, along = figure.add_axes((0.0, 0.0, 0.56, 1)), figure.add_axes((0.57, 0.0, 0.43, 1))
+        for panel, width in ((across, 0.56), (along, 0.43)):
+            half = reach * width * style.WIDE / _HEIGHT
+            panel.set(xlim=(-half, half), ylim=(-reach, reach), aspect="equal")
+            panel.set_axis_off()
+        _across(across, found, size)
+        _along(along, size)
+
+    r1, r2, width = (given(found[key], "m") for key in ("inner_radius_m", "outer_radius_m", "axial_width_m"))
+    fill = number(found["fill_ratio"], digits=2)
+    return draw(
+        name="disc-section",
+        paint=paint,
+        columns=0,
+        wide=True,
+        height=_HEIGHT,
+        alt=f"Section of the disc: {found['chambers']} chambers between {r1} and {r2}, {width} wide.",
+        caption=f"Section across the shaft and along it, dimensions in mm, to scale but for the bore, at a "
+        f"fill ratio of {fill}. The tube joins opposite chambers; the other pairs’ tubes are left out."
+        f"{_assumed(found)}",
+    )
+
+
+def _assumed(found: Record) -> str:
+    names = [
+        name.replace("_", " ") for name, origin in found.get("origins", {}).items() if origin == "assumed"
+    ]
+    return f" Assumed: {', '.join(names)}." if names else ""
+
+
+def _arc(radius: float, start: float, end: float) -> FloatArray:
+    angle = np.linspace(start, end, 61)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+
+
+def _arrow(panel: Axes, start: Sequence[float], end: Sequence[float], kind: str, **line: Any) -> None:
+    """A line between two places, with the heads of its kind."""
+    shape = {"arrowstyle": kind, "color": style.INK, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0, **line}
+    panel.annotate("", (end[0], end[1]), (start[0], start[1]), arrowprops=shape)
+
+
+def _sector(inner: float, outer: float, middle: float, half: float, strip: float) -> FloatArray:
+    """Outline of what lies between two radii of a chamber, its plates' strips taken off."""
+    ends = [half - math.asin(min(strip / radius, 1.0)) for radius in (outer, inner)]
+    return np.vstack(
+        [
+            _arc(outer, middle - ends[0], middle + ends[0]),
+            _arc(inner, middle + ends[1], middle - ends[1]),
+        ]
+    )
+
+
+def _across(panel: Axes, found: Record, size: dict[str, float]) -> None:
+    inner, outer, surface = size["inner_radius"], size["outer_radius"], size["free_surface_radius"]
+    strip, half = size["plate_thickness"], found["central_angle_rad"] / 2
+    panel.add_patch(Circle((0, 0), outer, facecolor=style.MAP[3], edgecolor=style.INK, linewidth=1))
+    for index in range(found["chambers"]):
+        middle = 2 * math.pi * index / found["chambers"]
+        for reach, colour in ((inner, style.SURFACE), (surface, style.MAP[7])):
+            shape = _sector(reach, outer, middle, half, strip)
+            panel.fill(*shape.T, facecolor=colour, edgecolor=style.INK, linewidth=0.6)
+        place = (inner + surface) / 2 * np.exp(1j * (middle + 0.62 * half))
+        panel.text(place.real, place.imag, chr(ord("A") + index), ha="center", va="center", weight="bold")
+    panel.plot(0, 0, "+", color=style.INK, markersize=9)
+    _tube(panel, size)
+    _radius(panel, outer, -0.5, f"R₂ {number(outer, digits=4)}")
+    _radius(panel, inner, -2.1, f"R₁ {number(inner, digits=4)}")
+    _radius(panel, surface, -2.62, f"R₁′ {number(surface, digits=4)}")
+    arc = 1.1 * outer
+    low, high = ([arc * math.cos(half), sign * arc * math.sin(half)] for sign in (-1, 1))
+    _arrow(panel, low, high, "<->", connectionstyle=f"arc3,rad={math.tan(half / 2):.3f}")
+    for sign in (-1, 1):
+        edge = np.outer([0, 1.14 * outer], [math.cos(half), sign * math.sin(half)])
+        panel.plot(*edge.T, color=style.MUTED, linewidth=0.7, linestyle=(0, (6, 2, 1, 2)))
+    panel.text(1.13 * outer, 0.12 * outer, f"θ {number(math.degrees(found['central_angle_rad']), digits=3)}°")
+    wall = 0.9 * outer * np.exp(1j * (half - strip / outer / 2))
+    _note(
+        panel, f"t {number(strip, digits=3)} each side", (wall.real, wall.imag), (0.72 * outer, 1.25 * outer)
+    )
+
+
+def _tube(panel: Axes, size: dict[str, float]) -> None:
+    """Out of chamber A, inward to the crest, half-way round at its radius, and outward."""
+    port, crest = size["port_radius"], size.get("crest_radius")
+    if crest is None:
+        panel.plot([port, -port], [0, 0], **_TUBE)
+        return
+    arc = _arc(crest, 0, math.pi)
+    path = np.vstack([[[port, 0]], arc, [[-port, 0]]])
+    panel.plot(*path.T, **_TUBE)
+    panel.plot([port, -port], [0, 0], "o", color=style.PAPER, markersize=5)
+    _note(
+        panel,
+        f"tube, bore {number(size['bore'], digits=3)}, length {number(size['length'], digits=4)}",
+        (float(arc[34, 0]), float(arc[34, 1])),
+        (-1.4 * port, 1.3 * port),
+    )
+    _radius(panel, crest, math.pi / 2 + 0.12, f"rₘ {number(crest, digits=3)}", share=0.75)
+    _note(panel, f"port {number(port, digits=3)}", (-port, 0), (-1.43 * port, -0.28 * port))
+
+
+def _radius(panel: Axes, radius: float, angle: float, text: str, *, share: float = 1.22) -> None:
+    """An arrow from the shaft to a radius; its label beyond the rim, or on the way."""
+    tip = [radius * math.cos(angle), radius * math.sin(angle)]
+    _arrow(panel, (0, 0), tip, "-|>")
+    rim = panel.get_ylim()[1] / _REACH
+    place = (share * rim if share > 1 else share * radius) * np.array([math.cos(angle), math.sin(angle)])
+    if share < 1:
+        place[0] += 0.05 * rim
+    else:
+        panel.plot(*np.array([tip, 0.95 * place]).T, color=style.MUTED, linewidth=0.7)
+    panel.text(place[0], place[1], text, ha="center" if share > 1 else "left", va="center", color=style.INK)
+
+
+def _note(panel: Axes, text: str, at: tuple[float, float], place: tuple[float, float]) -> None:
+    panel.annotate(
+        text,
+        at,
+        place,
+        color=style.INK,
+        va="center",
+        arrowprops={"arrowstyle": "-", "color": style.MUTED, "linewidth": 0.7},
+    )
+
+
+def _along(panel: Axes, size: dict[str, float]) -> None:
+    inner, outer, surface = size["inner_radius"], size["outer_radius"], size["free_surface_radius"]
+    half = size["axial_width"] / 2
+    wall = 0.06 * outer
+    for sign in (-1, 1):
+        low = {1: inner, -1: -outer}[sign]
+        panel.add_patch(
+            Rectangle((-half, low), 2 * half, outer - inner, facecolor=style.SURFACE, edgecolor=style.INK)
+        )
+        wet = {1: surface, -1: -outer}[sign]
+        panel.add_patch(
+            Rectangle(
+                (-half, wet), 2 * half, outer - surface, facecolor=style.MAP[7], edgecolor=style.INK, lw=0.6
+            )
+        )
+        panel.plot([half, half + wall], [sign * size["port_radius"] * 0.985] * 2, **_TUBE)
+    crest = size.get("crest_radius", 0.0)
+    panel.plot([half + wall] * 3, [0.985 * size["port_radius"], crest, -0.985 * size["port_radius"]], **_TUBE)
+    panel.plot(
+        [-1.35 * half, 1.5 * half], [0, 0], color=style.MUTED, linewidth=0.8, linestyle=(0, (8, 2, 1, 2))
+    )
+    _span(panel, (-half, half), -1.14 * outer, f"B {number(2 * half, digits=4)}")
+    panel.text(-half - 0.1 * outer, 0.62 * (inner + outer), "valve side:\ngas line", ha="right", va="center")
+    level = 0.5 * (inner + surface)
+    _arrow(panel, (-half - 0.35 * outer, level), (-half, level), "-|>", color=style.THIRD, linewidth=1.4)
+    panel.text(half + 2 * wall, 0.72 * outer, "tube", color=style.PAPER, va="center")
+    panel.text(0, (surface + outer) / 2, "liquid", ha="center", va="center")
+    panel.text(0, (surface + inner) / 2, "gas", ha="center", va="center")
+    panel.text(1.5 * half, 0.04 * outer, "shaft", ha="right", va="bottom", color=style.MUTED)
+
+
+def _span(panel: Axes, ends: tuple[float, float], level: float, text: str) -> None:
+    """A dimension line with its value below."""
+    _arrow(panel, (ends[0], level), (ends[1], level), "<->")
+    for end in ends:
+        panel.plot([end, end], [level * 0.9, level * 1.04], color=style.MUTED, linewidth=0.7)
+    panel.text(sum(ends) / 2, level * 1.03, text, ha="center", va="top")

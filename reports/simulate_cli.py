@@ -1,0 +1,142 @@
+"""The command `ringbalance simulate`."""
+
+from __future__ import annotations
+
+import json as json_format
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+from ringbalance.controller.document import csv_text, simulation_document, simulation_history
+from ringbalance.controller.eccentric_mass.document import eccentric_document, eccentric_history
+from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
+from ringbalance.controller.eccentric_mass.show import show_eccentric
+from ringbalance.controller.loop import simulate as run_loop
+from ringbalance.controller.show import show
+from ringbalance.reduced_model.law_by_name import law_by_name
+from ringbalance.reports.figures import deferred
+from ringbalance.scene.accuracy import Models, with_tolerance
+from ringbalance.scene.eccentric_models import EccentricScene
+from ringbalance.scene.faults import option_error
+from ringbalance.scene.loader import load_scene
+from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import AnyScene
+from ringbalance.scene.platform.files import check_file, write_whole
+from ringbalance.scene.platform.progress import Activity, activity
+from ringbalance.scene.platform.terminal import results_console
+
+SETTLED: Final = 0
+NOT_SETTLED: Final = 1
+_LARGEST_SEED: Final = 2**63 - 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Outputs:
+    """Where a run goes."""
+
+    json: bool
+    csv: Path | None
+    plot: Path | None
+
+
+def simulate(
+    scene: Path,
+    *,
+    law: str = "calibrated",
+    json: bool = False,
+    csv: Path | None = None,
+    plot: Path | None = None,
+    seed: int | None = None,
+    tolerance: str | None = None,
+    models: Models | None = None,
+) -> int:
+    """Run one closed-loop balancing of a scene.
+
+    Args:
+        scene: the scene file.
+        law: "calibrated", "paper", or a file written by `ringbalance calibrate --save`; eccentric masses have
+            none.
+        json: print one JSON document instead of tables.
+        csv: also write every instant of the run to this file, a column for each quantity with its unit.
+        plot: also draw the run's figures on one sheet, an SVG file.
+        seed: of all random numbers, in place of the scene's.
+        tolerance: in place of the scene's, such as "0.5 %" or 0.005.
+        models: "finest" models every term that has a model, whatever the tolerance.
+
+    Returns:
+        Exit code: 0 settled, 1 not settled; the result is printed either way.
+
+    Raises:
+        SceneError: a scene, a law or an option that cannot be used.
+        OSError: a file that cannot be written.
+    """
+    _check_output("--csv", csv, ".csv")
+    _check_output("--plot", plot, ".svg")
+    told = _with_seed(with_tolerance(load_scene(scene), tolerance=tolerance, models=models), seed)
+    outputs = _Outputs(json=json, csv=csv, plot=plot)
+    settled = (
+        _eccentric_masses(told, outputs) if isinstance(told, EccentricScene) else _ring(told, law, outputs)
+    )
+    return SETTLED if settled else NOT_SETTLED
+
+
+def _check_output(option: str, path: Path | None, ending: str) -> None:
+    if path is None:
+        return
+    if path.suffix.lower() != ending:
+        problem = "this name does not say what is written"
+        raise option_error(
+            option=option, value=str(path), problem=problem, allowed=f"a file name that ends in {ending}"
+        )
+    check_file(path)
+
+
+def _with_seed(scene: AnyScene, seed: int | None) -> AnyScene:
+    if seed is None:
+        return scene
+    if not 0 <= seed <= _LARGEST_SEED:
+        raise option_error(
+            option="--seed", value=seed, problem="out of range", allowed="a whole number from 0 to 2^63 - 1"
+        )
+    return replace(scene, run=replace(scene.run, seed=seed))
+
+
+def _ring(scene: Scene, law: str, outputs: _Outputs) -> bool:
+    with activity("simulate", f"flow law: {law} ...") as shown:
+        found = run_loop(scene, law_by_name(scene, law), progress=_clock(shown))
+    if outputs.csv is not None:
+        write_whole(outputs.csv, csv_text(simulation_history(found)))
+    if outputs.plot is not None:
+        _draw(outputs.plot, deferred.run_figures(simulation_document(found)))
+    if outputs.json:
+        print(json_format.dumps(simulation_document(found), allow_nan=False))
+    else:
+        show(found, console=results_console())
+    return found.settled
+
+
+def _eccentric_masses(scene: EccentricScene, outputs: _Outputs) -> bool:
+    # The first run on a machine compiles for about a minute; later ones take the code that is kept.
+    with activity("simulate", "closed loop (the first run compiles)") as shown:
+        found = simulate_eccentric(scene, progress=_clock(shown))
+        locked = None if outputs.plot is None else locked_run(scene, progress=_clock(shown))
+    if outputs.csv is not None:
+        write_whole(outputs.csv, csv_text(eccentric_history(found)))
+    if outputs.plot is not None and locked is not None:
+        runs = eccentric_document(found), eccentric_document(locked)
+        _draw(outputs.plot, deferred.eccentric_figures(scene, *runs))
+    if outputs.json:
+        print(json_format.dumps(eccentric_document(found), allow_nan=False))
+    else:
+        show_eccentric(found, console=results_console())
+    return found.settled
+
+
+def _draw(path: Path, figures: Any) -> None:
+    write_whole(path, deferred.sheet(figures))
+
+
+def _clock(shown: Activity) -> Callable[[float, float], None]:
+    """Shows the simulated time, s, of the time limit, s."""
+    return lambda time, limit: shown.show(f"{time:.1f} s of {limit:g} s simulated", done=time, total=limit)

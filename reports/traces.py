@@ -1,0 +1,60 @@
+"""Printed values that carry their place in the evidence, through any text, onto the page."""
+
+from __future__ import annotations
+
+import re
+from typing import Any, Final
+
+from markupsafe import Markup, escape
+
+from ringbalance.reports.numbers import shown
+from ringbalance.reports.prose import typeset
+
+_OPEN, _MIDDLE, _CLOSE = "\ue000", "\ue001", "\ue002"
+_TRACED: Final = re.compile(f"{_OPEN}([^{_MIDDLE}]*){_MIDDLE}([^{_CLOSE}]*){_CLOSE}")
+
+
+def traced(text: str, path: str) -> str:
+    """A value's text, marked with its dotted place in the evidence, such as "operating_point.k".
+
+    The mark is part of the text, so it survives sentences and tables that are made of it.
+    """
+    return f"{_OPEN}{path}{_MIDDLE}{text}{_CLOSE}"
+
+
+def untraced(text: str) -> str:
+    """The text alone, for a terminal."""
+    return _TRACED.sub(r"\2", text)
+
+
+def marked_up(value: object) -> object:
+    """Text as it goes onto the page: typeset, traced values in elements that name their place.
+
+    Markup, and what is marked `verbatim`, is left as it is.
+    """
+    if not isinstance(value, str) or isinstance(value, Markup):
+        return value
+    if _OPEN not in value:
+        return typeset(value)
+    # Between two traces stands prose; every third part, from the first on, is such.
+    parts = _TRACED.split(value)
+    found = [escape(typeset(parts[0]))]
+    for path, text, prose in zip(parts[1::3], parts[2::3], parts[3::3], strict=True):
+        found.append(Markup('<span data-from="{}">{}</span>').format(path, typeset(text)))
+        found.append(escape(typeset(prose)))
+    return Markup("").join(found)
+
+
+def evidence_at(evidence: Any, path: str) -> Any:
+    """What the evidence holds at a dotted place, list positions as numbers.
+
+    Raises: KeyError, IndexError: nothing is there.
+    """
+    for key in path.split("."):
+        evidence = evidence[int(key)] if isinstance(evidence, list) else evidence[key]
+    return evidence
+
+
+def read(evidence: Any, path: str, unit: str, *, width: float | None = None, digits: int = 3) -> str:
+    """The evidence's value at a place in the unit that suits it, with its half-width (95 %, SI), traced."""
+    return traced(shown(evidence_at(evidence, path), unit, width, digits=digits), path)

@@ -1,0 +1,174 @@
+"""The pictures of where the disc works: what stands in them is what they were given."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ringbalance.reports.figures.operation import (
+    operating_map,
+    reachable,
+    requirement_bars,
+    residual_polar,
+    settling_histogram,
+    tornado,
+)
+from ringbalance.reports.figures.section import disc_section
+from ringbalance.reports.figures.style import NARROW, Drawing
+from ringbalance.reports.pages.loop import SECTION as LOOP
+from ringbalance.reports.pages.operation import SECTION
+from ringbalance.reports.section import Work
+from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
+from ringbalance.verification.loops import calibration_of
+
+Record = dict[str, Any]
+COLUMN = 238.0
+"""Points of one of two columns on an A4 page with the report's margins."""
+
+
+def texts(drawing: Drawing) -> list[str]:
+    return re.findall(r"<text[^>]*>([^<]+)</text>", drawing.svg)
+
+
+@pytest.fixture(scope="module")
+def work() -> Work:
+    scene = liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper")))
+    return Work(scene=scene, calibration=calibration_of(scene), level="light")
+
+
+@pytest.fixture(scope="module")
+def collected(work: Work) -> Record:
+    found = SECTION.collect(work)
+    assert found is not None
+    return found
+
+
+def test_the_map_agrees_with_the_law(work: Work, collected: Record) -> None:
+    law = work.calibration.flow_law
+    for row, column in ((10, 50), (60, 30), (90, 90), (119, 2)):
+        told = collected["regimes"][int(collected["regime"][row][column])]
+        fill, gas = collected["fill_ratio"][column], collected["gas_pressure_Pa"][row]
+        flow = law.evaluate(fill_ratio=fill, gas_pressure=gas)
+        assert (told == "blocked") == (float(flow.velocity) == 0)
+        assert (told == "siphon") == (int(flow.regime) == 1)
+
+
+def test_liquid_spills_between_the_priming_pressure_and_a_full_bore(work: Work, collected: Record) -> None:
+    """At the crest's priming pressure the flow begins at zero, gas on the crest until swept out."""
+    point = work.calibration.operating_point
+    column = collected["fill_ratio"].index(point.fill_ratio)
+    pressure = np.asarray(collected["gas_pressure_Pa"])
+    names = [collected["regimes"][int(row[column])] for row in collected["regime"]]
+    order = list(dict.fromkeys(names))
+    assert order[:2] == ["blocked", "spilling"]
+    first = pressure[names.index("spilling")]
+    lift = work.calibration.flow_law.ends(fill_ratio=point.fill_ratio).upstream_hydrostatic
+    priming = (work.calibration.flow_law.path.hump_pressure or 0.0) - float(lift)
+    assert 0 < first - priming <= pressure[1]
+
+
+def test_each_area_of_the_map_is_named_in_words(collected: Record) -> None:
+    drawing = operating_map(collected)
+    there = {collected["regimes"][int(sign)] for row in collected["regime"] for sign in row}
+    assert there <= {*texts(drawing), "cannot be told"}
+    assert collected["point"]["regime"] in drawing.caption
+
+
+def test_the_section_carries_its_dimensions(collected: Record) -> None:
+    disc = {**collected["disc"], "free_surface_radius_m": 0.0401, "origins": {"bore": "assumed"}}
+    shown = " ".join(texts(disc_section(disc)))
+    for part in ("R₂ 44.50", "R₁ 20.50", "R₁′ 40.10", "t 2.78", "B 62.00", "θ 90.0°", "rₘ 31.5", "port 44.5"):
+        assert part in shown
+    assert disc_section(disc).caption.endswith("Assumed: bore.")
+    straight = " ".join(texts(disc_section({**disc, "crest_radius_m": None})))
+    assert "rₘ" not in straight
+
+
+def test_the_tornado_begins_with_the_largest_cause() -> None:
+    budget = {
+        "value": 10.0,
+        "numerical": 1e-4,
+        "model": 0.2,
+        "inputs": {"tube.bore": 0.5, "rotor.speed": -0.3, "disc.outer_radius": 0.0},
+    }
+    drawing = tornado({"velocity": budget, "lambda": budget}, {"velocity": "Velocity"})
+    assert drawing is not None
+    shown = texts(drawing)
+    places = [shown.index(name) for name in ("bore", "speed", "the model", "numerics")]
+    assert places == sorted(places)
+    assert "λ" not in " ".join(shown)
+    assert tornado({}, {"velocity": "Velocity"}) is None
+
+
+def test_runs_that_never_settle_have_a_bar_of_their_own() -> None:
+    sample = {
+        "title": "as it is",
+        "edges_s": [0.0, 1.0, 2.0],
+        "counts": [3, 1],
+        "runs": 10,
+        "not_settled": 0.6,
+        "time_limit_s": 20.0,
+    }
+    drawing = settling_histogram([sample])
+    assert drawing is not None
+    assert {"never", "60\u202f%"} <= set(texts(drawing))
+    heights = [abs(y) for y in bar_heights(drawing)]
+    assert max(heights) == pytest.approx(2 * heights[0], rel=0.02)
+    assert heights[0] == pytest.approx(3 * heights[1], rel=0.05)
+
+
+def bar_heights(drawing: Drawing) -> list[float]:
+    """Heights of the bars, in their order."""
+    bars = re.findall(
+        r'<path d="M [\d.]+ ([\d.]+) L [\d.]+ [\d.]+ L [\d.]+ ([\d.]+)[^"]*z *" clip', flat(drawing)
+    )
+    return [float(a) - float(b) for a, b in bars if float(a) != float(b)]
+
+
+def flat(drawing: Drawing) -> str:
+    return re.sub(r"\s+", " ", drawing.svg)
+
+
+def test_the_residual_ends_within_its_circle() -> None:
+    run = {"amplitude_m": [1e-5, 4e-6, 2e-8], "phase_rad": [1.5, 1.0, 0.2], "limit_m": 5e-8}
+    reach = {"vibration_m": 1.1e-5, "direction_rad": -0.3, "pairs": 2}
+    drawing = residual_polar(run, reach)
+    assert {"whole run", "near the limit"} <= set(texts(drawing))
+    assert "from 10\u202fµm (ring) to 0.020\u202fµm (dot)" in drawing.caption
+
+
+@pytest.mark.parametrize(("pairs", "corners"), [(1, 2), (2, 4), (3, 6)])
+def test_pairs_together_cancel_the_sum_of_what_each_does(pairs: int, corners: int) -> None:
+    found = reachable(1.0, 0.4, pairs)
+    assert len(found) == corners
+    # The farthest corner of n equal vectors spread over half a turn lies at 1/sin(pi/2n).
+    assert np.abs(found).max() == pytest.approx(1 / math.sin(math.pi / 2 / pairs))
+
+
+@pytest.mark.parametrize(
+    ("reached", "at_least", "verdict"),
+    [(1.2, True, "met"), (1.05, True, "cannot be told"), (0.8, True, "not met"), (1.2, False, "not met")],
+)
+def test_a_requirement_is_judged_in_words(reached: float, at_least: bool, verdict: str) -> None:
+    row = {"label": "moment", "required": 1.0, "reached": reached, "uncertainty": 0.1, "unit": "kg m"}
+    drawing = requirement_bars([{**row, "at_least": at_least}])
+    assert drawing is not None
+    assert any(text.endswith(f"; {verdict}") for text in texts(drawing))
+
+
+def test_text_is_no_smaller_than_eight_points_in_print(collected: Record) -> None:
+    drawing = operating_map(collected)
+    sizes = [float(size) for size in re.findall(r"font(?:-size)?: (?:bold )?([\d.]+)px", drawing.svg)]
+    assert sizes
+    assert min(sizes) * COLUMN / (72 * NARROW) >= 8
+
+
+def test_the_loop_s_reach_is_a_vibration(work: Work) -> None:
+    reach = LOOP.collect(work)
+    assert reach is not None
+    moment = work.calibration.residual.usable_pair_moment
+    assert reach["vibration_m"] == pytest.approx(moment * work.scene.rotor.influence_coefficient)

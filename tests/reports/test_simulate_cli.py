@@ -1,0 +1,212 @@
+"""`ringbalance simulate`: exit codes, one clean document, laws by name and by file."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+
+import ringbalance
+from ringbalance.cli import main
+from ringbalance.reduced_model.law.paper_law import paper_law
+from ringbalance.reports.simulate_cli import simulate
+from ringbalance.scene.faults import SceneError
+from ringbalance.scene.models import Scene
+
+
+@pytest.fixture
+def scene_file() -> Path:
+    return ringbalance.bundled_scene("liquid_ring_paper")
+
+
+def changed(scene_file: Path, tmp_path: Path, old: str, new: str) -> Path:
+    """The bundled scene with one text replaced."""
+    text = scene_file.read_text()
+    assert old in text
+    path = tmp_path / "changed.toml"
+    path.write_text(text.replace(old, new))
+    return path
+
+
+def document(path: Path, capsys: pytest.CaptureFixture[str], **options: Any) -> tuple[int, dict[str, Any]]:
+    code = simulate(path, json=True, **options)
+    return code, json.loads(capsys.readouterr().out)
+
+
+def test_the_calibrated_law_is_the_default(scene_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, found = document(scene_file, capsys)
+    # At 1 % the inertia of the liquid in the tube counts, so that fill and velocity are integrated together.
+    assert (found["law"], found["integrator"]) == ("calibrated", "runge_kutta")
+    assert code == (0 if found["settled"] else 1)
+
+
+def test_the_papers_law_settles(scene_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, found = document(scene_file, capsys, law="paper")
+    assert (code, found["law"], found["integrator"]) == (0, "paper", "closed_form")
+    assert found["settling_time_s"] < 5
+
+
+def test_a_saved_law_gives_the_same_run(
+    scene_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], paper_scene: Scene
+) -> None:
+    saved = paper_law(paper_scene).save(tmp_path / "law.json")
+    assert document(scene_file, capsys, law=str(saved)) == document(scene_file, capsys, law="paper")
+
+
+def test_not_settling_is_exit_code_1_with_its_result(
+    scene_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = changed(scene_file, tmp_path, 'pressure = "0.7 MPa"', 'pressure = "0.1 MPa"')
+    code, found = document(path, capsys, law="paper")
+    assert code == 1
+    assert found["outcome"] == "stalled"
+    assert "gas.pressure" in found["status"]
+
+
+def test_tables_go_to_standard_output_and_progress_does_not(
+    scene_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["simulate", str(scene_file), "--law", "paper"]) == 0
+    printed = capsys.readouterr()
+    assert "settling time" in printed.out
+    assert "injections" in printed.out
+    assert "settling" not in printed.err
+
+
+def test_bad_input_is_exit_code_2_and_says_what(
+    scene_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["simulate", str(scene_file), "--law", str(tmp_path / "none.json")]) == 2
+    assert "none.json" in capsys.readouterr().err
+    path = changed(scene_file, tmp_path, 'kind = "target_vector"', 'kind = "guesswork"')
+    assert main(["simulate", str(path), "--law", "paper", "--json"]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert '[controller] kind = "guesswork"' in printed.err
+
+
+def test_the_law_based_algorithm_runs_from_a_scene(
+    scene_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = changed(scene_file, tmp_path, 'kind = "target_vector"', 'kind = "law_based"')
+    assert main(["simulate", str(path), "--law", "paper", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert len({injection["time_s"] for injection in found["injections"]}) == 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key"),
+    [
+        ("max_fill_ratio = 0.5 ", "max_fill_ratio = 0.6 ", "max_fill_ratio"),
+        ('axial_width = "62 mm"', 'axial_width = "80 mm"', "axial_width"),
+    ],
+)
+def test_a_law_of_another_disc_is_refused(
+    scene_file: Path, tmp_path: Path, paper_scene: Scene, old: str, new: str, key: str
+) -> None:
+    saved = paper_law(paper_scene).save(tmp_path / "law.json")
+    scene_file = changed(scene_file, tmp_path, "initial_fill = 0.25", "# initial_fill = 0.25")
+    with pytest.raises(SceneError, match=rf"\[disc\] {key}"):
+        simulate(changed(scene_file, tmp_path, old, new), law=str(saved))
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_table_holds_every_instant_of_a_run(
+    scene_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, found = document(scene_file, capsys, law="paper", csv=tmp_path / "run.csv")
+    rows = rows_of(tmp_path / "run.csv")
+    assert [float(row["time_s"]) for row in rows] == found["time_s"]
+    assert [float(row["amplitude_m"]) for row in rows] == found["amplitude_m"]
+    assert [float(row["fill_ratio_B"]) for row in rows] == found["fill_ratio"]["B"]
+    seen = [float(row["measured_amplitude_m"]) for row in rows if row["measured_amplitude_m"]]
+    assert seen == found["samples"]["amplitude_m"]
+    opened = found["injections"][0]
+    at = [
+        row
+        for row in rows
+        if opened["time_s"] <= float(row["time_s"]) < opened["time_s"] + opened["duration_s"]
+    ]
+    assert {row[f"valve_open_{opened['chamber']}"] for row in at} == {"1"}
+    assert rows[-1][f"valve_open_{opened['chamber']}"] == "0"
+
+
+def test_a_table_of_eccentric_masses_holds_every_sample(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = ringbalance.bundled_scene("driven_masses_small")
+    short = changed(path, tmp_path, 'time_limit = "30 s"', 'time_limit = "0.5 s"')
+    _, found = document(short, capsys, csv=tmp_path / "run.csv", plot=tmp_path / "run.svg")
+    rows = rows_of(tmp_path / "run.csv")
+    assert len(rows) == 501
+    assert float(rows[-1]["time_s"]) == pytest.approx(0.5)
+    assert float(rows[-1]["energy_J"]) == found["energy_J"]
+    assert math.hypot(float(rows[7]["whirl_x_m"]), float(rows[7]["whirl_y_m"])) == pytest.approx(
+        float(rows[7]["amplitude_m"])
+    )
+    begun = {stage["name"]: stage["start_s"] for stage in found["stages"]}
+    for name, start in begun.items():
+        assert float(next(row for row in rows if row["stage"] == name)["time_s"]) == start
+    drawn = ElementTree.fromstring((tmp_path / "run.svg").read_text())
+    figures = drawn.findall("{http://www.w3.org/2000/svg}svg")
+    # At constant speed there is no run-up.
+    assert len(figures) == 4
+    assert "var(" not in (tmp_path / "run.svg").read_text()
+
+
+def test_a_sheet_shows_the_figures_of_a_run(
+    scene_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    document(scene_file, capsys, law="paper", plot=tmp_path / "run.svg")
+    drawn = ElementTree.fromstring((tmp_path / "run.svg").read_text())
+    told = [figure.attrib["aria-label"] for figure in drawn.findall("{http://www.w3.org/2000/svg}svg")]
+    assert len(told) == 4
+    for words in ("amplitude", "Valve-open times", "Fill ratios", "vector"):
+        assert any(words in text for text in told)
+    below = [float(figure.attrib["y"]) for figure in drawn.findall("{http://www.w3.org/2000/svg}svg")]
+    assert below == sorted(below)
+    assert len(set(below)) == 3
+
+
+def test_a_seed_replaces_that_of_the_scene(
+    scene_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    reseeded = changed(scene_file, tmp_path, "seed = 0", "seed = 3")
+    _, by_option = document(scene_file, capsys, law="paper", seed=3)
+    _, by_file = document(reseeded, capsys, law="paper")
+    _, other = document(scene_file, capsys, law="paper")
+    assert by_option == by_file
+    assert by_option["samples"] != other["samples"]
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "said"),
+    [
+        ("--csv", "run.txt", "ends in .csv"),
+        ("--plot", "run.png", "ends in .svg"),
+        ("--seed", "-1", "from 0 to 2^63 - 1"),
+        ("--csv", "file.csv/run.csv", "is a file, not a folder"),
+        ("--plot", "folder.svg", "is a folder, not a file"),
+    ],
+)
+def test_outputs_that_cannot_be_written_are_refused_before_the_run(
+    option: str, value: str, said: str, scene_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file.csv").touch()
+    (tmp_path / "folder.svg").mkdir()
+    given = value if option == "--seed" else str(tmp_path / value)
+    assert main(["simulate", str(scene_file), "--law", "paper", option, given, "--json"]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert said in printed.err
+    assert len(printed.err.strip().splitlines()) == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file.csv", "folder.svg"]

@@ -110,7 +110,7 @@ def budgets(*, scene: Scene, calibration: Calibrated) -> Mapping[str, Budget]:
     one without a flow over a crest neither crest pressure nor margin.
     """
     parts = _chamber_parts(calibration.chamber) | _flow_parts(scene, calibration)
-    effects = _input_effects(scene, calibration.operating_point)
+    effects = _input_effects(scene, calibration)
     return {
         name: Budget(
             quantity=name,
@@ -219,9 +219,10 @@ def _law_without_inputs(scene: Scene, calibration: Calibrated) -> CalibratedLaw:
     )
 
 
-def _input_effects(scene: Scene, point: OperatingPoint) -> dict[str, dict[str, float]]:
+def _input_effects(scene: Scene, calibration: Calibrated) -> dict[str, dict[str, float]]:
     """Larger change of every quantity to either side, by the input's path in the scene."""
-    here = device_of(scene, near=point.loss_velocity or 1.0)
+    near = calibration.operating_point.loss_velocity or 1.0
+    here = device_of(scene, near=near, near_fill=calibration.residual.fill_ratio)
     values, found = here.values(), {}
     for quantity, width in half_widths(scene).items():
         sides = [_moved(here, quantity, change).values() for change in (-width, width)]
@@ -235,4 +236,9 @@ def _input_effects(scene: Scene, point: OperatingPoint) -> dict[str, dict[str, f
 
 def _moved(device: Device, quantity: str, change: float) -> Device:
     scene = shifted(scene=device.scene, quantity=quantity, change=change)
-    return device_of(scene, near=device.near, heads=None if quantity in HEAD_INPUTS else device.heads)
+    return device_of(
+        scene,
+        near=device.near,
+        near_fill=device.near_fill,
+        heads=None if quantity in HEAD_INPUTS else device.heads,
+    )

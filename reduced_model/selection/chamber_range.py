@@ -74,7 +74,7 @@ def chamber_status(scene: Scene) -> Status:
 
 def _waves(scene: Scene, fills: FloatArray) -> Status:
     """Whether the swinging surface stays small against the ring's depth, by the estimate of its swing."""
-    swing = np.array([wave_height(scene, float(x)) for x in fills])
+    swing = wave_height(scene, fills)
     worst = int(np.argmax(swing))
     if swing[worst] <= SMALL:
         return Status()

@@ -45,7 +45,7 @@ def _ring(scene: Scene) -> tuple[Number, ...]:
     depth, gravity = disc.outer_radius - a, scene.environment.gravity
     ekman = scene.liquid.kinematic_viscosity / (omega * disc.outer_radius**2)
     bond = scene.liquid.density * omega**2 * a * depth**2 / surface_tension(scene)
-    swing = amplification(scene, disc.max_fill_ratio / 2)
+    swing = float(amplification(scene, disc.max_fill_ratio / 2))
     across = scene.environment.shaft == "horizontal" and gravity > 0
     return (
         _number(

@@ -128,15 +128,17 @@ class CaseDefinition(_Record):
         return self
 
     def _check_quantity(self, quantity: Quantity) -> None:
-        if (quantity.metric == "validation") and self.kind != "claim":
-            raise ValueError(f'{quantity.name}: metric "validation" is for claims; use "within_uncertainty"')
+        if quantity.metric == "validation" and self.kind not in ("claim", "validation"):
+            raise ValueError(
+                f'{quantity.name}: metric "validation" is for claims and validation; use "within_uncertainty"'
+            )
         if quantity.metric in NEEDS_REFERENCE and quantity.limit <= 0:
             raise ValueError(f"{quantity.name}: limit must be positive")
 
     def _check_mutation(self, mutation: Mutation) -> None:
         if mutation.expect not in VOCABULARY[self.kind] or mutation.expect is Verdict.NOT_RUN:
             raise ValueError(f'{mutation.id}: a {self.kind} case cannot come out "{mutation.expect}"')
-        if self.kind != "claim" and mutation.expect is not Verdict.FAILED:
+        if self.kind.endswith("verification") and mutation.expect is not Verdict.FAILED:
             raise ValueError(f'{mutation.id}: a mutation of a {self.kind} case must come out "failed"')
 
     def _check_consequence(self) -> None:

@@ -15,7 +15,7 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
 Level = Literal["light", "heavy"]
-CurveStyle = Literal["paper", "found", "reference"]
+CurveStyle = Literal["paper", "found", "reference", "points"]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,7 @@ from typing import Literal
 from ringbalance.verification.comparison import Comparison, compare
 from ringbalance.verification.evidence import Found, Reference
 
-Kind = Literal["code_verification", "solution_verification", "claim"]
+Kind = Literal["validation", "code_verification", "solution_verification", "claim"]
 Metric = Literal["validation", "within_uncertainty", "relative", "absolute", "at_most", "at_least"]
 
 
@@ -34,6 +34,7 @@ VOCABULARY: dict[Kind, tuple[Verdict, ...]] = {
         Verdict.CONFIRMED,
         Verdict.NOT_RUN,
     ),
+    "validation": (Verdict.REFUTED, Verdict.INCONCLUSIVE, Verdict.CONFIRMED, Verdict.NOT_RUN),
     "code_verification": (Verdict.FAILED, Verdict.INCONCLUSIVE, Verdict.PASSED, Verdict.NOT_RUN),
     "solution_verification": (Verdict.FAILED, Verdict.INCONCLUSIVE, Verdict.PASSED, Verdict.NOT_RUN),
 }
@@ -86,7 +87,7 @@ def _compare(value: float, found: Found, reference: Reference) -> Comparison:
 
 
 def _yes_or_no(kind: Kind, holds: bool) -> Verdict:
-    if kind == "claim":
+    if kind in ("claim", "validation"):
         return Verdict.CONFIRMED if holds else Verdict.REFUTED
     return Verdict.PASSED if holds else Verdict.FAILED
 

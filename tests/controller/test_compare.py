@@ -14,6 +14,7 @@ from ringbalance.controller.compare import compare, comparison_document
 from ringbalance.controller.compare_rotor import own_scene, rotor_of, scene_on
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
 from ringbalance.controller.eccentric_mass.plant.whirl import influence, steady_whirl
+from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene import (
     EccentricScene,
@@ -160,7 +161,11 @@ def test_a_comparison_has_both_tuned_over_one_span_and_several_seeds(
     paper_scene: Scene, small: EccentricScene
 ) -> None:
     noisy = replace(paper_scene, run=replace(paper_scene.run, time_limit=12.0))
-    brief = replace(small, run=replace(small.run, time_limit=6.0))
+    brief = replace(
+        small,
+        friction_filter=replace(small.friction_filter, speed_gain=2.0, drive_speed=5 * RPM),
+        run=replace(small.run, time_limit=6.0),
+    )
     found = compare(noisy, brief, model_of=paper_model, runs=2)
     ring, masses = found.sides
     assert found.span == pytest.approx(12.0) == ring.scene.run.time_limit
@@ -169,7 +174,7 @@ def test_a_comparison_has_both_tuned_over_one_span_and_several_seeds(
     gain = liquid_ring_scene(ring.scene).controller.proportional
     assert ring.tuned == {"controller.proportional": gain}
     assert set(masses.tuned) == {"friction_filter.speed_gain", "friction_filter.drive_speed"}
-    assert told.friction_filter.speed_gain < small.friction_filter.speed_gain
+    assert told.friction_filter.speed_gain < 2.0
     low, high = ring.ends("energy")
     assert low <= ring.middle("energy") <= high
     assert low < high
@@ -179,6 +184,16 @@ def test_a_comparison_has_both_tuned_over_one_span_and_several_seeds(
     assert document["runs"] == [2, 2]
     assert document["spread"][0]["energy_J"] == [low, high]
     json.dumps(document, allow_nan=False)
+
+
+def test_the_small_masses_balance_the_liquid_rings_rotor_with_every_seed(
+    paper_scene: Scene, small: EccentricScene
+) -> None:
+    """With seed 3 a friction arm is estimated 1.3 % too small: 2.5 of its standard deviations."""
+    told = eccentric_scene(scene_on(rotor_of(paper_scene), small))
+    brief = replace(told, run=replace(told.run, time_limit=5.0))
+    for seed in range(5):
+        assert simulate_eccentric(brief, seed=seed).settled
 
 
 def test_two_pairs_of_eccentric_masses(driven: EccentricScene) -> None:

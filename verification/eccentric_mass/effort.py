@@ -85,7 +85,7 @@ def positioning_effort(
             if printed:
                 extra = printed_compensation(law, believed_arm, speed, angle[i], rate[i])
             else:
-                extra = friction_torque(law, believed_arm, speed, rate[i], -angle[i])
+                extra = friction_torque(law, believed_arm, 0.0, speed, rate[i], -angle[i])
             net = asked[i] + extra - law.track.damping * rate[i]
             rate[i] = _later_rate(law, arm, speed, rate[i], net, step)
             angle[i] += step * rate[i]

@@ -8,13 +8,16 @@ to move.  Both come from the last sample, so that no voltage depends on itself.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.controller.eccentric_mass.estimation.friction_filter import TrackModel
 from ringbalance.controller.eccentric_mass.estimation.imbalance_model import WhirlModel
 
 Pair = tuple[float, float]
+
+BREAKS_AWAY: Final = 3.0
+"""Standard deviations of a friction arm beyond its estimate with which a mass at rest is set going."""
 
 
 class DriveLaw(NamedTuple):
@@ -97,23 +100,27 @@ def _tangential_load(law: DriveLaw, motion: Motion, acceleration: complex) -> Pa
 
 
 @compiled
-def friction_torque(law: DriveLaw, arm: float, speed: float, rate: float, distance: float) -> float:
+def friction_torque(
+    law: DriveLaw, arm: float, deviation: float, speed: float, rate: float, distance: float
+) -> float:
     """Torque that makes up for friction.
 
     mu b (W + w)^2 in the sense of w; at rest, where friction opposes whatever is about to move the mass, in
-    the sense of where the mass should go.
-    Args: `distance`: from where the mass is to where it should be, rad; infinite for one that should keep
-    going.
+    the sense of where the mass should go, and as large as friction may be: an arm that is estimated too small
+    would hold the mass where it is.
+    Args: `deviation`: standard deviation of the arm, m. `distance`: from where the mass is to where it should
+    be, rad; infinite for one that should keep going.
     Returns: Torque, N m; zero for a resting mass that is near its place.
     Source: part (b) of Eq. 39 of the paper on eccentric masses, which prints the angle for the rate and gives
     no torque at rest, so that a mass which friction holds stays held.
     """
     if not law.breaks_away:
         return 0.0
-    torque = max(arm, 0.0) * law.track.moment * (speed + rate) ** 2
+    pressure = law.track.moment * (speed + rate) ** 2
     if abs(rate) > law.slow:
-        return math.copysign(torque, rate)
-    return math.copysign(torque, distance) if abs(distance) > law.near else 0.0
+        return math.copysign(max(arm, 0.0) * pressure, rate)
+    largest = max(arm + BREAKS_AWAY * deviation, 0.0) * pressure
+    return math.copysign(largest, distance) if abs(distance) > law.near else 0.0
 
 
 @compiled

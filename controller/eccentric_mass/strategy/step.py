@@ -356,11 +356,12 @@ def _friction_of(
     smoothed: Smoothed,
     mass: int,
 ) -> float:
-    law, distance = settings.law, plan.goal[mass] - smoothed.angle[mass]
+    known, distance = beliefs.friction[mass], plan.goal[mass] - smoothed.angle[mass]
+    deviation = math.sqrt(max(known.arm_variance, 0.0))
     if plan.stage == FRICTION:
         # The paper's law of the pair compensates nothing.
         if settings.friction.pair_gain == 0:
             return 0.0
-        distance = math.copysign(math.inf, settings.friction.drive_speed)
-    arm = beliefs.friction[mass].arm
-    return friction_torque(law, arm, motion.speed, motion.rate[mass], distance)
+        # The arm is not yet known, and the masses are driven all the same.
+        distance, deviation = math.copysign(math.inf, settings.friction.drive_speed), 0.0
+    return friction_torque(settings.law, known.arm, deviation, motion.speed, motion.rate[mass], distance)

@@ -15,11 +15,12 @@ from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.sampled_loops import recommended_gains
 from ringbalance.controller.eccentric_mass.show import show_eccentric
 from ringbalance.scene import EccentricScene, SceneError, bundled_scene, load_scene
+from ringbalance.verification.eccentric_mass.scenes import changed
 
 
 @pytest.fixture(scope="module")
 def unlimited() -> EccentricScene:
-    """The small scene without its own weight, gain and voltage limit."""
+    """The small scene with the weight and gain of a larger machine, and without its voltage limit."""
     scene = load_scene(bundled_scene("driven_masses_small"))
     assert isinstance(scene, EccentricScene)
     return replace(
@@ -44,10 +45,12 @@ def test_a_diverging_run_is_a_status_with_finite_numbers(unlimited: EccentricSce
 
 
 def test_the_remedy_of_a_diverging_run_is_true(unlimited: EccentricScene) -> None:
-    weight = recommended_gains(unlimited).regulator.recommended
-    cured = replace(unlimited, lqr=replace(unlimited.lqr, state_weight=weight))
-    assert recommended_gains(cured).regulator.stable
-    assert simulate_eccentric(cured).outcome != "diverged"
+    mended = replace(unlimited, run=replace(unlimited.run, time_limit=8.0))
+    for key, value in simulate_eccentric(unlimited).remedies[0].changes:
+        table, name = key.split(".")
+        mended = changed(mended, table, **{name: value})
+    assert all(loop.stable for loop in recommended_gains(mended).loops)
+    assert simulate_eccentric(mended).settled
 
 
 def test_sampled_poles_of_the_small_scene(unlimited: EccentricScene) -> None:

@@ -208,10 +208,10 @@ def test_the_printed_compensation_takes_the_angle_for_the_rate(scene: EccentricS
     law = drive_law(scene)
     arm, speed, angle, rate = 0.01, 10.47, 2.0, -1.0
     friction = -arm * law.track.moment * (speed + rate) ** 2
-    assert friction_torque(law, arm, speed, rate, 0.0) == pytest.approx(friction)
+    assert friction_torque(law, arm, 0.0, speed, rate, 0.0) == pytest.approx(friction)
     assert printed_compensation(law, arm, speed, angle, rate) / friction > 1.7
     # At rest, a radian away from the goal, only one of them pushes.
-    assert friction_torque(law, arm, speed, 0.0, 1.0) > 0
+    assert friction_torque(law, arm, 0.0, speed, 0.0, 1.0) > 0
     assert printed_compensation(law, arm, speed, angle, 0.0) == 0
 
 

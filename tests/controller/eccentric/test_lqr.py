@@ -10,6 +10,7 @@ from scipy.linalg import expm, solve_continuous_are
 
 from ringbalance.controller.eccentric_mass.estimation.friction_filter import TrackModel
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
+from ringbalance.controller.eccentric_mass.remedies import found_beforehand
 from ringbalance.controller.eccentric_mass.sampled_loops import GAIN_MARGIN, recommended_gains
 from ringbalance.controller.eccentric_mass.strategy.lqr import lqr_gain
 from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
@@ -46,6 +47,11 @@ def test_the_back_emf_printed_without_its_sign_is_another_plant() -> None:
 @pytest.fixture(scope="module", params=["eccentric_mass_paper", "driven_masses_small", "washing_machine"])
 def scene(request: pytest.FixtureRequest) -> EccentricScene:
     return eccentric_scene(load_scene(bundled_scene(request.param)))
+
+
+def test_a_bundled_scene_needs_no_mending(scene: EccentricScene) -> None:
+    assert all(loop.stable and loop.gain_margin >= GAIN_MARGIN for loop in recommended_gains(scene).loops)
+    assert found_beforehand(scene) == ()
 
 
 def held(scene: EccentricScene, position: float, rate: float, *, helped: bool) -> ComplexArray:

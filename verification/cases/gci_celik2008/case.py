@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from importlib.resources import files
 from typing import Final
 
 from ringbalance.physics.convergence.grid import GridConvergence, Verdict, gci
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Found, Level, Table
-from ringbalance.verification.published import read_rows
 
 _FORMAL_ORDER: Final = 2.0
 _LAST_DIGIT: Final = {"order": 0.01, "limit": 0.0001, "error": 0.1, "index": 0.1}
@@ -50,7 +51,9 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 
 @lru_cache(maxsize=1)
 def _columns() -> tuple[_Column, ...]:
-    rows = read_rows("gci_celik2008", "celik2008_examples.csv")
+    path = files("ringbalance.verification.cases") / "gci_celik2008" / "data" / "celik2008_examples.csv"
+    lines = path.read_text(encoding="utf-8").splitlines()
+    rows = csv.DictReader(line for line in lines if not line.startswith("#"))
     return tuple(_column(row, first=index == 0) for index, row in enumerate(rows))
 
 

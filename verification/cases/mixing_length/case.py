@@ -14,8 +14,8 @@ from scipy.integrate import quad
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
-from ringbalance.verification.published import friction_formula, sand_rough_tubes, smooth_tube
 from ringbalance.verification.reference.mixing_length import MixingLength, mixing_length, mixing_length_flow
+from ringbalance.verification.validation.tube_friction import friction_points, predicted_friction
 
 Friction = Callable[[FloatArray, FloatArray], FloatArray]
 
@@ -52,15 +52,18 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         return np.array([flow.friction_factor for flow in flows])
 
     stride = _MEASURED[level]
-    sand, every = sand_rough_tubes().where(slice(None, None, stride)), smooth_tube()
+    sand, every = (
+        friction_points("nikuradse_1933").where(slice(None, None, stride)),
+        friction_points("mckeon_2004"),
+    )
     smooth = every.where(every.reynolds >= _HIGH).where(slice(None, None, -stride))
     even = np.array(_LOW + _EVEN[level])
-    apart = by_length(even, np.zeros_like(even)) / friction_formula(even, np.zeros_like(even)) - 1
-    measured = by_length(smooth.reynolds, smooth.roughness) / smooth.friction - 1
+    apart = by_length(even, np.zeros_like(even)) / predicted_friction(even, np.zeros_like(even)) - 1
+    measured = by_length(smooth.reynolds, smooth.relative_roughness) / smooth.friction - 1
     wall, formula = (
-        f(sand.reynolds, sand.roughness) / sand.friction - 1 for f in (by_length, friction_formula)
+        f(sand.reynolds, sand.relative_roughness) / sand.friction - 1 for f in (by_length, predicted_friction)
     )
-    grain = sand.reynolds * np.sqrt(sand.friction / 8) * sand.roughness
+    grain = sand.reynolds * np.sqrt(sand.friction / 8) * sand.relative_roughness
     between = (grain > _BETWEEN[0]) & (grain < _BETWEEN[1])
     return Evidence(
         found={
@@ -73,7 +76,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "measured": float(np.max(np.abs(measured))),
             "formula_between": float(np.mean(formula[between])),
             "formula_worst": float(np.max(formula[between])),
-            "bar": float(np.max((sand.uncertainty() / sand.friction)[between])),
+            "bar": float(np.max((sand.stated() / sand.friction)[between])),
             "rough": float(np.max(np.abs(wall[grain > _FULLY_ROUGH]))),
             "formula_rough": float(np.max(np.abs(formula[grain > _FULLY_ROUGH]))),
         },
@@ -99,14 +102,14 @@ def _quadrature_gap(closure: MixingLength, cells: int) -> float:
 
 def _figure(by_length: Friction) -> Series:
     """One sand over Re, where formula and measurements part."""
-    sand = sand_rough_tubes()
-    shown = sand.where(np.isclose(sand.roughness, 0.5 / _SHOWN))
-    reynolds, roughness = shown.reynolds, shown.roughness
-    formula = friction_formula(reynolds, roughness)
+    sand = friction_points("nikuradse_1933")
+    shown = sand.where(np.isclose(sand.relative_roughness, 0.5 / _SHOWN))
+    reynolds, roughness = shown.reynolds, shown.relative_roughness
+    formula = predicted_friction(reynolds, roughness)
     return figure(
         f"friction factor on sand of R/ks = {_SHOWN:.0f}",
         ("Reynolds number", "1", reynolds),
-        Curve("formula", "1", formula, uncertainty=shown.uncertainty()),
+        Curve("formula", "1", formula, uncertainty=shown.stated()),
         Curve("mixing length", "1", by_length(reynolds, roughness), style="paper"),
         Curve("Nikuradse (1933)", "1", shown.friction, style="reference"),
         log=True,

@@ -1,0 +1,55 @@
+"""Friction in tubes roughened with sand, as measured and as predicted."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Final
+
+import numpy as np
+
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Scene
+from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
+from ringbalance.verification.validation.tube_friction import FrictionPoints, friction_points
+
+_FULLY_ROUGH: Final = 70.0
+
+
+def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    points = friction_points("nikuradse_1933")
+    predicted = _predicted(points, defect)
+    statistics = points.statistics(predicted)
+    grain = points.reynolds * np.sqrt(points.friction / 8) * points.relative_roughness
+    deviation = predicted / points.friction - 1
+    return Evidence(
+        found={
+            "share_within": Found(value=statistics.share_within),
+            "fully_rough": Found(value=float(np.max(np.abs(deviation[grain > _FULLY_ROUGH])))),
+        },
+        numbers={
+            **{key: float(value) for key, value in vars(statistics).items() if key != "share_within"},
+            "worst": float(np.max(deviation)),
+        },
+        series=tuple(
+            _figure(points, predicted, wall) for wall in np.unique(points.relative_roughness)[[0, -1]]
+        ),
+    )
+
+
+def _predicted(points: FrictionPoints, defect: str | None) -> FloatArray:
+    if defect == "roughness_ignored":
+        smooth = np.zeros_like(points.relative_roughness)
+        return dataclasses.replace(points, relative_roughness=smooth).predicted()
+    return (1.1 if defect == "ten_per_cent_high" else 1.0) * points.predicted()
+
+
+def _figure(points: FrictionPoints, predicted: FloatArray, wall: float) -> Series:
+    here = points.relative_roughness == wall
+    one = points.where(here)
+    return figure(
+        f"friction factor of a tube with ks/d = {wall:.2g}, measured and predicted",
+        ("Reynolds number", "1", one.reynolds),
+        Curve("predicted", "1", predicted[here], uncertainty=one.stated()),
+        Curve("measured", "1", one.friction, style="points"),
+        log=True,
+    )

@@ -14,11 +14,11 @@ from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, Cu
 from ringbalance.reduced_model.chamber.inputs import half_widths, shifted
 from ringbalance.reduced_model.device import HEAD_INPUTS, Device, device_of
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.tube.crest_margin import directed_state, margin_of
+from ringbalance.reduced_model.operating.crest_margin import directed_state, margin_of
+from ringbalance.reduced_model.operating.point import OperatingPoint
+from ringbalance.reduced_model.operating.residual import ResidualLiquid, usable_moment_uncertainty
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
 from ringbalance.reduced_model.tube.heads import without_inputs
-from ringbalance.reduced_model.tube.operating_point import OperatingPoint
-from ringbalance.reduced_model.tube.residual import ResidualLiquid, usable_moment_uncertainty
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 

@@ -138,7 +138,7 @@ class Device:
 
 
 def device_of(
-    scene: Scene, *, near: float, near_fill: float, heads: tuple[FloatArray, ...] | None = None
+    scene: Scene, *, near: float, near_fill: float = 0.0, heads: tuple[FloatArray, ...] | None = None
 ) -> Device:
     """Set a device up from a scene.
 

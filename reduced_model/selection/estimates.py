@@ -15,15 +15,13 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume
-from ringbalance.reduced_model.chamber.values import by_closed_form
-from ringbalance.reduced_model.gas_line import LineEnd, line_ends
-from ringbalance.reduced_model.selection.chamber_range import (
+from ringbalance.reduced_model.chamber.range import (
     chamber_fills,
     mean_gravity,
     range_contributions,
     range_fills,
 )
-from ringbalance.reduced_model.selection.chamber_terms import (
+from ringbalance.reduced_model.chamber.terms import (
     PLATES,
     RIPPLE,
     SLOSHING,
@@ -31,6 +29,8 @@ from ringbalance.reduced_model.selection.chamber_terms import (
     capillary_share,
     wall_layers,
 )
+from ringbalance.reduced_model.chamber.values import by_closed_form
+from ringbalance.reduced_model.gas_line import LineEnd, line_ends
 from ringbalance.reduced_model.selection.tube_terms import (
     HUMP,
     LOSS,

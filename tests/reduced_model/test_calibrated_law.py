@@ -15,8 +15,8 @@ from ringbalance.reduced_model.chamber.calibration import calibrate_chamber
 from ringbalance.reduced_model.law.building import calibrated_law, column_pressure
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.operating.thresholds import priming_pressure, siphon_stall_pressure
 from ringbalance.reduced_model.tube.heads import tube_heads
-from ringbalance.reduced_model.tube.thresholds import priming_pressure, siphon_stall_pressure
 from ringbalance.scene.models import Scene
 
 AMBIENT = 101325.0

@@ -94,8 +94,8 @@ def test_a_separated_column_over_an_open_port_is_lost() -> None:
 def test_a_started_tube_is_primed_once_its_flow_carries_the_gas_out(
     froude_velocity: float, primed: bool
 ) -> None:
-    # Driving 5 - 1 + 7 - 10.5 = 0.5, gas margin 5 + 7 - 9 - 1 = 2: more could spill than drains, so the tube is
-    # full under its gas; a Froude number of 0.71 does not carry that out, one of 1.4 does.
+    # Driving 5 - 1 + 7 - 10.5 = 0.5, gas margin 5 + 7 - 9 - 1 = 2: more could spill than drains, so the tube
+    # is full under its gas; a Froude number of 0.71 does not carry that out, one of 1.4 does.
     slow, crest = replace(ENDS, downstream_hydrostatic=10.5), replace(CREST, froude_velocity=froude_velocity)
     flow = flow_of(slow, crest=crest, primed=False)
     assert (flow.velocity, flow.separated) == (math.sqrt(0.5), False)

@@ -11,8 +11,8 @@ import pytest
 from ringbalance.physics.results import StatusCode
 from ringbalance.physics.sloshing.response import sloshing_response
 from ringbalance.reduced_model.calibration import Calibration, calibrate
+from ringbalance.reduced_model.chamber.terms import wave_height, wave_mean
 from ringbalance.reduced_model.documents import calibration_document
-from ringbalance.reduced_model.selection.chamber_terms import wave_height, wave_mean
 from ringbalance.scene.models import Scene
 
 

@@ -10,6 +10,19 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.chamber import default_cells
+from ringbalance.reduced_model.chamber.range import chamber_fills, chamber_status
+from ringbalance.reduced_model.chamber.terms import (
+    COARSE_MESH,
+    FINE_MESH,
+    MEAN,
+    PLATES,
+    RIPPLE,
+    SLOSHING,
+    amplification,
+    capillary_share,
+    chamber_contributions,
+    mesh_error,
+)
 from ringbalance.reduced_model.chamber.tilted_ring import (
     POINTS,
     RADIAL_POINTS,
@@ -25,20 +38,7 @@ from ringbalance.reduced_model.chamber.values import (
     sloshing_meshes,
     with_sloshing,
 )
-from ringbalance.reduced_model.selection.chamber_range import chamber_fills, chamber_status
-from ringbalance.reduced_model.selection.chamber_terms import (
-    COARSE_MESH,
-    FINE_MESH,
-    MEAN,
-    PLATES,
-    RIPPLE,
-    SLOSHING,
-    amplification,
-    capillary_share,
-    chamber_contributions,
-    mesh_error,
-)
-from ringbalance.reduced_model.selection.contribution import Contribution
+from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy, Work

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ringbalance.mesh.geometry import surface_radius
+from ringbalance.reduced_model.chamber.terms import amplification, surface_tension
 from ringbalance.reduced_model.law.building import column_pressure
-from ringbalance.reduced_model.selection.chamber_terms import amplification, surface_tension
 from ringbalance.reduced_model.selection.estimates import (
     FILLING,
     INERTIA,

@@ -10,8 +10,8 @@ import numpy as np
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_area, surface_radius
 from ringbalance.reduced_model.chamber.values import by_closed_form, by_quadrature
+from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.reduced_model.paper import formulas as paper
-from ringbalance.reduced_model.selection.contribution import Contribution
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 

@@ -43,7 +43,7 @@ def report(
 
     Args:
         scene: the scene file.
-        out: folder for report.html, evidence.json, figures/ and fields/.
+        out: folder for report.html, annex.html, evidence.json, figures/, fields/ and tables/.
         level: "heavy" also runs the cases that take long.
         tolerance: in place of the scene's, such as "0.5 %" or 0.005.
         models: "finest" models every term that has a model, whatever the tolerance.

@@ -23,6 +23,8 @@ from ringbalance.reports.pictures.process import (
 from ringbalance.reports.render import render_pages
 from ringbalance.reports.saved import saved_cases
 from ringbalance.reports.section import Level, Record
+from ringbalance.reports.tables import FOLDER as TABLES
+from ringbalance.reports.tables import csv_tables
 from ringbalance.scene import AnyScene, liquid_ring_scene
 from ringbalance.scene.platform.files import staged
 
@@ -73,7 +75,7 @@ def write_report(
     scene = liquid_ring_scene(scene)
     folder, start = Path(out), time.perf_counter()
     saved = saved_cases(folder)
-    with staged(folder, files=FILES, folders=FOLDERS) as stage:
+    with staged(folder, files=FILES, folders=(*FOLDERS, TABLES)) as stage:
         drawing = start_drawing(
             scene=scene, fields=write_fields(scene=scene, folder=stage), folder=stage, opengl=opengl
         )
@@ -107,6 +109,9 @@ def _write_page(evidence: Record, stage: Path) -> Record:
     content = page_content(kept, pictures=pictures)
     for drawing in content.drawings:
         (figures / f"{drawing.name}.svg").write_text(standalone(drawing), encoding="utf-8")
+    (stage / TABLES).mkdir()
+    for name, table in csv_tables(kept).items():
+        (stage / TABLES / name).write_text(table, encoding="utf-8")
     for name, page in render_pages(content).items():
         (stage / name).write_text(page, encoding="utf-8")
     return kept

@@ -39,7 +39,7 @@ def report(
     tolerance: str | None = None,
     models: Models | None = None,
 ) -> int:
-    """Verify, calibrate, simulate and draw: everything, into one HTML file.
+    """Verify, calibrate, simulate and draw: everything, into a report and its annex.
 
     Args:
         scene: the scene file.

@@ -103,7 +103,9 @@ def plot(scene: Path, *, out: Path = Path("out")) -> int:
 
 def _summarise(console: Console, finished: Report) -> None:
     evidence = finished.evidence
-    for line in (*loop_sentences(evidence), lead_sentence(evidence)):
+    balanced = evidence["closed_loop"].get("balanced")
+    lines = [balanced["status"]] if balanced else [*loop_sentences(evidence), lead_sentence(evidence)]
+    for line in lines:
         console.print(untraced(line), markup=False, highlight=False)
     if not evidence["pictures"]["drawn"]:
         console.print(evidence["pictures"]["text"], markup=False, highlight=False)

@@ -21,6 +21,7 @@ from ringbalance.reports.figures.style import Drawing
 from ringbalance.reports.figures.tube import drag, drag_terms, flow_laws
 from ringbalance.reports.numbers import display_unit, fixed, measured, number, percent, short, shown
 from ringbalance.reports.pages.cases import case_view
+from ringbalance.reports.pages.eccentric_scene import BALANCER
 from ringbalance.reports.section import Cells, Record, Table
 from ringbalance.reports.sections import drawings_in, viewed
 from ringbalance.reports.traces import traced
@@ -205,19 +206,18 @@ def page_content(evidence: Record, *, pictures: Mapping[str, bytes] | None = Non
     out.
     Raises: KeyError: an evidence document that lacks a part.
     """
+    sections = viewed(evidence)
+    if evidence.get("balancer") == BALANCER:
+        return PageContent(context=_frame(evidence, sections), drawings=tuple(drawings_in(sections)))
     claims = [
         {**case_view(case), "elsewhere": summary.elsewhere(case, evidence)}
         for case in summary.claims(evidence)
     ]
     checks = [case_view(case) for case in summary.checks(evidence)]
     figures = _page_figures(evidence)
-    sections = viewed(evidence)
     calibration, runs = evidence["calibration"], evidence["closed_loop"]
     context = {
-        "scene": evidence["scene"],
-        "sections": sections,
-        "stamp": _stamp(evidence),
-        "running_head": _running_head(evidence),
+        **_frame(evidence, sections),
         "tallies": _tallies(evidence),
         "equations": _equations(),
         "figures": figures,
@@ -230,13 +230,23 @@ def page_content(evidence: Record, *, pictures: Mapping[str, bytes] | None = Non
         "checks": checks,
         "order_plots": [case["order_plot"] for case in checks if case["order_plot"]],
         "models": _models(calibration["models_used"]),
-        "scene_groups": _scene_groups(evidence["scene"]["table"]),
         "mesh_facts": _mesh_facts(evidence["pressure"]["mesh"]),
-        "version_facts": _version_facts(evidence),
-        "product": f"ringbalance {evidence['versions']['ringbalance']}",
     }
     drawings = drawings_in([figures, sections, *(_own_drawings(case) for case in (*claims, *checks))])
     return PageContent(context=context, drawings=tuple(drawings))
+
+
+def _frame(evidence: Record, sections: list[Record]) -> Record:
+    """What the page of any scene has."""
+    return {
+        "scene": evidence["scene"],
+        "sections": sections,
+        "stamp": _stamp(evidence),
+        "running_head": _running_head(evidence),
+        "scene_groups": _scene_groups(evidence["scene"]["table"]),
+        "version_facts": _version_facts(evidence),
+        "product": f"ringbalance {evidence['versions']['ringbalance']}",
+    }
 
 
 def _own_drawings(case: Record) -> list[Record]:

@@ -103,4 +103,4 @@ def test_reading_takes_the_unit_that_suits() -> None:
 def test_the_report_of_changed_evidence_is_traced_too(evidence: Record) -> None:
     evidence["operating_point"]["gas_pressure_Pa"] = 1.234e6
     page = render(evidence)["report.html"]
-    assert '<span data-from="operating_point.gas_pressure_Pa">1.234\u202fMPa</span>' in page
+    assert '<span data-from="operating_point.gas_pressure_Pa">1.23\u202fMPa</span>' in page

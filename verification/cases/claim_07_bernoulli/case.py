@@ -14,7 +14,7 @@ from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene.models import Scene
 from ringbalance.verification.comparison import from_half_width, from_range
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
-from ringbalance.verification.loops import calibration_of
+from ringbalance.verification.loops import flow_law_of
 from ringbalance.verification.paper_numbers import plate_uncertainty
 from ringbalance.verification.reference.tube_running import (
     driving_head,
@@ -77,7 +77,7 @@ def _exit(scene: Scene) -> tuple[float, float]:
 
 
 def _law(scene: Scene) -> CalibratedLaw:
-    return calibration_of(scene).flow_law
+    return flow_law_of(scene)
 
 
 def _siphon_share(scene: Scene) -> float:

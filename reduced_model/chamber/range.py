@@ -10,14 +10,14 @@ import numpy as np
 
 from ringbalance.physics.results import Status, StatusCode
 from ringbalance.physics.sloshing.range import SMALL
-from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing, tilted_ring
-from ringbalance.reduced_model.selection.chamber_terms import (
+from ringbalance.reduced_model.chamber.terms import (
     MEAN,
     chamber_contributions,
     resonant_fill,
     wave_height,
 )
-from ringbalance.reduced_model.selection.contribution import Contribution
+from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing, tilted_ring
+from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.scene.arrays import FloatArray, distinct
 from ringbalance.scene.models import Scene
 
@@ -74,7 +74,7 @@ def chamber_status(scene: Scene) -> Status:
 
 def _waves(scene: Scene, fills: FloatArray) -> Status:
     """Whether the swinging surface stays small against the ring's depth, by the estimate of its swing."""
-    swing = np.array([wave_height(scene, float(x)) for x in fills])
+    swing = wave_height(scene, fills)
     worst = int(np.argmax(swing))
     if swing[worst] <= SMALL:
         return Status()

@@ -19,6 +19,8 @@ from ringbalance.reports.numbers import (
     with_unit,
 )
 from ringbalance.reports.section import Record, Table
+from ringbalance.reports.tables import FOLDER, is_long, table_file
+from ringbalance.reports.traces import traced
 from ringbalance.verification.catalogue import load_cases
 
 _FACTS: Final = (
@@ -89,17 +91,24 @@ def _criterion(quantity: Record) -> str:
     return f"within {given(limit, unit)}"
 
 
-def _quantity_row(quantity: Record) -> Record:
+def _quantity_row(quantity: Record, path: str) -> Record:
     """One judged quantity, every number in the unit that suits its size."""
+
+    def marked(key: str, text: str) -> str:
+        return text if text == MISSING else traced(text, f"{path}.{key}")
+
     unit = quantity.get("unit") or "1"
     own = quantity.get("value_uncertainty")
     half_width = quantity.get("uncertainty") if own is None else own
     return {
         "name": quantity.get("title") or quantity["name"],
         "why": quantity.get("why") or "",
-        "value": _value(quantity, half_width),
-        "reference": shown(quantity.get("reference"), unit, quantity.get("reference_uncertainty"), digits=4),
-        "error": shown(quantity.get("error"), unit, quantity.get("uncertainty"), digits=2),
+        "value": marked("value", _value(quantity, half_width)),
+        "reference": marked(
+            "reference",
+            shown(quantity.get("reference"), unit, quantity.get("reference_uncertainty"), digits=4),
+        ),
+        "error": marked("error", shown(quantity.get("error"), unit, quantity.get("uncertainty"), digits=2)),
         "parts": [
             shown((quantity.get("validation") or {}).get(part), unit, digits=2)
             for part in ("u_num", "u_input", "u_D")
@@ -198,13 +207,16 @@ def _deciding_quantity(case: Record) -> Record | None:
 
 def _in_brief(case: Record) -> Record:
     """The deciding quantity in one line: what the paper has, what was found, the comparison's half-width."""
-    quantity = _deciding_quantity(case)
+    quantity, path = _deciding_quantity(case), f"verification.{case['id']}.quantities"
     if quantity is None:
         return dict.fromkeys(("paper", "found", "half_width"), MISSING) | {"what": ""}
     unit, reference = quantity.get("unit") or "1", quantity.get("reference")
+    path = f"{path}.{case['quantities'].index(quantity)}"
+    value_text = _without_half_width(_value(quantity, quantity.get("value_uncertainty")))
+    paper = MISSING if reference is None else traced(given(reference, unit, digits=4), f"{path}.reference")
     return {
-        "paper": _criterion(quantity) if reference is None else given(reference, unit, digits=4),
-        "found": _without_half_width(_value(quantity, quantity.get("value_uncertainty"))),
+        "paper": _criterion(quantity) if reference is None else paper,
+        "found": value_text if quantity.get("value") is None else traced(value_text, f"{path}.value"),
         "half_width": _width(quantity),
         "what": quantity.get("title") or "",
     }
@@ -252,12 +264,20 @@ def case_view(case: Record) -> Record:
         "rests_on": [f"{one['path']} ({one['origin']})" for one in case.get("rests_on") or []],
         "facts": _facts(case),
         "equations": _equations(case),
-        "rows": [_quantity_row(quantity) for quantity in case.get("quantities") or []],
+        "rows": [
+            _quantity_row(quantity, f"verification.{case['id']}.quantities.{place}")
+            for place, quantity in enumerate(case.get("quantities") or [])
+        ],
         "order_plot": order_plot({**case, "convergence": sequences}),
         "drawings": series_plots(case),
         "tables": [
             *(_sequence_table(sequence) for sequence in case.get("convergence") or []),
-            *(_data_table(table) for table in case.get("tables") or []),
+            *(_data_table(table) for table in case.get("tables") or [] if not is_long(table)),
+        ],
+        "files": [
+            (table["name"], f"{FOLDER}/{table_file(case, table)}")
+            for table in case.get("tables") or []
+            if is_long(table)
         ],
         "mutations": _mutations(case),
         "doubts": case.get("doubts") or [],

@@ -26,7 +26,7 @@ import numpy.typing as npt
 
 from ringbalance.physics.results import Estimate, Status, StatusCode
 from ringbalance.physics.splines import Surface
-from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.scene.arrays import BoolArray, FloatArray, distinct
 
 Rows = Sequence[Mapping[str, str]]
 
@@ -106,8 +106,8 @@ def _columns(rows: Rows) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray
 def _rectangle(table: str, rows: Rows) -> Rectangle:
     """Splines over the nodes; a = 0, where F = 1, is not in the file."""
     a, b, fine, relative = _columns(rows)
-    first, i = np.unique(a, return_inverse=True)
-    second, j = np.unique(b, return_inverse=True)
+    first, second = distinct(a), distinct(b)
+    i, j = np.searchsorted(first, a), np.searchsorted(second, b)
     gap, uncertainty_95 = (np.zeros((first.size + 1, second.size)) for _ in range(2))
     gap[i + 1, j] = np.log(fine) - _base_at(table, a, b)
     uncertainty_95[i + 1, j] = relative

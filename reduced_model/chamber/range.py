@@ -18,7 +18,7 @@ from ringbalance.reduced_model.chamber.terms import (
 )
 from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing, tilted_ring
 from ringbalance.reduced_model.contribution import Contribution
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import FloatArray, distinct
 from ringbalance.scene.models import Scene
 
 FILLS: Final = (0.2, 0.5, 1.0)
@@ -39,7 +39,7 @@ def range_fills(scene: Scene) -> FloatArray:
     fills, resonant = scene.disc.max_fill_ratio * np.array(FILLS), resonant_fill(scene)
     if resonant is None or not fills[0] < resonant < fills[-1]:
         return fills
-    return np.unique(np.append(fills, resonant))
+    return distinct(np.append(fills, resonant))
 
 
 def range_contributions(scene: Scene) -> Mapping[str, Mapping[str, Contribution]]:

@@ -20,10 +20,10 @@ from ringbalance.reduced_model.law.building import calibrated_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.model import BalancerModel, balancer_model
 from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_law
+from ringbalance.reduced_model.operating.point import OperatingPoint, operating_point
+from ringbalance.reduced_model.operating.residual import ResidualLiquid, residual_liquid
 from ringbalance.reduced_model.selection.registry import ModelUsed, models_used
 from ringbalance.reduced_model.tube.heads import tube_heads
-from ringbalance.reduced_model.tube.operating_point import OperatingPoint, operating_point
-from ringbalance.reduced_model.tube.residual import ResidualLiquid, residual_liquid
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
@@ -83,10 +83,8 @@ def calibrate(scene: AnyScene) -> Calibration:
         laminar tube, correlations beyond; see the parts.
     """
     scene = liquid_ring_scene(scene)
-    check_ring(scene)
-    chamber, heads = calibrate_chamber(scene), tube_heads(scene)
-    law = calibrated_law(scene=scene, chamber=chamber, heads=heads)
-    point = operating_point(scene=scene, law=law)
+    chamber, law = _chamber_and_law(scene)
+    heads, point = law.heads, operating_point(scene=scene, law=law)
     return Calibration(
         scene=scene,
         chamber=chamber,
@@ -110,6 +108,20 @@ def calibrate(scene: AnyScene) -> Calibration:
             "moment_table_error_kg_m": chamber.moment.interpolation,
         },
     )
+
+
+def calibrated_model(scene: Scene) -> BalancerModel:
+    """The balancer that `calibrate` finds, without what it reports beside: half the work.
+
+    Raises: SceneError, ValueError: as `calibrate`.
+    """
+    return balancer_model(_chamber_and_law(scene)[1])
+
+
+def _chamber_and_law(scene: Scene) -> tuple[ChamberCalibration, CalibratedLaw]:
+    check_ring(scene)
+    chamber = calibrate_chamber(scene)
+    return chamber, calibrated_law(scene=scene, chamber=chamber, heads=tube_heads(scene))
 
 
 def _tube(scene: Scene, velocity: FloatArray) -> TubeLoss:

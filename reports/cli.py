@@ -19,6 +19,7 @@ from ringbalance.reports.pictures.process import (
 from ringbalance.reports.report import Report, write_report
 from ringbalance.reports.section import Level
 from ringbalance.reports.summary import lead_sentence
+from ringbalance.reports.traces import untraced
 from ringbalance.scene import liquid_ring_scene, load_scene, read_scene
 from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.platform.files import staged
@@ -38,11 +39,11 @@ def report(
     tolerance: str | None = None,
     models: Models | None = None,
 ) -> int:
-    """Verify, calibrate, simulate and draw: everything, into one HTML file.
+    """Verify, calibrate, simulate and draw: everything, into a report and its annex.
 
     Args:
         scene: the scene file.
-        out: folder for report.html, evidence.json, figures/ and fields/.
+        out: folder for report.html, annex.html, evidence.json, figures/, fields/ and tables/.
         level: "heavy" also runs the cases that take long.
         tolerance: in place of the scene's, such as "0.5 %" or 0.005.
         models: "finest" models every term that has a model, whatever the tolerance.
@@ -102,8 +103,10 @@ def plot(scene: Path, *, out: Path = Path("out")) -> int:
 
 def _summarise(console: Console, finished: Report) -> None:
     evidence = finished.evidence
-    for line in (*loop_sentences(evidence), lead_sentence(evidence)):
-        console.print(line, markup=False, highlight=False)
+    balanced = evidence["closed_loop"].get("balanced")
+    lines = [balanced["status"]] if balanced else [*loop_sentences(evidence), lead_sentence(evidence)]
+    for line in lines:
+        console.print(untraced(line), markup=False, highlight=False)
     if not evidence["pictures"]["drawn"]:
         console.print(evidence["pictures"]["text"], markup=False, highlight=False)
     console.print(f"took {evidence['times']['total_s']:.0f} s", style="dim", highlight=False)

@@ -1,6 +1,7 @@
 """The evidence document: all that a report says, as plain numbers and texts, gathered from every room.
 
-Everything but `times` is the same, to the last bit, for the same scene file, seed and versions.
+Everything but `times` and `provenance` is the same, to the last bit, for the same scene file, seed and
+versions.
 """
 
 from __future__ import annotations
@@ -24,9 +25,10 @@ from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.reports.pages.cases import typeset_equations
 from ringbalance.reports.pictures.fields import chamber_field, mesh_record, pressure_profile
+from ringbalance.reports.provenance import provenance
 from ringbalance.reports.section import Level, Record, Work
 from ringbalance.reports.sections import collected
-from ringbalance.scene import Scene, scene_table
+from ringbalance.scene import AnyScene, Scene, scene_table
 from ringbalance.verification import paper_numbers
 from ringbalance.verification.document import merge_saved, results_document
 from ringbalance.verification.result import CaseResult
@@ -72,7 +74,7 @@ def collect_evidence(
         # While the cases still run, there is time for what the page will need.
         typeset_equations()
         tell("verification")
-        cases = merge_saved(_finished(under_way, tell), saved)
+        cases = merge_saved(finished_cases(under_way, tell), saved)
     sections |= collected(work, last=True)
     # What a section measured by the clock does not reproduce.
     clocked = {name: record.pop("times") for name, record in sections.items() if "times" in record}
@@ -80,7 +82,7 @@ def collect_evidence(
         "format": FORMAT,
         "level": level,
         "versions": versions(),
-        "scene": _scene(scene, scene_text),
+        "scene": scene_record(scene, scene_text, [asdict(row) for row in scene_table(scene)]),
         "seeds": {"run": scene.run.seed},
         "limit_m": scene.controller.limit,
         "paper": _paper(),
@@ -92,6 +94,7 @@ def collect_evidence(
         **sections,
         "verification": cases,
         "pictures": {"drawn": False, "text": "The 3-D pictures were not asked for.", "files": []},
+        "provenance": provenance(),
         "times": {"date": date.today().isoformat()} | clocked,
     }
 
@@ -109,14 +112,16 @@ def _version(name: str) -> str:
         return ""
 
 
-def _scene(scene: Scene, text: str) -> Record:
+def scene_record(scene: AnyScene, text: str, rows: list[Record]) -> Record:
+    """Names, hashes and text of a scene file, with the rows of its values."""
     return {
         "name": scene.name,
         "file": scene.source,
         "sha256": scene.sha256,
         "values_sha256": scene.values_sha256,
         "text": text,
-        "table": [asdict(row) for row in scene_table(scene)],
+        "origins": dict(scene.origins),
+        "table": rows,
     }
 
 
@@ -142,7 +147,7 @@ def _closed_loop(scene: Scene, calibration: Calibration) -> Record:
     return {name: simulation_document(simulate(scene, model)) for name, model in models.items()}
 
 
-def _finished(under_way: Iterator[CaseResult], tell: Progress) -> list[Record]:
+def finished_cases(under_way: Iterator[CaseResult], tell: Progress) -> list[Record]:
     """Records of the cases as they come."""
     results = []
     for result in under_way:

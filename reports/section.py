@@ -10,8 +10,8 @@ from typing import Any, Final, Literal
 
 from ringbalance.controller.tuning.tune import Tuning, tune
 from ringbalance.reduced_model.calibration import Calibration
-from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reports.numbers import MISSING
+from ringbalance.reports.traces import untraced
 from ringbalance.scene import Scene
 from ringbalance.verification.loops import calibration_of
 
@@ -38,7 +38,7 @@ class Table:
     def numeric(self) -> list[bool]:
         """By column."""
         columns = zip(*self.rows, strict=True) if self.rows else [()] * len(self.heads)
-        return [_numeric([cell for cell in column if cell.strip(MISSING)]) for column in columns]
+        return [_numeric([untraced(cell) for cell in column if cell.strip(MISSING)]) for column in columns]
 
 
 def _numeric(cells: Cells) -> bool:
@@ -62,11 +62,7 @@ class Work:
 @lru_cache(maxsize=4)
 def tuning_of(scene: Scene) -> Tuning:
     """One tuning serves every report of a scene within a process."""
-    return tune(scene, model_of=_model_of, members=_TUNING_RUNS, runs=_TERM_RUNS)
-
-
-def _model_of(scene: Scene) -> BalancerModel:
-    return calibration_of(scene).model
+    return tune(scene, calibration_of(scene).model, members=_TUNING_RUNS, runs=_TERM_RUNS)
 
 
 def _nothing(_work: Work) -> None:
@@ -96,11 +92,13 @@ class Section:
     """From its own evidence and the whole to what the template calls `view`: texts, `Drawing`s, or None."""
     always: bool = False
     """Whether it is shown without evidence of its own, which is then empty."""
+    in_parts: bool = False
+    """Whether its view is a list of kinds and contents, which one template sets in turn."""
 
     @property
     def template(self) -> str:
         """File in `templates`."""
-        return f"{self.name}.html"
+        return "parts.html" if self.in_parts else f"{self.name}.html"
 
     def view(self, evidence: Record) -> Record | None:
         """What the template shows of the whole evidence; None: no such section."""

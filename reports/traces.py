@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from markupsafe import Markup, escape
 
+from ringbalance.reports.numbers import shown
 from ringbalance.reports.prose import typeset
 
 _OPEN, _MIDDLE, _CLOSE = "\ue000", "\ue001", "\ue002"
@@ -45,10 +46,20 @@ def marked_up(value: object) -> object:
 
 
 def evidence_at(evidence: Any, path: str) -> Any:
-    """What the evidence holds at a dotted place, list positions as numbers.
+    """What the evidence holds at a dotted place; in a list by position, or by the `id` of an item.
 
     Raises: KeyError, IndexError: nothing is there.
     """
     for key in path.split("."):
-        evidence = evidence[int(key)] if isinstance(evidence, list) else evidence[key]
+        if not isinstance(evidence, list):
+            evidence = evidence[key]
+        elif key.lstrip("-").isdigit():
+            evidence = evidence[int(key)]
+        else:
+            evidence = {item.get("id"): item for item in evidence}[key]
     return evidence
+
+
+def read(evidence: Any, path: str, unit: str, *, width: float | None = None, digits: int = 3) -> str:
+    """The evidence's value at a place in the unit that suits it, with its half-width (95 %, SI), traced."""
+    return traced(shown(evidence_at(evidence, path), unit, width, digits=digits), path)

@@ -68,7 +68,9 @@ _STYLES: Final = {
     "paper": (style.PAPER, (0, (5, 2))),
     "found": (style.FOUND, "-"),
     "reference": (style.THIRD, (0, (1, 1.5))),
+    "points": (style.THIRD, "none"),
 }
+"""Colour and line of a curve; "points" has markers alone."""
 
 
 def series_plots(case: Record) -> list[Drawing]:
@@ -100,7 +102,9 @@ def _series_plot(name: str, series: Record) -> Drawing:
             colour = next(spare) if colour in used else colour
             used.add(colour)
             y = _with_gaps(curve["values"], unit)
-            axes.plot(x, y, color=colour, linestyle=dashes, label=typeset(curve["name"]))
+            marker = "o" if dashes == "none" else None
+            label = typeset(curve["name"])
+            axes.plot(x, y, color=colour, linestyle=dashes, label=label, marker=marker, markersize=2.5)
             if curve.get("uncertainty"):
                 band = _with_gaps(curve["uncertainty"], unit)
                 axes.fill_between(x, y - band, y + band, color=colour, alpha=0.2, linewidth=0)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from check_traces import traces, untrue
 from keep_evidence import kept_document
 
 from ringbalance.reports import cli
@@ -90,6 +91,8 @@ def test_the_page_comes_from_the_evidence_file_alone(first: Report) -> None:
     evidence = json.loads((first.page.parent / "evidence.json").read_text())
     for name, page in render(evidence).items():
         assert (first.page.parent / name).read_text() == page
+    assert untrue(render(evidence).values(), evidence) == []
+    assert len(traces(render(evidence).values())) > 100
 
 
 def test_the_consequences_of_a_wrong_k_are_reported(first: Report) -> None:
@@ -160,7 +163,8 @@ def test_thresholds_of_the_papers_disc(first: Report) -> None:
     # rho omega^2 (R2^2 - r_m^2)/2 with 44.5 mm, 31.5 mm and 10 000 rpm, and Eq. 19 with u = 0, by hand.
     assert point["priming_pressure_vented_Pa"] == pytest.approx(0.5417e6, rel=1e-3)
     assert point["stall_pressure_paper_Pa"] == pytest.approx(0.381e6, rel=1e-3)
-    # Density 0.2 % and speed 0.1 %, squared in the pressure, give 0.28 %; the radii add less than twice that.
+    # Density 0.2 % and speed 0.1 %, squared in the pressure, alone give 0.28 %; the radii add less than
+    # three times that.
     share = point["stall_uncertainty"] / point["stall_pressure_Pa"]
     assert math.hypot(0.002, 0.002) < share < 3 * math.hypot(0.002, 0.002)
 

@@ -7,10 +7,10 @@ from typing import Any
 from ringbalance.reports.summary import (
     CHECK_VERDICTS,
     CLAIM_VERDICTS,
+    assumed_inputs,
     checks,
     claims,
-    headlines,
-    key_numbers,
+    common_causes,
     lead_sentence,
     tone,
     verdict_counts,
@@ -49,19 +49,22 @@ def test_the_lead_is_counted(evidence: Record) -> None:
 def test_claims_stand_in_the_papers_order(evidence: Record) -> None:
     evidence["verification"].reverse()
     assert [case["number"] for case in claims(evidence)] == [1, 6, 9, 10, 11, 14]
-    assert [case["number"] for case in headlines(evidence)] == [6, 9, 10, 11]
 
 
-def test_without_marked_claims_those_that_fell_are_reported(evidence: Record) -> None:
-    for case in evidence["verification"]:
-        case["headline"] = False
-    assert [case["number"] for case in headlines(evidence)] == [6, 9, 10]
+def test_claims_are_grouped_by_what_they_have_in_common() -> None:
+    def claim(number: int, verdict: str, cause: str, *paths: str) -> dict[str, Any]:
+        rests = [{"path": path} for path in paths]
+        return {"number": number, "verdict": verdict, "cause": cause, "rests_on": rests}
 
-
-def test_numbers_come_with_their_bars(evidence: Record) -> None:
-    shown = {item["label"]: item for item in key_numbers(evidence)}
-    assert (shown["Lever arm λ"]["value"], shown["Lever arm λ"]["half_width"]) == ("72.040", "±\u202f0.024")
-    assert shown["Lever arm λ"]["unit"] == "mm"
-    assert shown["Drag coefficient k"]["paper"] == "about 50"
-    assert shown["Velocity in the tube"]["half_width"] == "±\u202f0.3"
-    assert all(item["half_width"] for item in shown.values())
+    cases = [
+        claim(1, "confirmed", "", "disc.plate_thickness"),
+        claim(2, "refuted", "the tube"),
+        claim(3, "confirmed with correction", "plates left out", "disc.plate_thickness"),
+        claim(4, "refuted", "plates left out"),
+        claim(5, "not run", "plates left out"),
+    ]
+    first, second = common_causes(cases)
+    assert (first["cause"], first["numbers"]) == ("plates left out", [3, 4])
+    assert first["verdicts"] == ["confirmed with correction", "refuted"]
+    assert second["numbers"] == [2]
+    assert assumed_inputs(cases) == {"disc.plate_thickness": [1, 3]}

@@ -29,8 +29,8 @@ from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.chamber.range import chamber_status
 from ringbalance.reduced_model.gas_line import line_answers
 from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw, balancer_model
+from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.reduced_model.selection.registry import ModelUsed
-from ringbalance.reduced_model.tube.residual import residual_fill_ratio
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
 

@@ -13,7 +13,7 @@ from ringbalance.controller.liquid_ring.plant import LiquidRing, initial_state
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.rotor import chamber_letters, influence
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.tube.residual import residual_fill_ratio
+from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene

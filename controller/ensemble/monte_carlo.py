@@ -25,7 +25,7 @@ from ringbalance.controller.ensemble.transfer import PairTransfer, pair_transfer
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw, balancer_model
-from ringbalance.reduced_model.tube.residual import residual_fill_ratio
+from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.scene.arrays import IntArray
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.faults import SceneError

@@ -22,7 +22,7 @@ from ringbalance.controller.loop import DRIFT_POINTS, GAS_POINTS, IDLE_OPERATION
 from ringbalance.controller.rotor import chamber_directions, initial_vibration
 from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.tube.residual import residual_fill_ratio
+from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene

@@ -28,7 +28,7 @@ from ringbalance.reports.pictures.fields import chamber_field, mesh_record, pres
 from ringbalance.reports.provenance import provenance
 from ringbalance.reports.section import Level, Record, Work
 from ringbalance.reports.sections import collected
-from ringbalance.scene import Scene, scene_table
+from ringbalance.scene import AnyScene, Scene, scene_table
 from ringbalance.verification import paper_numbers
 from ringbalance.verification.document import merge_saved, results_document
 from ringbalance.verification.result import CaseResult
@@ -74,7 +74,7 @@ def collect_evidence(
         # While the cases still run, there is time for what the page will need.
         typeset_equations()
         tell("verification")
-        cases = merge_saved(_finished(under_way, tell), saved)
+        cases = merge_saved(finished_cases(under_way, tell), saved)
     sections |= collected(work, last=True)
     # What a section measured by the clock does not reproduce.
     clocked = {name: record.pop("times") for name, record in sections.items() if "times" in record}
@@ -82,7 +82,7 @@ def collect_evidence(
         "format": FORMAT,
         "level": level,
         "versions": versions(),
-        "scene": _scene(scene, scene_text),
+        "scene": scene_record(scene, scene_text, [asdict(row) for row in scene_table(scene)]),
         "seeds": {"run": scene.run.seed},
         "limit_m": scene.controller.limit,
         "paper": _paper(),
@@ -112,7 +112,8 @@ def _version(name: str) -> str:
         return ""
 
 
-def _scene(scene: Scene, text: str) -> Record:
+def scene_record(scene: AnyScene, text: str, rows: list[Record]) -> Record:
+    """Names, hashes and text of a scene file, with the rows of its values."""
     return {
         "name": scene.name,
         "file": scene.source,
@@ -120,7 +121,7 @@ def _scene(scene: Scene, text: str) -> Record:
         "values_sha256": scene.values_sha256,
         "text": text,
         "origins": dict(scene.origins),
-        "table": [asdict(row) for row in scene_table(scene)],
+        "table": rows,
     }
 
 
@@ -146,7 +147,7 @@ def _closed_loop(scene: Scene, calibration: Calibration) -> Record:
     return {name: simulation_document(simulate(scene, model)) for name, model in models.items()}
 
 
-def _finished(under_way: Iterator[CaseResult], tell: Progress) -> list[Record]:
+def finished_cases(under_way: Iterator[CaseResult], tell: Progress) -> list[Record]:
     """Records of the cases as they come."""
     results = []
     for result in under_way:

@@ -21,8 +21,10 @@ from ringbalance.reports.figures.style import Drawing
 from ringbalance.reports.figures.tube import drag, drag_terms, flow_laws
 from ringbalance.reports.numbers import display_unit, fixed, measured, number, percent, short, shown
 from ringbalance.reports.pages.cases import case_view
+from ringbalance.reports.pages.eccentric_scene import BALANCER
 from ringbalance.reports.section import Cells, Record, Table
 from ringbalance.reports.sections import drawings_in, viewed
+from ringbalance.reports.traces import traced
 
 Facts = tuple[tuple[str, str], ...]
 """Labels and texts."""
@@ -75,6 +77,10 @@ def _column(values: list[float], unit: str, *, digits: int = 6) -> list[str]:
     return [fixed(value * display.factor, decimals) for value in values]
 
 
+def _traced(texts: list[str], key: str) -> list[str]:
+    return [traced(text, f"calibration.chamber.{key}.{place}") for place, text in enumerate(texts)]
+
+
 def _relative(values: list[float], reference: list[float]) -> list[float | None]:
     return [value / base if base else None for value, base in zip(values, reference, strict=True)]
 
@@ -85,14 +91,14 @@ def _chamber_table(chamber: Record) -> Table:
     paper, paper_moment = chamber["wall_pressure_paper_Pa"], chamber["moment_paper_kg_m"]
     columns = [
         [short(fill) for fill in chamber["fill_ratio"]],
-        _column(chamber["free_surface_radius_m"], "m", digits=5),
-        _column(pressure, "Pa"),
+        _traced(_column(chamber["free_surface_radius_m"], "m", digits=5), "free_surface_radius_m"),
+        _traced(_column(pressure, "Pa"), "wall_pressure_Pa"),
         [number(u, digits=1) for u in _relative(chamber["wall_pressure_uncertainty"], pressure)],
-        _column(paper, "Pa", digits=4),
+        _traced(_column(paper, "Pa", digits=4), "wall_pressure_paper_Pa"),
         _errors(paper, pressure),
-        _column(moment, "kg m"),
+        _traced(_column(moment, "kg m"), "moment_kg_m"),
         [number(u, digits=1) for u in _relative(chamber["moment_uncertainty"], moment)],
-        _column(paper_moment, "kg m", digits=4),
+        _traced(_column(paper_moment, "kg m", digits=4), "moment_paper_kg_m"),
         _errors(paper_moment, moment),
     ]
     pa, kg_m = display_unit("Pa", *pressure).symbol, display_unit("kg m", *moment).symbol
@@ -200,19 +206,18 @@ def page_content(evidence: Record, *, pictures: Mapping[str, bytes] | None = Non
     out.
     Raises: KeyError: an evidence document that lacks a part.
     """
+    sections = viewed(evidence)
+    if evidence.get("balancer") == BALANCER:
+        return PageContent(context=_frame(evidence, sections), drawings=tuple(drawings_in(sections)))
     claims = [
         {**case_view(case), "elsewhere": summary.elsewhere(case, evidence)}
         for case in summary.claims(evidence)
     ]
     checks = [case_view(case) for case in summary.checks(evidence)]
     figures = _page_figures(evidence)
-    sections = viewed(evidence)
     calibration, runs = evidence["calibration"], evidence["closed_loop"]
     context = {
-        "scene": evidence["scene"],
-        "sections": sections,
-        "stamp": _stamp(evidence),
-        "running_head": _running_head(evidence),
+        **_frame(evidence, sections),
         "tallies": _tallies(evidence),
         "equations": _equations(),
         "figures": figures,
@@ -225,13 +230,23 @@ def page_content(evidence: Record, *, pictures: Mapping[str, bytes] | None = Non
         "checks": checks,
         "order_plots": [case["order_plot"] for case in checks if case["order_plot"]],
         "models": _models(calibration["models_used"]),
-        "scene_groups": _scene_groups(evidence["scene"]["table"]),
         "mesh_facts": _mesh_facts(evidence["pressure"]["mesh"]),
-        "version_facts": _version_facts(evidence),
-        "product": f"ringbalance {evidence['versions']['ringbalance']}",
     }
     drawings = drawings_in([figures, sections, *(_own_drawings(case) for case in (*claims, *checks))])
     return PageContent(context=context, drawings=tuple(drawings))
+
+
+def _frame(evidence: Record, sections: list[Record]) -> Record:
+    """What the page of any scene has."""
+    return {
+        "scene": evidence["scene"],
+        "sections": sections,
+        "stamp": _stamp(evidence),
+        "running_head": _running_head(evidence),
+        "scene_groups": _scene_groups(evidence["scene"]["table"]),
+        "version_facts": _version_facts(evidence),
+        "product": f"ringbalance {evidence['versions']['ringbalance']}",
+    }
 
 
 def _own_drawings(case: Record) -> list[Record]:

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from ringbalance.reports.eccentric_evidence import collect_eccentric
 from ringbalance.reports.evidence import Progress, collect_evidence
 from ringbalance.reports.figures.style import standalone
 from ringbalance.reports.page import DOCUMENTS, page_content
@@ -23,7 +26,10 @@ from ringbalance.reports.pictures.process import (
 from ringbalance.reports.render import render_pages
 from ringbalance.reports.saved import saved_cases
 from ringbalance.reports.section import Level, Record
-from ringbalance.scene import AnyScene, liquid_ring_scene
+from ringbalance.reports.tables import FOLDER as TABLES
+from ringbalance.reports.tables import csv_tables
+from ringbalance.scene import AnyScene, Scene
+from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.platform.files import staged
 
 FILES: Final = ("evidence.json", *DOCUMENTS)
@@ -65,30 +71,40 @@ def write_report(
     """Verify, calibrate, simulate and draw a scene into one folder.
 
     Args: `scene_text`: the scene file's own text, for the appendix.
-    Raises: SceneError: a scene that cannot be calibrated or simulated, or a balancer without liquid; nothing
-    is written.
+    Raises: SceneError: a scene that cannot be calibrated or simulated; nothing is written.
     Raises: OSError: the folder cannot be written, or holds an evidence.json that is none; known before the
     work.
     """
-    scene = liquid_ring_scene(scene)
     folder, start = Path(out), time.perf_counter()
     saved = saved_cases(folder)
-    with staged(folder, files=FILES, folders=FOLDERS) as stage:
-        drawing = start_drawing(
-            scene=scene, fields=write_fields(scene=scene, folder=stage), folder=stage, opengl=opengl
-        )
-        try:
-            evidence = collect_evidence(
-                scene, level=level, scene_text=scene_text, saved=saved, workers=workers, progress=progress
+    with staged(folder, files=FILES, folders=(*FOLDERS, TABLES)) as stage:
+        if isinstance(scene, EccentricScene):
+            evidence = collect_eccentric(
+                scene, level=level, scene_text=scene_text, workers=workers, progress=progress
             )
-            _tell(progress, "pictures")
-            evidence["pictures"] = finish_drawing(drawing)
-        finally:
-            stop_drawing(drawing)
+        else:
+            with _pictures(scene, stage, opengl) as pictures:
+                evidence = collect_evidence(
+                    scene, level=level, scene_text=scene_text, saved=saved, workers=workers, progress=progress
+                )
+                _tell(progress, "pictures")
+                evidence["pictures"] = pictures()
         _tell(progress, "page")
         evidence["times"]["total_s"] = round(time.perf_counter() - start, 1)
         evidence = _write_page(evidence, stage)
     return Report(page=folder / "report.html", evidence=evidence)
+
+
+@contextmanager
+def _pictures(scene: Scene, stage: Path, opengl: OpenGL | None) -> Iterator[Callable[[], Record]]:
+    """Draws while the body runs; called, what is given waits for the record of the pictures."""
+    drawing = start_drawing(
+        scene=scene, fields=write_fields(scene=scene, folder=stage), folder=stage, opengl=opengl
+    )
+    try:
+        yield lambda: finish_drawing(drawing)
+    finally:
+        stop_drawing(drawing)
 
 
 def _tell(progress: Progress | None, stage: str) -> None:
@@ -102,11 +118,15 @@ def _write_page(evidence: Record, stage: Path) -> Record:
     kept: Record = json.loads(text)
     (stage / "evidence.json").write_text(text, encoding="utf-8")
     figures = stage / "figures"
+    figures.mkdir(exist_ok=True)
     names = [item[theme] for item in evidence["pictures"]["files"] for theme in ("light", "dark")]
     pictures = {name: (figures / name).read_bytes() for name in names}
     content = page_content(kept, pictures=pictures)
     for drawing in content.drawings:
         (figures / f"{drawing.name}.svg").write_text(standalone(drawing), encoding="utf-8")
+    (stage / TABLES).mkdir()
+    for name, table in csv_tables(kept).items():
+        (stage / TABLES / name).write_text(table, encoding="utf-8")
     for name, page in render_pages(content).items():
         (stage / name).write_text(page, encoding="utf-8")
     return kept

@@ -11,6 +11,7 @@ from typing import Any, Final, Literal
 from ringbalance.controller.tuning.tune import Tuning, tune
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reports.numbers import MISSING
+from ringbalance.reports.traces import untraced
 from ringbalance.scene import Scene
 from ringbalance.verification.loops import calibration_of
 
@@ -37,7 +38,7 @@ class Table:
     def numeric(self) -> list[bool]:
         """By column."""
         columns = zip(*self.rows, strict=True) if self.rows else [()] * len(self.heads)
-        return [_numeric([cell for cell in column if cell.strip(MISSING)]) for column in columns]
+        return [_numeric([untraced(cell) for cell in column if cell.strip(MISSING)]) for column in columns]
 
 
 def _numeric(cells: Cells) -> bool:
@@ -91,11 +92,13 @@ class Section:
     """From its own evidence and the whole to what the template calls `view`: texts, `Drawing`s, or None."""
     always: bool = False
     """Whether it is shown without evidence of its own, which is then empty."""
+    in_parts: bool = False
+    """Whether its view is a list of kinds and contents, which one template sets in turn."""
 
     @property
     def template(self) -> str:
         """File in `templates`."""
-        return f"{self.name}.html"
+        return "parts.html" if self.in_parts else f"{self.name}.html"
 
     def view(self, evidence: Record) -> Record | None:
         """What the template shows of the whole evidence; None: no such section."""

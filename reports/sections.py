@@ -15,6 +15,7 @@ from ringbalance.reports.pages import (
     conditions,
     credibility,
     document,
+    eccentric_scene,
     extremes,
     first_page,
     loop,
@@ -71,7 +72,8 @@ def collected(work: Work, *, last: bool) -> Record:
 
 def viewed(evidence: Record) -> list[Record]:
     """What each section shows, in order and numbered, without those that have nothing to show."""
-    views = [(section, section.view(evidence)) for section in SECTIONS]
+    sections = eccentric_scene.SECTIONS if evidence.get("balancer") == eccentric_scene.BALANCER else SECTIONS
+    views = [(section, section.view(evidence)) for section in sections]
     shown = [(section, view) for section, view in views if view is not None]
     counts = {"report": count(1), "annex": count(1)}
     return [

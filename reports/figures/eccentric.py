@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.patches import Circle
 
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
@@ -16,11 +18,13 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.eccentric_models import EccentricScene
 
 _RPM: Final = 30 / math.pi
-_DEVIATIONS: Final = 2.0
+DEVIATIONS: Final = 2.0
 """Half-width of a band: a normal error is within it with 95 %."""
 _LARGE: Final = 0.01
 """Imbalance from which on it is given in kg m."""
 _COLOURS: Final = (style.FOUND, style.THIRD)
+_SHORTEST: Final = 0.09
+"""Fraction of the time axis that the name of a stage needs."""
 _LOCKED: Final = {**style.AS_PAPER, "linewidth": 1.2, "label": "masses locked"}
 _BALANCED: Final = {"color": style.FOUND, "linewidth": 1.2, "label": "balanced"}
 
@@ -44,6 +48,7 @@ def amplitude_over_time(run: Record, locked: Record) -> Drawing:
         pairs = ((locked, _LOCKED), (run, _BALANCED))
         curves = [(told["time_s"], np.asarray(told["amplitude_m"]), line) for told, line in pairs]
         style.amplitudes(axes, curves, run["limit_m"])
+        _shade_stages(axes, run)
 
     return draw(
         name="eccentric-amplitude",
@@ -53,8 +58,27 @@ def amplitude_over_time(run: Record, locked: Record) -> Drawing:
         height=3.2,
         alt=f"Vibration amplitude over time: at worst {_worst(run)} balanced, {_worst(locked)} locked.",
         caption=f"Vibration amplitude over time. At worst {_worst(run)} with balancing, {_worst(locked)} "
-        "with the masses locked at their first places.",
+        "with the masses locked at their first places. Shaded in turn: the stages of the strategy.",
     )
+
+
+def _shade_stages(axes: Axes, run: Record) -> None:
+    span = run["time_s"][-1] - run["time_s"][0]
+    axes.set_xlim(run["time_s"][0], run["time_s"][-1])
+    for place, stage in enumerate(run["stages"]):
+        start, end = stage["start_s"], stage["end_s"]
+        if place % 2 == 0:
+            axes.axvspan(start, end, color=style.MUTED, alpha=0.12, linewidth=0)
+        if end - start > _SHORTEST * span:
+            axes.annotate(
+                stage["name"].replace("_", " "),
+                (start, 1),
+                xycoords=("data", "axes fraction"),
+                xytext=(3, -3),
+                textcoords="offset points",
+                va="top",
+                color=style.MUTED,
+            )
 
 
 def amplitude_over_speed(run: Record, locked: Record) -> Drawing:
@@ -144,7 +168,7 @@ def _estimate(
         largest = 0.0
         for index, (value, deviation, true) in enumerate(curves):
             colour, which = _COLOURS[index], f" {index + 1}" if len(curves) > 1 else ""
-            values, widths = factor * value[early], _DEVIATIONS * factor * deviation[early]
+            values, widths = factor * value[early], DEVIATIONS * factor * deviation[early]
             axes.plot(time, values, color=colour, label=f"estimate{which}")
             style.band(axes, time, values, widths, colour)
             axes.axhline(factor * true, color=colour, linewidth=1, linestyle=":", label=f"true{which}")
@@ -159,6 +183,34 @@ def _estimate(
         y=label,
         alt=f"{title} as estimated over time, with a 95 % band, and the true value.",
         caption=f"{title} as estimated, with the filter’s own 95 % band, and as it is in the plant.",
+    )
+
+
+def sampled_poles(loops: Sequence[Record]) -> Drawing:
+    """Sampled poles of the drives' loops in the complex plane, with the unit circle.
+
+    Args: `loops`: those of the tuning document.
+    """
+
+    def paint(axes: Axes) -> None:
+        axes.add_patch(Circle((0, 0), 1, fill=False, color=style.INK, linewidth=1))
+        for index, loop in enumerate(loops):
+            poles = np.asarray(loop["poles"])
+            axes.plot(poles[:, 0], poles[:, 1], linestyle="", label=loop["name"], **style.line(index, size=6))
+        far = 1.1 * max(1.0, *(abs(part) for loop in loops for pole in loop["poles"] for part in pole))
+        axes.set(xlim=(-far, far), ylim=(-far, far), aspect="equal")
+
+    outside = [loop["name"] for loop in loops if not loop["stable"]]
+    told = f"Outside, and unstable: {', '.join(outside)}" if outside else "All lie within: stable"
+    return draw(
+        name="sampled-poles",
+        paint=paint,
+        x="real part",
+        y="imaginary part",
+        columns=2,
+        height=3.4,
+        alt=f"Poles of the sampled loops and the unit circle. {told}.",
+        caption=f"Poles of the drives’ loops as they run, sampled, and the unit circle. {told}.",
     )
 
 

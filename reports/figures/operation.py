@@ -35,6 +35,8 @@ _MICROMETRE: Final = 1e6
 _BARS: Final = 5
 """Inputs that a panel of the tornado shows."""
 _BINS: Final = 16
+_WIDEST: Final = 2.5
+"""Times the requirement at which a bar is cut off."""
 
 
 def operating_map(found: Record) -> Drawing:
@@ -296,7 +298,8 @@ def requirement_bars(rows: Iterable[Record]) -> Drawing | None:
         for place, (row, verdict, colour) in enumerate(judged):
             ratio, width = row["reached"] / row["required"], (row["uncertainty"] or 0) / row["required"]
             axes.barh(place, ratio, height=0.42, color=colour, alpha=0.75, linewidth=0)
-            axes.errorbar(ratio, place, xerr=width, color=style.INK, linewidth=1.2, capsize=3)
+            if width:
+                axes.errorbar(ratio, place, xerr=width, color=style.INK, linewidth=1.2, capsize=3)
             sense = "at least" if row["at_least"] else "at most"
             reached, wanted = (
                 shown(row["reached"], row["unit"], row["uncertainty"]),
@@ -312,7 +315,7 @@ def requirement_bars(rows: Iterable[Record]) -> Drawing | None:
             )
             low, high = min(low, ratio - width), max(high, ratio + width)
         axes.set_yticks([])
-        axes.set(ylim=(len(judged) - 0.6, -0.95), xlim=(0, min(1.08 * high, 4)))
+        axes.set(ylim=(len(judged) - 0.6, -0.95), xlim=(0, min(1.08 * high, _WIDEST)))
         axes.spines["left"].set_visible(False)
         axes.grid(visible=False, axis="y")
 
@@ -323,10 +326,9 @@ def requirement_bars(rows: Iterable[Record]) -> Drawing | None:
         x="reached over required",
         columns=0,
         wide=True,
-        height=0.8 + 0.5 * len(kept),
+        height=0.8 + 0.44 * len(kept),
         alt=f"Requirements against what is reached: {told}.",
-        caption=f"Reached over required, with 95 % intervals; the line is the requirement. {told[0].upper()}"
-        f"{told[1:]}.",
+        caption="Reached over required, with 95 % intervals where known; the line is the requirement.",
     )
 
 

@@ -22,7 +22,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullLocator
 from numpy.typing import ArrayLike
 
-from ringbalance.reports.numbers import MINUS, number, power_of_ten
+from ringbalance.reports.numbers import MINUS, display_unit, number, power_of_ten
 from ringbalance.scene.arrays import FloatArray
 
 INK: Final = "#010101"
@@ -173,11 +173,13 @@ class Drawing:
 WIDE: Final = 7.5
 """Width, in, of a figure that takes the page's whole width: its text then has the size of a narrow one's."""
 NARROW: Final = 3.6
-_LEFT: Final = 0.62
-_RIGHT: Final = 0.08
+_LEFT: Final = 0.66
+_RIGHT: Final = 0.14
 _BOTTOM: Final = 0.42
 _TOP: Final = 0.1
 _LEGEND_ROW: Final = 0.175
+_MANY: Final = 1e4
+"""Range of a logarithmic axis from which on decades alone are labelled."""
 _TOP_AXIS: Final = 0.42
 
 
@@ -228,16 +230,18 @@ def logarithmic(
 def amplitudes(
     axes: Axes, curves: Iterable[tuple[ArrayLike, FloatArray, dict[str, Any]]], limit: float
 ) -> None:
-    """Vibration amplitudes over time and the limit, m, on a logarithmic axis in um."""
-    drawn = [(time, 1e6 * amplitude, drawn_as) for time, amplitude, drawn_as in curves]
+    """Vibration amplitudes over time and the limit, m, on a logarithmic axis in the unit that suits them."""
+    told = list(curves)
+    unit = display_unit("m", limit, *(float(amplitude.max()) for _, amplitude, _ in told))
+    drawn = [(time, unit.factor * amplitude, drawn_as) for time, amplitude, drawn_as in told]
     for time, values, drawn_as in drawn:
         axes.plot(time, values, **drawn_as)
-    axes.axhline(limit * 1e6, color=MUTED, linewidth=1, linestyle=":", label="limit")
-    every = np.append(np.concatenate([values for _, values, _ in drawn]), limit * 1e6)
+    axes.axhline(limit * unit.factor, color=MUTED, linewidth=1, linestyle=":", label="limit")
+    every = np.append(np.concatenate([values for _, values, _ in drawn]), limit * unit.factor)
     low, high = 0.7 * every[every > 0].min(), 1.4 * every.max()
-    logarithmic(axes, "y", within=(low, high))
+    logarithmic(axes, "y", within=(low, high) if high < _MANY * low else None)
     axes.set_ylim(low, high)
-    axes.set(xlabel="time in s", ylabel="amplitude in µm, zero to peak", xlim=(0, None))
+    axes.set(xlabel="time in s", ylabel=f"amplitude in {unit.symbol}, zero to peak", xlim=(0, None))
 
 
 def _to_page(text: str, name: str, alt: str) -> str:

@@ -3,41 +3,53 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import product
 from textwrap import fill
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
-from matplotlib.patches import Patch
 
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import number
 from ringbalance.reports.section import Cells, Record, Section, Table
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.verification.extremes.axes import Axis, axis_of
-from ringbalance.verification.extremes.design import PERIODS
+from ringbalance.verification.extremes.axes import Axis, axis_of, places_of
+from ringbalance.verification.extremes.design import GAS_TIME, PERIODS
 from ringbalance.verification.extremes.point import Ending
 from ringbalance.verification.extremes.study import MAP_PREFIX
+from ringbalance.verification.runner import paper_scene
 
 CASE: Final = "extremes"
-_COLOURS: Final = {
-    Ending.SOLVED: (style.FOUND, 0.55),
-    Ending.WIDE: (style.FOUND, 0.22),
-    Ending.STATUS: (style.THIRD, 0.5),
-    Ending.REFUSED: (style.MUTED, 0.18),
-    Ending.BROKEN: (style.PAPER, 1.0),
+_LOOPS: Final = {
+    "settled": ("S", "settles", style.FOUND),
+    "time_limit": ("T", "time is up", style.MUTED),
+    "diverging": ("D", "diverges", style.PAPER),
+    "drifting": ("D", "diverges", style.PAPER),
+    "gas_time_too_short": ("G", "below the shortest gas time", style.THIRD),
+    "noise": ("N", "lost in noise", style.FOURTH),
+    "stalled": ("B", "blocked", style.FIFTH),
+    "capacity_exceeded": ("C", "beyond the capacity", style.FOURTH),
+    "": ("A", "answered, loop not run", style.GRID),
 }
-_MARKS: Final = (
-    ("loop settles", ("settled",), "o", 3.0),
-    ("loop diverges or drifts", ("diverging", "drifting"), "x", 3.5),
-)
-"""Outcomes of the closed loop that a map shows by marks."""
+"""Sign, name and colour of how the loop ends, by its outcome."""
+_ENDINGS: Final = {
+    Ending.REFUSED: ("R", str(Ending.REFUSED), style.GRID),
+    Ending.BROKEN: ("!", str(Ending.BROKEN), style.PAPER),
+}
+"""The same of points that no loop follows."""
+_RESERVATION: Final = "*"
+_SCENE: Final[dict[str, Any]] = {
+    "color": style.INK,
+    "markerfacecolor": "none",
+    "markersize": 15,
+    "markeredgewidth": 1.8,
+}
+_SHADE: Final = 0.3
 _LABEL: Final = 34
 """Characters of an axis' label on one line."""
-_LEGEND: Final = 0.62
-"""Inches above a map for its legend."""
 
 
 def _view(_own: Record, evidence: Record) -> Record:
@@ -57,13 +69,16 @@ def _view(_own: Record, evidence: Record) -> Record:
             rows=axis_rows(tables["axes"]),
             style="",
         ),
-        "maps": map_drawings(tables),
+        "maps": map_drawings(tables, places_of(paper_scene())),
     }
 
 
-def map_drawings(tables: Mapping[str, Record]) -> list[Drawing]:
-    """The stability maps. Args: `tables`: columns of the case's tables, by name."""
-    return [_map(name, columns) for name, columns in tables.items() if name.startswith(MAP_PREFIX)]
+def map_drawings(tables: Mapping[str, Record], places: Mapping[str, float]) -> list[Drawing]:
+    """The stability maps.
+
+    Args: `tables`: columns of the case's tables, by name. `places`: of the scene on the axes, in their units.
+    """
+    return [_map(name, columns, places) for name, columns in tables.items() if name.startswith(MAP_PREFIX)]
 
 
 def axis_rows(columns: Record) -> list[Cells]:
@@ -97,38 +112,30 @@ def _shortened(message: str) -> str:
     return message.split("\n")[0].split(".toml: ", 1)[-1]
 
 
-def _map(name: str, columns: Record) -> Drawing:
+def _map(name: str, columns: Record, places: Mapping[str, float]) -> Drawing:
     x, y = (axis_of(part) for part in name.removeprefix(MAP_PREFIX).split(" and "))
     xs, ys = (np.unique(np.asarray(columns[axis.name], dtype=np.float64)) for axis in (x, y))
-    shape = (ys.size, xs.size)
-    endings = np.asarray(columns["ending"], dtype=object).reshape(shape)
-    loops = np.asarray(columns["loop"], dtype=object).reshape(shape)
+    told = [_sign(*cell) for cell in zip(columns["ending"], columns["loop"], strict=True)]
+    kinds = dict.fromkeys(kind for kind, _ in told)
 
     def paint(axes: Axes) -> None:
         edges_x, edges_y = _edges(x, xs), _edges(y, ys)
-        present = [ending for ending in Ending if np.any(endings == str(ending))]
-        for ending in present:
-            colour, strength = _COLOURS[ending]
-            there = np.ma.masked_not_equal(endings == str(ending), True)
-            axes.pcolormesh(edges_x, edges_y, there, cmap=ListedColormap([colour]), alpha=strength)
-        for label, outcomes, marker, size in _MARKS:
-            rows, cols = np.nonzero(np.isin(loops, outcomes))
-            if rows.size:
-                axes.plot(
-                    xs[cols],
-                    ys[rows],
-                    marker,
-                    color=style.FOUND,
-                    markersize=size,
-                    markeredgewidth=0.9,
-                    label=label,
-                )
-        for axis, target, edges in (("x", x, edges_x), ("y", y, edges_y)):
+        numbers = np.reshape([list(kinds).index(kind) for kind, _ in told], (ys.size, xs.size))
+        shades = ListedColormap([colour for *_, colour in kinds])
+        axes.pcolormesh(
+            edges_x, edges_y, numbers, cmap=shades, vmin=0, vmax=len(kinds) - 1 or 1, alpha=_SHADE
+        )
+        for (at_y, at_x), (_, sign) in zip(product(ys, xs), told, strict=True):
+            axes.text(at_x, at_y, sign, ha="center", va="center", color=style.INK)
+        axes.plot(places[x.name], places[y.name], "o", **_SCENE)
+        for which, target, edges in (("x", x, edges_x), ("y", y, edges_y)):
             if target.spacing == "log":
-                style.logarithmic(axes, axis)
-            getattr(axes, f"set_{axis}lim")(edges[0], edges[-1])
+                style.logarithmic(axes, which)
+            getattr(axes, f"set_{which}lim")(edges[0], edges[-1])
         axes.grid(visible=False)
-        _legend(axes, present)
+        for sign, title, colour in kinds:
+            axes.fill_between([], [], [], color=colour, alpha=_SHADE, label=f"{sign}  {title}")
+        style.legend_above(axes, columns=2)
 
     return draw(
         x=_label(x),
@@ -136,12 +143,19 @@ def _map(name: str, columns: Record) -> Drawing:
         name=f"extremes-{x.name}-{y.name}",
         paint=paint,
         columns=0,
-        height=3.4,
-        alt=f"Where the program answers over {x.title} and {y.title}, and where it refuses with a message.",
-        caption=f"{x.title[0].upper()}{x.title[1:]} and {y.title}, all else as in the scene. "
-        f"Unmarked: the loop ends in another way, most often because its time of {PERIODS} control periods, "
-        "which need not be the scene’s, is up.",
+        height=3.6,
+        alt=f"How the loop ends over {x.title} and {y.title}: {', '.join(title for _, title, _ in kinds)}.",
+        caption=f"{x.title[0].upper()}{x.title[1:]} and {y.title}, all else as in the scene, which is the "
+        f"ring. Loops run for {PERIODS} control periods and {GAS_TIME} s of gas, which need not be the "
+        f"scene’s time. {_RESERVATION}: answered with a reservation.",
     )
+
+
+def _sign(ending: str, loop: str) -> tuple[tuple[str, str, str], str]:
+    """Sign, name and colour of a point's kind, and the sign as it stands in its cell."""
+    kind = _ENDINGS.get(Ending(ending)) or _LOOPS.get(loop) or ("O", loop.replace("_", " "), style.MUTED)
+    reserved = Ending(ending) in (Ending.STATUS, Ending.WIDE)
+    return kind, kind[0] + (_RESERVATION if reserved else "")
 
 
 def _edges(axis: Axis, values: FloatArray) -> FloatArray:
@@ -155,15 +169,6 @@ def _edges(axis: Axis, values: FloatArray) -> FloatArray:
 def _label(axis: Axis) -> str:
     told = axis.title if axis.unit == "1" else f"{axis.title} in {_shown(axis.unit)}"
     return fill(told, _LABEL)
-
-
-def _legend(axes: Axes, present: list[Ending]) -> None:
-    cells = [Patch(color=_COLOURS[e][0], alpha=_COLOURS[e][1], linewidth=0, label=str(e)) for e in present]
-    handles = [*cells, *axes.get_legend_handles_labels()[0]]
-    figure = style.figure_of(axes)
-    figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0, 1), ncols=2, borderaxespad=0.0)
-    box, height = axes.get_position(), figure.get_figheight()
-    axes.set_position((box.x0, box.y0, box.width, 1 - box.y0 - _LEGEND / height))
 
 
 SECTION: Final = Section(name="extremes", title="At the extremes", show=_view)

@@ -20,6 +20,7 @@ from ringbalance.scene.platform.files import staged, write_whole
 from ringbalance.scene.platform.progress import activity
 from ringbalance.scene.platform.terminal import messages_console, results_console
 from ringbalance.verification.evidence import Level
+from ringbalance.verification.extremes.axes import places_of
 from ringbalance.verification.extremes.study import (
     SIZES,
     Record,
@@ -78,7 +79,7 @@ def extremes(
         told, tables = extremes_document(found), extremes_tables(found)
         if stage is not None:
             write_whole(stage / FILE, json_format.dumps(told, allow_nan=False) + "\n")
-            for drawing in map_drawings(tables):
+            for drawing in map_drawings(tables, places_of(base.scene)):
                 write_whole(stage / f"{drawing.name}.svg", standalone(drawing))
     if out is not None:
         console.print(f"written to {out}", highlight=False)

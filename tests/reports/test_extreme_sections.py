@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import re
+import tomllib
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, cast
 
 import pytest
 
 from ringbalance.reports.pages import extremes, extremes_cli, sloshing
 from ringbalance.reports.section import Work
-from ringbalance.scene import Scene
+from ringbalance.scene import Scene, liquid_ring_scene
+from ringbalance.scene.loader import scene_from
+from ringbalance.verification.extremes.axes import places_of, toml_bytes, varied
 
 Record = dict[str, Any]
 
@@ -123,6 +128,18 @@ def test_a_map_draws_every_ending_that_occurs_and_no_other() -> None:
     assert drawing.name == "extremes-speed-fill"
     assert "refused with a message" in drawing.svg
     assert "broken" not in drawing.svg
+    signs = re.findall(r"<text[^>]*>([SR]\*?)</text>", drawing.svg)
+    assert sorted(signs) == 3 * ["R"] + 3 * ["S"] + 3 * ["S*"]
+
+
+def test_the_scene_stands_on_the_maps_where_its_own_file_puts_it(paper_scene: Scene) -> None:
+    places = places_of(paper_scene)
+    document = varied(tomllib.loads(Path(paper_scene.file).read_text()), scene=paper_scene, values=places)
+    made = liquid_ring_scene(scene_from(content=toml_bytes(document), file="varied.toml"))
+    assert made.disc.plate_thickness == pytest.approx(paper_scene.disc.plate_thickness)
+    assert made.gas.pressure == pytest.approx(paper_scene.gas.pressure)
+    assert made.rotor.speed == pytest.approx(paper_scene.rotor.speed)
+    assert made.tube.bore == pytest.approx(paper_scene.tube.bore)
 
 
 def test_extremes_that_were_not_run_say_so() -> None:

@@ -76,6 +76,38 @@ def axis_of(name: str) -> Axis:
     return {axis.name: axis for axis in AXES}[name]
 
 
+def places_of(scene: Scene) -> dict[str, float]:
+    """Where a scene stands on the axes of the maps, in their units."""
+    disc, tube, control = scene.disc, scene.tube, scene.controller
+    return {
+        "speed": scene.rotor.speed * 30 / math.pi,
+        "fill": disc.max_fill_ratio,
+        "angle": math.degrees(disc.central_angle),
+        "plate": disc.plate_thickness / _closing(scene, disc.central_angle),
+        "viscosity": scene.liquid.kinematic_viscosity,
+        "bore": 1e3 * tube.bore,
+        "pressure": scene.gas.pressure / _column(scene, scene.rotor.speed),
+        "gain": 1.0,
+        "noise": scene.sensor.amplitude_noise / control.limit,
+        "period": control.period,
+    }
+
+
+def _closing(scene: Scene, angle: float) -> float:
+    """Plate thickness that closes a chamber of a central angle, m."""
+    return scene.disc.inner_radius * math.sin(min(angle, math.pi) / 2)
+
+
+def _column(scene: Scene, speed: float) -> float:
+    """Pressure of a column from the siphon crest to the wall, Pa."""
+    hump = scene.tube.hump_radius or scene.disc.inner_radius
+    return float(
+        hydrostatic_pressure(
+            density=scene.liquid.density, angular_velocity=speed, inner=hump, outer=scene.disc.outer_radius
+        )
+    )
+
+
 def varied(document: Mapping[str, Any], *, scene: Scene, values: Mapping[str, float]) -> Document:
     """The document of a scene's own file with some axes set.
 
@@ -161,8 +193,7 @@ def _set_fill(document: Document, value: float, _: Scene, __: Values) -> None:
 
 def _set_plate(document: Document, value: float, scene: Scene, values: Values) -> None:
     angle = math.radians(values["angle"]) if "angle" in values else scene.disc.central_angle
-    closing = scene.disc.inner_radius * math.sin(min(angle, math.pi) / 2)
-    document["disc"]["plate_thickness"] = f"{value * closing!r} m"
+    document["disc"]["plate_thickness"] = f"{value * _closing(scene, angle)!r} m"
 
 
 def _set_angle(document: Document, value: float, _: Scene, __: Values) -> None:
@@ -198,11 +229,7 @@ def _set_roughness(document: Document, value: float, scene: Scene, values: Value
 
 def _set_pressure(document: Document, value: float, scene: Scene, values: Values) -> None:
     speed = math.pi / 30 * values["speed"] if "speed" in values else scene.rotor.speed
-    hump = scene.tube.hump_radius or scene.disc.inner_radius
-    column = hydrostatic_pressure(
-        density=scene.liquid.density, angular_velocity=speed, inner=hump, outer=scene.disc.outer_radius
-    )
-    document["gas"]["pressure"] = f"{value * column!r} Pa"
+    document["gas"]["pressure"] = f"{value * _column(scene, speed)!r} Pa"
 
 
 def _set_tolerance(document: Document, value: float, _: Scene, __: Values) -> None:

@@ -1,0 +1,92 @@
+"""The evidence document of a scene with two eccentric masses."""
+
+from __future__ import annotations
+
+from datetime import date
+from typing import Any
+
+from ringbalance.controller.eccentric_mass.study import eccentric_study, study_document
+from ringbalance.reports.evidence import FORMAT, Progress, finished_cases, scene_record, versions
+from ringbalance.reports.numbers import given, short
+from ringbalance.reports.provenance import provenance
+from ringbalance.reports.section import Level, Record
+from ringbalance.scene.dimensions import DIMENSIONS
+from ringbalance.scene.eccentric_models import EccentricScene, SpeedPoint
+from ringbalance.scene.keys.declaration import keys_of
+from ringbalance.scene.keys.fields import Reader
+from ringbalance.scene.keys.schema import ECCENTRIC_MASS
+from ringbalance.verification.catalogue import load_cases
+from ringbalance.verification.runner import DRIVEN, cases_under_way, paper_scene
+
+
+def collect_eccentric(
+    scene: EccentricScene,
+    *,
+    level: Level = "light",
+    scene_text: str = "",
+    workers: int = 1,
+    progress: Progress | None = None,
+) -> Record:
+    """Run the scene, balanced and with its masses locked, and judge its loops and the claims of its paper.
+
+    Raises: SceneError: a run that takes too many samples or steps.
+    """
+    tell = progress or (lambda _: None)
+    cases = [case.id for case in load_cases() if case.paper == DRIVEN]
+    with cases_under_way(
+        cases, scene=paper_scene(), level=level, mutations=level == "heavy", workers=workers
+    ) as under_way:
+        tell("balanced and locked run")
+        study = study_document(eccentric_study(scene))
+        verification = finished_cases(under_way, tell)
+    run = study.pop("run")
+    return {
+        "format": FORMAT,
+        "level": level,
+        "balancer": scene.balancer,
+        "versions": versions(),
+        "scene": scene_record(scene, scene_text, parameters(scene)),
+        "seeds": {"run": scene.run.seed},
+        "truth": {
+            "unbalance_kg_m": scene.imbalance.mass * scene.imbalance.radius,
+            "phase_rad": scene.imbalance.phase,
+            "friction_arm_m": list(scene.masses.friction_arm),
+        },
+        "closed_loop": {"balanced": run},
+        **study,
+        "verification": verification,
+        "provenance": provenance(),
+        "pictures": {"drawn": True, "text": "", "files": []},
+        "times": {"date": date.today().isoformat()},
+    }
+
+
+def parameters(scene: EccentricScene) -> list[Record]:
+    """Every value of a scene with its meaning and its origin, as rows of a table."""
+    return [
+        {
+            "group": name.replace("_", " ").capitalize(),
+            "quantity": key.replace("_", " "),
+            "value": _written(value, entry.takes),
+            "note": entry.presence.meaning,
+            "origin": scene.origin_of(f"{name}.{key}"),
+            "uncertainty": "",
+            "path": f"{name}.{key}",
+        }
+        for name, table in ECCENTRIC_MASS.tables.items()
+        if table.record is not None
+        for key, entry in keys_of(table.record).items()
+        if (value := getattr(getattr(scene, name, None), key, None)) is not None
+    ]
+
+
+def _written(value: Any, takes: object) -> str:
+    if isinstance(value, tuple):
+        return ", ".join(_written(item, takes) for item in value)
+    if isinstance(value, SpeedPoint):
+        return f"{given(value.speed, 'rad/s')} from {given(value.time, 's')}"
+    if isinstance(value, bool | str):
+        return str(value)
+    dimension = takes.dimension if isinstance(takes, Reader) else None
+    unit = next(iter(DIMENSIONS[dimension].units)).replace("*", " ") if dimension else ""
+    return given(value, unit) if unit else short(float(value))

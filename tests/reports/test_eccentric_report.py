@@ -1,0 +1,128 @@
+"""The report of a scene with eccentric masses: what stands in it, and where each number comes from."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ringbalance.reports import eccentric_evidence
+from ringbalance.reports.eccentric_evidence import parameters
+from ringbalance.reports.figures.eccentric import sampled_poles
+from ringbalance.reports.pages.eccentric_scene import SECTIONS
+from ringbalance.reports.render import render
+from ringbalance.reports.report import write_report
+from ringbalance.scene import bundled_scene, eccentric_scene, load_scene
+from ringbalance.scene.eccentric_models import EccentricScene
+
+Record = dict[str, Any]
+
+
+@contextmanager
+def no_cases(*_: Any, **__: Any) -> Iterator[Iterator[Any]]:
+    """In place of the paper's claims, which have tests of their own."""
+    yield iter(())
+
+
+@pytest.fixture(scope="module")
+def scene() -> EccentricScene:
+    told = eccentric_scene(load_scene(bundled_scene("driven_masses_small")))
+    first, *_ = told.rotor.speed_profile
+    profile = (first, replace(first, time=8.0), replace(first, time=10.0, speed=0.9 * first.speed))
+    return replace(
+        told,
+        rotor=replace(told.rotor, speed_profile=profile),
+        run=replace(told.run, time_limit=11.0),
+    )
+
+
+@pytest.fixture(scope="module")
+def folder(scene: EccentricScene, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("report")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(eccentric_evidence, "cases_under_way", no_cases)
+        write_report(scene, out, scene_text='name = "small"\n')
+    return out
+
+
+@pytest.fixture(scope="module")
+def evidence(folder: Path) -> Record:
+    found: Record = json.loads((folder / "evidence.json").read_text())
+    return found
+
+
+def test_report_and_annex_are_written_with_their_figures(folder: Path) -> None:
+    assert {path.name for path in folder.iterdir()} >= {
+        "report.html",
+        "annex.html",
+        "evidence.json",
+        "figures",
+    }
+    names = {path.stem for path in (folder / "figures").iterdir()}
+    assert names >= {
+        *("eccentric-amplitude", "eccentric-run-up", "eccentric-imbalance", "eccentric-friction"),
+        *("eccentric-angles", "sampled-poles", "requirements"),
+    }
+
+
+def test_every_section_is_there_and_says_something(folder: Path) -> None:
+    pages = {place: (folder / f"{place}.html").read_text() for place in ("report", "annex")}
+    for section in SECTIONS:
+        page = pages[section.place]
+        assert f'<section id="{section.name}"' in page
+    assert "nan" not in re.sub(r"<svg.*?</svg>", "", pages["report"], flags=re.DOTALL).lower().split()
+
+
+def test_the_first_page_compares_with_the_locked_rotor(folder: Path, evidence: Record) -> None:
+    page = (folder / "report.html").read_text()
+    status = evidence["closed_loop"]["balanced"]["status"]
+    assert status.split(":")[0].capitalize() in page
+    assert "with the masses locked where they start" in page
+    for row in evidence["requirements"]:
+        assert row["quantity"] in page
+
+
+def test_an_unmet_requirement_is_not_called_met(evidence: Record) -> None:
+    changed = json.loads(json.dumps(evidence))
+    changed["requirements"] = [
+        {
+            "quantity": "patience",
+            "unit": "s",
+            "sense": "at most",
+            "required": 1.0,
+            "achieved": None,
+            "met": False,
+        }
+    ]
+    page = render(changed)["report.html"]
+    assert re.search(r"patience</th>.*?not met", page)
+
+
+def test_every_value_has_its_origin(scene: EccentricScene) -> None:
+    rows = {(row["group"], row["quantity"]): row for row in parameters(scene)}
+    mass = rows["Masses", "guide radius"]
+    assert mass["origin"] == scene.origin_of("masses.guide_radius")
+    assert mass["value"] == f"{1e3 * scene.masses.guide_radius:.6g}\u202fmm"
+    assert "from" in rows["Rotor", "speed profile"]["value"]
+    assert all(row["note"] for row in rows.values())
+
+
+def test_unstable_loops_are_named() -> None:
+    loop = {"name": "speed control", "poles": [[-1.3, 0.0]], "stable": False}
+    assert "unstable: speed control" in sampled_poles([loop]).caption
+    assert "stable" in sampled_poles([{**loop, "poles": [[0.5, 0.1]], "stable": True}]).caption
+
+
+def test_a_run_that_did_not_come_to_its_estimates_is_shown(evidence: Record) -> None:
+    changed = json.loads(json.dumps(evidence))
+    run = changed["closed_loop"]["balanced"]
+    run.update(residual_ratio=None, innovation=None, warnings=["the rotor stands still"])
+    page = render(changed)["report.html"]
+    assert "The rotor stands still." in page
+    assert "normalised innovations" not in page

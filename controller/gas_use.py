@@ -22,8 +22,8 @@ class GasUse:
 
     fillings: int
     normal_volume: float
-    """Gas in the filled chambers when their valves closed, all of which is vented, and gas that passed
-    through, normal m^3."""
+    """Gas from the supply: what the chambers held above ambient pressure when their valves closed, all of
+    which is vented, and gas that passed through, normal m^3."""
     energy: float
     """Least work that compresses it, p V ln(p_1/p_a) a filling, J."""
     run_dry: int
@@ -65,7 +65,7 @@ def gas_use(*, scene: Scene, model: BalancerModel, operations: Sequence[Operatio
 
     Gas through a chamber that has run dry is bounded by a choked nozzle of the tube's section and by the
     line.
-    Source: p V of each filling at closing; `compression_work`, `nozzle_flow`.
+    Source: (p_1 - p_a) V of each filling at closing; `compression_work`, `nozzle_flow`.
     """
     gas = scene.gas
     supply = gas.pressure + gas.ambient_pressure
@@ -77,7 +77,8 @@ def gas_use(*, scene: Scene, model: BalancerModel, operations: Sequence[Operatio
     passed = through * math.fsum(operation.run_dry for operation in operations)
     dead = gas.dead_volume or 0.0
     content = math.fsum(
-        (done.closing_pressure + gas.ambient_pressure) * ((1 - done.fill_after) * model.chamber_volume + dead)
+        # A vented chamber is full of ambient gas, which no supply has to deliver.
+        done.closing_pressure * ((1 - done.fill_after) * model.chamber_volume + dead)
         for done in operations
     )
     total = content + passed

@@ -107,7 +107,7 @@ def outcome_of(facts: Facts) -> Outcome:
     if facts.loop.unstable:
         return Outcome.UNSTABLE
     if min(facts.since, facts.held_since) < math.inf:
-        return Outcome.HOVERING
+        return Outcome.HOLD_INCOMPLETE if facts.loop.stays else Outcome.HOVERING
     if facts.last_command and not _longest(facts).operation.moved:
         if _longest(facts).operation.event in {Event.EMPTY, Event.FULL}:
             return Outcome.CHAMBER_EMPTY
@@ -185,14 +185,12 @@ def _to_gain(facts: Facts) -> str:
 
 
 def _hovering(facts: Facts) -> str:
-    """Within the limit at the end or for a while: what is missing for a settled run."""
+    """Within the limit at the end or for a while, in a loop that is not expected to stay there."""
     settings, loop = facts.scene.controller, facts.loop
     head = (
         f"hovering: {_um(facts.final_amplitude)} at {facts.time:.4g} s, limit {_um(settings.limit)}, "
         f"hold time {settings.hold_time:.4g} s; "
     )
-    if loop.stays:
-        return head + "time is up before the amplitude has held: raise run.time_limit"
     sigma = facts.scene.sensor.amplitude_noise
     if NOISE_DEVIATIONS * sigma > settings.limit:
         cure = f"the sensor's own is {_um(sigma)}: raise controller.limit or average the sensor"
@@ -202,6 +200,14 @@ def _hovering(facts: Facts) -> str:
     return head + (
         f"it is not expected to stay: noise keeps up a standard deviation{left}, and the limit must hold "
         f"{STAYING_DEVIATIONS:g} of them; {cure}"
+    )
+
+
+def _hold_incomplete(facts: Facts) -> str:
+    return (
+        f"{_not_settled(facts)}; within it from {facts.since:.4g} s on, but the hold time of "
+        f"{facts.scene.controller.hold_time:.4g} s is not complete within the time limit of "
+        f"{facts.scene.run.time_limit:.4g} s: raise run.time_limit"
     )
 
 
@@ -340,6 +346,7 @@ def _too_many(facts: Facts) -> str:
 _TEXTS: Final[Mapping[Outcome, Callable[[Facts], str]]] = {
     Outcome.SETTLED: _settled,
     Outcome.HOVERING: _hovering,
+    Outcome.HOLD_INCOMPLETE: _hold_incomplete,
     Outcome.UNSTABLE: _unstable,
     Outcome.TIME_LIMIT: _time_limit,
     Outcome.STALLED: _stalled,

@@ -21,6 +21,7 @@ class Outcome(StrEnum):
 
     SETTLED = "settled"
     HOVERING = "hovering"
+    HOLD_INCOMPLETE = "hold_incomplete"
     UNSTABLE = "unstable"
     TIME_LIMIT = "time_limit"
     STALLED = "stalled"
@@ -40,7 +41,7 @@ class Verdict(StrEnum):
     SETTLED = "settled"
     """The amplitude has held within its limit and is expected to stay, or nothing can change any more."""
     HOVERING = "hovering"
-    """It ends within the limit, or has held, without that."""
+    """It ends within the limit, or has held, and is not expected to stay."""
     NOT_SETTLED = "not settled"
     UNSTABLE = "unstable"
     """A small residual grows, or the amplitude did."""

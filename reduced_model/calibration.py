@@ -83,10 +83,8 @@ def calibrate(scene: AnyScene) -> Calibration:
         laminar tube, correlations beyond; see the parts.
     """
     scene = liquid_ring_scene(scene)
-    check_ring(scene)
-    chamber, heads = calibrate_chamber(scene), tube_heads(scene)
-    law = calibrated_law(scene=scene, chamber=chamber, heads=heads)
-    point = operating_point(scene=scene, law=law)
+    chamber, law = _chamber_and_law(scene)
+    heads, point = law.heads, operating_point(scene=scene, law=law)
     return Calibration(
         scene=scene,
         chamber=chamber,
@@ -110,6 +108,20 @@ def calibrate(scene: AnyScene) -> Calibration:
             "moment_table_error_kg_m": chamber.moment.interpolation,
         },
     )
+
+
+def calibrated_model(scene: Scene) -> BalancerModel:
+    """The balancer that `calibrate` finds, without what it reports beside: half the work.
+
+    Raises: SceneError, ValueError: as `calibrate`.
+    """
+    return balancer_model(_chamber_and_law(scene)[1])
+
+
+def _chamber_and_law(scene: Scene) -> tuple[ChamberCalibration, CalibratedLaw]:
+    check_ring(scene)
+    chamber = calibrate_chamber(scene)
+    return chamber, calibrated_law(scene=scene, chamber=chamber, heads=tube_heads(scene))
 
 
 def _tube(scene: Scene, velocity: FloatArray) -> TubeLoss:

@@ -4,12 +4,13 @@ A line that a scene does not give is a range, not an absence: conductances of sm
 distributor and their switching times, of which both ends are answered for.
 
 **The smallest correction.**  Without a column in the tube nothing flows before the gas has filled the chamber
-up to the pressure that starts the flow.  A valve that shuts at that moment leaves a started column, which
-runs until the chamber has vented to the pressure that stops it: this amount is the smallest that the line can
-deliver, whatever is commanded.  A valve is not expected to open for less than its own lag.  With isothermal
-gas the times belong to the pressure (`physics.gas.supply`), so the liquid moved is the integral of
-rho S u(p) dt over filling and venting, at constant fills.  The column's inertia delays both ends alike.
-"""
+up to the pressure that starts the flow, and liquid only spills over the crest up to the one that primes the
+tube.  A valve that shuts at that moment leaves a primed column, which runs until the chamber has vented to
+the pressure that stops it: this amount is the smallest that the line can be relied upon to deliver; what
+spills before is less, and depends on every millisecond.  A valve is not expected to open for less than its
+own lag.  With isothermal gas the times belong to the pressure (`physics.gas.supply`), so the liquid moved is
+the integral of rho S u(p) dt over filling and venting, at constant fills.  The column's inertia delays
+both ends alike."""
 
 from __future__ import annotations
 
@@ -20,6 +21,7 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.physics.gas.supply import GasLine, line_with
+from ringbalance.reduced_model.law.flow_law import Flow
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Gas, Scene
@@ -33,6 +35,8 @@ DEFAULT_CRITICAL_RATIO: Final = 0.3
 _PRESSURES: Final = 65
 """Per refinement of a threshold, and of the integral over filling and venting."""
 _REFINEMENTS: Final = 4
+_SLOWEST_RISE: Final = 100.0
+"""Times longer than without liquid that a pressure may take to rise."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,7 +106,7 @@ def line_answers(scene: Scene, model: BalancerModel) -> tuple[LineAnswer, ...]:
 
 
 def _answer(
-    scene: Scene, model: BalancerModel, end: LineEnd, fill: float, edges: tuple[float, float] | None
+    scene: Scene, model: BalancerModel, end: LineEnd, fill: float, edges: _Edges | None
 ) -> LineAnswer:
     volume = (1 - fill) * model.chamber_volume + (scene.gas.dead_volume or 0.0)
     line, opening, metres = end.line, None, None
@@ -128,23 +132,39 @@ def _answer(
     )
 
 
-def _velocity(model: BalancerModel, fill: float, pressure: FloatArray, *, primed: bool) -> FloatArray:
-    flow = model.flow.evaluate(
+def _flow(model: BalancerModel, fill: float, pressure: FloatArray, *, primed: bool) -> Flow:
+    return model.flow.evaluate(
         fill_ratio=np.full(pressure.shape, fill),
         opposite_fill_ratio=np.full(pressure.shape, fill),
         gas_pressure=pressure,
         primed=np.full(pressure.shape, primed),
     )
-    return np.asarray(flow.velocity, dtype=np.float64)
 
 
-def _edges(model: BalancerModel, fill: float, pressure: float) -> tuple[float, float] | None:
-    """Gauge pressures that start a flow and that stop it, Pa; None where the gas starts none."""
-    start = _edge(lambda p: _velocity(model, fill, p, primed=False) > 0, pressure)
-    if start is None:
+@dataclass(frozen=True, kw_only=True)
+class _Edges:
+    """Gauge pressures, Pa."""
+
+    starts: float
+    """From which on liquid flows or spills."""
+    primes: float
+    """From which on the tube is primed; the supply's where it never is."""
+    stops: float
+    """Down to which a primed column flows."""
+
+
+def _edges(model: BalancerModel, fill: float, pressure: float) -> _Edges | None:
+    """None where the gas starts no flow."""
+    starts = _edge(lambda p: _flow(model, fill, p, primed=False).velocity > 0, pressure)
+    if starts is None:
         return None
-    stop = _edge(lambda p: _velocity(model, fill, p, primed=True) > 0, start)
-    return start, 0.0 if stop is None else stop
+    primes = _edge(lambda p: _flow(model, fill, p, primed=False).primed, pressure)
+    stops = _edge(lambda p: _flow(model, fill, p, primed=True).velocity > 0, starts)
+    return _Edges(
+        starts=starts,
+        primes=pressure if primes is None else max(primes, starts),
+        stops=0.0 if stops is None else stops,
+    )
 
 
 def _edge(flows: Callable[[FloatArray], BoolArray], highest: float) -> float | None:
@@ -162,43 +182,45 @@ def _edge(flows: Callable[[FloatArray], BoolArray], highest: float) -> float | N
 
 
 def _shortest(
-    model: BalancerModel, fill: float, end: LineEnd, volume: float, edges: tuple[float, float]
+    model: BalancerModel, fill: float, end: LineEnd, volume: float, edges: _Edges
 ) -> tuple[float, float]:
-    """Shortest valve-open time that moves liquid, s, and the length of column that it moves, m."""
-    line, (start, stop) = end.line, edges
-    ambient, supply = line.ambient_pressure, line.supply_pressure
-    rising = ambient + np.linspace(start, supply - ambient, _PRESSURES)
-    filled = line.filling_time(rising, volume=volume)
-    opening = max(float(filled[0]), end.valve_lag)
-    # Beyond the end of filling the pressure stays the supply's.
-    reached = float(np.interp(opening, filled, rising))
-    up = ambient + np.linspace(start, reached - ambient, _PRESSURES)
-    down = ambient + np.linspace(stop, reached - ambient, _PRESSURES)
-    metres = float(_metres(model, fill, up - ambient, line.filling_time(up, volume=volume)).sum())
-    metres += _venting(model, fill, line, volume, down)
-    held = max(opening - float(filled[-1]), 0.0)
-    top = float(_velocity(model, fill, np.array([reached - ambient]), primed=True)[0])
-    return opening, metres + held * top
+    """Shortest valve-open time that primes the tube, s, and the length of column that it moves, m."""
+    line, ambient, supply = end.line, end.line.ambient_pressure, end.line.supply_pressure
+    primed = ambient + edges.primes
+    rising = np.linspace(ambient + edges.starts, primed, _PRESSURES)
+    spill, spent = _passed(model, fill, line, volume, rising, primed=False)
+    opening, reached = float(line.filling_time(rising[0], volume=volume)) + spent, primed
+    metres = spill
+    if opening < end.valve_lag:
+        filled = np.linspace(primed, supply, _PRESSURES)
+        ahead = opening + line.filling_time(filled, volume=volume) - line.filling_time(primed, volume=volume)
+        # Beyond the end of filling the pressure stays the supply's.
+        reached, opening = float(np.interp(end.valve_lag, ahead, filled)), end.valve_lag
+        more, _ = _passed(model, fill, line, volume, np.linspace(primed, reached, _PRESSURES), primed=True)
+        top = float(_flow(model, fill, np.array([reached - ambient]), primed=True).velocity[0])
+        metres += more + max(opening - float(ahead[-1]), 0.0) * top
+    falling = np.linspace(reached, ambient + min(edges.stops, reached - ambient), _PRESSURES)
+    return opening, metres + _passed(model, fill, line, volume, falling, primed=True)[0]
 
 
-def _metres(model: BalancerModel, fill: float, pressure: FloatArray, time: FloatArray) -> FloatArray:
-    """u dt of each step along a gauge pressure whose times are given."""
-    middle = (pressure[1:] + pressure[:-1]) / 2
-    speed = np.maximum(_velocity(model, fill, middle, primed=True), 0.0)
-    return np.asarray(speed * np.abs(np.diff(time)))
+def _passed(
+    model: BalancerModel, fill: float, line: GasLine, volume: float, pressure: FloatArray, *, primed: bool
+) -> tuple[float, float]:
+    """Metres of column that pass, and the time, s, along an absolute pressure that rises or falls.
 
-
-def _venting(model: BalancerModel, fill: float, line: GasLine, volume: float, pressure: FloatArray) -> float:
-    """Metres that pass while an absolute pressure falls by venting and by giving way to the gas.
-
-    V dp = -(f + p S u) dt with f = -V dp/dt of the line alone.
+    V dp = (f - p S u) dt with f = V dp/dt of the line alone.
     """
-    alone = _metres(model, fill, pressure - line.ambient_pressure, line.venting_time(pressure, volume=volume))
-    middle = (pressure[1:] + pressure[:-1]) / 2
-    by_line, by_liquid = volume * np.diff(pressure), middle * model.tube_area * alone
-    # Where the pressure does not fall, nothing passes.
-    total = np.where(by_line > 0, by_line + by_liquid, 1.0)
-    return float(np.sum(alone * by_line / total))
+    falls = pressure[-1] < pressure[0]
+    times = (line.venting_time if falls else line.filling_time)(pressure, volume=volume)
+    middle, alone = (pressure[1:] + pressure[:-1]) / 2, np.abs(np.diff(times))
+    flow = _flow(model, fill, middle - line.ambient_pressure, primed=primed)
+    speed = np.maximum(flow.velocity, 0.0)
+    by_line, by_liquid = volume * np.diff(pressure), middle * model.tube_area * speed * alone
+    # Where the line does not move the pressure nothing passes; one that only just rises takes its time.
+    total = by_line - by_liquid
+    slower = np.divide(by_line, total, out=np.zeros_like(total), where=total * by_line > 0)
+    lasting = alone * np.minimum(slower, _SLOWEST_RISE)
+    return float(np.sum(speed * lasting)), float(np.sum(lasting))
 
 
 def line_text(answers: tuple[LineAnswer, ...]) -> str:

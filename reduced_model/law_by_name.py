@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.calibration import calibrated_model
 from ringbalance.reduced_model.law.loading import load_model
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
@@ -17,5 +17,5 @@ def law_by_name(scene: Scene, law: str) -> BalancerModel:
     Raises: SceneError: a scene that cannot be calibrated, or a file that holds no law.
     """
     if law == "calibrated":
-        return calibrate(scene).model
+        return calibrated_model(scene)
     return paper_model(scene) if law == "paper" else load_model(Path(law))

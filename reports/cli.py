@@ -19,6 +19,7 @@ from ringbalance.reports.pictures.process import (
 from ringbalance.reports.report import Report, write_report
 from ringbalance.reports.section import Level
 from ringbalance.reports.summary import lead_sentence
+from ringbalance.reports.traces import untraced
 from ringbalance.scene import liquid_ring_scene, load_scene, read_scene
 from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.platform.files import staged
@@ -105,7 +106,7 @@ def _summarise(console: Console, finished: Report) -> None:
     balanced = evidence["closed_loop"].get("balanced")
     lines = [balanced["status"]] if balanced else [*loop_sentences(evidence), lead_sentence(evidence)]
     for line in lines:
-        console.print(line, markup=False, highlight=False)
+        console.print(untraced(line), markup=False, highlight=False)
     if not evidence["pictures"]["drawn"]:
         console.print(evidence["pictures"]["text"], markup=False, highlight=False)
     console.print(f"took {evidence['times']['total_s']:.0f} s", style="dim", highlight=False)

@@ -8,6 +8,7 @@ from typing import Any
 from ringbalance.controller.eccentric_mass.study import eccentric_study, study_document
 from ringbalance.reports.evidence import FORMAT, Progress, finished_cases, scene_record, versions
 from ringbalance.reports.numbers import given, short
+from ringbalance.reports.provenance import provenance
 from ringbalance.reports.section import Level, Record
 from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.eccentric_models import EccentricScene, SpeedPoint
@@ -55,6 +56,7 @@ def collect_eccentric(
         **study,
         "verification": verification,
         "pictures": {"drawn": True, "text": "", "files": []},
+        "provenance": provenance(),
         "times": {"date": date.today().isoformat()},
     }
 
@@ -66,6 +68,7 @@ def parameters(scene: EccentricScene) -> list[Record]:
             "group": name.replace("_", " ").capitalize(),
             "quantity": key.replace("_", " "),
             "value": _written(value, entry.takes),
+            "uncertainty": "",
             "note": entry.presence.meaning,
             "origin": scene.origin_of(f"{name}.{key}"),
         }

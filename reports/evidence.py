@@ -1,6 +1,7 @@
 """The evidence document: all that a report says, as plain numbers and texts, gathered from every room.
 
-Everything but `times` is the same, to the last bit, for the same scene file, seed and versions.
+Everything but `times` and `provenance` is the same, to the last bit, for the same scene file, seed and
+versions.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.reports.pages.cases import typeset_equations
 from ringbalance.reports.pictures.fields import chamber_field, mesh_record, pressure_profile
+from ringbalance.reports.provenance import provenance
 from ringbalance.reports.section import Level, Record, Work
 from ringbalance.reports.sections import collected
 from ringbalance.scene import AnyScene, Scene, scene_table
@@ -92,6 +94,7 @@ def collect_evidence(
         **sections,
         "verification": cases,
         "pictures": {"drawn": False, "text": "The 3-D pictures were not asked for.", "files": []},
+        "provenance": provenance(),
         "times": {"date": date.today().isoformat()} | clocked,
     }
 
@@ -117,6 +120,7 @@ def scene_record(scene: AnyScene, text: str, rows: list[Record]) -> Record:
         "sha256": scene.sha256,
         "values_sha256": scene.values_sha256,
         "text": text,
+        "origins": dict(scene.origins),
         "table": rows,
     }
 

@@ -213,7 +213,7 @@ def page_content(evidence: Record, *, pictures: Mapping[str, bytes] | None = Non
     calibration, runs = evidence["calibration"], evidence["closed_loop"]
     context = {
         **_frame(evidence, sections),
-        "summary": _summary(evidence, claims),
+        "tallies": _tallies(evidence),
         "equations": _equations(),
         "figures": figures,
         "pictures": _pictures(evidence["pictures"], pictures or {}),
@@ -263,14 +263,11 @@ def _running_head(evidence: Record) -> str:
     return f"{scene['name']}, scene {scene['sha256'][:12]}, {evidence['times']['date']}"
 
 
-def _summary(evidence: Record, claims: list[Record]) -> Record:
-    chosen = {case["id"] for case in summary.headlines(evidence)}
+def _tallies(evidence: Record) -> Record:
     return {
         "lead": summary.lead_sentence(evidence),
         "claims": summary.verdict_counts(summary.claims(evidence), summary.CLAIM_VERDICTS),
         "checks": summary.verdict_counts(summary.checks(evidence), summary.CHECK_VERDICTS),
-        "numbers": summary.key_numbers(evidence),
-        "headlines": [case for case in claims if case["id"] in chosen],
     }
 
 

@@ -49,6 +49,7 @@ def _page(content: PageContent, file: str) -> str:
         finalize=marked_up,
     )
     environment.filters |= {"tone": summary.tone, "verbatim": escape}
+    environment.tests |= {"verdict": summary.is_verdict}
     environment.globals |= {"numbered": _Numbers(PREFIXES[document["place"]]), "annex_file": ANNEX}
     page = environment.get_template("report.html").render(
         content.context,

@@ -14,6 +14,7 @@ from ringbalance.reports.eccentric_evidence import collect_eccentric
 from ringbalance.reports.evidence import Progress, collect_evidence
 from ringbalance.reports.figures.style import standalone
 from ringbalance.reports.page import DOCUMENTS, page_content
+from ringbalance.reports.pages.document import evidence_text
 from ringbalance.reports.pictures.opengl import OpenGL
 from ringbalance.reports.pictures.process import (
     FOLDERS,
@@ -111,9 +112,9 @@ def _tell(progress: Progress | None, stage: str) -> None:
 
 def _write_page(evidence: Record, stage: Path) -> Record:
     """Evidence, figures and page; the page is made of the evidence as it reads back from its file."""
-    text = json.dumps(evidence, allow_nan=False, indent=1, ensure_ascii=False)
+    text = evidence_text(evidence)
     kept: Record = json.loads(text)
-    (stage / "evidence.json").write_text(text + "\n", encoding="utf-8")
+    (stage / "evidence.json").write_text(text, encoding="utf-8")
     figures = stage / "figures"
     figures.mkdir(exist_ok=True)
     names = [item[theme] for item in evidence["pictures"]["files"] for theme in ("light", "dark")]

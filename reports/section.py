@@ -10,7 +10,6 @@ from typing import Any, Final, Literal
 
 from ringbalance.controller.tuning.tune import Tuning, tune
 from ringbalance.reduced_model.calibration import Calibration
-from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reports.numbers import MISSING
 from ringbalance.scene import Scene
 from ringbalance.verification.loops import calibration_of
@@ -62,11 +61,7 @@ class Work:
 @lru_cache(maxsize=4)
 def tuning_of(scene: Scene) -> Tuning:
     """One tuning serves every report of a scene within a process."""
-    return tune(scene, model_of=_model_of, members=_TUNING_RUNS, runs=_TERM_RUNS)
-
-
-def _model_of(scene: Scene) -> BalancerModel:
-    return calibration_of(scene).model
+    return tune(scene, calibration_of(scene).model, members=_TUNING_RUNS, runs=_TERM_RUNS)
 
 
 def _nothing(_work: Work) -> None:

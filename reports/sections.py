@@ -11,10 +11,20 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from ringbalance.reports.figures.style import Drawing
+from ringbalance.reports.pages import (
+    conditions,
+    credibility,
+    document,
+    eccentric_scene,
+    extremes,
+    first_page,
+    loop,
+    operation,
+    sloshing,
+)
 from ringbalance.reports.pages import consequences as consequence_view
 from ringbalance.reports.pages import drag_coefficient as fifty
 from ringbalance.reports.pages import eccentric_mass as driven
-from ringbalance.reports.pages import eccentric_scene, extremes, first_page, operation, sloshing
 from ringbalance.reports.pages import model_selection as trade
 from ringbalance.reports.pages import paper_figures as paper_again
 from ringbalance.reports.pages import siphon_crest as hump
@@ -23,10 +33,13 @@ from ringbalance.reports.section import Place, Record, Section, Work
 
 SECTIONS: Final[tuple[Section, ...]] = (
     first_page.SECTION,
+    conditions.SECTION,
     operation.SECTION,
-    operation.LOOP,
+    loop.SECTION,
     Section(name="claims", title="Claims of the liquid-ring paper", place="report"),
+    credibility.SECTION,
     Section(name="parameters", title="Parameters and their origin", place="report"),
+    document.SECTION,
     Section(name="disc", title="The disc and its liquid"),
     Section(name="pressure", title="Pressure of the liquid"),
     Section(name="moment", title="Balancing moment and λ"),

@@ -1,4 +1,4 @@
-"""What a busy engineer reads first: verdict counts, calibrated numbers, what changes in the closed loop."""
+"""Claims and checks, counted by verdict."""
 
 from __future__ import annotations
 
@@ -6,16 +6,6 @@ import math
 from collections import Counter
 from typing import Final
 
-from ringbalance.reports.numbers import (
-    PLUS_MINUS,
-    THIN_SPACE,
-    given,
-    number,
-    percent,
-    short,
-    shown,
-    shown_apart,
-)
 from ringbalance.reports.section import Record
 
 CLAIM_VERDICTS: Final = ("confirmed", "confirmed with correction", "refuted", "inconclusive", "not run")
@@ -28,14 +18,16 @@ _TONES: Final = {
     "failed": "bad",
     "inconclusive": "open",
     "not run": "idle",
+    "met": "good",
+    "not met": "bad",
+    "cannot be told": "open",
+    "none stated": "idle",
 }
-_RUNS: Final = {
-    "blocked": "is blocked",
-    "siphon": "runs as a full siphon",
-    "separated": "runs separated",
-    "reverse": "runs in reverse",
-    "cannot be told": "runs full or separated, which cannot be told",
-}
+
+
+def is_verdict(text: str) -> bool:
+    """Whether a cell of a table is a verdict, which has a colour of its own."""
+    return text in _TONES
 
 
 def tone(verdict: str) -> str:
@@ -98,90 +90,3 @@ def elsewhere(case: Record, evidence: Record) -> bool:
     """
     judged = case.get("scene_sha256")
     return bool(judged) and judged != evidence["scene"]["values_sha256"]
-
-
-def headlines(evidence: Record) -> list[Record]:
-    """Claims worth a line in the summary: judged on this disc and so marked, else those that did not hold."""
-    every = [case for case in claims(evidence) if not elsewhere(case, evidence)]
-    marked = [case for case in every if case.get("headline")]
-    return marked or [case for case in every if tone(case["verdict"]) in {"bad", "fair"}]
-
-
-def key_numbers(evidence: Record) -> list[Record]:
-    """The calibrated numbers with their expanded uncertainties (95 %)."""
-    point, paper, calibration = evidence["operating_point"], evidence["paper"], evidence["calibration"]
-    return [
-        _lambda_number(calibration["lambda"], paper),
-        _drag_number(point, paper),
-        _pressure_number(calibration["chamber"]),
-        _velocity_number(point),
-        *_priming_number(point, paper),
-        _stall_number(point),
-    ]
-
-
-def _key(label: str, parts: tuple[str, str], paper: str, note: str) -> Record:
-    value, sign, half_width = parts[0].partition(PLUS_MINUS)
-    # A power of ten stands behind both numbers, so such a text is left in one piece.
-    whole = value.startswith("(")
-    return {
-        "label": label,
-        "value": parts[0] if whole else value,
-        "half_width": f"±{THIN_SPACE}{half_width}" if sign and not whole else "",
-        "unit": parts[1],
-        "paper": paper,
-        "note": note,
-    }
-
-
-def _lambda_number(record: Record, paper: Record) -> Record:
-    half_width = math.hypot(record["uncertainty_m"], record["input_uncertainty_m"])
-    parts = shown_apart(record["per_transferred_mass_m"], "m", half_width)
-    varies = percent(record["variation_over_range"])
-    note = f"Moment per transferred mass; varies by {varies} over the fill range."
-    said = f"{given(paper['lambda_m'], 'm')} within {short(100 * paper['lambda_spread'])} %"
-    return _key("Lever arm λ", parts, said, note)
-
-
-def _drag_number(point: Record, paper: Record) -> Record:
-    parts = shown_apart(point["k"], "1", point["k_uncertainty"])
-    said = f"about {short(paper['drag_coefficient'])}"
-    if point["k"] is None:
-        return _key("Drag coefficient k", parts, said, "Nothing flows at the scene’s gas pressure.")
-    note = (
-        f"At {shown(point['k_at_velocity_m_s'], 'm/s', digits=3)}, Re {number(point['reynolds'], digits=2)}, "
-    )
-    return _key("Drag coefficient k", parts, said, note + f"{point['flow_state']}.")
-
-
-def _pressure_number(chamber: Record) -> Record:
-    half_width = math.hypot(
-        chamber["wall_pressure_uncertainty"][-1], chamber["wall_pressure_input_uncertainty"][-1]
-    )
-    parts = shown_apart(chamber["wall_pressure_Pa"][-1], "Pa", half_width)
-    said = f"{shown(chamber['wall_pressure_paper_Pa'][-1], 'Pa')} by Eq. 12"
-    note = f"Of the liquid, at the largest fill ratio of {short(chamber['fill_ratio'][-1])}."
-    return _key("Wall pressure", parts, said, note)
-
-
-def _velocity_number(point: Record) -> Record:
-    parts = shown_apart(point["velocity_m_s"], "m/s", point["velocity_uncertainty"], digits=3)
-    said = f"{shown(point['velocity_paper_m_s'], 'm/s', digits=3)} by Eq. 19"
-    note = f"At {given(point['gas_pressure_Pa'], 'Pa')} and equal fills; the tube {_RUNS[point['regime']]}."
-    return _key("Velocity in the tube", parts, said, note)
-
-
-def _priming_number(point: Record, paper: Record) -> list[Record]:
-    if point["priming_pressure_vented_Pa"] is None:
-        return []
-    parts = shown_apart(point["priming_pressure_vented_Pa"], "Pa", point["priming_uncertainty"])
-    low = given(paper["working_range_Pa"][0], "Pa")
-    trapped = shown(point["priming_pressure_trapped_Pa"], "Pa")
-    note = f"Over the siphon crest, gas vented, driven chamber empty. Gas trapped, equal fills: {trapped}."
-    return [_key("Priming pressure", parts, f"works from {low}", note)]
-
-
-def _stall_number(point: Record) -> Record:
-    parts = shown_apart(point["stall_pressure_Pa"], "Pa", point["stall_uncertainty"])
-    said = f"{shown(point['stall_pressure_paper_Pa'], 'Pa')} by Eq. 19"
-    return _key("Stall pressure", parts, said, "Below it a full siphon stops before the chamber is empty.")

@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from markupsafe import Markup, escape
 
+from ringbalance.reports.numbers import shown
 from ringbalance.reports.prose import typeset
 
 _OPEN, _MIDDLE, _CLOSE = "\ue000", "\ue001", "\ue002"
@@ -52,3 +53,8 @@ def evidence_at(evidence: Any, path: str) -> Any:
     for key in path.split("."):
         evidence = evidence[int(key)] if isinstance(evidence, list) else evidence[key]
     return evidence
+
+
+def read(evidence: Any, path: str, unit: str, *, width: float | None = None, digits: int = 3) -> str:
+    """The evidence's value at a place in the unit that suits it, with its half-width (95 %, SI), traced."""
+    return traced(shown(evidence_at(evidence, path), unit, width, digits=digits), path)

@@ -13,7 +13,7 @@ from ringbalance.controller.loop import simulate as run_closed_loop
 from ringbalance.controller.simulation import Simulation
 from ringbalance.controller.tuning.tune import Tuning
 from ringbalance.controller.tuning.tune import tune as tune_scene
-from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.calibration import calibrate, calibrated_model
 from ringbalance.reduced_model.law.model import CompleteLaw, balancer_model
 from ringbalance.scene import AnyScene, EccentricScene, Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
@@ -67,16 +67,13 @@ def compare(first: AnyScene, second: AnyScene) -> Comparison:
         liquid rings run under their calibrated laws.
     Raises: SceneError: a balancer that cannot work on that rotor.
     """
-    return run_comparison(first, second, model_of=lambda scene: calibrate(scene).model)
+    return run_comparison(first, second, model_of=lambda scene: calibrated_model(scene))
 
 
 def tune(scene: AnyScene, *, flow_law: CompleteLaw | None = None) -> Tuning:
     """Recommend the controller's gain, with its margins and the settling times under it.
 
-    Under a given law, inputs that the scene states as uncertain do not change the law itself.
     Raises: SceneError: a scene with eccentric masses, or a rotor too slow for the liquid to form a ring.
     """
-    given = None if flow_law is None else balancer_model(flow_law)
-    return tune_scene(
-        liquid_ring_scene(scene), model_of=lambda asked: calibrate(asked).model if given is None else given
-    )
+    told = liquid_ring_scene(scene)
+    return tune_scene(told, calibrated_model(told) if flow_law is None else balancer_model(flow_law))

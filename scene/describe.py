@@ -27,9 +27,13 @@ class Row:
     value: str
     """With its unit."""
     note: str
-    """What the value means, and its expanded uncertainty; may be empty."""
+    """What the value means; may be empty."""
     origin: str
     """"given", "inferred", "assumed", "measured" or "default"."""
+    uncertainty: str
+    """Expanded (95 %), with its unit; empty where none is stated."""
+    path: str
+    """Of the value in the scene, such as "tube.bore"."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,13 +115,14 @@ def _rows(scene: Scene, group: str, line: _Line) -> Iterator[Row]:
         return
     written = line.shown.absent if value is None else _written(line, value)
     source = scene.liquid.source if line.path == "liquid.name" else ""
-    notes = [line.shown.note, source, _spread(scene, line)]
     yield Row(
         group=group,
         quantity=line.shown.name,
         value=written,
-        note="; ".join(note for note in notes if note),
+        note="; ".join(note for note in (line.shown.note, source) if note),
         origin=scene.origin_of(line.path),
+        uncertainty=_spread(scene, line),
+        path=line.path,
     )
 
 
@@ -150,12 +155,11 @@ def _spread(scene: Scene, line: _Line) -> str:
         if f"{UNCERTAIN_QUANTITIES[each.quantity]}.{each.quantity}" == line.path
     ]
     if given and not given[0].relative:
-        width = (
-            format_quantity(given[0].half_width, line.dimension, line.shown.unit) if line.dimension else ""
-        )
-        return f"plus or minus {width or f'{given[0].half_width:g}'} (95 %)"
+        width = given[0].half_width
+        shown_width = format_quantity(width, line.dimension, line.shown.unit) if line.dimension else ""
+        return shown_width or f"{width:g}"
     relative = {
         "liquid.density": scene.liquid.density_uncertainty,
         "liquid.kinematic_viscosity": scene.liquid.viscosity_uncertainty,
     }.get(line.path, given[0].half_width if given else 0.0)
-    return f"plus or minus {100 * relative:.3g} % (95 %)" if relative else ""
+    return f"{100 * relative:.3g} %" if relative else ""

@@ -58,19 +58,19 @@ def _interval(shared: Record, flow: int, fill: float) -> int:
 
 
 @compiled
-def _follow(shared: Record, interval: int, fill: float, time: float) -> float:
-    """Fill after a time on the path of an interval."""
+def _follow(shared: Record, interval: int, fill: float, time: float) -> tuple[float, float]:
+    """Fill after a time on the path of an interval, and the time left at its end."""
     node, sign = shared.node, -float(shared.sense[interval])
     first, last = shared.first[interval], shared.last[interval]
     piece = _piece(shared, first, last, X, sign, sign * fill)
     span, rise, d0, d1 = _cubic(shared, piece)
     clock = node[piece, T] + _piece_part(fill - node[piece, X], rise, d0, d1) * span + time
     if clock >= node[last, T]:
-        return float(node[last, X])
+        return float(node[last, X]), float(clock - node[last, T])
     piece = _piece(shared, piece, last, T, 1.0, clock)
     span, rise, d0, d1 = _cubic(shared, piece)
     after = node[piece, X] + _piece_rise((clock - node[piece, T]) / span, rise, d0, d1)
-    return float(max(after, fill) if sign > 0.0 else min(after, fill))
+    return float(max(after, fill) if sign > 0.0 else min(after, fill)), 0.0
 
 
 @compiled
@@ -110,10 +110,19 @@ def gas_on(shared: Record, fill: float, wet: bool, time: float) -> tuple[float, 
         )
         # Whatever it holds, this law's tube is empty once the gas is off.
         return after, False
-    start = _interval(shared, ON if wet else DRY, fill)
+    if wet:
+        return _flow(shared, ON, fill, time)
+    start = _interval(shared, DRY, fill)
     if shared.sense[start] == 0:
         return fill, shared.holds[start] > 0
-    return _flow(shared, ON, fill, time)
+    if shared.holds[start] > 0:
+        return _flow(shared, ON, fill, time)
+    # An unprimed tube spills until it is primed.
+    after, left = _follow(shared, start, fill, time)
+    end = _interval(shared, DRY, after)
+    if left > 0.0 and shared.sense[end] != 0 and shared.holds[end] > 0:
+        return _flow(shared, ON, after, left)
+    return after, False
 
 
 @compiled
@@ -130,7 +139,7 @@ def _flow(shared: Record, flow: int, fill: float, time: float) -> tuple[float, b
     sense = shared.sense[interval]
     if sense == 0:
         return fill, shared.holds[interval] > 0
-    after = _follow(shared, interval, fill, time)
+    after, _ = _follow(shared, interval, fill, time)
     if sense > 0 and shared.lowest_empties and after <= shared.lowest:
         return after, False
     if sense < 0 and shared.highest_empties and after >= shared.highest:

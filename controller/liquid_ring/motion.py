@@ -2,18 +2,33 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Final
 
+import numpy as np
+import numpy.typing as npt
+
 from ringbalance.controller.liquid_ring.column import Column
+from ringbalance.controller.liquid_ring.records import EVENTS, MOTION, PIECES, PLANT, WORK, P, U
 from ringbalance.controller.liquid_ring.transfer import Event
-from ringbalance.physics.gas.supply import GasLine
+from ringbalance.physics.gas.supply import (
+    HEAT_CAPACITY_RATIO,
+    REFERENCE_PRESSURE,
+    REFERENCE_TEMPERATURE,
+    GasLine,
+)
 from ringbalance.reduced_model.law.flow_law import Regime
 
 Two = tuple[float, float]
 
-LEAST_GAS: Final = 1e-3
-"""Share of a chamber that liquid never takes from its gas."""
+RELATIVE_ERROR: Final = 1e-9
+"""Of each state, allowed to one step of a single run."""
+MOST_STEPS: Final = 200_000
+"""Within one interval of time."""
+_FIRST_STEP: Final = 1e-6
+"""s."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +63,7 @@ class Record:
 
 @dataclass(frozen=True, kw_only=True)
 class Motion:
-    """What a pair is about besides its fills."""
+    """State of a chamber pair other than its fills."""
 
     velocity: float = 0.0
     """In the tube, m/s, positive out of chamber 0."""
@@ -59,7 +74,7 @@ class Motion:
     valves: tuple[bool, bool] = (False, False)
     """Which valves are open."""
     pending: tuple[Switch, ...] = ()
-    """In the order of time."""
+    """At most an opening and a closing of one valve."""
     record: Record = field(default_factory=Record)
 
     @property
@@ -91,11 +106,126 @@ class Dynamics:
     """V, m^3."""
     max_fill_ratio: float
     """Largest x of a chamber."""
+    residual: float = 0.0
+    """Fill of a driven chamber that no command goes below."""
 
-    def gas_volume(self, fill: float) -> float:
-        """Volume of the gas that belongs to one chamber.
+    def plant(self, *, total: float, relative_error: float = RELATIVE_ERROR) -> npt.NDArray[np.void]:
+        """Record of type `PLANT`, shape (1,), of a pair with a sum of fill ratios."""
+        return _filled(self, total, relative_error)
 
-        Args: `fill`: x.
-        Returns: (1 - x) V, at least a thousandth of V, and the dead volume, m^3.
-        """
-        return max(1 - fill, LEAST_GAS) * self.chamber_volume + self.dead_volume
+    @cached_property
+    def _plants(self) -> dict[float, npt.NDArray[np.void]]:
+        return {}
+
+    def kept_plant(self, *, total: float) -> npt.NDArray[np.void]:
+        """The same, made once."""
+        if total not in self._plants:
+            self._plants[total] = self.plant(total=total)
+        return self._plants[total]
+
+
+def _filled(dynamics: Dynamics, total: float, relative_error: float) -> npt.NDArray[np.void]:
+    plant, column, crest, line = (
+        np.zeros(1, dtype=PLANT),
+        dynamics.column,
+        dynamics.column.crest,
+        dynamics.line,
+    )
+    for name in ("density", "length", "port_pressure", "gas_off", "gas_factor", "one_way"):
+        plant[name] = getattr(column, name)
+    plant["crest_end"], plant["return_crest_end"] = column.crest_ends
+    for name in (
+        "inertia",
+        "valve_lag",
+        "gas_pressure",
+        "ambient_pressure",
+        "dead_volume",
+        "tube_area",
+        "chamber_volume",
+        "max_fill_ratio",
+        "residual",
+    ):
+        plant[name] = getattr(dynamics, name)
+    plant["total"], plant["relative_error"], plant["most_steps"] = total, relative_error, MOST_STEPS
+    if crest is not None:
+        plant["crest"] = True
+        for name in ("column_pressure", "vapour_pressure", "trapped", "released", "froude_velocity"):
+            plant[name] = getattr(crest, name)
+    plant["temperature"], plant["heat_capacity_ratio"] = 1.0, 1.0
+    if line is not None:
+        plant["line"], plant["temperature"] = True, line.temperature
+        plant["critical_ratio"] = line.critical_ratio
+        plant["passing"] = line.conductance * REFERENCE_PRESSURE / math.sqrt(REFERENCE_TEMPERATURE)
+        plant["heat_capacity_ratio"] = 1.0 if line.process == "isothermal" else HEAT_CAPACITY_RATIO
+    for which, table in enumerate(column.tables):
+        pieces = table.coefficients.T
+        if len(pieces) > PIECES:
+            raise ValueError(f"a table of the law has {len(pieces)} pieces, at most {PIECES} can be compiled")
+        plant["cells"][0, which, : len(pieces)] = pieces
+        plant["pieces"][0, which] = len(pieces)
+        plant["table_start"][0, which], plant["table_step"][0, which] = table.start, table.step
+    return plant
+
+
+def packed(
+    plant: npt.NDArray[np.void], *, fill: float, primed: bool, motion: Motion, log_speed: float = 0.0
+) -> npt.NDArray[np.void]:
+    """Record of type `MOTION`, shape (1,), of a pair; `fill` is x of chamber 0."""
+    known, ambient, total = plant[0], float(plant["ambient_pressure"][0]), float(plant["total"][0])
+    state = np.zeros(1, dtype=MOTION)
+    volumes = [
+        max(1 - x, 1e-3) * known["chamber_volume"] + known["dead_volume"] for x in (fill, total - fill)
+    ]
+    contents = motion.contents or [ambient * volume / known["temperature"] for volume in volumes]
+    record = motion.record
+    state["state"][0, :6] = fill, motion.velocity, *(p + ambient for p in motion.gases), *contents
+    state["state"][0, WORK + record.chamber] = record.work
+    state["opens"], state["closes"] = math.inf, math.inf
+    chamber = record.chamber
+    for switch in motion.pending:
+        state["opens" if switch.opens else "closes"], chamber = switch.after, switch.chamber
+    for name, value in {
+        "log_speed": log_speed,
+        "length": _FIRST_STEP,
+        "started": fill,
+        "fill_before": record.fill,
+        "least_fill": total - fill if chamber else fill,
+        "closing_pressure": record.closing_pressure,
+        "run_dry": record.run_dry,
+        "primed": primed,
+        "valve_0": motion.valves[0],
+        "valve_1": motion.valves[1],
+        "direction": np.sign(motion.velocity),
+        "chamber": chamber,
+        "regime_start": record.regime_start,
+        "regime_end": record.regime_end,
+        "event": EVENTS.index(record.event),
+    }.items():
+        state[name] = value
+    return state
+
+
+def unpacked(plant: npt.NDArray[np.void], state: npt.NDArray[np.void]) -> Motion:
+    """What `packed` was made of, some time later."""
+    one, ambient = state[0], float(plant["ambient_pressure"][0])
+    y, chamber = one["state"], int(one["chamber"])
+    waiting = ((float(one["opens"]), True), (float(one["closes"]), False))
+    return Motion(
+        velocity=float(y[U]) if one["direction"] else 0.0,
+        gases=(float(y[P]) - ambient, float(y[P + 1]) - ambient),
+        contents=(float(y[P + 2]), float(y[P + 3])),
+        valves=(bool(one["valve_0"]), bool(one["valve_1"])),
+        pending=tuple(
+            Switch(after=after, chamber=chamber, opens=opens) for after, opens in waiting if after < math.inf
+        ),
+        record=Record(
+            chamber=chamber,
+            fill=float(one["fill_before"]),
+            work=float(y[WORK + chamber]),
+            regime_start=Regime(int(one["regime_start"])),
+            regime_end=Regime(int(one["regime_end"])),
+            event=EVENTS[int(one["event"])],
+            closing_pressure=float(one["closing_pressure"]),
+            run_dry=float(one["run_dry"]),
+        ),
+    )

@@ -8,7 +8,7 @@ t = (V/S) integral dx/u(x) and which is kept as cubic pieces x(t), fine enough f
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
 
@@ -61,6 +61,11 @@ class FlowPaths:
     """Time from the start of the path (s), x, dx/dt with which the piece after the node begins and the one
     before it ends; each path in the order of time, shape (4, nodes)."""
 
+    def primes(self, fill: float) -> bool:
+        """Whether the tube holds a column after it has begun to flow at a fill."""
+        interval = int(np.searchsorted(self.edges, fill, side="right"))
+        return bool(self.sense[interval] != 0 and self.holds[interval])
+
 
 @dataclass(frozen=True, kw_only=True)
 class _Map:
@@ -77,13 +82,15 @@ class _Map:
 def flow_paths(drive: Drive, *, primed: bool, most_changes: int = MOST_CHANGES) -> FlowPaths:
     """All flows of a pair under the gas pressure of a drive, whose fill and priming do not matter.
 
-    With `primed` False only where an empty tube starts to flow, and in which sense, without paths.
+    With `primed` False those of an unprimed tube, whose paths end where it is primed.
     Raises: UntabulatedError: a law that changes sense, regime or priming more than `most_changes` times.
     """
-    found = _mapped(drive, primed=primed, most_changes=most_changes)
+    flowing = replace(drive, primed=primed)
+    found = _mapped(flowing, most_changes=most_changes)
     intervals = _intervals(drive, found)
-    paths = _path_of_each(found) if primed else np.full(found.sense.size, -1)
-    nodes = [_path(drive, intervals, found.sense, paths == p) for p in range(int(paths.max()) + 1)]
+    own = found.sense if primed else np.where(found.holds, 0, found.sense)
+    paths = _path_of_each(own)
+    nodes = [_path(flowing, intervals, own, paths == p) for p in range(int(paths.max()) + 1)]
     begin = np.cumsum([0] + [rows.shape[1] for rows in nodes])
     return FlowPaths(
         edges=found.after,
@@ -95,42 +102,40 @@ def flow_paths(drive: Drive, *, primed: bool, most_changes: int = MOST_CHANGES) 
     )
 
 
-def _state(drive: Drive, fill: FloatArray, *, primed: bool) -> IntArray:
+def _state(drive: Drive, fill: FloatArray) -> IntArray:
     """Sense, priming and regime in one number."""
-    flow = drive.flow(fill, primed=primed)
+    flow = drive.flow(fill, primed=drive.primed)
     sense = np.sign(flow.velocity).astype(np.int64)
     return sense + 1 + 3 * flow.primed.astype(np.int64) + 6 * np.asarray(flow.regime, dtype=np.int64)
 
 
-def _mapped(drive: Drive, *, primed: bool, most_changes: int) -> _Map:
+def _mapped(drive: Drive, *, most_changes: int) -> _Map:
     """Look along the range, then narrow every change down to neighbouring numbers."""
     x = np.linspace(drive.lowest, drive.highest, FILLS)
-    state = _state(drive, x, primed=primed)
+    state = _state(drive, x)
     at = np.flatnonzero(np.diff(state))
     before, after, goal = x[at], x[at + 1], x[at + 1]
     found: list[tuple[float, float]] = []
     while before.size:
         if len(found) + before.size > most_changes:
             raise UntabulatedError
-        left, right = _narrowed(drive, before, after, primed=primed)
+        left, right = _narrowed(drive, before, after)
         found += zip(left.tolist(), right.tolist(), strict=True)
         # Another change may lie between the one found and the next point looked at.
-        more = _state(drive, right, primed=primed) != _state(drive, goal, primed=primed)
+        more = _state(drive, right) != _state(drive, goal)
         before, after, goal = right[more], goal[more], goal[more]
     found.sort()
     left, right = np.array(found).reshape(-1, 2).T
-    each = _state(drive, np.concatenate([[drive.lowest], right]), primed=primed)
+    each = _state(drive, np.concatenate([[drive.lowest], right]))
     return _Map(before=left, after=right, sense=each % 3 - 1, holds=each // 3 % 2 > 0)
 
 
-def _narrowed(
-    drive: Drive, before: FloatArray, after: FloatArray, *, primed: bool
-) -> tuple[FloatArray, FloatArray]:
+def _narrowed(drive: Drive, before: FloatArray, after: FloatArray) -> tuple[FloatArray, FloatArray]:
     rows = np.arange(before.size)
     while np.any(np.nextafter(before, 1.0) < after):
         x = before[:, None] + (after - before)[:, None] * np.linspace(0.0, 1.0, SECTION)
         x[:, -1] = after
-        state = _state(drive, x, primed=primed)
+        state = _state(drive, x)
         first = np.argmax(state != state[:, :1], axis=1)
         before, after = np.maximum.accumulate(x, axis=1)[rows, first - 1], x[rows, first]
     return before, after
@@ -142,12 +147,12 @@ def _intervals(drive: Drive, found: _Map) -> FloatArray:
     return np.stack([low, high], axis=1)
 
 
-def _path_of_each(found: _Map) -> IntArray:
+def _path_of_each(senses: IntArray) -> IntArray:
     """Number the runs of neighbouring intervals that flow in one sense."""
-    paths, number = np.full(found.sense.size, -1), -1
-    for i, sense in enumerate(found.sense):
+    paths, number = np.full(senses.size, -1), -1
+    for i, sense in enumerate(senses):
         if sense != 0:
-            number += i == 0 or found.sense[i - 1] != sense
+            number += i == 0 or senses[i - 1] != sense
             paths[i] = number
     return paths
 
@@ -212,7 +217,7 @@ def _ending(times: FloatArray, x: FloatArray, slope: FloatArray) -> FloatArray:
 
 def _slope(drive: Drive, fill: FloatArray, sense: int) -> FloatArray:
     """dx/dt, never against the sense."""
-    speed = np.maximum(sense * drive.flow(fill).velocity, 0.0)
+    speed = np.maximum(sense * drive.flow(fill, primed=drive.primed).velocity, 0.0)
     return np.asarray(-sense * drive.exchange_rate * speed)
 
 
@@ -224,7 +229,8 @@ def _durations(
     spent, rates = [], []
     for a, b in ((top, bottom), (top, middle), (middle, bottom)):
         z = b[:, None] + (a - b)[:, None] * _ABSCISSA
-        speed = np.abs(drive.flow(ends[1] + (ends[0] - ends[1]) * z**2).velocity)
+        fill = ends[1] + (ends[0] - ends[1]) * z**2
+        speed = np.abs(drive.flow(fill, primed=drive.primed).velocity)
         rate = drive.exchange_rate * np.maximum(speed, np.finfo(np.float64).tiny ** 0.5)
         spent.append((2 * abs(ends[0] - ends[1]) * z / rate) @ _WEIGHT * (a - b))
         rates.append(rate.max(axis=1))

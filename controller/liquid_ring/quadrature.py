@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final
 
@@ -23,7 +23,7 @@ from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
 from ringbalance.scene.arrays import FloatArray
 
 _KEPT: Final = 16
-"""Tables kept: a run needs one with gas and one without."""
+"""Tables kept: a run needs one without gas, and two with it, primed and unprimed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +49,8 @@ class _Way:
     """x at which the flow ends by itself."""
     duration: float
     """s until then."""
+    primed: bool
+    """Whether the tube is primed on its last part."""
 
 
 def quadrature(drive: Drive, instants: FloatArray) -> Transfer:
@@ -66,11 +68,10 @@ def quadrature(drive: Drive, instants: FloatArray) -> Transfer:
     if float(before.velocity) == 0:
         return still(drive, t, flow=before)
     try:
-        paths = _paths(_SameLaw(drive.law), drive.total, drive.exchange_rate, drive.gas_pressure)
-        way = _way(paths, drive.fill, t)
+        way = _course(drive, t)
         event = _event(drive, way, float(t[-1]))
     except UntabulatedError:
-        way = _Way(fill=np.full(t.shape, drive.fill), end=drive.fill, duration=0.0)
+        way = _Way(fill=np.full(t.shape, drive.fill), end=drive.fill, duration=0.0, primed=drive.primed)
         event = Event.UNFINISHED
     return finished(
         drive,
@@ -79,28 +80,49 @@ def quadrature(drive: Drive, instants: FloatArray) -> Transfer:
         regime_start=Regime(int(before.regime)),
         event=event,
         event_time=None if event is Event.NONE else way.duration,
+        primed=way.primed,
     )
 
 
+def _course(drive: Drive, instants: FloatArray) -> _Way:
+    """The path that a pair follows: an unprimed tube spills along one of its own until it is primed."""
+    key = (_SameLaw(drive.law), drive.total, drive.exchange_rate, drive.gas_pressure)
+    running = _paths(*key, primed=True)
+    if drive.primed:
+        return _way(running, drive.fill, instants, primed=True)
+    spilling = _paths(*key, primed=False)
+    if spilling.primes(drive.fill):
+        return _way(running, drive.fill, instants, primed=True)
+    first = _way(spilling, drive.fill, instants, primed=False)
+    if not spilling.primes(first.end) or instants[-1] <= first.duration:
+        return first
+    later = np.maximum(instants - first.duration, 0.0)
+    second = _way(running, first.end, later, primed=True)
+    fill = np.where(instants > first.duration, second.fill, first.fill)
+    return replace(second, fill=fill, duration=first.duration + second.duration)
+
+
 @lru_cache(maxsize=_KEPT)
-def _paths(law: _SameLaw, total: float, exchange_rate: float, gas_pressure: float) -> FlowPaths:
+def _paths(
+    law: _SameLaw, total: float, exchange_rate: float, gas_pressure: float, *, primed: bool
+) -> FlowPaths:
     drive = Drive(
         law=law.law,
         fill=total / 2,
         total=total,
         exchange_rate=exchange_rate,
         gas_pressure=gas_pressure,
-        primed=True,
+        primed=primed,
     )
-    return flow_paths(drive, primed=True)
+    return flow_paths(drive, primed=primed)
 
 
-def _way(paths: FlowPaths, fill: float, instants: FloatArray) -> _Way:
+def _way(paths: FlowPaths, fill: float, instants: FloatArray, *, primed: bool) -> _Way:
     """Follow the path on which a fill lies."""
     interval = int(np.searchsorted(paths.edges, fill, side="right"))
     number, sign = int(paths.path[interval]), -float(paths.sense[interval])
     if number < 0:
-        return _Way(fill=np.full(instants.shape, fill), end=fill, duration=0.0)
+        return _Way(fill=np.full(instants.shape, fill), end=fill, duration=0.0, primed=primed)
     time, x, after, before = paths.nodes[:, paths.begin[number] : paths.begin[number + 1]]
     span, rise = np.diff(time), np.diff(x)
     d0, d1 = after[:-1] * span, before[1:] * span
@@ -112,7 +134,8 @@ def _way(paths: FlowPaths, fill: float, instants: FloatArray) -> _Way:
     at = _piece(time, clock[flowing])
     moved = piece_rise((clock[flowing] - time[at]) / span[at], rise[at], d0[at], d1[at])
     reached[flowing] = sign * np.maximum(sign * (x[at] + moved), sign * fill)
-    return _Way(fill=reached, end=float(x[-1]), duration=max(float(time[-1] - begun), 0.0))
+    duration = max(float(time[-1] - begun), 0.0)
+    return _Way(fill=reached, end=float(x[-1]), duration=duration, primed=primed)
 
 
 def _piece(ascending: FloatArray, wanted: FloatArray) -> FloatArray:

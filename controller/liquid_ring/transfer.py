@@ -126,10 +126,14 @@ def finished(
     regime_start: Regime,
     event: Event,
     event_time: float | None,
+    primed: bool = True,
 ) -> Transfer:
-    """An interval that flowed; gas that has blown through an emptied chamber leaves no column."""
+    """An interval that flowed, at its end in a primed tube or not.
+
+    Gas that has blown through an emptied chamber leaves no column.
+    """
     held = np.clip(fill, drive.lowest, drive.highest)
-    after = drive.flow(held[-1])
+    after = drive.flow(held[-1], primed=primed)
     return Transfer(
         instants=instants,
         fill=held,

@@ -56,7 +56,7 @@ def tune(
     if isinstance(given, EccentricScene):
         return _eccentric_masses(given, json=json)
     with activity("tune", f"flow law: {law} ...") as shown:
-        found = tune_scene(given, model_of=lambda asked: law_by_name(asked, law), progress=shown.show)
+        found = tune_scene(given, law_by_name(given, law), progress=shown.show)
     if json:
         print(json_format.dumps(tuning_document(found), allow_nan=False))
     else:

@@ -12,23 +12,24 @@ import numpy as np
 from ringbalance.controller.algorithms.by_name import controller_of, target_vector_of
 from ringbalance.controller.checks import check_settings
 from ringbalance.controller.ensemble.monte_carlo import Probability, binomial_share, simulate_ensemble
-from ringbalance.controller.ensemble.samples import MemberUncertainty, drawn_members, member_uncertainty
+from ringbalance.controller.ensemble.samples import MemberUncertainty, drawn_members
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.terms import run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor, vibration_rates
 from ringbalance.controller.tuning.margins import Margins, loop_margins
-from ringbalance.controller.tuning.recommendation import factor_uncertainty, recommended_gain
+from ringbalance.controller.tuning.recommendation import (
+    Contribution,
+    FactorUncertainty,
+    factor_uncertainty,
+    recommended_gain,
+)
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.gas_line import LineAnswer, line_answers, line_document
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.selection.registry import ModelUsed
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import nominal_value, with_value
 
-ModelOf = Callable[[Scene], BalancerModel]
-"""Makes the model of a scene."""
 Progress = Callable[[str], None]
 
 MEMBERS: Final = 2000
@@ -36,17 +37,6 @@ MEMBERS: Final = 2000
 RUNS: Final = 20
 """Runs one by one, where an injection carries more than the flow law or the algorithm is not compiled."""
 QUANTILES: Final = {"p50": 0.5, "p95": 0.95}
-_IN_MEMBERS: Final = frozenset({"influence_coefficient", "lag_angle"})
-
-
-@dataclass(frozen=True, kw_only=True)
-class Contribution:
-    """One part of the loop factor's uncertainty."""
-
-    name: str
-    uncertainty: float
-    """Expanded (95 %), relative to the loop factor."""
-    source: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,8 +91,8 @@ class Tuning:
 
 def tune(
     scene: Scene,
+    model: BalancerModel,
     *,
-    model_of: ModelOf,
     members: int = MEMBERS,
     runs: int = RUNS,
     progress: Progress | None = None,
@@ -116,12 +106,12 @@ def tune(
     told = progress or _silent
     check_settings(scene)
     check_ring(scene)
-    told("flow law ...")
-    model = model_of(scene)
-    widths, contributions = _total_uncertainty(scene, model, model_of, told)
+    told("uncertainty ...")
+    known = factor_uncertainty(scene, model)
+    widths = known.widths
     present = loop_factor(scene, model, controller_of(scene, model))
     wanted = recommended_gain(
-        scene, model, loop=loop_factor(scene, model, target_vector_of(scene)), uncertainty_95=widths
+        scene, model, loop=loop_factor(scene, model, target_vector_of(scene)), uncertainty=known
     )
     has_gain = scene.controller.kind != "law_based"
     tuned = _with_gain(scene, wanted) if has_gain and wanted > 0 else scene
@@ -139,8 +129,8 @@ def tune(
         gain=wanted if has_gain and wanted > 0 else None,
         present=present,
         loop=loop,
-        margins=_margins(tuned, loop, widths) if wanted > 0 else None,
-        contributions=contributions,
+        margins=_margins(tuned, loop, known) if wanted > 0 else None,
+        contributions=known.parts,
         first_gas_time=min(wanted * amplitude, scene.controller.maximum_gas_time) if wanted > 0 else None,
         last_gas_time=wanted * limit if wanted > 0 else None,
         smallest_correction=smallest,
@@ -170,61 +160,14 @@ def _with_gain(scene: Scene, gain: float) -> Scene:
     return replace(scene, controller=replace(settings, kind="target_vector"))
 
 
-def _total_uncertainty(
-    scene: Scene, model: BalancerModel, model_of: ModelOf, told: Progress
-) -> tuple[MemberUncertainty, tuple[Contribution, ...]]:
-    """The law's own without its inputs, and each stated input by what it does to the rate."""
-    plain = replace(scene, uncertainty=())
-    bare = member_uncertainty(plain, model_of(plain))
-    stated = member_uncertainty(scene, model)
-    rate = float(np.max(np.mean(vibration_rates(scene, model), axis=1)))
-    parts = [
-        Contribution(name="velocity", uncertainty=bare.velocity, source=bare.sources[0]),
-        Contribution(name="moment", uncertainty=bare.moment, source=bare.sources[1]),
-        Contribution(
-            name="influence_coefficient", uncertainty=stated.influence_coefficient, source=stated.sources[2]
-        ),
-    ]
-    inputs = 0.0
-    for entry in scene.uncertainty:
-        if entry.quantity in _IN_MEMBERS:
-            continue
-        told(f"uncertainty of {entry.quantity} ...")
-        value = nominal_value(scene=scene, quantity=entry.quantity)
-        if value is None or rate == 0.0:
-            continue
-        half = entry.half_width * (abs(value) if entry.relative else 1.0)
-        change = _changed_rate(plain, entry.quantity, value, half, model_of, rate)
-        inputs = math.hypot(inputs, change)
-        parts.append(Contribution(name=entry.quantity, uncertainty=change, source="the scene's uncertainty"))
-    widths = replace(
-        stated, velocity=math.hypot(bare.velocity, inputs), moment=bare.moment, sources=stated.sources
-    )
-    return widths, tuple(parts)
-
-
-def _changed_rate(
-    scene: Scene, quantity: str, value: float, half: float, model_of: ModelOf, rate: float
-) -> float:
-    """Relative change of the rate by an input at the edge of its uncertainty; 1 where no law can be made."""
-    for changed in (value + half, value - half):
-        try:
-            other = with_value(scene=scene, quantity=quantity, value=changed)
-            found = float(np.max(np.mean(vibration_rates(other, model_of(other)), axis=1)))
-        except (SceneError, ValueError):
-            continue
-        return abs(found / rate - 1.0)
-    return 1.0
-
-
-def _margins(scene: Scene, loop: LoopFactor, widths: MemberUncertainty) -> Margins:
+def _margins(scene: Scene, loop: LoopFactor, known: FactorUncertainty) -> Margins:
     settings = scene.controller
     error = abs(settings.assumed_lag_angle - scene.rotor.lag_angle)
     fixed = settings.kind != "law_based"
     return loop_margins(
         loop_factor=loop.value if fixed and loop.value else 1.0,
-        gain_uncertainty=factor_uncertainty(widths),
-        phase_uncertainty=widths.lag_angle + error,
+        gain_uncertainty=known.total,
+        phase_uncertainty=known.widths.lag_angle + error,
         integral=settings.period / (settings.integral_time or math.inf) if fixed else 0.0,
         derivative=settings.derivative_time / settings.period if fixed else 0.0,
     )

@@ -56,37 +56,6 @@ class GasLine:
     """b."""
     process: GasProcess
 
-    def rates(
-        self, *, pressure: float, content: float, volume: float, growth: float, is_open: bool
-    ) -> tuple[float, float]:
-        """dp/dt (Pa/s) and d(m R)/dt (W/K) of a chamber's gas.
-
-        Args:
-            pressure: p, absolute, Pa.
-            content: m R = p V/T, J/K.
-            growth: dV/dt, m^3/s.
-            is_open: whether the line leads to the supply; else to the surroundings.
-        Source: ISO 6358-1 for the mass flow; first law for the chamber's gas.
-        """
-        outside = self.supply_pressure if is_open else self.ambient_pressure
-        isothermal = self.process == "isothermal"
-        if outside >= pressure:
-            temperature = self.temperature
-            flow = self._flow(upstream=outside, downstream=pressure, temperature=temperature)
-        else:
-            # A trial step of the integrator may empty a chamber of its gas; such a step is thrown away.
-            own = pressure * volume / max(content, 1e-9 * volume)
-            temperature = self.temperature if isothermal else own
-            flow = -self._flow(upstream=pressure, downstream=outside, temperature=temperature)
-        exponent = 1.0 if isothermal else HEAT_CAPACITY_RATIO
-        return exponent * (flow - pressure * growth) / volume, flow / temperature
-
-    def _flow(self, *, upstream: float, downstream: float, temperature: float) -> float:
-        """R T_1 m' = C p_0 p_1 sqrt(T_1/T_0) phi(p_2/p_1), pressure times volume per time, W."""
-        shape = flow_shape(ratio=downstream / upstream, critical_ratio=self.critical_ratio)
-        warm = math.sqrt(temperature / REFERENCE_TEMPERATURE)
-        return self.conductance * REFERENCE_PRESSURE * upstream * warm * shape
-
     def time_constant(self, *, volume: float) -> float:
         """tau = V/(C p_0) sqrt(T_0/T), s."""
         warm = math.sqrt(REFERENCE_TEMPERATURE / self.temperature)
@@ -153,12 +122,3 @@ def line_with(gas: Gas, *, conductance: float, critical_ratio: float) -> GasLine
         critical_ratio=critical_ratio,
         process=gas.process,
     )
-
-
-def flow_shape(*, ratio: float, critical_ratio: float) -> float:
-    """phi(r), the mass flow over its choked value: 1 up to b, 0 at r = 1."""
-    if ratio <= critical_ratio:
-        return 1.0
-    held = min(ratio, max(_LAMINAR_RATIO, critical_ratio))
-    ellipse = math.sqrt(max(1 - ((held - critical_ratio) / (1 - critical_ratio)) ** 2, 0.0))
-    return ellipse if ratio == held else ellipse * (1 - ratio) / (1 - held)

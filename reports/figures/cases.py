@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -64,11 +64,13 @@ def order_plot(case: Record) -> Drawing | None:
     )
 
 
-_STYLES: Final = {
-    "paper": (style.PAPER, (0, (5, 2))),
-    "found": (style.FOUND, "-"),
-    "reference": (style.THIRD, (0, (1, 1.5))),
+_STYLES: Final[dict[str, tuple[str, dict[str, Any]]]] = {
+    "paper": (style.PAPER, {"linestyle": (0, (5, 2))}),
+    "found": (style.FOUND, {}),
+    "reference": (style.THIRD, {"linestyle": (0, (1, 1.5))}),
+    "points": (style.INK, {"linestyle": "", "marker": "o", "markersize": 2.5}),
 }
+"""Colour and drawing of a curve by its style."""
 
 
 def series_plots(case: Record) -> list[Drawing]:
@@ -96,11 +98,11 @@ def _series_plot(name: str, series: Record) -> Drawing:
 
     def paint(axes: Axes) -> None:
         for curve in curves:
-            colour, dashes = _STYLES[curve.get("style") or "found"]
+            colour, line = _STYLES[curve.get("style") or "found"]
             colour = next(spare) if colour in used else colour
             used.add(colour)
             y = _with_gaps(curve["values"], unit)
-            axes.plot(x, y, color=colour, linestyle=dashes, label=typeset(curve["name"]))
+            axes.plot(x, y, color=colour, label=typeset(curve["name"]), **line)
             if curve.get("uncertainty"):
                 band = _with_gaps(curve["uncertainty"], unit)
                 axes.fill_between(x, y - band, y + band, color=colour, alpha=0.2, linewidth=0)

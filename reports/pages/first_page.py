@@ -2,22 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, Final
+from collections.abc import Sequence
+from typing import Final
 
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.tuning.tune import tuning_document
-from ringbalance.reports.numbers import MISSING, given, measured, number, percent, shown
-from ringbalance.reports.section import Cells, Record, Section, Table, Work
-from ringbalance.scene import SceneError, bundled_scene, liquid_ring_scene, load_scene
+from ringbalance.reduced_model.chamber.inputs import half_widths
+from ringbalance.reports.numbers import THIN_SPACE, given, number, percent, shown
+from ringbalance.reports.pages.requirements import (
+    MISSED,
+    OPEN,
+    Requirement,
+    decision,
+    input_name,
+    requirement_figure,
+    requirement_record,
+    requirement_table,
+    requirements,
+    resting,
+)
+from ringbalance.reports.section import Record, Section, Work
+from ringbalance.reports.traces import traced
+from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.verification.loops import calibration_of
 from ringbalance.verification.runner import paper_scene
 
 _OTHER_READING: Final = "liquid_ring_paper_calibrated"
 """The paper's disc with the bore that its Fig. 7 implies under the calibrated law."""
 _RETUNED: Final = "calibrated_retuned"
-_GRAM_MILLIMETRE: Final = 1e6
-_MICROMETRE: Final = 1e6
+_DOMINANT: Final = 3
+_MAIN: Final = {
+    "velocity": "flow velocity",
+    "usable_moment": "usable moment",
+    "lambda": "lever arm λ",
+    "wall_pressure": "wall pressure",
+}
+"""Results whose causes of uncertainty are compared; k and the margin follow from the velocity's."""
 _ENDINGS: Final = {
     "settled": "settles",
     "hovering": "hovers about its limit",
@@ -30,12 +50,20 @@ def _collect(work: Work) -> Record:
     rotor = work.scene.rotor
     return {
         "needed_moment_kg_m": rotor.initial_amplitude / rotor.influence_coefficient,
+        "needed_uncertainty_kg_m": _needed_uncertainty(work.scene),
+        "requirement": requirement_record(work.scene),
         "bore_m": work.scene.tube.bore,
         "bore_uncertainty_stated": any(i.quantity == "bore" for i in work.scene.uncertainty),
         "time_limit_s": work.scene.run.time_limit,
         "other_reading": _other_reading(work),
         "tuning": tuning_document(work.tuning),
     }
+
+
+def _needed_uncertainty(scene: Scene) -> float:
+    """Of the initial unbalance, kg m at 95 %, by that of the influence coefficient."""
+    width = half_widths(scene).get("influence_coefficient", 0.0)
+    return scene.rotor.initial_amplitude * width / scene.rotor.influence_coefficient**2
 
 
 def _other_reading(work: Work) -> Record | None:
@@ -59,31 +87,45 @@ def _other_reading(work: Work) -> Record | None:
 
 
 def _view(found: Record, evidence: Record) -> Record:
+    rows = requirements(evidence)
     return {
-        "loop_lead": [*_loop_lead(evidence), *_chance(found, evidence)],
-        "alerts": [*_dry(evidence), *_reach(found, evidence), *_gas_line(evidence), *_chamber(evidence)],
-        "rests": [*_bore(found, evidence), _EXACT, _NO_MEASUREMENT],
-        "loop": _loop_table(evidence),
-        "reach": _reach_table(found, evidence["calibration"].get("residual_liquid")),
+        "decision": decision(rows),
+        "loop_lead": loop_sentences(evidence),
+        "alerts": [*_dry(evidence), *_gas_line(evidence), *_chamber(evidence)],
+        "requirements": requirement_table(rows),
+        "bars": requirement_figure(rows),
+        "actions": _actions(evidence, rows),
+        "dominant": dominant(evidence),
+        "unmeasured": _NO_MEASUREMENT,
+        "rests": _bore(found, evidence),
     }
 
 
-_EXACT: Final = (
-    "An input whose uncertainty the scene does not state is taken as exact, so each ± is a lower bound where "
-    "inputs are assumed."
-)
 _NO_MEASUREMENT: Final = (
-    "No measurement of this device is compared with here. Every verdict on the paper compares a model with a "
-    "model."
+    "No comparison with measurements of this device exists. Verdicts on the paper compare a model with "
+    "a model; only parts of the model, the friction of a straight pipe among them, are compared with "
+    "measurements."
 )
 
 
 def loop_sentences(evidence: Record) -> list[str]:
-    """What the loop does under the calibrated law and with the recommended gain."""
-    return _loop_lead(evidence)
+    """What the loop does under the calibrated law, which gain to set, and what the paper's law expects."""
+    run = evidence["closed_loop"].get("calibrated")
+    if run is None:
+        return ["The closed loop was not run."]
+    told = [f"Under the calibrated law the loop {_ending(run)}{_factor(run)}."]
+    tuned = retuned(evidence)
+    if tuned is not None:
+        gain, own = (shown(r, "s/m", digits=2) for r in _gains(evidence, tuned))
+        told.append(f"Recommended gain: {gain} (the scene has {own}). With it this run {_ending(tuned)}.")
+    paper = evidence["closed_loop"].get("paper")
+    if paper is not None:
+        told.append(f"Under the paper’s law, with the scene’s gain, it {_ending(paper)}.")
+    return told
 
 
-def _retuned(evidence: Record) -> Record | None:
+def retuned(evidence: Record) -> Record | None:
+    """The run with the recommended gain, if there is one."""
     runs = (evidence.get("consequences") or {}).get("runs", [])
     return next((run for run in runs if run.get("name") == _RETUNED), None)
 
@@ -94,21 +136,6 @@ def _ending(run: Record) -> str:
     return f"{_ENDINGS[verdict]}{when}"
 
 
-def _loop_lead(evidence: Record) -> list[str]:
-    run = evidence["closed_loop"].get("calibrated")
-    if run is None:
-        return ["The closed loop was not run."]
-    told = [f"Under the calibrated law the loop {_ending(run)}{_factor(run)}."]
-    tuned = _retuned(evidence)
-    if tuned is not None:
-        gain, own = (shown(r, "s/m", digits=2) for r in _gains(evidence, tuned))
-        told.append(f"Recommended gain: {gain} (the scene has {own}). With it this run {_ending(tuned)}.")
-    paper = evidence["closed_loop"].get("paper")
-    if paper is not None:
-        told.append(f"Under the paper’s law, with the scene’s gain, it {_ending(paper)}.")
-    return told
-
-
 def _gains(evidence: Record, tuned: Record) -> tuple[float, float | None]:
     runs = evidence["consequences"]["runs"]
     own: Record = next((run for run in runs if run.get("name") == "calibrated"), {})
@@ -116,15 +143,30 @@ def _gains(evidence: Record, tuned: Record) -> tuple[float, float | None]:
 
 
 def _factor(run: Record) -> str:
-    if run.get("loop_factor") is None:
+    """What the loop factor means for a small residual, in plain words."""
+    factor = run.get("loop_factor")
+    if factor is None:
         return ""
-    value, limit = (number(run[key], digits=3) for key in ("loop_factor", "loop_factor_limit"))
-    return f": one injection takes {value} times a small residual away, and from {limit} times on it grows"
+    value, limit = (
+        traced(number(run[key], digits=3), f"closed_loop.calibrated.{key}")
+        for key in ("loop_factor", "loop_factor_limit")
+    )
+    if factor > run["loop_factor_limit"]:
+        end = f"From {limit} times on the residual grows, so it grows here"
+    elif factor > 1:
+        end = (
+            "The residual turns to the opposite side each time and shrinks slowly; "
+            f"from {limit} times on it grows"
+        )
+    else:
+        end = f"The rest is left to the next injection; from {limit} times on the residual would grow"
+    return f". One injection moves {value} times the liquid that would just cancel a small residual. {end}"
 
 
-def _chance(found: Record, evidence: Record) -> list[str]:
+def chance(evidence: Record) -> list[str]:
     """Fractions of the ensembles that have settled by the end, with the scene's gain and the recommended."""
     ensembles = (evidence.get("consequences") or {}).get("ensembles", [])
+    found = evidence.get("summary")
     if len(ensembles) < 3 or not found:
         return []
     members, until = ensembles[1]["members"], given(found["time_limit_s"], "s")
@@ -163,23 +205,6 @@ def _sentence(text: str) -> str:
     return f"{text[0].upper()}{text[1:].rstrip('.')}."
 
 
-def _reach(found: Record, evidence: Record) -> list[str]:
-    rest = evidence["calibration"].get("residual_liquid")
-    if not rest or not found:
-        return []
-    needed, usable = found["needed_moment_kg_m"], rest["usable_pair_moment_kg_m"]
-    width, told = rest["usable_pair_moment_uncertainty"], shown(found["needed_moment_kg_m"], "kg m", digits=3)
-    reach = shown(usable, "kg m", width)
-    if needed > usable + width:
-        return [f"The unbalance of {told} is beyond the {reach} that one pair can usably give."]
-    if needed > usable - width:
-        return [
-            f"Whether one pair can give the {told} of the unbalance cannot be told: usable are {reach}. In "
-            "the direction of a pair it has no help from the other."
-        ]
-    return []
-
-
 def _gas_line(evidence: Record) -> list[str]:
     warning = (evidence["calibration"].get("gas_line") or {}).get("warning")
     return [_sentence(warning)] if warning else []
@@ -188,6 +213,47 @@ def _gas_line(evidence: Record) -> list[str]:
 def _chamber(evidence: Record) -> list[str]:
     status = evidence["calibration"].get("status") or {"code": "ok"}
     return [] if status["code"] == "ok" else [_sentence(status["text"])]
+
+
+def _actions(evidence: Record, rows: Sequence[Requirement]) -> list[str]:
+    """What to do next, the most urgent first."""
+    told, tuned = [], retuned(evidence)
+    verdicts = {row.name.split(" with ")[0]: row.verdict for row in reversed(rows)}
+    if tuned is not None and verdicts.get("Loop factor") == MISSED:
+        told.append(f"Set the proportional gain to {shown(tuned['proportional_s_per_m'], 's/m', digits=2)}.")
+    if verdicts.get("Smallest correction that the valve can give") in {MISSED, OPEN}:
+        told.append(
+            "Choose the valve before anything else is built, and put its conductance, critical ratio and lag "
+            "into the scene: only a fast one can reach the limit."
+        )
+    if verdicts.get("Correction capacity of one pair") in {MISSED, OPEN}:
+        told.append("Balance the rotor better by hand, or take a larger disc: the capacity has no reserve.")
+    if any("tube.bore" in row.rests or "bore of the tube" in row.rests for row in rows):
+        told.append(
+            "Measure the flow through the tube at three gas pressures; every velocity and gain rests on the "
+            "bore."
+        )
+    return told
+
+
+def dominant(evidence: Record) -> list[str]:
+    """The three causes that change a main result most, relative to it."""
+    budgets = evidence["calibration"].get("budgets") or {}
+    effects = []
+    for name, budget in budgets.items():
+        if name not in _MAIN or not budget["value"]:
+            continue
+        causes = {**budget["inputs"], "the model itself": budget["model"]}
+        effects += [(width / abs(budget["value"]), cause, name) for cause, width in causes.items()]
+    largest: dict[str, tuple[float, str]] = {}
+    for effect, cause, name in sorted(effects, reverse=True):
+        largest.setdefault(cause, (effect, name))
+    return [_cause(evidence, cause, *largest[cause]) for cause in list(largest)[:_DOMINANT]]
+
+
+def _cause(evidence: Record, cause: str, effect: float, name: str) -> str:
+    label = resting(evidence, cause) or input_name(cause)
+    return f"{label[0].upper()}{label[1:]}: ±{THIN_SPACE}{percent(effect)} of the {_MAIN[name]}"
 
 
 def _bore(found: Record, evidence: Record) -> list[str]:
@@ -205,73 +271,6 @@ def _bore(found: Record, evidence: Record) -> list[str]:
         f"{number(other['loop_factor'], digits=2)} and the loop {_ending(other)}. Which of the two the "
         "paper’s machine had is not known."
     ]
-
-
-def _loop_table(evidence: Record) -> Table:
-    runs = evidence["closed_loop"]
-    columns = {
-        "Calibrated law,\nthe scene’s gain": runs.get("calibrated"),
-        "Calibrated law,\nrecommended gain": _retuned(evidence),
-        "The paper’s law,\nthe scene’s gain": runs.get("paper"),
-    }
-
-    def row(label: str, read: Callable[[Record], str]) -> Cells:
-        return label, *(MISSING if run is None else read(run) for run in columns.values())
-
-    def factor(run: Record) -> str:
-        return number(run.get("loop_factor"), digits=3)
-
-    def gas(key: str, text: Callable[[Any], str]) -> Callable[[Record], str]:
-        return lambda run: text(run["gas"][key]) if run.get("gas") else MISSING
-
-    def length(key: str) -> Callable[[Record], str]:
-        return lambda run: number(run[key] * _MICROMETRE, digits=2) if run.get(key) else MISSING
-
-    rows = [
-        row("Verdict", lambda run: run.get("verdict") or MISSING),
-        row("Loop factor h, unstable from 2", factor),
-        row("Within the limit from", lambda run: shown(run["settling_time_s"], "s", digits=3)),
-        row("Standard deviation that noise keeps up, µm", length("stationary_deviation_m")),
-        row("Injections", lambda run: str(_injections(run))),
-        row("Gas consumed, normal litres", gas("normal_litres", lambda v: number(v, digits=2))),
-        row("Energy to compress it", gas("compression_energy_J", lambda v: shown(v, "J", digits=2))),
-        row("Injections that run a chamber dry", gas("injections_run_dry", str)),
-        row("Overshoots", lambda run: str(run["overshoots"])),
-        row("Misadjustments", lambda run: str(run["misadjustments"])),
-    ]
-    shown_rows = [cells for cells in rows if any(cell != MISSING for cell in cells[1:])]
-    return Table(
-        caption=f"One run each, with the scene’s noise; the limit is {given(evidence['limit_m'], 'm')}.",
-        heads=("", *columns),
-        rows=shown_rows,
-    )
-
-
-def _injections(run: Record) -> int:
-    return run["injections"] if isinstance(run["injections"], int) else len(run["injections"])
-
-
-def _reach_table(found: Record, rest: Record | None) -> Table | None:
-    if not rest or not found:
-        return None
-    usable = measured(
-        _GRAM_MILLIMETRE * rest["usable_pair_moment_kg_m"],
-        _GRAM_MILLIMETRE * rest["usable_pair_moment_uncertainty"],
-    )
-    needed, geometric = (
-        _GRAM_MILLIMETRE * moment for moment in (found["needed_moment_kg_m"], rest["pair_moment_kg_m"])
-    )
-    rows = (
-        ("needed for the initial vibration", number(needed, digits=3)),
-        ("by geometry", number(geometric)),
-        ("usable", usable),
-    )
-    return Table(
-        caption="What one pair can correct. Below a residual fill gas enters the port, so the geometric "
-        "moment is not usable to the end.",
-        heads=("", "Moment, g mm"),
-        rows=rows,
-    )
 
 
 SECTION: Final = Section(

@@ -1,4 +1,4 @@
-"""Where the disc works and how its loop ends: the operating map, the dimensioned section, the residual."""
+"""Where the disc works: the operating map and the dimensioned section."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reports.figures.operation import operating_map, residual_polar, settling_histogram
+from ringbalance.reports.figures.operation import operating_map
 from ringbalance.reports.figures.section import disc_section
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.scene.arrays import IntArray
@@ -19,8 +19,6 @@ _HIGHEST: Final = 1.5
 """Top of the map over the scene's gas pressure, or over the priming pressure where that is higher."""
 _SPILLING: Final = "spilling"
 _NAMES: Final = (*(regime.label for regime in Regime), _SPILLING)
-_GAINS: Final = {1: "with the scene’s gain", 2: "with the recommended gain"}
-"""Titles of the calibrated law's ensembles, by their place in the evidence."""
 
 
 def _regimes(law: CalibratedLaw, fill: np.typing.ArrayLike, pressure: np.typing.ArrayLike) -> IntArray:
@@ -81,42 +79,6 @@ def _view(found: Record, evidence: Record) -> Record:
     return {"map": operating_map(found), "disc": disc_section(disc)}
 
 
-def _reach(work: Work) -> Record:
-    """What a pair cancels at the most, as a vibration; where the first pair's lies, by the sensor's phase."""
-    scene, moment = work.scene, work.calibration.residual.usable_pair_moment
-    return {
-        "pairs": scene.disc.chambers // 2,
-        "vibration_m": moment * scene.rotor.influence_coefficient,
-        "direction_rad": -scene.rotor.lag_angle,
-        "time_limit_s": scene.run.time_limit,
-    }
-
-
-def _loop_view(found: Record, evidence: Record) -> Record:
-    run = evidence["closed_loop"].get("calibrated")
-    return {
-        "polar": residual_polar(run, found) if run and found else None,
-        "settling": settling_histogram(_samples(found, evidence)) if found else None,
-    }
-
-
-def _samples(found: Record, evidence: Record) -> list[Record]:
-    ensembles = (evidence.get("consequences") or {}).get("ensembles", [])
-    return [
-        {
-            "title": title,
-            "edges_s": ensembles[place]["settling_time_s"]["edges"],
-            "counts": ensembles[place]["settling_time_s"]["counts"],
-            "runs": ensembles[place]["members"],
-            "not_settled": ensembles[place]["probability"]["not_settled"]["value"],
-            "time_limit_s": found["time_limit_s"],
-        }
-        for place, title in _GAINS.items()
-        if place < len(ensembles)
-    ]
-
-
 SECTION: Final = Section(
     name="operation", title="Where it works", place="report", collect=_collect, show=_view
 )
-LOOP: Final = Section(name="loop", title="Loop and tuning", place="report", collect=_reach, show=_loop_view)

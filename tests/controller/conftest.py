@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from ringbalance.controller.liquid_ring import compiled_column
 from ringbalance.controller.liquid_ring.interval import Passage, pass_time
 from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, Switch
 from ringbalance.controller.liquid_ring.transfer import Drive
@@ -174,6 +175,18 @@ def calibrated(scene: models.Scene) -> BalancerModel:
 
 
 @pytest.fixture(scope="session")
+def plant_of() -> Callable[..., Dynamics]:
+    """Terms of a plant for a scene and a balancer."""
+
+    def make(scene: models.Scene, model: BalancerModel, *terms: str) -> Dynamics:
+        found = dynamics_of(scene=scene, model=model, modelled=terms)
+        assert found is not None
+        return found
+
+    return make
+
+
+@pytest.fixture(scope="session")
 def plant(scene: models.Scene) -> Callable[..., Dynamics]:
     """Terms of a plant for a balancer, with changes to the scene's gas and tube."""
 
@@ -185,6 +198,34 @@ def plant(scene: models.Scene) -> Callable[..., Dynamics]:
         return found
 
     return make
+
+
+@dataclass(frozen=True)
+class Forces:
+    """The compiled forces of a plant's column, with total fill 0.5."""
+
+    dynamics: Dynamics
+
+    def steady(
+        self, fills: tuple[float, float], gases: tuple[float, float], *, primed: bool
+    ) -> tuple[float, bool, bool]:
+        """Velocity out of chamber 0, whether separated, whether the tube holds a column."""
+        known = self.dynamics.kept_plant(total=0.5)[0]
+        return compiled_column.steady(known, *fills, *gases, primed, 0.0)
+
+    def accelerations(
+        self, fills: tuple[float, float], gases: tuple[float, float], *, speed: float, primed: bool = True
+    ) -> tuple[float, float]:
+        """Of a full and of a separated column that flows out of chamber 0."""
+        known = self.dynamics.kept_plant(total=0.5)[0]
+        at = compiled_column.ends(known, *fills, *gases, 1)
+        return compiled_column.accelerations(known, at, speed, 1, primed, 0.0)
+
+
+@pytest.fixture(scope="session")
+def forces() -> Callable[[Dynamics], Forces]:
+    """Forces of a plant's column."""
+    return Forces
 
 
 @pytest.fixture(scope="session")

@@ -80,38 +80,59 @@ class Second:
         )
         return float(rho * disc.axial_width * found[0])
 
-    def directed(self, x: float, y: float, p: float, q: float, *, primed: bool, back: bool) -> float:
-        """Velocity from a chamber at x and p to one at y and q."""
+    def directed(
+        self, x: float, y: float, p: float, q: float, *, primed: bool, back: bool
+    ) -> tuple[float, bool]:
+        """Velocity from a chamber at x and p to one at y and q, and whether the tube is full then."""
         tube, rho = self.scene.tube, self.scene.liquid.density
         own, other = self.depth(self.surface(x)), self.depth(self.surface(y))
         surplus = p - q + own - max(other, self.port)
         if own < self.port or surplus <= 0:
-            return 0.0
+            return 0.0, False
         k = tube.drag_coefficient or 0.0
         siphon = math.sqrt(2 * surplus / rho / (k + 1))
         if tube.hump_radius is None:
-            return siphon if max(p, q) > 0 and (primed or not back) else 0.0
+            flows = max(p, q) > 0 and (primed or not back)
+            return (siphon, True) if flows else (0.0, False)
         hump = self.depth(tube.hump_radius)
         cavity = self.scene.liquid.vapour_pressure - self.scene.gas.ambient_pressure
         margin = p - (q if other < self.port else cavity) + own - hump
         push = max(other - self.port, 0.0) if tube.hump_gas == "trapped" else 0.0
-        if margin <= 0 or not (primed or p - q + own - hump - push > 0):
-            return 0.0
+        lifted = min(margin, p - q + own - hump - push)
+        if margin <= 0 or not (primed or lifted > 0):
+            return 0.0, False
         share = 1 - tube.hump_position if back else tube.hump_position
 
-        def excess(u: float) -> float:
-            alpha = float(self.alpha(math.log(max(u, 1e-2))))
-            return (alpha + share * k) * u * u / 2 - margin / rho
+        def under(pressure: float) -> float:
+            def excess(u: float) -> float:
+                alpha = float(self.alpha(math.log(max(u, 1e-2))))
+                return (alpha + share * k) * u * u / 2 - pressure / rho
 
-        return min(siphon, float(brentq(excess, 1e-12, 1e4, xtol=1e-14)))
+            return float(brentq(excess, 1e-12, 1e4, xtol=1e-14))
+
+        if primed:
+            return min(siphon, under(margin)), True
+        # Gas stays over the crest below a Froude number of 0.6, and is gone above 1.1.
+        froude = under(lifted) / (self.scene.rotor.speed * math.sqrt(tube.hump_radius * tube.bore))
+        part = min(max((froude - 0.6) / 0.5, 0.0), 1.0)
+        gone = part * part * (3 - 2 * part)
+        broken = under(lifted + gone * (margin - lifted))
+        return min(siphon, broken), broken >= siphon or (other >= self.port and gone > 0.5)
 
     def velocity(self, x: float, total: float, p: float, *, primed: bool = True) -> float:
-        ahead = self.directed(x, total - x, p, 0.0, primed=primed, back=False)
-        return ahead or -self.directed(total - x, x, 0.0, p, primed=primed, back=True)
+        return self.flow(x, total, p, primed=primed)[0]
+
+    def flow(self, x: float, total: float, p: float, *, primed: bool) -> tuple[float, bool]:
+        """Velocity, and whether the tube is full then."""
+        ahead, full = self.directed(x, total - x, p, 0.0, primed=primed, back=False)
+        if ahead > 0:
+            return ahead, full
+        back, full = self.directed(total - x, x, 0.0, p, primed=primed, back=True)
+        return -back, full
 
     def after(self, x: float, total: float, p: float, duration: float, *, primed: bool) -> tuple[float, bool]:
         """Fill after a stretch of constant pressure, and whether a column is left."""
-        start = self.velocity(x, total, p, primed=primed)
+        start, primed = self.flow(x, total, p, primed=primed)
         largest = self.scene.disc.max_fill_ratio
         lowest, highest = max(0.0, total - largest), min(total, largest)
         limit = lowest if start > 0 else highest
@@ -121,19 +142,24 @@ class Second:
         def gone(_: float, state: np.ndarray) -> float:
             return float(state[0] - limit)
 
-        gone.terminal = True  # type: ignore[attr-defined]
+        def fills_up(_: float, state: np.ndarray) -> float:
+            return 0.5 - self.flow(float(state[0]), total, p, primed=False)[1]
+
+        gone.terminal = fills_up.terminal = True  # type: ignore[attr-defined]
         found = solve_ivp(
-            lambda _, state: [-self.rate * self.velocity(float(state[0]), total, p)],
+            lambda _, state: [-self.rate * self.velocity(float(state[0]), total, p, primed=primed)],
             (0.0, duration),
             [x],
             method="DOP853",
             rtol=1e-8,
             atol=1e-10,
-            events=gone,
+            events=gone if primed else (gone, fills_up),
         )
+        if not primed and found.t_events[1].size:
+            return self.after(float(found.y[0, -1]), total, p, duration - float(found.t[-1]), primed=True)
         end = limit if found.t_events[0].size else float(found.y[0, -1])
         empty = end == limit and limit in {0.0, total}
-        return end, not empty and self.velocity(end, total, p) != 0
+        return end, primed and not empty and self.velocity(end, total, p) != 0
 
 
 def cycles(run: Simulation) -> Iterator[tuple[float, float, list[Injection]]]:

@@ -18,7 +18,7 @@ from ringbalance.controller.document import simulation_document
 from ringbalance.controller.liquid_ring.plant import LiquidRing, initial_state
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.loop import MAX_SAMPLES, simulate
-from ringbalance.controller.simulation import Outcome, Simulation
+from ringbalance.controller.simulation import Outcome, Simulation, Verdict
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_law, paper_model
 from ringbalance.scene.faults import SceneError
@@ -278,7 +278,9 @@ def test_dipping_below_the_limit_at_the_end_is_not_settling(scene: Scene, model:
     end = settled.settling_time + 1.2
     cut = simulate(replace(with_noise(scene), run=replace(scene.run, time_limit=end)), model)
     assert cut.amplitude[-1] <= cut.limit
-    assert cut.outcome is Outcome.HOVERING
+    assert cut.outcome is Outcome.HOLD_INCOMPLETE
+    assert cut.verdict is Verdict.NOT_SETTLED
+    assert "raise run.time_limit" in cut.status
     assert not cut.settled
 
 

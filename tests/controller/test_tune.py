@@ -16,7 +16,10 @@ from ringbalance.cli import main
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.tuning.loop_factor import vibration_rates
 from ringbalance.controller.tuning.margins import loop_margins
+from ringbalance.controller.tuning.recommendation import factor_uncertainty
 from ringbalance.controller.tuning.tune import Tuning, tune, tuning_document
+from ringbalance.reduced_model.calibration import calibrated_model
+from ringbalance.reduced_model.chamber.inputs import half_widths, shifted
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.models import InputUncertainty, Scene
@@ -26,7 +29,7 @@ MEMBERS = 300
 
 def tuned(scene: Scene, **more: Any) -> Tuning:
     asked = replace(scene, sensor=replace(scene.sensor, amplitude_noise=1e-8, phase_noise=0.005))
-    return tune(asked, model_of=paper_model, members=MEMBERS, runs=3, **more)
+    return tune(asked, paper_model(asked), members=MEMBERS, runs=3, **more)
 
 
 @pytest.fixture(scope="module")
@@ -101,6 +104,31 @@ def test_an_uncertain_input_counts_by_what_it_does_to_the_rate(scene: Scene) -> 
     assert wider.gain < exact.gain
 
 
+def test_a_device_solved_again_stands_for_its_law_made_again(paper_scene: Scene) -> None:
+    """Every input that matters: its effect on the rate under a law that is calibrated with it."""
+    law = calibrated_model(paper_scene)
+    found = {part.name: part.uncertainty for part in factor_uncertainty(paper_scene, law).parts}
+    rate = float(np.max(np.mean(vibration_rates(paper_scene, law), axis=1)))
+    for quantity in ("bore", "length", "pressure", "hump_position", "outer_radius"):
+        width = half_widths(paper_scene)[quantity]
+        moved = [shifted(scene=paper_scene, quantity=quantity, change=side * width) for side in (-1, 1)]
+        rates = [float(np.max(np.mean(vibration_rates(s, calibrated_model(s)), axis=1))) for s in moved]
+        effect = max(abs(one / rate - 1) for one in rates)
+        assert found[quantity] == pytest.approx(effect, rel=0.05, abs=2e-4), quantity
+
+
+def test_simulate_names_the_gain_that_tune_recommends(paper_scene: Scene) -> None:
+    law = paper_model(paper_scene)
+    high = replace(
+        with_settings(paper_scene, proportional=4 * paper_scene.controller.proportional),
+        run=replace(paper_scene.run, time_limit=20.0),
+    )
+    run = simulate(high, law)
+    gain = tune(high, law, members=10, runs=1).gain
+    assert gain is not None
+    assert f"to {gain * 1e-6:.3g} s/um" in run.status
+
+
 def test_the_recommended_gain_settles_its_runs(found: Tuning) -> None:
     assert found.succeeded
     assert found.settling is not None
@@ -154,7 +182,7 @@ def test_a_limit_that_cannot_be_reached_is_said(scene: Scene, settings: dict[str
 def test_gas_that_drives_nothing_gives_no_gain(scene: Scene, calibrated: BalancerModel) -> None:
     # 0.1 MPa lifts no liquid over the crest.
     weak = replace(scene, gas=replace(scene.gas, pressure=0.1e6))
-    answer = tune(weak, model_of=lambda _: calibrated)
+    answer = tune(weak, calibrated)
     assert answer.gain is None
     assert "drives no liquid" in answer.status
     json.dumps(tuning_document(answer), allow_nan=False)

@@ -107,9 +107,8 @@ def test_claims_judged_on_another_disc_are_distinguished(evidence: Record) -> No
     for case in changed["verification"]:
         case["scene_sha256"] = changed["scene"]["values_sha256"]
     assert "judged on it, not on this one" not in summary.lead_sentence(changed)
-    marked = next(case for case in summary.claims(changed) if case in summary.headlines(changed))
+    marked = summary.claims(changed)[0]
     marked["scene_sha256"] = "0" * 64
     assert summary.elsewhere(marked, changed)
-    assert marked not in summary.headlines(changed)
     assert "1 of them" in summary.lead_sentence(changed)
     assert "Judged on the paper’s disc" in render(changed)["report.html"]

@@ -160,7 +160,8 @@ def test_thresholds_of_the_papers_disc(first: Report) -> None:
     # rho omega^2 (R2^2 - r_m^2)/2 with 44.5 mm, 31.5 mm and 10 000 rpm, and Eq. 19 with u = 0, by hand.
     assert point["priming_pressure_vented_Pa"] == pytest.approx(0.5417e6, rel=1e-3)
     assert point["stall_pressure_paper_Pa"] == pytest.approx(0.381e6, rel=1e-3)
-    # Density 0.2 % and speed 0.1 %, squared in the pressure, give 0.28 %; the radii add less than twice that.
+    # Density 0.2 % and speed 0.1 %, squared in the pressure, alone give 0.28 %; the radii add less than
+    # three times that.
     share = point["stall_uncertainty"] / point["stall_pressure_Pa"]
     assert math.hypot(0.002, 0.002) < share < 3 * math.hypot(0.002, 0.002)
 

@@ -9,8 +9,6 @@ from ringbalance.reports.summary import (
     CLAIM_VERDICTS,
     checks,
     claims,
-    headlines,
-    key_numbers,
     lead_sentence,
     tone,
     verdict_counts,
@@ -49,19 +47,3 @@ def test_the_lead_is_counted(evidence: Record) -> None:
 def test_claims_stand_in_the_papers_order(evidence: Record) -> None:
     evidence["verification"].reverse()
     assert [case["number"] for case in claims(evidence)] == [1, 6, 9, 10, 11, 14]
-    assert [case["number"] for case in headlines(evidence)] == [6, 9, 10, 11]
-
-
-def test_without_marked_claims_those_that_fell_are_reported(evidence: Record) -> None:
-    for case in evidence["verification"]:
-        case["headline"] = False
-    assert [case["number"] for case in headlines(evidence)] == [6, 9, 10]
-
-
-def test_numbers_come_with_their_bars(evidence: Record) -> None:
-    shown = {item["label"]: item for item in key_numbers(evidence)}
-    assert (shown["Lever arm λ"]["value"], shown["Lever arm λ"]["half_width"]) == ("72.040", "±\u202f0.024")
-    assert shown["Lever arm λ"]["unit"] == "mm"
-    assert shown["Drag coefficient k"]["paper"] == "about 50"
-    assert shown["Velocity in the tube"]["half_width"] == "±\u202f0.3"
-    assert all(item["half_width"] for item in shown.values())

@@ -285,10 +285,10 @@ def test_table_of_a_scene(newcomer_document: dict[str, Any], load: Load) -> None
     rows = {(row.group, row.quantity): row for row in scene_table(load(newcomer_document))}
     assert rows["Disc", "outer radius R2"].value == "60 mm"
     assert rows["Rotor", "speed"].value == "6000 rpm"
-    assert rows["Rotor", "speed"].note == "plus or minus 1 % (95 %)"
-    assert rows["Rotor", "lag angle"].note == "plus or minus 3 deg (95 %)"
+    assert rows["Rotor", "speed"].uncertainty == "1 %"
+    assert rows["Rotor", "lag angle"].uncertainty == "3 deg"
     assert (rows["Rotor", "speed"].origin, rows["Rotor", "lag angle"].origin) == ("given", "default")
-    assert rows["Connecting tube", "bore d"].note == "plus or minus 0.02 mm (95 %)"
+    assert rows["Connecting tube", "bore d"].uncertainty == "0.02 mm"
     assert rows["Connecting tube", "siphon crest radius"].value == "none: always a full siphon"
     assert rows["Liquid", "temperature"].value == "25 degC"
     assert rows["Run", "tolerance"].value == "1 %"

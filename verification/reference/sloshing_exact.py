@@ -20,7 +20,7 @@ from ringbalance.scene.arrays import ComplexArray, FloatArray
 
 
 @dataclass(frozen=True, kw_only=True)
-class _CosineWaves:
+class CosineWaves:
     """The free surface's condition on cosines; lengths in outer radii, times in 1/omega."""
 
     central_angle: float
@@ -35,14 +35,14 @@ class _CosineWaves:
     """Of -psi: integral of cos(m ...) sin(n ...), rows m."""
 
 
-def cosine_waves(*, central_angle: float, depth: float, terms: int = 160) -> _CosineWaves:
+def cosine_waves(*, central_angle: float, depth: float, terms: int = 160) -> CosineWaves:
     """The problem at a depth H = ln(R2/a); frequencies of the lowest modes converge like `terms`^-3."""
     n = np.arange(1, terms + 1)
     k = np.asarray(np.pi * n / central_angle, dtype=np.float64)
     rows, columns = np.meshgrid(n, n, indexing="ij")
     odd = (rows + columns) % 2 == 1
     gap = np.where(odd, columns**2 - rows**2, 1)
-    return _CosineWaves(
+    return CosineWaves(
         central_angle=central_angle,
         wavenumber=k,
         mass=np.diag(1 / np.tanh(k * depth)) * central_angle / 2,
@@ -51,18 +51,16 @@ def cosine_waves(*, central_angle: float, depth: float, terms: int = 160) -> _Co
     )
 
 
-def cosine_frequencies(waves: _CosineWaves, *, modes: int) -> FloatArray:
+def cosine_frequencies(waves: CosineWaves, *, modes: int) -> FloatArray:
     """Lowest natural frequencies over the speed, s: (s^2 mass + 2 i s mixed - spring) B = 0, made linear."""
     n = waves.wavenumber.size
-    zero, one = np.zeros((n, n)), np.eye(n)
-    left = np.block([[zero, one], [waves.spring, -2j * waves.mixed]])
-    right = np.block([[one, zero], [zero, waves.mass]])
-    s = eigvals(left, right)
+    mass = np.diagonal(waves.mass)[:, None]
+    s = eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [waves.spring / mass, -2j * waves.mixed / mass]]))
     real = s[np.abs(s.imag) < 1e-6 * np.abs(s)].real
     return np.asarray(np.sort(real[real > 0])[:modes], dtype=np.float64)
 
 
-def cosine_amplification(waves: _CosineWaves, *, frequency_ratio: float) -> float:
+def cosine_amplification(waves: CosineWaves, *, frequency_ratio: float) -> float:
     """Swing of the first moment under G = r exp(i angle), over that of a surface that follows at once."""
     load = _load(waves)
     swing, still = (
@@ -75,7 +73,7 @@ def cosine_amplification(waves: _CosineWaves, *, frequency_ratio: float) -> floa
     return size(swing) / size(still)
 
 
-def cosine_pressure_amplification(waves: _CosineWaves, *, frequency_ratio: float, depth: float) -> float:
+def cosine_pressure_amplification(waves: CosineWaves, *, frequency_ratio: float, depth: float) -> float:
     """Swing of the mean wall pressure under the same forcing, over that of such a surface.
 
     Cosines have no mean, so phi has the same one, none, on wall and surface, and p' is left with the
@@ -89,7 +87,7 @@ def cosine_pressure_amplification(waves: _CosineWaves, *, frequency_ratio: float
     return float(abs(1 + 2 * stream / drive))
 
 
-def _load(waves: _CosineWaves) -> ComplexArray:
+def _load(waves: CosineWaves) -> ComplexArray:
     """Integrals of exp(i angle) with each cosine."""
     half = waves.central_angle / 2
 
@@ -100,7 +98,7 @@ def _load(waves: _CosineWaves) -> ComplexArray:
 
 
 def _potential(
-    waves: _CosineWaves, frequency_ratio: float, load: ComplexArray, *, still: bool
+    waves: CosineWaves, frequency_ratio: float, load: ComplexArray, *, still: bool
 ) -> ComplexArray:
     """B, of the forced waves or of a surface that follows at once."""
     s = frequency_ratio

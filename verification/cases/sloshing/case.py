@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
 
+from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.sloshing.modes import (
     default_sloshing_cells,
     natural_frequencies,
@@ -14,11 +16,12 @@ from ringbalance.physics.sloshing.modes import (
     sloshing_modes,
 )
 from ringbalance.physics.sloshing.response import SloshingResponse, sloshing_response
-from ringbalance.physics.sloshing.system import sloshing_system
+from ringbalance.physics.sloshing.system import SloshingSystem, sloshing_system
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
 from ringbalance.verification.reference.sloshing_exact import (
+    CosineWaves,
     cosine_amplification,
     cosine_frequencies,
     cosine_pressure_amplification,
@@ -35,8 +38,21 @@ _CORIOLIS: Final = {"coriolis_off_by_a_percent": 1.01}
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     bare = replace(scene.disc, plate_thickness=0.0)
-    depths = _depths(bare)
-    fills = np.linspace(0.02, 1.0, _POINTS[level]) * scene.disc.max_fill_ratio
+    judged = {
+        "still": _still_deviation(bare),
+        "frequencies": _frequency_deviation(bare, _CORIOLIS.get(defect or "", 1.0)),
+        **_forced_deviations(bare, defect),
+    }
+    return replace(
+        _overview(scene, _POINTS[level]),
+        found={name: Found(value=value) for name, value in judged.items()},
+    )
+
+
+@lru_cache(maxsize=2)
+def _overview(scene: Scene, points: int) -> Evidence:
+    """What is shown of the scene's own disc; nothing of it is judged, so no mutation changes it."""
+    fills = np.linspace(0.02, 1.0, points) * scene.disc.max_fill_ratio
     ratios = sloshing_modes(
         disc=scene.disc, fill_ratio=fills, modes=_MODES, cells=_COARSE
     ).frequency_ratio.value
@@ -44,11 +60,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     equal = _response(scene, np.array([scene.disc.initial_fill]))
     met = dict(resonant_fills(disc=scene.disc, modes=_MODES))
     return Evidence(
-        found={
-            "still": Found(value=_still_deviation(bare, depths)),
-            "frequencies": Found(value=_frequency_deviation(bare, depths, _CORIOLIS.get(defect or "", 1.0))),
-            **{name: Found(value=value) for name, value in _forced_deviations(bare, depths, defect).items()},
-        },
+        found={},
         numbers={
             "first": float(ratios[-1, 0]),
             "third": met.get(3, 0.0),
@@ -61,48 +73,51 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 
 
 def _depths(disc: Disc) -> FloatArray:
-    radii = sloshing_modes(disc=disc, fill_ratio=_FILLS, modes=1).surface_radius
-    return np.asarray(np.log(disc.outer_radius / radii), dtype=np.float64)
+    return np.asarray(np.log(disc.outer_radius / surface_radius(disc=disc, fill_ratio=_FILLS)))
 
 
-def _still_deviation(disc: Disc, depths: FloatArray) -> float:
-    found = _frequencies(disc, depths, 0.0)
+@lru_cache(maxsize=4)
+def _waves(disc: Disc) -> tuple[CosineWaves, ...]:
+    return tuple(cosine_waves(central_angle=disc.central_angle, depth=float(h)) for h in _depths(disc))
+
+
+def _still_deviation(disc: Disc) -> float:
     k = np.pi / disc.central_angle * np.arange(1, _MODES + 1)
-    exact = np.sqrt(k * np.tanh(np.outer(depths, k)))
-    return float(np.abs(found / exact - 1).max())
+    exact = np.sqrt(k * np.tanh(np.outer(_depths(disc), k)))
+    return float(np.abs(_frequencies(disc, 0.0) / exact - 1).max())
 
 
-def _frequencies(disc: Disc, depths: FloatArray, factor: float) -> FloatArray:
+@lru_cache(maxsize=4)
+def _frequencies(disc: Disc, factor: float) -> FloatArray:
     """With a factor on the Coriolis force: zero for a chamber that does not turn, or a mutation."""
-    cells = default_sloshing_cells(disc=disc, modes=_MODES)[0]
-    radii = disc.outer_radius * np.exp(-depths)
-    systems = [sloshing_system(disc=disc, surface_radius=float(a), cells=cells) for a in radii]
-    turned = [replace(system, coriolis=factor * system.coriolis) for system in systems]
+    turned = [replace(system, coriolis=factor * system.coriolis) for system in _systems(disc)]
     return np.array([natural_frequencies(system)[:_MODES] for system in turned])
 
 
-def _frequency_deviation(disc: Disc, depths: FloatArray, factor: float) -> float:
-    found = _frequencies(disc, depths, factor)
-    exact = np.array(
-        [
-            cosine_frequencies(cosine_waves(central_angle=disc.central_angle, depth=float(h)), modes=_MODES)
-            for h in depths
-        ]
-    )
-    return float(np.abs(found / exact - 1).max())
+@lru_cache(maxsize=1)
+def _systems(disc: Disc) -> tuple[SloshingSystem, ...]:
+    cells = default_sloshing_cells(disc=disc, modes=_MODES)[0]
+    radii = surface_radius(disc=disc, fill_ratio=_FILLS)
+    return tuple(sloshing_system(disc=disc, surface_radius=float(a), cells=cells) for a in radii)
 
 
-def _forced_deviations(disc: Disc, depths: FloatArray, defect: str | None) -> dict[str, float]:
+def _frequency_deviation(disc: Disc, factor: float) -> float:
+    return float(np.abs(_frequencies(disc, factor) / _exact_frequencies(disc) - 1).max())
+
+
+@lru_cache(maxsize=1)
+def _exact_frequencies(disc: Disc) -> FloatArray:
+    return np.array([cosine_frequencies(waves, modes=_MODES) for waves in _waves(disc)])
+
+
+def _forced_deviations(disc: Disc, defect: str | None) -> dict[str, float]:
     """Of the swings of moment and wall pressure.
 
     Turning gravity backwards is the same as turning the Coriolis force of the reference round.
     """
-    found = sloshing_response(
-        disc=disc, fill_ratio=_FILLS, angular_velocity=1.0, kinematic_viscosity=0.0, gravity=0.0
-    )
+    found = _swinging(disc)
     moments, pressures = [], []
-    for depth in depths:
-        waves = cosine_waves(central_angle=disc.central_angle, depth=float(depth))
+    for waves, depth in zip(_waves(disc), _depths(disc), strict=True):
         turned = replace(waves, mixed=-waves.mixed) if defect == "forcing_backwards" else waves
         moments.append(cosine_amplification(turned, frequency_ratio=1.0))
         pressures.append(cosine_pressure_amplification(turned, frequency_ratio=1.0, depth=float(depth)))
@@ -111,6 +126,13 @@ def _forced_deviations(disc: Disc, depths: FloatArray, defect: str | None) -> di
         "forced": float(np.abs(found.amplification.value / np.array(moments) - 1).max()),
         "pressure": float(np.abs(taken.value / np.array(pressures) - 1).max()),
     }
+
+
+@lru_cache(maxsize=1)
+def _swinging(disc: Disc) -> SloshingResponse:
+    return sloshing_response(
+        disc=disc, fill_ratio=_FILLS, angular_velocity=1.0, kinematic_viscosity=0.0, gravity=0.0
+    )
 
 
 def _response(scene: Scene, fills: FloatArray) -> SloshingResponse:

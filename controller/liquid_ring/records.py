@@ -1,0 +1,111 @@
+"""Records that compiled code works on: a plant's constants, and one pair of chambers in motion."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from ringbalance.controller.liquid_ring.transfer import Event
+
+Record = Any
+"""One element of an array with one of the types below; compiled code changes it in place."""
+
+HYDROSTATIC: Final = 0
+"""P(x), Pa."""
+HEAD: Final = 1
+"""ln((k + 1) u^2/2) over ln u."""
+TO_CREST: Final = 2
+"""ln((alpha + k_up) u^2/2) over ln u, flow out of chamber 0."""
+RETURN_CREST: Final = 3
+"""The same for flow out of chamber 1."""
+PIECES: Final = 4096
+"""Room for the pieces of a table, fixed, so that compiled code serves every law."""
+
+_PLANT_REAL: Final = (
+    "density",  # kg/m^3
+    "length",  # L, m
+    "crest_end",  # fraction of the path to the end of the crest's arc, flow out of chamber 0
+    "return_crest_end",  # the same for flow out of chamber 1
+    "port_pressure",  # D_p, Pa
+    "column_pressure",  # D_m, Pa
+    "vapour_pressure",  # gauge, Pa
+    "released",  # as in `SiphonCrest`
+    "froude_velocity",  # m/s
+    "gas_off",  # gauge, Pa, at or below which a chamber counts as without gas in a tube without a crest
+    "gas_factor",  # gas pressure on the liquid over the one at the place of measurement
+    "valve_lag",  # s
+    "gas_pressure",  # of the supply, gauge, Pa
+    "ambient_pressure",  # absolute, Pa
+    "temperature",  # of supply and surroundings, K
+    "passing",  # C p_0 sqrt(1/T_0) of the line, m^3/(s K^(1/2))
+    "critical_ratio",
+    "heat_capacity_ratio",  # exponent of the gas: 1 isothermal, gamma adiabatic
+    "dead_volume",  # m^3
+    "tube_area",  # S, m^2
+    "chamber_volume",  # V, m^3
+    "max_fill_ratio",
+    "total",  # x_A + x_C
+    "residual",  # fill of a driven chamber that no command goes below
+    "relative_error",  # allowed to one step
+)
+_PLANT_WHOLE: Final = (
+    "crest",  # whether there is one
+    "trapped",
+    "one_way",  # whether liquid leaves only a chamber that has gas, as in the paper's Eq. 19
+    "inertia",
+    "line",  # whether valve and line take time to pass gas
+    "most_steps",
+)
+PLANT: Final = np.dtype(
+    [(name, np.float64) for name in _PLANT_REAL]
+    + [(name, np.int64) for name in _PLANT_WHOLE]
+    + [
+        ("table_start", np.float64, (4,)),
+        ("table_step", np.float64, (4,)),
+        ("pieces", np.int64, (4,)),
+        ("cells", np.float64, (4, PIECES, 6)),
+    ]
+)
+"""Constants of a plant with moving liquid, filling gas and late valves."""
+
+X: Final = 0
+U: Final = 1
+P: Final = 2
+Q: Final = 3
+WORK: Final = 6
+_MOTION_REAL: Final = (
+    "opens",  # s from now until the valve of `chamber` opens, infinite for never
+    "closes",
+    "log_speed",  # of the factor on the law's velocity
+    "length",  # of the next step, s
+    "started",  # x at the last start
+    "ran_back",  # change of x by flow out of the chamber not driven last, both valves closed
+    "fill_before",  # of the driven chamber at the command
+    "least_fill",  # of the driven chamber since
+    "closing_pressure",  # of the driven chamber's gas when its valve closed, gauge, Pa
+    "run_dry",  # time for which its valve stays open to the empty chamber, s
+)
+_MOTION_WHOLE: Final = (
+    "primed",
+    "valve_0",  # whether open
+    "valve_1",
+    "direction",  # +1 out of chamber 0, -1 out of chamber 1, 0 at rest
+    "balanced",  # whether a further start would be round-off
+    "stopped",  # direction of the last flow that ended
+    "steps",
+    "chamber",  # 0 or 1: the one driven last
+    "regime_start",  # values of `Regime`
+    "regime_end",
+    "event",  # index into `EVENTS`
+)
+MOTION: Final = np.dtype(
+    [("state", np.float64, (8,))]  # x, u, p, q (absolute), m R of both gases, work of both gases
+    + [(name, np.float64) for name in _MOTION_REAL]
+    + [(name, np.int64) for name in _MOTION_WHOLE]
+)
+"""One pair of chambers; x of chamber 1 is total - x, here as everywhere, so liquid is conserved."""
+EVENTS: Final = tuple(Event)
+"""Events by number."""
+WORKSPACE: Final = (24, 8)
+"""Shape of the array that a step of a pair works in."""

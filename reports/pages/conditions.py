@@ -1,0 +1,107 @@
+"""The numbers to use, with what makes each uncertain, and the inputs on which they rest."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from ringbalance.reports.figures.operation import tornado
+from ringbalance.reports.figures.style import Drawing
+from ringbalance.reports.numbers import MISSING, display_unit, given, number, percent, shown
+from ringbalance.reports.pages.requirements import input_name, resting
+from ringbalance.reports.section import Cells, Record, Section, Table
+from ringbalance.reports.traces import read, traced
+
+_NAMES: Final = {
+    "lambda": "Lever arm λ, moment per transferred mass",
+    "drag_coefficient": "Drag coefficient k",
+    "velocity": "Velocity in the tube at equal fills",
+    "wall_pressure": "Wall pressure at the largest fill",
+    "moment": "Moment of one chamber at the largest fill",
+    "usable_moment": "Usable moment of one pair",
+    "chamber_volume": "Volume of one chamber",
+    "crest_pressure": "Pressure over the siphon crest",
+    "cavitation_margin": "Cavitation margin",
+}
+_DRAWN: Final = ("velocity", "usable_moment", "lambda")
+_REGIMES: Final = {
+    "blocked": "is blocked",
+    "siphon": "runs as a full siphon",
+    "separated": "runs with a separated column",
+    "reverse": "runs in reverse",
+    "cannot be told": "runs full or with a separated column, which cannot be told",
+}
+
+
+def _view(_own: Record, evidence: Record) -> Record:
+    return {"state": _state(evidence), "budgets": _budget_table(evidence), "tornado": _tornado(evidence)}
+
+
+def _state(evidence: Record) -> str:
+    """At which gas pressure and fill the velocities hold, and how the tube then runs."""
+    point = evidence["operating_point"]
+    at = f"At {given(point['gas_pressure_Pa'], 'Pa')} and equal fills of {given(point['fill_ratio'], '1')}"
+    if point["k"] is None:
+        return f"{at} nothing flows: the tube {_REGIMES[point['regime']]}."
+    return (
+        f"{at} the tube {_REGIMES[point['regime']]}; the flow is {point['flow_state']}, Re "
+        f"{traced(number(point['reynolds'], digits=2), 'operating_point.reynolds')}. Below "
+        f"{read(evidence, 'operating_point.stall_pressure_Pa', 'Pa', width=point['stall_uncertainty'])} a "
+        "full siphon stops before the chamber is empty."
+    )
+
+
+def _budget_table(evidence: Record) -> Table:
+    budgets = evidence["calibration"].get("budgets") or {}
+    return Table(
+        caption="Numbers to use, with their expanded uncertainties (95 %): ± is the root of the sum of "
+        "squares of the three parts. Pressures are gauge.",
+        heads=("Quantity", "Value ± total", "Numerical", "Inputs", "Model", "Largest input", "The paper"),
+        rows=[_row(evidence, name) for name in _NAMES if name in budgets],
+        style="",
+    )
+
+
+def _tornado(evidence: Record) -> Drawing | None:
+    titles = {name: _NAMES[name] for name in _DRAWN}
+    return tornado(evidence["calibration"].get("budgets") or {}, titles)
+
+
+def _row(evidence: Record, name: str) -> Cells:
+    path, budget = f"calibration.budgets.{name}", evidence["calibration"]["budgets"][name]
+    unit = display_unit(budget["unit"], budget["value"])
+    parts = [
+        traced(number(budget[part] * unit.factor, digits=2), f"{path}.{part}")
+        for part in ("numerical", "input", "model")
+    ]
+    value = traced(shown(budget["value"], budget["unit"], budget["total"]), f"{path}.value")
+    return _NAMES[name], value, *parts, _largest(evidence, budget), _paper(evidence, name)
+
+
+def _largest(evidence: Record, budget: Record) -> str:
+    inputs = budget["inputs"]
+    if not inputs or not budget["value"]:
+        return MISSING
+    path = max(inputs, key=inputs.__getitem__)
+    return resting(evidence, path) or input_name(path)
+
+
+def _paper(evidence: Record, name: str) -> str:
+    paper, point = evidence["paper"], evidence["operating_point"]
+    if name == "lambda":
+        return f"{given(paper['lambda_m'], 'm')} within {percent(paper['lambda_spread'])}"
+    if name == "drag_coefficient":
+        return f"about {traced(given(paper['drag_coefficient'], '1'), 'paper.drag_coefficient')}"
+    if name == "velocity":
+        return (
+            read(evidence, "operating_point.velocity_paper_m_s", "m/s") + " by Eq. 19" if point else MISSING
+        )
+    if name == "wall_pressure":
+        return read(evidence, "calibration.chamber.wall_pressure_paper_Pa.-1", "Pa", digits=4) + " by Eq. 12"
+    if name == "moment":
+        return read(evidence, "calibration.chamber.moment_paper_kg_m.-1", "kg m", digits=4) + " by Eq. 7"
+    return MISSING
+
+
+SECTION: Final = Section(
+    name="conditions", title="Numbers to use, and their conditions", place="report", show=_view
+)

@@ -1,0 +1,129 @@
+"""What is validated, what is verified, what is assumed; and a credibility assessment after NASA-STD-7009B."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from ringbalance.reports import summary
+from ringbalance.reports.pages.requirements import input_name
+from ringbalance.reports.section import Cells, Record, Section, Table
+
+_MEASURED: Final = ("friction_blend", "mixing_length")
+"""Cases of other kinds than validation whose reference is measured: parts of the model."""
+_UNSURE: Final = ("assumed", "inferred", "default")
+
+
+def _view(_own: Record, evidence: Record) -> Record:
+    return {
+        "kinds": _kinds(evidence),
+        "assumed": _origins(evidence),
+        "credibility": _credibility(evidence),
+    }
+
+
+def _of(evidence: Record, *kinds: str) -> list[Record]:
+    return [case for case in evidence["verification"] if case["kind"] in kinds]
+
+
+def _validated(evidence: Record) -> list[Record]:
+    return [
+        case for case in evidence["verification"] if case["kind"] == "validation" or case["id"] in _MEASURED
+    ]
+
+
+def _kinds(evidence: Record) -> Table:
+    validated = _validated(evidence)
+    rest = [case for case in _of(evidence, "code_verification") if case not in validated]
+    rows = [
+        ("Device against measurements", "none exists", "Nothing: no measurement of this device is known."),
+        ("Parts against measurements", _outcome(validated), _titles(validated)),
+        ("Code verification", _outcome(rest), "Solvers against manufactured solutions and closed forms."),
+        (
+            "Solution verification",
+            _outcome(_of(evidence, "solution_verification")),
+            "Discretisation, choice of models, coverage of the printed intervals, extremes.",
+        ),
+        ("Claims of the papers", _outcome(_of(evidence, "claim")), "A model against a model."),
+    ]
+    return Table(
+        caption="What each kind of evidence is and how it came out.",
+        heads=("Kind", "Outcome", "What it compares"),
+        rows=rows,
+        style="",
+    )
+
+
+def _outcome(cases: Sequence[Record]) -> str:
+    counts = summary.verdict_counts(list(cases), tuple(dict.fromkeys(case["verdict"] for case in cases)))
+    return ", ".join(f"{item['count']} {item['verdict']}" for item in counts) or "none run"
+
+
+def _titles(cases: Sequence[Record]) -> str:
+    return "; ".join(case["title"] for case in cases) or "None ran."
+
+
+def _origins(evidence: Record) -> list[str]:
+    """Inputs that nobody gave, by origin."""
+    origins = evidence["scene"].get("origins") or {}
+    found = {
+        origin: sorted(input_name(path) for path, own in origins.items() if own == origin)
+        for origin in _UNSURE[:2]
+    }
+    return [f"{origin.capitalize()}: {', '.join(names)}." for origin, names in found.items() if names]
+
+
+def _credibility(evidence: Record) -> Table:
+    return Table(
+        caption="Credibility after NASA-STD-7009B: levels from 0 (insufficient evidence) to 4, assessed by "
+        "the program’s authors and not reviewed by others.",
+        heads=("Factor", "Level", "Evidence"),
+        rows=[*_development(evidence), *_use(evidence)],
+        style="",
+    )
+
+
+def _development(evidence: Record) -> list[Cells]:
+    checks = summary.checks(evidence)
+    failed = [case for case in checks if case["verdict"] == "failed"]
+    return [
+        (
+            "Data pedigree",
+            "1",
+            "Properties of liquids with source and uncertainty; the device’s data are printed.",
+        ),
+        (
+            "Verification",
+            "1" if failed else "3",
+            f"{_outcome(checks)}; numerical errors are estimated for every quantity, and deliberate errors "
+            "in the code must be noticed.",
+        ),
+        ("Validation", "1", "Parts only, see above; none of the device."),
+    ]
+
+
+def _use(evidence: Record) -> list[Cells]:
+    budgets = evidence["calibration"].get("budgets")
+    origins = (evidence["scene"].get("origins") or {}).values()
+    assumed = sum(origin == "assumed" for origin in origins)
+    return [
+        (
+            "Input pedigree",
+            "1" if assumed else "2",
+            f"{assumed} inputs are assumed." if assumed else "Every input is given, measured or inferred.",
+        ),
+        (
+            "Uncertainty characterisation",
+            "3" if budgets else "1",
+            "Numerical, input and model parts of each main quantity; the closed loop over drawn inputs "
+            "and noise.",
+        ),
+        ("Robustness of results", "2", "Sensitivity to each stated input; not to combinations of them."),
+        ("Use history", "0", "No decision on a built device is known to rest on this program."),
+        ("Management", "2", "Versioned, tested at each change, evidence kept with dates and hashes."),
+    ]
+
+
+SECTION: Final = Section(
+    name="credibility", title="What is validated, verified and assumed", place="report", show=_view
+)

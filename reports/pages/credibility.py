@@ -9,8 +9,6 @@ from ringbalance.reports import summary
 from ringbalance.reports.pages.requirements import input_name
 from ringbalance.reports.section import Cells, Record, Section, Table
 
-_MEASURED: Final = ("friction_blend", "mixing_length")
-"""Cases of other kinds than validation whose reference is measured: parts of the model."""
 _UNSURE: Final = ("assumed", "inferred", "default")
 
 
@@ -26,15 +24,9 @@ def _of(evidence: Record, *kinds: str) -> list[Record]:
     return [case for case in evidence["verification"] if case["kind"] in kinds]
 
 
-def _validated(evidence: Record) -> list[Record]:
-    return [
-        case for case in evidence["verification"] if case["kind"] == "validation" or case["id"] in _MEASURED
-    ]
-
-
 def _kinds(evidence: Record) -> Table:
-    validated = _validated(evidence)
-    rest = [case for case in _of(evidence, "code_verification") if case not in validated]
+    validated = _of(evidence, "validation")
+    rest = _of(evidence, "code_verification")
     rows = [
         ("Device against measurements", "none exists", "Nothing: no measurement of this device is known."),
         ("Parts against measurements", _outcome(validated), _titles(validated)),

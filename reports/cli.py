@@ -39,11 +39,11 @@ def report(
     tolerance: str | None = None,
     models: Models | None = None,
 ) -> int:
-    """Verify, calibrate, simulate and draw: everything, into one HTML file.
+    """Verify, calibrate, simulate and draw: everything, into a report and its annex.
 
     Args:
         scene: the scene file.
-        out: folder for report.html, evidence.json, figures/ and fields/.
+        out: folder for report.html, annex.html, evidence.json, figures/, fields/ and tables/.
         level: "heavy" also runs the cases that take long.
         tolerance: in place of the scene's, such as "0.5 %" or 0.005.
         models: "finest" models every term that has a model, whatever the tolerance.

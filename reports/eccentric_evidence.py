@@ -55,8 +55,8 @@ def collect_eccentric(
         "closed_loop": {"balanced": run},
         **study,
         "verification": verification,
-        "pictures": {"drawn": True, "text": "", "files": []},
         "provenance": provenance(),
+        "pictures": {"drawn": True, "text": "", "files": []},
         "times": {"date": date.today().isoformat()},
     }
 
@@ -71,6 +71,7 @@ def parameters(scene: EccentricScene) -> list[Record]:
             "uncertainty": "",
             "note": entry.presence.meaning,
             "origin": scene.origin_of(f"{name}.{key}"),
+            "path": f"{name}.{key}",
         }
         for name, table in ECCENTRIC_MASS.tables.items()
         if table.record is not None

@@ -149,7 +149,7 @@ class DisplayUnit:
 
 
 _Scale = tuple[str, float] | tuple[str, float, float]
-_SCALES: Final[dict[str, tuple[_Scale, ...]]] = {
+SCALES: Final[dict[str, tuple[_Scale, ...]]] = {
     "m": (("nm", 1e9), ("µm", 1e6, 1e-8), ("mm", 1e3, 1e-4)),
     "Pa": (("Pa", 1.0), ("kPa", 1e-3, 1e3), ("MPa", 1e-6, 1e5)),
     "s": (("ms", 1e3), ("s", 1.0, 0.1)),
@@ -175,7 +175,7 @@ _SCALES: Final[dict[str, tuple[_Scale, ...]]] = {
 
 def display_unit(unit: str, *values: float | None) -> DisplayUnit:
     """The display unit that suits the largest of some SI values; an unknown unit is kept as it is."""
-    scales = _SCALES.get(unit, ((unit, 1.0),))
+    scales = SCALES.get(unit, ((unit, 1.0),))
     units = [DisplayUnit(symbol=s, factor=f, start=start[0] if start else 0.0) for s, f, *start in scales]
     largest = max((abs(value) for value in values if value is not None), default=0.0)
     # 0.1 MPa may arrive as 99 999.999 999: the last bits must not choose the unit.

@@ -24,6 +24,7 @@ from ringbalance.reports.pages.cases import case_view
 from ringbalance.reports.pages.eccentric_scene import BALANCER
 from ringbalance.reports.section import Cells, Record, Table
 from ringbalance.reports.sections import drawings_in, viewed
+from ringbalance.reports.traces import traced
 
 Facts = tuple[tuple[str, str], ...]
 """Labels and texts."""
@@ -76,6 +77,10 @@ def _column(values: list[float], unit: str, *, digits: int = 6) -> list[str]:
     return [fixed(value * display.factor, decimals) for value in values]
 
 
+def _traced(texts: list[str], key: str) -> list[str]:
+    return [traced(text, f"calibration.chamber.{key}.{place}") for place, text in enumerate(texts)]
+
+
 def _relative(values: list[float], reference: list[float]) -> list[float | None]:
     return [value / base if base else None for value, base in zip(values, reference, strict=True)]
 
@@ -86,14 +91,14 @@ def _chamber_table(chamber: Record) -> Table:
     paper, paper_moment = chamber["wall_pressure_paper_Pa"], chamber["moment_paper_kg_m"]
     columns = [
         [short(fill) for fill in chamber["fill_ratio"]],
-        _column(chamber["free_surface_radius_m"], "m", digits=5),
-        _column(pressure, "Pa"),
+        _traced(_column(chamber["free_surface_radius_m"], "m", digits=5), "free_surface_radius_m"),
+        _traced(_column(pressure, "Pa"), "wall_pressure_Pa"),
         [number(u, digits=1) for u in _relative(chamber["wall_pressure_uncertainty"], pressure)],
-        _column(paper, "Pa", digits=4),
+        _traced(_column(paper, "Pa", digits=4), "wall_pressure_paper_Pa"),
         _errors(paper, pressure),
-        _column(moment, "kg m"),
+        _traced(_column(moment, "kg m"), "moment_kg_m"),
         [number(u, digits=1) for u in _relative(chamber["moment_uncertainty"], moment)],
-        _column(paper_moment, "kg m", digits=4),
+        _traced(_column(paper_moment, "kg m", digits=4), "moment_paper_kg_m"),
         _errors(paper_moment, moment),
     ]
     pa, kg_m = display_unit("Pa", *pressure).symbol, display_unit("kg m", *moment).symbol

@@ -26,6 +26,8 @@ from ringbalance.reports.pictures.process import (
 from ringbalance.reports.render import render_pages
 from ringbalance.reports.saved import saved_cases
 from ringbalance.reports.section import Level, Record
+from ringbalance.reports.tables import FOLDER as TABLES
+from ringbalance.reports.tables import csv_tables
 from ringbalance.scene import AnyScene, Scene
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.platform.files import staged
@@ -75,7 +77,7 @@ def write_report(
     """
     folder, start = Path(out), time.perf_counter()
     saved = saved_cases(folder)
-    with staged(folder, files=FILES, folders=FOLDERS) as stage:
+    with staged(folder, files=FILES, folders=(*FOLDERS, TABLES)) as stage:
         if isinstance(scene, EccentricScene):
             evidence = collect_eccentric(
                 scene, level=level, scene_text=scene_text, workers=workers, progress=progress
@@ -122,6 +124,9 @@ def _write_page(evidence: Record, stage: Path) -> Record:
     content = page_content(kept, pictures=pictures)
     for drawing in content.drawings:
         (figures / f"{drawing.name}.svg").write_text(standalone(drawing), encoding="utf-8")
+    (stage / TABLES).mkdir()
+    for name, table in csv_tables(kept).items():
+        (stage / TABLES / name).write_text(table, encoding="utf-8")
     for name, page in render_pages(content).items():
         (stage / name).write_text(page, encoding="utf-8")
     return kept

@@ -11,6 +11,7 @@ from typing import Any, Final, Literal
 from ringbalance.controller.tuning.tune import Tuning, tune
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reports.numbers import MISSING
+from ringbalance.reports.traces import untraced
 from ringbalance.scene import Scene
 from ringbalance.verification.loops import calibration_of
 
@@ -37,7 +38,7 @@ class Table:
     def numeric(self) -> list[bool]:
         """By column."""
         columns = zip(*self.rows, strict=True) if self.rows else [()] * len(self.heads)
-        return [_numeric([cell for cell in column if cell.strip(MISSING)]) for column in columns]
+        return [_numeric([untraced(cell) for cell in column if cell.strip(MISSING)]) for column in columns]
 
 
 def _numeric(cells: Cells) -> bool:

@@ -46,12 +46,17 @@ def marked_up(value: object) -> object:
 
 
 def evidence_at(evidence: Any, path: str) -> Any:
-    """What the evidence holds at a dotted place, list positions as numbers.
+    """What the evidence holds at a dotted place; in a list by position, or by the `id` of an item.
 
     Raises: KeyError, IndexError: nothing is there.
     """
     for key in path.split("."):
-        evidence = evidence[int(key)] if isinstance(evidence, list) else evidence[key]
+        if not isinstance(evidence, list):
+            evidence = evidence[key]
+        elif key.lstrip("-").isdigit():
+            evidence = evidence[int(key)]
+        else:
+            evidence = {item.get("id"): item for item in evidence}[key]
     return evidence
 
 

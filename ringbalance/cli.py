@@ -28,7 +28,7 @@ BROKEN_PIPE = 141
 COMMANDS = {
     "report": (
         "ringbalance.reports.cli:report",
-        "Verify, calibrate, simulate and draw: everything, into one HTML file.",
+        "Verify, calibrate, simulate and draw: everything, into a report and its annex.",
     ),
     "calibrate": (
         "ringbalance.reduced_model.cli:calibrate",

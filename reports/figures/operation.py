@@ -152,7 +152,7 @@ def _panel(bars: Axes, title: str, budget: Record) -> None:
     bars.set_xticks(
         ticks[:: len(ticks) // 2], [f"{style.plain_number(t)} %" for t in ticks[:: len(ticks) // 2]]
     )
-    bars.set_title(title, loc="left", x=-0.9, fontsize="medium", weight="bold", color=style.INK)
+    bars.set_title(title.split(",")[0], loc="left", x=-0.9, fontsize="medium", weight="bold", color=style.INK)
     bars.grid(visible=False, axis="y")
     bars.spines["left"].set_visible(False)
 

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ringbalance.reports.figures import style
-from ringbalance.reports.figures.loop import CHAMBER_COLOURS, early_time, fill_ratios
+from ringbalance.reports.figures.loop import early_time, fill_ratios
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import shown
 from ringbalance.reports.section import Record
@@ -58,10 +58,8 @@ def valve_open_times(run: Record) -> Drawing:
                 [item["time_s"] for item in mine],
                 [item["duration_s"] for item in mine],
                 linestyle="",
-                marker="os^D"[index % 4],
-                markersize=3.5,
-                color=CHAMBER_COLOURS[index % len(CHAMBER_COLOURS)],
                 label=letter,
+                **style.line(index, size=3.5),
             )
         spans = [item["duration_s"] for item in injections]
         style.logarithmic(axes, "y", within=(0.5 * min(spans), 2 * max(spans)))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 from ringbalance.reports.figures.operation import tornado
 from ringbalance.reports.figures.style import Drawing
-from ringbalance.reports.numbers import MISSING, display_unit, given, number, percent, shown
-from ringbalance.reports.pages.requirements import input_name, resting
+from ringbalance.reports.numbers import MISSING, display_unit, fixed, given, number, percent, shown
+from ringbalance.reports.pages.requirements import named_with_origin
 from ringbalance.reports.section import Cells, Record, Section, Table
 from ringbalance.reports.traces import read, traced
 
@@ -22,7 +23,7 @@ _NAMES: Final = {
     "crest_pressure": "Pressure over the siphon crest",
     "cavitation_margin": "Cavitation margin",
 }
-_DRAWN: Final = ("velocity", "usable_moment", "lambda")
+_DRAWN: Final = {"velocity": "Velocity", "usable_moment": "Usable moment", "lambda": "Lever arm λ"}
 _REGIMES: Final = {
     "blocked": "is blocked",
     "siphon": "runs as a full siphon",
@@ -62,19 +63,26 @@ def _budget_table(evidence: Record) -> Table:
 
 
 def _tornado(evidence: Record) -> Drawing | None:
-    titles = {name: _NAMES[name] for name in _DRAWN}
-    return tornado(evidence["calibration"].get("budgets") or {}, titles)
+    return tornado(evidence["calibration"].get("budgets") or {}, _DRAWN)
 
 
 def _row(evidence: Record, name: str) -> Cells:
     path, budget = f"calibration.budgets.{name}", evidence["calibration"]["budgets"][name]
     unit = display_unit(budget["unit"], budget["value"])
     parts = [
-        traced(number(budget[part] * unit.factor, digits=2), f"{path}.{part}")
+        _part(budget[part] * unit.factor, budget["total"] * unit.factor, f"{path}.{part}")
         for part in ("numerical", "input", "model")
     ]
     value = traced(shown(budget["value"], budget["unit"], budget["total"]), f"{path}.value")
     return _NAMES[name], value, *parts, _largest(evidence, budget), _paper(evidence, name)
+
+
+def _part(part: float, total: float, path: str) -> str:
+    """A part to the place of the total's second digit, or that it is smaller than that."""
+    place = math.floor(math.log10(total)) - 1 if total else 0
+    if round(part, -place) == 0:
+        return f"< {number(10.0**place, digits=1)}"
+    return traced(fixed(round(part, -place), max(-place, 0)), path)
 
 
 def _largest(evidence: Record, budget: Record) -> str:
@@ -82,7 +90,7 @@ def _largest(evidence: Record, budget: Record) -> str:
     if not inputs or not budget["value"]:
         return MISSING
     path = max(inputs, key=inputs.__getitem__)
-    return resting(evidence, path) or input_name(path)
+    return named_with_origin(evidence, path)
 
 
 def _paper(evidence: Record, name: str) -> str:

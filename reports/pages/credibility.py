@@ -95,7 +95,7 @@ def _development(evidence: Record) -> list[Cells]:
 
 
 def _use(evidence: Record) -> list[Cells]:
-    budgets = evidence["calibration"].get("budgets")
+    budgets = (evidence.get("calibration") or {}).get("budgets")
     origins = (evidence["scene"].get("origins") or {}).values()
     assumed = sum(origin == "assumed" for origin in origins)
     return [

@@ -20,7 +20,7 @@ from ringbalance.reports.figures.eccentric import (
 )
 from ringbalance.reports.figures.operation import requirement_bars
 from ringbalance.reports.numbers import MISSING, number, percent, shown
-from ringbalance.reports.pages import document
+from ringbalance.reports.pages import credibility, document
 from ringbalance.reports.pages.cases import case_view
 from ringbalance.reports.section import Cells, Record, Section, Table
 
@@ -242,6 +242,7 @@ SECTIONS: Final = (
     Section(
         name="claims", title="Claims of the eccentric-mass paper", place="report", show=_claims, in_parts=True
     ),
+    credibility.SECTION,
     Section(name="parameters", title="Parameters and their origin", place="report"),
     document.SECTION,
     Section(name="cases", title="Claims: evidence and doubts", show=_cases, in_parts=True),

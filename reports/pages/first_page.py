@@ -14,12 +14,11 @@ from ringbalance.reports.pages.requirements import (
     OPEN,
     Requirement,
     decision,
-    input_name,
+    named_with_origin,
     requirement_figure,
     requirement_record,
     requirement_table,
     requirements,
-    resting,
 )
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.reports.traces import traced
@@ -51,6 +50,7 @@ def _collect(work: Work) -> Record:
     return {
         "needed_moment_kg_m": rotor.initial_amplitude / rotor.influence_coefficient,
         "needed_uncertainty_kg_m": _needed_uncertainty(work.scene),
+        "gas_pressure_uncertainty_Pa": half_widths(work.scene).get("pressure", 0.0),
         "requirement": requirement_record(work.scene),
         "bore_m": work.scene.tube.bore,
         "bore_uncertainty_stated": any(i.quantity == "bore" for i in work.scene.uncertainty),
@@ -228,7 +228,7 @@ def _actions(evidence: Record, rows: Sequence[Requirement]) -> list[str]:
         )
     if verdicts.get("Correction capacity of one pair") in {MISSED, OPEN}:
         told.append("Balance the rotor better by hand, or take a larger disc: the capacity has no reserve.")
-    if any("tube.bore" in row.rests or "bore of the tube" in row.rests for row in rows):
+    if any("bore" in row.rests for row in rows):
         told.append(
             "Measure the flow through the tube at three gas pressures; every velocity and gain rests on the "
             "bore."
@@ -252,7 +252,7 @@ def dominant(evidence: Record) -> list[str]:
 
 
 def _cause(evidence: Record, cause: str, effect: float, name: str) -> str:
-    label = resting(evidence, cause) or input_name(cause)
+    label = named_with_origin(evidence, cause)
     return f"{label[0].upper()}{label[1:]}: ±{THIN_SPACE}{percent(effect)} of the {_MAIN[name]}"
 
 

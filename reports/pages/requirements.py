@@ -83,7 +83,7 @@ def requirement_table(rows: Iterable[Requirement]) -> Table:
         "rests on inputs that nobody gave holds only if they do.",
         heads=("Requirement", "Required", "Result", "Verdict", "Rests on"),
         rows=[(row.name, row.wanted, row.result, row.verdict, row.rests) for row in rows],
-        style="",
+        style="words",
     )
 
 
@@ -114,8 +114,17 @@ def decision(rows: Iterable[Requirement]) -> str:
 def resting(evidence: Record, *paths: str) -> str:
     """The inputs among some that are neither given nor measured, with their origin."""
     origins = evidence["scene"].get("origins") or {}
-    unsure = [(path, origins[path]) for path in paths if origins.get(path, "given") not in _CERTAIN]
-    return ", ".join(f"{input_name(path)} ({origin})" for path, origin in unsure)
+    by_origin: dict[str, list[str]] = {}
+    for path in paths:
+        if (origin := origins.get(path, "given")) not in _CERTAIN:
+            by_origin.setdefault(origin, []).append(path.partition(".")[2].replace("_", " "))
+    return "; ".join(f"{origin}: {', '.join(names)}" for origin, names in by_origin.items())
+
+
+def named_with_origin(evidence: Record, path: str) -> str:
+    """An input's name, with its origin where it is neither given nor measured."""
+    origin = (evidence["scene"].get("origins") or {}).get(path, "given")
+    return input_name(path) + ("" if origin in _CERTAIN else f" ({origin})")
 
 
 def input_name(path: str) -> str:
@@ -166,15 +175,16 @@ def _gas_pressure(evidence: Record) -> Requirement | None:
     starts = point.get("priming_pressure_vented_Pa") is not None
     key = "priming_pressure_vented_Pa" if starts else "stall_pressure_Pa"
     width = point["priming_uncertainty" if starts else "stall_uncertainty"]
+    own = (evidence.get("summary") or {}).get("gas_pressure_uncertainty_Pa") or 0.0
     return Requirement(
         name="Gas pressure " + ("that lifts the liquid over the siphon crest" if starts else "above stall"),
         wanted=f"at least {read(evidence, f'operating_point.{key}', 'Pa', width=width)}",
-        result=traced(given(point["gas_pressure_Pa"], "Pa"), "operating_point.gas_pressure_Pa"),
-        verdict=_above(point["gas_pressure_Pa"], point[key], width),
+        result=read(evidence, "operating_point.gas_pressure_Pa", "Pa", width=own),
+        verdict=_above(point["gas_pressure_Pa"], point[key], math.hypot(width, own)),
         rests=resting(evidence, "tube.hump_radius", "tube.port_radius", "tube.hump_gas"),
         required=point[key],
         reached=point["gas_pressure_Pa"],
-        uncertainty=width,
+        uncertainty=math.hypot(width, own),
         unit="Pa",
     )
 

@@ -238,7 +238,7 @@ def test_the_decision_counts_and_names(evidence: Record) -> None:
 
 def test_what_rests_on_assumptions_says_so(evidence: Record) -> None:
     row = row_of(evidence, "Correction capacity")
-    assert row.rests == "plate thickness of the disc (inferred), bore of the tube (assumed)"
+    assert row.rests == "inferred: plate thickness; assumed: bore"
 
 
 def test_the_largest_causes_come_first_and_once(evidence: Record) -> None:

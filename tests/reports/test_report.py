@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from check_traces import traces, untrue
 from keep_evidence import kept_document
 
 from ringbalance.reports import cli
@@ -90,6 +91,8 @@ def test_the_page_comes_from_the_evidence_file_alone(first: Report) -> None:
     evidence = json.loads((first.page.parent / "evidence.json").read_text())
     for name, page in render(evidence).items():
         assert (first.page.parent / name).read_text() == page
+    assert untrue(render(evidence).values(), evidence) == []
+    assert len(traces(render(evidence).values())) > 100
 
 
 def test_the_consequences_of_a_wrong_k_are_reported(first: Report) -> None:

@@ -1,0 +1,106 @@
+"""Every number that the report traces is what the evidence holds, and one quantity has one value."""
+
+from __future__ import annotations
+
+import random
+from typing import Any
+
+import pytest
+from check_traces import agrees, printed, traces, untrue
+
+from ringbalance.reports.render import render
+from ringbalance.reports.traces import evidence_at, marked_up, read, traced, untraced
+
+Record = dict[str, Any]
+SAME = (
+    ("operating_point.k", "calibration.operating_point.k", "calibration.budgets.drag_coefficient.value"),
+    ("operating_point.velocity_m_s", "calibration.budgets.velocity.value"),
+    ("calibration.chamber.wall_pressure_Pa.-1", "calibration.budgets.wall_pressure.value"),
+    ("calibration.lambda.per_transferred_mass_m", "calibration.budgets.lambda.value"),
+    ("calibration.residual_liquid.usable_pair_moment_kg_m", "calibration.budgets.usable_moment.value"),
+    ("consequences.retuned_proportional_s_per_m", "summary.tuning.gain"),
+)
+"""Places of the evidence that hold the same quantity."""
+
+
+@pytest.fixture(scope="module")
+def found(pages: dict[str, str]) -> list[tuple[str, str]]:
+    return traces(pages.values())
+
+
+def test_every_traced_number_is_the_evidence_s(
+    pages: dict[str, str], found: list[tuple[str, str]], whole: Record
+) -> None:
+    assert len(found) >= 100
+    assert untrue(pages.values(), whole) == []
+    for path, text in random.Random(15).sample(found, 100):
+        assert agrees(text, evidence_at(whole, path)), (path, text)
+
+
+def test_a_wrong_number_is_noticed(evidence: Record, found: list[tuple[str, str]]) -> None:
+    for path in {path for path, _ in found}:
+        value = evidence_at(evidence, path)
+        text = next(text for own, text in found if own == path)
+        shown, half = printed(text) or (0.0, 1.0)
+        if isinstance(value, float) and abs(shown) > 3 * half:
+            assert not agrees(text, 1.37 * value), path
+
+
+def test_one_quantity_is_printed_with_one_value(found: list[tuple[str, str]]) -> None:
+    names = {path: group[0] for group in SAME for path in group}
+    values: dict[str, list[tuple[float, float, str]]] = {}
+    for path, text in found:
+        if number := printed(text):
+            values.setdefault(names.get(path, path), []).append((*number, text))
+    twice = {path: told for path, told in values.items() if len(told) > 1}
+    assert twice
+    for path, told in twice.items():
+        for value, half, text in told:
+            for other, other_half, other_text in told:
+                apart = abs(value - other)
+                # A value in another unit is told apart by its power of ten.
+                assert apart <= half + other_half or not 0.01 < abs(value / (other or 1)) < 100, (
+                    path,
+                    text,
+                    other_text,
+                )
+
+
+def held_at(evidence: Record, path: str) -> Any:
+    try:
+        return evidence_at(evidence, path)
+    except (KeyError, IndexError):
+        return None
+
+
+def test_places_of_one_quantity_agree(whole: Record) -> None:
+    for group in SAME:
+        held = [value for path in group if (value := held_at(whole, path)) is not None]
+        assert held == pytest.approx(held[:1] * len(held), rel=5e-3), group
+
+
+def test_two_values_of_one_quantity_are_found(evidence: Record) -> None:
+    evidence["calibration"]["budgets"]["velocity"]["value"] = 7.0
+    with pytest.raises(AssertionError):
+        test_places_of_one_quantity_agree(evidence)
+
+
+def test_a_trace_survives_a_sentence_and_markup_does_not() -> None:
+    told = f"At {traced('3 um', 'a.0.b')} & <b> the {traced('lambda', 'c')}."
+    assert untraced(told) == "At 3 um & <b> the lambda."
+    page = marked_up(told)
+    assert page == (
+        'At <span data-from="a.0.b">3 µm</span> &amp; &lt;b&gt; the <span data-from="c">λ</span>.'
+    )
+
+
+def test_reading_takes_the_unit_that_suits() -> None:
+    assert untraced(
+        read({"a": [{"b": 2.5e-6}]}, "a.0.b", "m", width=1e-7)
+    ) == "(2.50\u202f±\u202f0.10)\u202fµm".replace("\u202f±\u202f", "\u00a0±\u00a0")
+
+
+def test_the_report_of_changed_evidence_is_traced_too(evidence: Record) -> None:
+    evidence["operating_point"]["gas_pressure_Pa"] = 1.234e6
+    page = render(evidence)["report.html"]
+    assert '<span data-from="operating_point.gas_pressure_Pa">1.23\u202fMPa</span>' in page

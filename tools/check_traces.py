@@ -1,0 +1,70 @@
+"""Compare every traced number of a report with its evidence: python tools/check_traces.py OUT."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from collections.abc import Iterable
+from html import unescape
+from pathlib import Path
+from typing import Any, Final
+
+from ringbalance.reports.numbers import MINUS, SCALES
+from ringbalance.reports.traces import evidence_at
+
+_TRACED: Final = re.compile(r'<span data-from="([^"]+)">(.*?)</span>')
+_NUMBER: Final = re.compile(rf"\(?({MINUS}?[\d\u202f]+(?:\.\d+)?)(?:\u202f×\u202f10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?")
+_RAISED: Final = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+_FACTORS: Final = frozenset({1.0, 100.0, 1e3, *(scale[1] for scales in SCALES.values() for scale in scales)})
+
+
+def traces(pages: Iterable[str]) -> list[tuple[str, str]]:
+    """Every traced number of some pages: its place in the evidence, and its text."""
+    return [(path, unescape(text)) for page in pages for path, text in _TRACED.findall(page)]
+
+
+def printed(text: str) -> tuple[float, float] | None:
+    """A printed number and half of its last digit, both in the printed unit; None for a text without one."""
+    match = _NUMBER.match(text)
+    if match is None:
+        return None
+    digits = match[1].replace("\u202f", "").replace(MINUS, "-")
+    power = 10.0 ** int((match[2] or "0").translate(_RAISED))
+    return float(digits) * power, 0.5 * 10.0 ** (_idle_zeros(text) - len(digits.partition(".")[2])) * power
+
+
+def _idle_zeros(text: str) -> int:
+    """Zeros at the end of a whole number that its uncertainty leaves without a meaning: 1 in 920 ± 100."""
+    parts = [re.sub(r"\D", "", part) for part in text.split("±")]
+    if len(parts) < 2 or "." in text:
+        return 0
+    return min(len(part) - len(part.rstrip("0")) for part in parts)
+
+
+def agrees(text: str, value: float | str) -> bool:
+    """Whether a printed text is a value in one of the units that values are printed in."""
+    number = printed(text)
+    if number is None or isinstance(value, str):
+        return text == value
+    return any(abs(number[0] - value * factor) <= 1.001 * number[1] for factor in _FACTORS)
+
+
+def untrue(pages: Iterable[str], evidence: Any) -> list[tuple[str, str]]:
+    """The traced numbers that the evidence does not hold."""
+    return [(path, text) for path, text in traces(pages) if not agrees(text, evidence_at(evidence, path))]
+
+
+def main(folder: Path) -> int:
+    """Check a report's folder; exit code 1 when a number is not the evidence's."""
+    pages = [(folder / name).read_text(encoding="utf-8") for name in ("report.html", "annex.html")]
+    evidence = json.loads((folder / "evidence.json").read_bytes())
+    wrong = untrue(pages, evidence)
+    print(f"{len(traces(pages))} traced numbers, {len(wrong)} wrong")
+    for path, text in wrong:
+        print(f"{path}: printed {text}, evidence {evidence_at(evidence, path)}")
+    return bool(wrong)
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1])))

@@ -232,11 +232,9 @@ def residual_polar(run: Record, reach: Record | None = None) -> Drawing:
             panel.set_title(title, loc="left", fontsize="medium", color=style.INK)
         panels[1].text(-0.98 * close, -0.98 * close, "circle: limit", color=style.PAPER)
         if ends.size:
-            lines = {"facecolor": "none", "edgecolor": style.THIRD, "linestyle": (0, (5, 2))}
-            panels[0].fill(ends.real, ends.imag, **lines)
-            panels[0].text(
-                -0.98 * whole, -0.98 * whole, "dashed: what the disc can cancel", color=style.THIRD
-            )
+            closed, corner = np.append(ends, ends[0]), -0.98 * whole
+            panels[0].plot(closed.real, closed.imag, color=style.THIRD, linestyle=(0, (5, 2)))
+            panels[0].text(corner, corner, "dashed: what the disc can cancel", color=style.THIRD)
 
     first, last = (shown(float(abs(vector[i])) / _MICROMETRE, "m", digits=2) for i in (0, -1))
     dashed = " Dashed: vibrations that the pairs can cancel together, each within its usable moment."
@@ -247,8 +245,8 @@ def residual_polar(run: Record, reach: Record | None = None) -> Drawing:
         wide=True,
         height=3.7,
         alt=f"Residual vibration as a vector in the rotor’s plane, from {first} to {last}.",
-        caption=f"Residual vibration as a vector, from {first} (ring) to {last} (dot); radius in µm, angle as "
-        f"the sensor’s phase. Solid circle: the limit.{dashed if ends.size else ''}",
+        caption=f"Residual vibration as a vector, from {first} (ring) to {last} (dot); radius in µm, angle "
+        f"as the sensor’s phase. Solid circle: the limit.{dashed if ends.size else ''}",
     )
 
 

@@ -62,6 +62,19 @@ def counted(cases: list[Record]) -> list[str]:
     return [f"{c['count']} {'is' if c['count'] == 1 else 'are'} {c['verdict']}" for c in counts]
 
 
+def common_causes(cases: list[Record]) -> list[Record]:
+    """Claims that do not simply hold, grouped by what they have in common; the largest group first."""
+    groups: dict[str, list[Record]] = {}
+    for case in cases:
+        if case.get("cause") and case["verdict"] != "not run":
+            groups.setdefault(case["cause"], []).append(case)
+    ordered = sorted(groups.items(), key=lambda group: -len(group[1]))
+    return [
+        {"cause": cause, "numbers": [c["number"] for c in group], "verdicts": [c["verdict"] for c in group]}
+        for cause, group in ordered
+    ]
+
+
 def lead_sentence(evidence: Record) -> str:
     """The whole result in two sentences, counted from the verdicts."""
     parts = counted(claims(evidence))

@@ -4,14 +4,42 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from typing import Annotated, Literal, Self
+from types import MappingProxyType
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, model_validator
 
 from ringbalance.verification.text import placeholders
-from ringbalance.verification.verdicts import VOCABULARY, Kind, Metric, Verdict
+from ringbalance.verification.verdicts import VOCABULARY, Kind, Metric, Role, Verdict
 
 Text = Annotated[str, StringConstraints(min_length=3, strip_whitespace=True)]
+CAUSES: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "": "",
+        "plates": "support plates left out",
+        "tube": "tube and siphon crest not given",
+        "settings": "controller settings not given",
+        "gas_pressure": "gas pressure not raised with the density",
+        "two_masses": "transferred mass taken for the difference of two",
+        "gravity": "surface at rest left out",
+        "eccentric_masses": "own mass of the eccentric masses left out",
+        "friction": "friction left to the regulator",
+        "force": "force of the turning masses left out",
+    }
+)
+"""Common causes of a claim's departure, as readers see them."""
+Cause = Literal[
+    "",
+    "plates",
+    "tube",
+    "settings",
+    "gas_pressure",
+    "two_masses",
+    "gravity",
+    "eccentric_masses",
+    "friction",
+    "force",
+]
 Identifier = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*$")]
 Basis = Literal["total", "per unit depth", "pointwise", "ratio", "count", "time"]
 ReferenceKind = Literal[
@@ -44,6 +72,29 @@ class _ReferenceText(_Record):
     doubts: tuple[Text, ...] = ()
 
 
+class RestsOn(_Record):
+    """An input that decides a claim, by its scene path; it widens the claim where nobody gave its value."""
+
+    path: Annotated[str, StringConstraints(pattern=r"^[a-z_]+\.[a-z_]+$")]
+    low: float | None = None
+    """Smallest and largest value, SI, where this claim has its own reason for them."""
+    high: float | None = None
+    documented: bool = False
+    """Whether the documented range counts even where the scene states one, such as for an input that was
+    inferred from this very claim."""
+    covered: str = ""
+    """Why the case is not computed at the ends of its range: what else accounts for it."""
+    why: str = ""
+    """Reason for a range of its own, or for taking the documented one."""
+
+    @model_validator(mode="after")
+    def _whole_range(self) -> Self:
+        own = self.low is not None
+        if own != (self.high is not None) or bool(self.why) != (own or self.documented):
+            raise ValueError(f"{self.path}: low, high and why, or documented and why, or the path alone")
+        return self
+
+
 class Quantity(_Record):
     """One judged number: its limit and the limit's reason stand before the result."""
 
@@ -54,6 +105,8 @@ class Quantity(_Record):
     metric: Metric
     limit: float
     why: Text
+    judges: Role = "number"
+    """A claim's number, the idea behind it, or one reading of what the paper leaves open."""
     correction: str = ""
     """Named correction after which a claim's number is reproduced."""
 
@@ -94,6 +147,12 @@ class CaseDefinition(_Record):
     reference: _ReferenceText
     judged_on: Literal["scene", "paper"] = "scene"
     """Whether the scene at hand is judged, or always the paper's own disc, or rotor with eccentric masses."""
+    cause: Cause = ""
+    """Why a claim does not simply hold: one of `CAUSES`; shared by claims that fail together."""
+    judgement: str = ""
+    """Why the criteria lead to this verdict and no other, where that may be disputed."""
+    rests_on: tuple[RestsOn, ...] = ()
+    """Inputs that decide the claim."""
     headline: bool = False
     cost: Literal["light", "heavy"] = "light"
     quantity: tuple[Quantity, ...] = Field(min_length=1)
@@ -102,7 +161,7 @@ class CaseDefinition(_Record):
     @property
     def prose(self) -> tuple[str, ...]:
         """Texts that may hold placeholders."""
-        return (self.explanation, *self.consequence.values(), *self.reference.doubts)
+        return (self.explanation, self.judgement, *self.consequence.values(), *self.reference.doubts)
 
     def consequence_of(self, verdict: Verdict) -> str:
         """The sentence for a designer that goes with a verdict, placeholders still in it."""
@@ -117,11 +176,13 @@ class CaseDefinition(_Record):
                 "a case that is no claim has an order, its position in the report; a claim has none"
             )
         _unique("quantity", [quantity.name for quantity in self.quantity])
+        _unique("rests_on", [one.path for one in self.rests_on])
         _unique("must_fail", [mutation.id for mutation in self.must_fail])
         for quantity in self.quantity:
             self._check_quantity(quantity)
         for mutation in self.must_fail:
             self._check_mutation(mutation)
+        self._check_claim()
         self._check_consequence()
         for text in self.prose:
             placeholders(text)
@@ -140,6 +201,14 @@ class CaseDefinition(_Record):
             raise ValueError(f'{mutation.id}: a {self.kind} case cannot come out "{mutation.expect}"')
         if self.kind.endswith("verification") and mutation.expect is not Verdict.FAILED:
             raise ValueError(f'{mutation.id}: a mutation of a {self.kind} case must come out "failed"')
+
+    def _check_claim(self) -> None:
+        ideas = [quantity for quantity in self.quantity if quantity.judges == "idea"]
+        plain = all(q.judges == "number" and not q.correction for q in self.quantity)
+        if self.kind != "claim" and not (plain and not self.cause and not self.rests_on):
+            raise ValueError("judges, correction, cause and rests_on are for claims")
+        if any(quantity.correction for quantity in self.quantity) and not ideas:
+            raise ValueError("a correction needs a quantity that judges the idea")
 
     def _check_consequence(self) -> None:
         known = [verdict.value for verdict in VOCABULARY[self.kind]]

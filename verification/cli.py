@@ -144,7 +144,7 @@ def _print_case(console: Console, result: CaseResult) -> None:
         console.print(_indented(result.status, style="dim"), "")
         return
     table = Table(box=None, header_style="dim", padding=(0, 1, 0, 2))
-    for header in ("quantity", "found", "reference or limit", "95 % ±", "verdict"):
+    for header in ("quantity", "found", "reference or limit", "±", "verdict"):
         table.add_column(header, justify="left" if header in ("quantity", "verdict") else "right")
     for quantity in result.quantities:
         table.add_row(*_quantity_row(quantity))

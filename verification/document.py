@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.verification.case import NEEDS_REFERENCE, CaseDefinition
+from ringbalance.verification.case import CAUSES, NEEDS_REFERENCE, CaseDefinition
 from ringbalance.verification.comparison import COVERAGE_FACTOR
-from ringbalance.verification.evidence import Convergence, Curve, Evidence, Series, Table
+from ringbalance.verification.evidence import Convergence, Curve, Evidence, Found, Reference, Series, Table
 from ringbalance.verification.result import CaseResult, MutationResult, QuantityResult
 from ringbalance.verification.verdicts import Verdict
 
@@ -41,6 +42,9 @@ def case_document(result: CaseResult) -> Document:
             "uncertainty": definition.reference.uncertainty,
         },
         "doubts": [text for doubt in definition.reference.doubts if (text := result.filled(doubt))],
+        "cause": CAUSES[definition.cause] if result.verdict is not Verdict.CONFIRMED else "",
+        "judgement": result.filled(definition.judgement),
+        "rests_on": [vars(one) for one in result.assumptions],
         "headline": definition.headline,
         "cost": definition.cost,
         "level": result.level,
@@ -74,16 +78,17 @@ def definition_document(definition: CaseDefinition) -> Document:
 
 
 def comparison_half_width(result: QuantityResult) -> float | None:
-    """Expanded uncertainty, 2 u_val, of the comparison that decided a quantity.
+    """Half-width of the comparison that decided a quantity: 2 u_val, and as far as assumed inputs move it.
 
     Returns: Zero where nothing uncertain entered; None where the case was not run.
     """
     found, comparison = result.found, result.comparison
     if found is None or comparison is None:
         return None
+    reach = max(map(abs, found.reach))
     certain = found.numerical == 0 and found.input == 0
     judged_alone = result.quantity.metric not in NEEDS_REFERENCE
-    return 0.0 if certain and judged_alone else comparison.half_width
+    return reach if certain and judged_alone else comparison.half_width + reach
 
 
 def _consequence(result: CaseResult) -> str:
@@ -101,20 +106,41 @@ def _quantity(result: QuantityResult) -> Document:
         "basis": quantity.basis,
         "value": None if found is None else found.value,
         "reference": None if reference is None else reference.value,
-        "error": None if reference is None or found is None else found.value - reference.value,
         "uncertainty": comparison_half_width(result),
-        "value_uncertainty": (
-            None if found is None else COVERAGE_FACTOR * float(np.hypot(found.numerical, found.input))
-        ),
-        "numerical_uncertainty": None if found is None else COVERAGE_FACTOR * found.numerical,
-        "input_uncertainty": None if found is None else COVERAGE_FACTOR * found.input,
         "reference_uncertainty": None if reference is None else COVERAGE_FACTOR * reference.uncertainty,
-        "corrected": None if found is None else found.corrected,
+        **_found(found, reference),
         "correction": quantity.correction,
+        "judges": quantity.judges,
         "metric": quantity.metric,
         "limit": quantity.limit,
         "why": quantity.why,
         "verdict": result.verdict.value,
+    }
+
+
+def _found(found: Found | None, reference: Reference | None) -> Document:
+    """Uncertainties of a found number: expanded ones, and the standard ones of V&V 20 by their symbols
+    there."""
+    if found is None:
+        names = ("error", "value_uncertainty", "value_low", "value_high", "numerical_uncertainty")
+        return dict.fromkeys((*names, "input_uncertainty", "corrected", "validation"))
+    low, high = found.reach
+    error = None if reference is None else found.value - reference.value
+    known = COVERAGE_FACTOR * math.hypot(found.numerical, found.input)
+    parts = {
+        "u_num": found.numerical,
+        "u_input": found.input_standard_uncertainty,
+        "u_D": 0.0 if reference is None else reference.uncertainty,
+    }
+    return {
+        "error": error,
+        "value_uncertainty": known + max(-low, high),
+        "value_low": found.value + low - known,
+        "value_high": found.value + high + known,
+        "numerical_uncertainty": COVERAGE_FACTOR * found.numerical,
+        "input_uncertainty": COVERAGE_FACTOR * parts["u_input"],
+        "corrected": found.corrected,
+        "validation": {"E": error, **parts, "u_val": math.hypot(*parts.values())},
     }
 
 

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from ringbalance.physics.results import Status
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import Scene
+from ringbalance.verification.comparison import from_range
 
 Level = Literal["light", "heavy"]
 CurveStyle = Literal["paper", "found", "reference", "points"]
@@ -38,14 +39,30 @@ class Found:
     numerical: float = 0.0
     """u_num, standard uncertainty of the calculation."""
     input: float = 0.0
-    """u_input, standard uncertainty from what the calculation was given."""
+    """u_input, standard uncertainty from what the calculation was given, without `assumed`."""
+    reach: tuple[float, float] = (0.0, 0.0)
+    """How far down and up the number moves against its reference while all inputs that nobody gave pass
+    through their ranges; what is random is in `input`."""
     corrected: float | None = None
     """The number once the correction that the case's text names is made; None where there is none."""
     conclusive: bool = True
     """False when the sequence behind the number is not asymptotic, or a solve did not succeed."""
 
     def __post_init__(self) -> None:
-        _finite(self.value, self.numerical, self.input, 0.0 if self.corrected is None else self.corrected)
+        corrected = 0.0 if self.corrected is None else self.corrected
+        _finite(self.value, self.numerical, self.input, corrected, *self.reach)
+
+    def moved(self, low: float, high: float) -> Found:
+        """The same number with more inputs that move it: their reaches add, as an assumption is no random
+        error."""
+        return dataclasses.replace(
+            self, reach=(self.reach[0] + min(low, 0.0), self.reach[1] + max(high, 0.0))
+        )
+
+    @property
+    def input_standard_uncertainty(self) -> float:
+        """u_input with the assumed inputs, the number equally likely within their reach (GUM, 4.3.7)."""
+        return math.hypot(self.input, from_range(self.reach))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,7 +149,7 @@ class Evidence:
     status: Status = field(default_factory=Status)
 
 
-def no_reference(_scene: Scene) -> Mapping[str, Reference]:
+def no_reference(_scene: Any) -> Mapping[str, Reference]:
     """What a case's `reference` is where limits alone judge its quantities. Returns: Nothing."""
     return {}
 
@@ -141,10 +158,12 @@ class CaseCode(Protocol):
     """A case's `case.py`.
 
     Beside `compute` it may have `reference`: what the judged quantities are compared with, by their names, or
-    a function of the scene that gives this. A quantity that is not named has none.
+    a function of the scene that gives this. A quantity that is not named has none. `values(scene)`, where it
+    has that, is a shorter way to the judged numbers; it is asked for them at the ends of the assumed inputs'
+    ranges.
     """
 
-    def compute(self, scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    def compute(self, scene: Any, level: Level, defect: str | None = None) -> Evidence:
         """What the program finds on a scene, with one of the case's mutations built in by its name."""
         ...
 

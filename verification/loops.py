@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, Final
 
@@ -16,13 +17,15 @@ from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.loop_models import ControllerKind
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Curve, Series, figure
+from ringbalance.verification.evidence import Curve, Found, Series, figure
 
 PHASES: Final = tuple(math.radians(angle) for angle in (90, 180, 270, 360))
 """Of the initial vibration, the four cases of Fig. 6."""
 AMPLITUDES: Final = (2e-6, 4e-6, 6e-6, 8e-6, 10e-6)
 """Of the initial vibration, the five cases of Fig. 8, m."""
 LARGEST: Final = 10e-6
+PERIODS: Final = (0.25, 0.5, 1.0)
+"""Between operations, s: the paper gives none; the middle one is judged and the others bound it."""
 
 
 def loop_scene(
@@ -87,6 +90,12 @@ def sampled_amplitudes(run: Simulation) -> np.ndarray:
 def settling(run: Simulation) -> float:
     """Settling time, s, infinite where the run did not settle."""
     return math.inf if run.settling_time is None else run.settling_time
+
+
+def over_period(numbers: Sequence[float]) -> Found:
+    """A number found with each of `PERIODS`: the middle one's, which the others move."""
+    value = float(numbers[1])
+    return Found(value=value).moved(min(numbers) - value, max(numbers) - value)
 
 
 def amplitude_series(name: str, runs: dict[str, Simulation], *, points: int = 400) -> Series:

@@ -11,9 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.comparison import from_half_width, from_rounding, input_uncertainty
+from ringbalance.verification.comparison import from_rounding, input_uncertainty
 from ringbalance.verification.evidence import Reference
 
 
@@ -60,7 +59,6 @@ DENSITY: Final = 1000.0
 """Table 1, kg/m^3."""
 LAMBDA_TOLERANCE: Final = 0.007
 """Section 5.2: 72 mm within 0.7 %."""
-PLATE_QUANTITY: Final = "plate_thickness"
 
 
 def at_paper_density(scene: Scene) -> Scene:
@@ -68,27 +66,9 @@ def at_paper_density(scene: Scene) -> Scene:
     return dataclasses.replace(scene, liquid=dataclasses.replace(scene.liquid, density=DENSITY))
 
 
-def plate_uncertainty(scene: Scene) -> float:
-    """Standard uncertainty of the plate thickness, m: as the scene states it.
-
-    A disc whose volume prints as the paper's 67.7 ml, with none stated, has its thickness inferred from that
-    number, and inherits its rounding; any other thickness is exact.
-    """
-    disc = scene.disc
-    for stated in scene.uncertainty:
-        if stated.quantity == PLATE_QUANTITY:
-            scale = disc.plate_thickness if stated.relative else 1.0
-            return from_half_width(stated.half_width * scale)
-    if abs(chamber_volume(disc=disc) - CHAMBER_VOLUME.value) > CHAMBER_VOLUME.last_digit / 2:
-        return 0.0
-    strips = 2 * (disc.outer_radius - disc.inner_radius) * disc.axial_width
-    return from_rounding(CHAMBER_VOLUME.last_digit) / strips
-
-
-def plate_effect(scene: Scene, quantity: Callable[[Disc], float]) -> float:
-    """Standard uncertainty that the plate thickness gives to a quantity of the disc, in its unit."""
-    changed = (lambda t: quantity(with_plate(scene.disc, t)), scene.disc.plate_thickness)
-    return input_uncertainty([(*changed, plate_uncertainty(scene))])
+def rounded_radius(quantity: Callable[[float], float]) -> float:
+    """Standard uncertainty that the rounding of the printed R1'min gives to a quantity of it."""
+    return input_uncertainty([(quantity, RING_RADIUS.value, from_rounding(RING_RADIUS.last_digit))])
 
 
 def with_plate(disc: Disc, thickness: float) -> Disc:

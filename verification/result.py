@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from ringbalance.verification.assumptions import Assumption
 from ringbalance.verification.case import CaseDefinition, Quantity
 from ringbalance.verification.comparison import COVERAGE_FACTOR, Comparison
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference
@@ -55,6 +56,8 @@ class CaseResult:
     scene_name: str
     scene_sha256: str
     time_s: float = 0.0
+    assumptions: tuple[Assumption, ...] = ()
+    """Inputs that nobody gave and that the verdict rests on."""
     mutations: tuple[MutationResult, ...] = ()
 
     @property
@@ -66,10 +69,15 @@ class CaseResult:
     def numbers(self) -> Mapping[str, float]:
         """All numbers that the case's text may ask for.
 
-        For each quantity q: q, q_reference, q_error, q_relative (error over reference), q_uncertainty (95 %
-        half-width of the comparison), q_limit; and the evidence's own.
+        For each quantity q: q, q_low and q_high (as far as assumed inputs move it) (as
+        far as the assumed input of key k does), q_reference, q_error,
+        q_relative (error over reference), q_uncertainty (95 % half-width of the comparison), q_limit; and the
+        evidence's own.
         """
         named: dict[str, float] = {}
+        for one in self.assumptions:
+            key = one.path.partition(".")[2]
+            named |= {f"{key}_low": one.low, f"{key}_high": one.high}
         for result in self.quantities:
             named |= _named_numbers(result)
         return named | dict(self.evidence.numbers if self.evidence else {})
@@ -88,8 +96,11 @@ def _named_numbers(result: QuantityResult) -> dict[str, float]:
     name, found, comparison = result.quantity.name, result.found, result.comparison
     if found is None or comparison is None:
         return {}
+    low, high = found.reach
     named = {
         name: found.value,
+        f"{name}_low": found.value + low,
+        f"{name}_high": found.value + high,
         f"{name}_error": comparison.error,
         f"{name}_uncertainty": comparison.half_width,
         f"{name}_limit": result.quantity.limit,

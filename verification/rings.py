@@ -5,14 +5,14 @@ from __future__ import annotations
 import dataclasses
 from functools import lru_cache
 
+from ringbalance.mesh.geometry import chamber_volume, liquid_area
 from ringbalance.physics.convergence.grid import GridConvergence, Verdict
 from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
 from ringbalance.physics.results import Estimate
-from ringbalance.reduced_model.paper.formulas import moment_paper
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import Convergence, Found
-from ringbalance.verification.paper_numbers import RING_RADIUS, plate_effect
+from ringbalance.verification.paper_numbers import RING_RADIUS, with_plate
 from ringbalance.verification.reference.exact_chamber import exact_moment
 
 
@@ -56,20 +56,26 @@ def scaled(found: Found, factor: float) -> Found:
     )
 
 
-def chamber_moment(scene: Scene, quantities: RingQuantities, index: int, *, density: float) -> Found:
-    """Moment of one chamber, kg m, with what the plate thickness's uncertainty does to it."""
-    fill = float(quantities.fill_ratio[index])
+def chamber_moment(scene: Scene, *, density: float, factor: float = 1.0) -> Found:
+    """Moment of one chamber at its largest fill times a factor, kg m, by finite elements.
 
-    def moment(disc: Disc) -> float:
-        return float(exact_moment(disc=disc, density=density, fill_ratio=fill))
+    Its correction is the moment of a ring of the printed radius that no plates take anything from.
+    """
+    ring = ring_of(scene, (scene.disc.max_fill_ratio,), density=density)
+    found = scaled(found_of(ring, "moment", 0), factor)
+    return dataclasses.replace(found, corrected=factor * _bare_moment(scene.disc, density))
 
-    return found_of(quantities, "moment", index, input_=plate_effect(scene, moment))
+
+def _bare_moment(disc: Disc, density: float) -> float:
+    bare = with_plate(disc, 0.0)
+    liquid = disc.axial_width * float(liquid_area(disc=bare, surface_radius=RING_RADIUS.value))
+    fill = liquid / chamber_volume(disc=bare)
+    return float(exact_moment(disc=bare, density=density, fill_ratio=fill))
 
 
-def bare_chamber_moment(scene: Scene, *, density: float) -> Found:
-    """Moment of a half-full chamber by Eq. 7 with the printed radius, which leaves the plates out."""
-    moment = moment_paper(disc=scene.disc, density=density, surface_radius=RING_RADIUS.value)
-    return Found(value=float(moment))
+def without_plates(found: Found) -> Found:
+    """A number with its correction made: what a case finds once the plates are left out."""
+    return Found(value=found.value if found.corrected is None else found.corrected)
 
 
 def mesh_table(quantities: RingQuantities, name: str, unit: str, index: int) -> Convergence:

@@ -8,17 +8,19 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager
 from functools import lru_cache, partial
-from typing import Literal
+from typing import Any
 
 from ringbalance.scene import AnyScene, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.platform.processes import Workers
-from ringbalance.verification.case import NEEDS_REFERENCE, CaseDefinition, Mutation, Quantity
+from ringbalance.verification.assumptions import assumptions_of, overridden
+from ringbalance.verification.case import CaseDefinition, Mutation
 from ringbalance.verification.catalogue import case_code, load_case, load_cases
 from ringbalance.verification.eccentric_mass.scenes import driven_scene
-from ringbalance.verification.evidence import CaseCode, Evidence, Level, NotRunError, Reference
+from ringbalance.verification.evidence import CaseCode, Level, NotRunError
+from ringbalance.verification.judging import judge, references, widened
 from ringbalance.verification.result import CaseResult, MutationResult, QuantityResult
-from ringbalance.verification.verdicts import Verdict, combine, judge_quantity
+from ringbalance.verification.verdicts import Verdict, combine
 
 Progress = Callable[[CaseResult], None]
 PAPER_SCENE = "liquid_ring_paper"
@@ -69,19 +71,45 @@ def run_definition(
         mutated = scene if mutation is None else overridden(scene, mutation.scene)
         built_in = None if mutation is None or mutation.scene else mutation.id
         evidence = code.compute(mutated, level, built_in)
-        quantities = _judge(definition, evidence, _references(code, mutated))
+        prescribed = {} if mutation is None else mutation.scene
+        rests = [one for one in definition.rests_on if one.path not in prescribed]
+        assumptions = assumptions_of(rests, mutated)
+        values = partial(_values, code, level, built_in)
+        by_corners = [one for one in assumptions if not one.covered]
+        evidence = widened(evidence, code, mutated, by_corners, values=values)
+        quantities = judge(definition, evidence, references(code, mutated))
     except NotRunError as error:
         return outcome(status=str(error))
     except (ValueError, ArithmeticError, RuntimeError) as error:
         # A case that breaks down has not shown what it is there to show.
         return outcome(status=f"{type(error).__name__}: {error}", verdict=_broken_down(definition))
-    verdict = combine(kind=definition.kind, verdicts=[result.verdict for result in quantities])
+    verdict = combine(
+        kind=definition.kind,
+        verdicts=[result.verdict for result in quantities],
+        roles=[result.quantity.judges for result in quantities],
+    )
     if not evidence.status.ok and verdict not in (Verdict.FAILED, Verdict.REFUTED):
         verdict = Verdict.INCONCLUSIVE
     result = outcome(status=evidence.status.text, verdict=verdict)
     return dataclasses.replace(
-        result, quantities=quantities, evidence=evidence, time_s=time.perf_counter() - start
+        result,
+        quantities=quantities,
+        evidence=evidence,
+        assumptions=assumptions,
+        time_s=time.perf_counter() - start,
     )
+
+
+def _values(code: CaseCode, level: Level, defect: str | None, scene: Any) -> Mapping[str, float]:
+    """Judged numbers on a scene, by the case's shorter way to them where it has one."""
+    shorter = getattr(code, "values", None)
+    if shorter is not None and defect is None:
+        return dict(shorter(scene))
+    try:
+        found = code.compute(scene, level, defect).found
+    except NotRunError as error:
+        raise ValueError(f"not at every value of an assumed input: {error}") from error
+    return {name: one.value for name, one in found.items()}
 
 
 def _broken_down(definition: CaseDefinition) -> Verdict:
@@ -91,7 +119,6 @@ def _broken_down(definition: CaseDefinition) -> Verdict:
 def _outcome(
     definition: CaseDefinition, *, scene: Scene, level: Level, status: str, verdict: Verdict = Verdict.NOT_RUN
 ) -> CaseResult:
-    judged: AnyScene = driven_scene() if definition.paper == DRIVEN else scene
     return CaseResult(
         definition=definition,
         verdict=verdict,
@@ -99,12 +126,14 @@ def _outcome(
         evidence=None,
         status=status,
         level=level,
-        scene_name=judged.name,
-        scene_sha256=judged.values_sha256,
+        scene_name=scene.name,
+        scene_sha256=scene.values_sha256,
     )
 
 
-def _scene_of(definition: CaseDefinition, scene: Scene) -> Scene:
+def _scene_of(definition: CaseDefinition, scene: Scene) -> Any:
+    if definition.paper == DRIVEN:
+        return driven_scene()
     return paper_scene() if definition.judged_on == "paper" else scene
 
 
@@ -113,59 +142,6 @@ def _mutation(definition: CaseDefinition, defect: str) -> Mutation:
     if not found:
         raise KeyError(f"{definition.id} has no mutation {defect}")
     return found[0]
-
-
-def overridden(scene: Scene, overrides: Mapping[str, float | Literal["absent"]]) -> Scene:
-    """A scene with some SI values changed by "table.quantity"; "absent" stands for None.
-
-    Raises: ValueError: a table or quantity that a scene does not have.
-    """
-    for path, value in overrides.items():
-        table, _, key = path.partition(".")
-        if not hasattr(getattr(scene, table, None), key):
-            raise ValueError(f'a scene has no quantity "{path}"')
-        part = dataclasses.replace(getattr(scene, table), **{key: None if value == "absent" else value})
-        scene = dataclasses.replace(scene, **{table: part})
-    return scene
-
-
-def _references(code: CaseCode, scene: Scene) -> Mapping[str, Reference]:
-    given = getattr(code, "reference", {})
-    found: Mapping[str, Reference] = given(scene) if callable(given) else given
-    return found
-
-
-def _judge(
-    definition: CaseDefinition, evidence: Evidence, references: Mapping[str, Reference]
-) -> tuple[QuantityResult, ...]:
-    names = {quantity.name for quantity in definition.quantity}
-    if set(evidence.found) != names or not set(references) <= names:
-        raise ValueError(
-            f"{definition.id}: judged are {sorted(names)}, found {sorted(evidence.found)}, "
-            f"referenced {sorted(references)}"
-        )
-    return tuple(_judge_one(definition, quantity, evidence, references) for quantity in definition.quantity)
-
-
-def _judge_one(
-    definition: CaseDefinition, quantity: Quantity, evidence: Evidence, references: Mapping[str, Reference]
-) -> QuantityResult:
-    found = evidence.found[quantity.name]
-    reference = references.get(quantity.name) if quantity.metric in NEEDS_REFERENCE else None
-    judgement = judge_quantity(
-        kind=definition.kind,
-        metric=quantity.metric,
-        limit=quantity.limit,
-        found=found,
-        reference=reference,
-    )
-    return QuantityResult(
-        quantity=quantity,
-        verdict=judgement.verdict,
-        found=found,
-        reference=references.get(quantity.name),
-        comparison=judgement.comparison,
-    )
 
 
 def _run_mutations(case_id: str, *, scene: Scene, level: Level = "light") -> tuple[MutationResult, ...]:

@@ -18,6 +18,7 @@ from ringbalance.reports.numbers import (
     shown,
     with_unit,
 )
+from ringbalance.reports.pages.requirements import input_name
 from ringbalance.reports.section import Record, Table
 from ringbalance.reports.tables import FOLDER, is_long, table_file
 from ringbalance.reports.traces import traced
@@ -26,11 +27,15 @@ from ringbalance.verification.catalogue import load_cases
 _FACTS: Final = (
     ("claim", "Claim"),
     ("explanation", "Finding"),
+    ("judgement", "Why this verdict"),
     ("consequence", "Consequence"),
+    ("cause", "Common cause"),
     ("protects", "Protects"),
     ("assumes", "Assumes"),
     ("does_not_cover", "Does not cover"),
 )
+_LOPSIDED: Final = 1.2
+"""Ratio of the two sides of an interval from which on both ends are shown."""
 _RELATIVE_METRICS: Final = ("relative", "validation", "within_uncertainty")
 
 
@@ -53,7 +58,15 @@ def _facts(case: Record) -> list[tuple[str, str]]:
     pairs = [(label, _sentence(case[key])) for key, label in _FACTS if case.get(key)]
     reference = case.get("reference") or {}
     told = [str(reference[key]) for key in ("kind", "source", "uncertainty") if reference.get(key)]
-    return [*pairs, *([("Reference", "; ".join(told))] if told else []), ("Run", _how_run(case))]
+    rests = [("Rests on", "; ".join(map(_assumption, found)))] if (found := case.get("rests_on")) else []
+    return [*pairs, *rests, *([("Reference", "; ".join(told))] if told else []), ("Run", _how_run(case))]
+
+
+def _assumption(one: Record) -> str:
+    """An input that nobody gave, with its range in SI, and what either rests on."""
+    low, value, high = (short(one[key], digits=3) for key in ("low", "value", "high"))
+    accounted = f"; {one['covered']}" if one["covered"] else ""
+    return f"{one['path']}, {one['origin']}: {value}, from {low} to {high} in SI ({one['why']}{accounted})"
 
 
 def _how_run(case: Record) -> str:
@@ -97,6 +110,10 @@ def _quantity_row(quantity: Record, path: str) -> Record:
             shown(quantity.get("reference"), unit, quantity.get("reference_uncertainty"), digits=4),
         ),
         "error": marked("error", shown(quantity.get("error"), unit, quantity.get("uncertainty"), digits=2)),
+        "parts": [
+            shown((quantity.get("validation") or {}).get(part), unit, digits=2)
+            for part in ("u_num", "u_input", "u_D")
+        ],
         "limit": _criterion(quantity),
         "verdict": quantity.get("verdict") or "not run",
     }
@@ -138,7 +155,7 @@ def _sequence_label(sequence: Record) -> str:
 
 def _notes(sequence: Record) -> list[str]:
     gci = sequence.get("gci")
-    told = [] if gci is None else [f"Expanded uncertainty (95 %) of the finest value {percent(gci)}"]
+    told = [] if gci is None else [f"Grid convergence index of the finest value {percent(gci)}"]
     return [*told, sequence["note"]] if sequence.get("note") else told
 
 
@@ -195,18 +212,31 @@ def _in_brief(case: Record) -> Record:
     if quantity is None:
         return dict.fromkeys(("paper", "found", "half_width"), MISSING) | {"what": ""}
     unit, reference = quantity.get("unit") or "1", quantity.get("reference")
-    value, half_width = quantity.get("value"), quantity.get("uncertainty")
-    display = display_unit(unit, value)
-    width = number(None if not half_width else half_width * display.factor, digits=2)
-    path = f"{path}.{case['quantities'].index(quantity)}"
+    value, path = quantity.get("value"), f"{path}.{case['quantities'].index(quantity)}"
     paper = MISSING if reference is None else traced(given(reference, unit, digits=4), f"{path}.reference")
     value_text = _without_half_width(_value(quantity, quantity.get("value_uncertainty")))
     return {
         "paper": _criterion(quantity) if reference is None else paper,
         "found": value_text if value is None else traced(value_text, f"{path}.value"),
-        "half_width": with_unit(width, display.symbol),
+        "half_width": _width(quantity),
         "what": quantity.get("title") or "",
     }
+
+
+def _width(quantity: Record) -> str:
+    """Half-width of the comparison; a range where assumed inputs move the number further one way than the
+    other."""
+    value, half_width = quantity.get("value"), quantity.get("uncertainty")
+    display = display_unit(quantity.get("unit") or "1", value)
+    low, high = quantity.get("value_low"), quantity.get("value_high")
+    if value is not None and low is not None and high is not None:
+        sides = sorted((value - low, high - value))
+        if sides[1] > _LOPSIDED * sides[0] and sides[1] > 0.1 * abs(value):
+            ends = [number(end * display.factor, digits=2) for end in (low, high)]
+            return with_unit(" to ".join(ends), display.symbol)
+    return with_unit(
+        number(None if not half_width else half_width * display.factor, digits=2), display.symbol
+    )
 
 
 def _without_half_width(text: str) -> str:
@@ -231,6 +261,8 @@ def case_view(case: Record) -> Record:
         "why_not_run": case.get("status") or "" if case["verdict"] == "not run" else "",
         "brief": _in_brief(case),
         "consequence": case.get("consequence") or "",
+        "cause": case.get("cause") or "",
+        "rests_on": [f"{input_name(one['path'])} ({one['origin']})" for one in case.get("rests_on") or []],
         "facts": _facts(case),
         "equations": _equations(case),
         "rows": [

@@ -25,9 +25,11 @@ from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reports.studies.consequences_gain import GainCurve, LoopGain, loop_gain
 from ringbalance.scene.models import Scene
+from ringbalance.verification.assumptions import KNOWN
 
 MEMBERS: Final = 2000
 """Of each ensemble at the light level."""
+_DECIDING: Final = ("tube.bore", "tube.length", "tube.hump_radius", "rotor.influence_coefficient")
 POINTS: Final = 50
 """Most entries of any array in the document."""
 
@@ -81,7 +83,7 @@ def find_consequences(
     Source: sections 5 and 6 of the liquid-ring paper; the comparison is this program's.
     """
     nominal = paper_model(scene) if paper is None else paper
-    notes: list[str] = []
+    notes = _assumed(scene)
     transfers = {m.name: _transfer(scene, m, notes) for m in (nominal, calibrated)}
     gains = {m.name: _gain(scene, m, transfers[m.name], notes) for m in (nominal, calibrated)}
     retuned = retuned or _recommended(scene, calibrated)
@@ -102,6 +104,13 @@ def find_consequences(
         notes=tuple(notes),
         findings=_findings(gains[nominal.name], gains[calibrated.name], retuned, runs, tuple(ensembles)),
     )
+
+
+def _assumed(scene: Scene) -> list[str]:
+    """What k, lambda and the rate rest on that nobody gave."""
+    found = [(path, scene.origin_of(path)) for path in _DECIDING]
+    named = [f"{path} ({origin})" for path, origin in found if origin not in KNOWN]
+    return [f"These results rest on inputs that nobody gave: {', '.join(named)}."] if named else []
 
 
 def _with_gain(scene: Scene, proportional: float) -> Scene:

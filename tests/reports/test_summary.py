@@ -9,6 +9,7 @@ from ringbalance.reports.summary import (
     CLAIM_VERDICTS,
     checks,
     claims,
+    common_causes,
     lead_sentence,
     tone,
     verdict_counts,
@@ -47,3 +48,21 @@ def test_the_lead_is_counted(evidence: Record) -> None:
 def test_claims_stand_in_the_papers_order(evidence: Record) -> None:
     evidence["verification"].reverse()
     assert [case["number"] for case in claims(evidence)] == [1, 6, 9, 10, 11, 14]
+
+
+def test_claims_are_grouped_by_what_they_have_in_common() -> None:
+    def claim(number: int, verdict: str, cause: str, *paths: str) -> dict[str, Any]:
+        rests = [{"path": path} for path in paths]
+        return {"number": number, "verdict": verdict, "cause": cause, "rests_on": rests}
+
+    cases = [
+        claim(1, "confirmed", "", "disc.plate_thickness"),
+        claim(2, "refuted", "the tube"),
+        claim(3, "confirmed with correction", "plates left out", "disc.plate_thickness"),
+        claim(4, "refuted", "plates left out"),
+        claim(5, "not run", "plates left out"),
+    ]
+    first, second = common_causes(cases)
+    assert (first["cause"], first["numbers"]) == ("plates left out", [3, 4])
+    assert first["verdicts"] == ["confirmed with correction", "refuted"]
+    assert second["numbers"] == [2]

@@ -13,7 +13,6 @@ from scipy.integrate import dblquad
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_area, surface_radius
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.comparison import input_uncertainty
-from ringbalance.verification.paper_numbers import plate_uncertainty
 from ringbalance.verification.reference import manufactured_flow as flow
 from ringbalance.verification.reference.exact_chamber import central_lambda, exact_moment, exact_wall_pressure
 from ringbalance.verification.reference.gravity import exact_ring
@@ -149,12 +148,3 @@ def test_an_exact_input_is_not_evaluated() -> None:
         raise AssertionError
 
     assert input_uncertainty([(refuse, 1.0, 0.0)]) == 0.0
-
-
-def test_the_plates_inherit_the_rounding_of_the_volume(paper_scene: Scene) -> None:
-    # dV/dt = 2 (R2 - R1) B = 2.976 ml/mm; 67.7 ml is rounded to 0.1.
-    silent = dataclasses.replace(paper_scene, uncertainty=())
-    assert plate_uncertainty(silent) == pytest.approx(0.05 / math.sqrt(3) / 2.976 * 1e-3, rel=1e-3)
-    assert plate_uncertainty(paper_scene) > plate_uncertainty(silent)
-    other = dataclasses.replace(silent, disc=dataclasses.replace(paper_scene.disc, plate_thickness=1e-3))
-    assert plate_uncertainty(other) == 0.0

@@ -14,9 +14,10 @@ from ringbalance.physics.results import Status, StatusCode
 from ringbalance.scene.models import Scene
 from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification import runner
+from ringbalance.verification.assumptions import overridden
 from ringbalance.verification.case import CaseDefinition, parse_case
 from ringbalance.verification.evidence import Evidence, Found, Level, NotRunError, Reference
-from ringbalance.verification.runner import mutate_definition, overridden, run_case, run_cases, run_definition
+from ringbalance.verification.runner import mutate_definition, run_case, run_cases, run_definition
 from ringbalance.verification.verdicts import Verdict
 
 QUICK = ("gci_celik2008", "claim_02_ring_radius", "claim_12_correction_mass")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from ringbalance.verification.evidence import Found, Reference
-from ringbalance.verification.verdicts import Kind, Metric, Verdict, combine, judge_quantity
+from ringbalance.verification.verdicts import Kind, Metric, Role, Verdict, combine, judge_quantity
 
 
 def verdict(kind: Kind, metric: Metric, limit: float, found: Found, reference: Reference | None) -> Verdict:
@@ -109,7 +109,7 @@ def test_evidence_that_is_not_finite_is_refused() -> None:
     ("kind", "verdicts", "expected"),
     [
         ("claim", ["confirmed", "confirmed"], "confirmed"),
-        ("claim", ["confirmed", "confirmed with correction"], "confirmed with correction"),
+        ("claim", ["confirmed", "confirmed with correction"], "refuted"),
         ("claim", ["inconclusive", "confirmed with correction"], "inconclusive"),
         ("claim", ["inconclusive", "refuted", "confirmed"], "refuted"),
         ("code_verification", ["passed", "passed"], "passed"),
@@ -125,3 +125,56 @@ def test_the_deciding_quantity(kind: Kind, verdicts: list[str], expected: str) -
 def test_a_word_of_another_kind_is_refused() -> None:
     with pytest.raises(ValueError, match="knows no"):
         combine(kind="claim", verdicts=[Verdict.PASSED])
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (Found(value=0.4, corrected=1.0), "confirmed with correction"),
+        (Found(value=0.4, corrected=0.9), "refuted"),
+        (Found(value=1.2, corrected=0.9), "confirmed"),
+    ],
+)
+def test_a_bound_may_hold_after_a_correction(found: Found, expected: str) -> None:
+    assert verdict("claim", "at_least", 1.0, found, None) == expected
+
+
+@pytest.mark.parametrize(
+    ("reach", "expected"),
+    [
+        ((-0.2, 0.2), "confirmed"),
+        ((0.0, 0.5), "inconclusive"),
+        ((-0.7, 0.0), "inconclusive"),
+    ],
+)
+def test_an_assumption_may_take_a_confirmation_away(reach: tuple[float, float], expected: str) -> None:
+    """It departs by 0.1, and 5 % of ten is 0.5."""
+    assert verdict("claim", "validation", 0.05, Found(value=10.1, reach=reach), TEN) == expected
+
+
+@pytest.mark.parametrize(
+    ("reach", "expected"),
+    [((-0.5, 5.0), "refuted"), ((-0.9, 0.0), "inconclusive"), ((-20, 0), "inconclusive")],
+)
+def test_an_assumption_may_take_a_refutation_away(reach: tuple[float, float], expected: str) -> None:
+    """It departs by 1.0, beyond 0.2."""
+    assert verdict("claim", "validation", 0.05, Found(value=11.0, reach=reach), TEN) == expected
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "roles", "expected"),
+    [
+        (["confirmed with correction", "confirmed"], ["number", "idea"], "confirmed with correction"),
+        (["confirmed with correction", "refuted"], ["number", "idea"], "refuted"),
+        (["confirmed with correction", "inconclusive"], ["number", "idea"], "inconclusive"),
+        (["confirmed with correction", "confirmed"], ["number", "number"], "refuted"),
+        (["refuted", "confirmed"], ["number", "idea"], "refuted"),
+        (["refuted", "confirmed"], ["reading", "reading"], "confirmed"),
+        (["refuted", "inconclusive"], ["reading", "reading"], "inconclusive"),
+        (["refuted", "refuted"], ["reading", "reading"], "refuted"),
+        (["refuted", "confirmed", "confirmed"], ["reading", "reading", "idea"], "confirmed"),
+        (["confirmed", "confirmed", "refuted"], ["reading", "reading", "idea"], "refuted"),
+    ],
+)
+def test_ideas_numbers_and_readings(verdicts: list[str], roles: list[Role], expected: str) -> None:
+    assert combine(kind="claim", verdicts=[Verdict(word) for word in verdicts], roles=roles) == expected

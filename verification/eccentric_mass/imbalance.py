@@ -28,7 +28,7 @@ PAPER_PHASES = (30.0, 100.0, 210.0, 300.0)
 """Of the imbalance in Fig. 4, deg."""
 CONVERGED = 0.02
 """Relative error of the imbalance within which its estimate has converged."""
-SCALES = (1.0, 10.0, 100.0, 1000.0, 1500.0, 2000.0, 2500.0)
+SCALES = (1.0, 10.0, 100.0, 1000.0, 1500.0, 2000.0, 2500.0, 1e4)
 """Sensor noise that the filter assumes, over the true one."""
 
 

@@ -60,3 +60,13 @@ def central_lambda(*, disc: Disc) -> float:
     a = surface_radius(disc=disc, fill_ratio=disc.max_fill_ratio / 2)
     alpha = half_angle(disc=disc, radius=a)
     return float(2 * a * np.sin(alpha) / alpha)
+
+
+def whole_ring_pressure(scene: Scene) -> float:
+    """Wall pressure at the largest fill if the whole ring were one rectangular element, Pa: a mistake.
+
+    Centrifugal force of a ring of unit angle over its outer face, integral of rho omega^2 r^2 dr / R2.
+    """
+    outer = scene.disc.outer_radius
+    inner = float(surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio))
+    return scene.liquid.density * scene.rotor.speed**2 * (outer**3 - inner**3) / (3 * outer)

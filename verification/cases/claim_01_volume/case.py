@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from functools import partial
 
 from scipy.optimize import brentq
 
@@ -18,6 +18,7 @@ from ringbalance.verification.paper_numbers import (
     DEPARTURE_LOW,
     LOW_PRESSURE,
     RING_RADIUS,
+    rounded_radius,
     with_plate,
 )
 
@@ -30,13 +31,13 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     volume = _volume_without_plates if defect == "no_plates" else _volume_from_radius
     departure = Found(
         value=_volume_from_departure(scene, DEPARTURE_LOW.value),
-        input=math.hypot(_departure_uncertainty(scene), _rounded_radius_uncertainty(disc)),
+        input=math.hypot(_departure_uncertainty(scene), rounded_radius(partial(_twice_the_liquid, disc))),
     )
-    radius_half_width = COVERAGE_FACTOR * _rounded_radius(lambda r: _plate_from_radius(disc, r))
+    radius_half_width = COVERAGE_FACTOR * rounded_radius(lambda r: _plate_from_radius(disc, r))
     found = {
         "volume": Found(
             value=volume(disc, RING_RADIUS.value),
-            input=_rounded_radius(lambda radius: volume(disc, radius)),
+            input=rounded_radius(lambda radius: volume(disc, radius)),
         ),
         "volume_from_departure": departure,
         "flat_strip": Found(value=abs(chamber_volume_paper(disc=disc) / chamber_volume(disc=disc) - 1)),
@@ -62,11 +63,6 @@ def _plate_from_radius(disc: Disc, radius: float) -> float:
     return float(brentq(excess, 0.0, 0.3 * disc.inner_radius, xtol=1e-12))
 
 
-def _rounded_radius(quantity: Callable[[float], float]) -> float:
-    """Standard uncertainty that the rounding of the printed radius gives to a quantity."""
-    return input_uncertainty([(quantity, RING_RADIUS.value, from_rounding(RING_RADIUS.last_digit))])
-
-
 def _volume_from_radius(disc: Disc, radius: float) -> float:
     return chamber_volume(disc=with_plate(disc, _plate_from_radius(disc, radius)))
 
@@ -89,13 +85,9 @@ def _departure_uncertainty(scene: Scene) -> float:
     return input_uncertainty([(lambda d: _volume_from_departure(scene, d), DEPARTURE_LOW.value, rounding)])
 
 
-def _rounded_radius_uncertainty(disc: Disc) -> float:
+def _twice_the_liquid(disc: Disc, radius: float) -> float:
     """The paper reads V'_AC off a radius that it has rounded."""
-
-    def twice_the_liquid(radius: float) -> float:
-        return 2 * disc.axial_width * float(liquid_area(disc=disc, surface_radius=radius))
-
-    return _rounded_radius(twice_the_liquid)
+    return 2 * disc.axial_width * float(liquid_area(disc=disc, surface_radius=radius))
 
 
 def _table(disc: Disc, from_radius: Found, from_departure: Found) -> Table:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
@@ -14,7 +12,6 @@ from ringbalance.verification.paper_numbers import (
     INITIAL_LIQUID_VOLUME,
     MAX_LIQUID_VOLUME,
     RING_RADIUS,
-    plate_effect,
     with_plate,
 )
 
@@ -30,16 +27,13 @@ reference = {
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-
-    def found(quantity: Callable[[Disc], float]) -> Found:
-        return Found(value=quantity(scene.disc), input=plate_effect(scene, quantity))
-
+    volume = chamber_volume(disc=scene.disc)
     bare = with_plate(scene.disc, 0.0)
     return Evidence(
         found={
-            "ring_radius": found(_half_full_radius),
-            "max_liquid": found(lambda disc: _HALF * chamber_volume(disc=disc)),
-            "initial_liquid": found(lambda disc: _QUARTER * chamber_volume(disc=disc)),
+            "ring_radius": Found(value=_half_full_radius(scene.disc)),
+            "max_liquid": Found(value=_HALF * volume),
+            "initial_liquid": Found(value=_QUARTER * volume),
         },
         numbers={"radius_bare": _half_full_radius(bare)},
         series=(_radius_over_fill(scene.disc, bare),),

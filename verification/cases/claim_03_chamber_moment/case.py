@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Final
 
 import numpy as np
@@ -11,27 +12,55 @@ from ringbalance.reduced_model.paper.formulas import (
     moment_paper,
     surface_radius_paper,
 )
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
-from ringbalance.verification.paper_numbers import CHAMBER_MOMENT, DENSITY, RING_RADIUS, at_paper_density
-from ringbalance.verification.rings import chamber_moment, mesh_table, ring_of
+from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, Series, figure
+from ringbalance.verification.paper_numbers import (
+    CHAMBER_MOMENT,
+    DENSITY,
+    RING_RADIUS,
+    at_paper_density,
+    rounded_radius,
+    with_plate,
+)
+from ringbalance.verification.rings import (
+    chamber_moment,
+    found_of,
+    mesh_table,
+    ring_of,
+    scaled,
+    without_plates,
+)
 
 _FILLS: Final = (0.1, 0.2, 0.3, 0.4, 0.5)
+_WHOLE_ANGLE: Final = float(np.sqrt(2))
+"""Sine of the central angle over that of its half, which Eq. 7 takes."""
 
 
-reference = dict.fromkeys(("moment", "arithmetic"), CHAMBER_MOMENT.reference)
+reference = dict.fromkeys(("moment", "arithmetic"), CHAMBER_MOMENT.reference) | {
+    "without_plates": Reference(value=1.0)
+}
+
+
+def values(scene: Scene) -> dict[str, float]:
+    return {"moment": chamber_moment(at_paper_density(scene), density=DENSITY).value}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     given = at_paper_density(scene)
     ring = ring_of(given, _FILLS)
-    by_elements = chamber_moment(given, ring, -1, density=DENSITY)
+    moment = chamber_moment(given, density=DENSITY)
+    if defect == "plates_left_out":
+        moment = without_plates(moment)
     unrounded, rounded = (_eq_7(given.disc, radius) for radius in (_radius(given.disc), RING_RADIUS.value))
-    arithmetic = Found(value=unrounded, corrected=rounded)
-    moment = arithmetic if defect == "plates_left_out" else by_elements
     return Evidence(
-        found={"moment": moment, "arithmetic": arithmetic},
+        found={
+            "moment": moment,
+            "arithmetic": Found(value=unrounded, input=rounded_radius(lambda r: _eq_7(given.disc, r))),
+            "without_plates": scaled(_shape(given), _WHOLE_ANGLE if defect == "whole_angle" else 1.0),
+        },
         numbers={
+            "rounded": rounded,
             "rounding_step": abs(unrounded - rounded),
             "shortfall": 1 - moment.value / CHAMBER_MOMENT.value,
         },
@@ -39,6 +68,13 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         convergence=(mesh_table(ring, "moment", "kg m", len(_FILLS) - 1),),
         status=ring.status,
     )
+
+
+def _shape(scene: Scene) -> Found:
+    """Finite elements over Eq. 7 where there are no plates to leave out."""
+    bare = with_plate(scene.disc, 0.0)
+    disc = ring_of(dataclasses.replace(scene, disc=bare), (scene.disc.max_fill_ratio,))
+    return scaled(found_of(disc, "moment", 0), 1 / _eq_7(bare, _radius(bare)))
 
 
 def _radius(disc: Disc) -> float:
@@ -49,7 +85,7 @@ def _eq_7(disc: Disc, radius: float) -> float:
     return float(moment_paper(disc=disc, density=DENSITY, surface_radius=radius))
 
 
-def _figure(scene: Scene, moment: np.ndarray, uncertainty: np.ndarray) -> Series:
+def _figure(scene: Scene, moment: FloatArray, uncertainty: FloatArray) -> Series:
     x = np.array(_FILLS)
     liquid = 2 * x * max_liquid_volume_paper(disc=scene.disc)
     radius = surface_radius_paper(disc=scene.disc, liquid_volume=liquid)

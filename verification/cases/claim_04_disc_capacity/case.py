@@ -10,7 +10,7 @@ from ringbalance.reduced_model.paper.formulas import capacity
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
 from ringbalance.verification.paper_numbers import CHAMBER_MOMENT, DENSITY, DISC_MOMENT, at_paper_density
-from ringbalance.verification.rings import bare_chamber_moment, chamber_moment, ring_of, scaled
+from ringbalance.verification.rings import chamber_moment, ring_of, without_plates
 
 reference = dict.fromkeys(("capacity", "arithmetic"), DISC_MOMENT.reference)
 
@@ -18,18 +18,21 @@ reference = dict.fromkeys(("capacity", "arithmetic"), DISC_MOMENT.reference)
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     given = at_paper_density(scene)
     ring = ring_of(given, (given.disc.max_fill_ratio,))
-    chamber = chamber_moment(given, ring, 0, density=DENSITY)
+    both = chamber_moment(given, density=DENSITY, factor=math.sqrt(2))
     if defect == "plates_left_out":
-        chamber = bare_chamber_moment(given, density=DENSITY)
+        both = without_plates(both)
     printed = float(capacity(chamber_moment=CHAMBER_MOMENT.value))
+    if defect == "added_as_numbers":
+        printed = 2 * CHAMBER_MOMENT.value
     rounding = CHAMBER_MOMENT.reference.uncertainty * math.sqrt(2)
+    chamber = both.value / math.sqrt(2)
     return Evidence(
         found={
-            "capacity": scaled(chamber, math.sqrt(2)),
+            "capacity": both,
             "arithmetic": Found(value=printed, input=rounding),
         },
-        numbers={"guaranteed": chamber.value},
-        series=(_over_phase(chamber.value),),
+        numbers={"guaranteed": chamber},
+        series=(_over_phase(chamber),),
         status=ring.status,
     )
 

@@ -9,7 +9,7 @@ from ringbalance.scene import liquid_at
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference
 from ringbalance.verification.paper_numbers import DENSE_DISC_MOMENT, DENSITY
-from ringbalance.verification.rings import bare_chamber_moment, chamber_moment, found_of, ring_of, scaled
+from ringbalance.verification.rings import chamber_moment, found_of, ring_of, without_plates
 
 _DENSE: Final = 2 * DENSITY
 
@@ -20,13 +20,11 @@ reference = {"ratio": Reference(value=2.0), "dense_capacity": DENSE_DISC_MOMENT.
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     full = (scene.disc.max_fill_ratio,)
     light, dense = (ring_of(scene, full, density=density) for density in (DENSITY, _DENSE))
-    chamber = chamber_moment(scene, dense, 0, density=_DENSE)
+    capacity = chamber_moment(scene, density=_DENSE, factor=math.sqrt(2))
     if defect == "plates_left_out":
-        chamber = bare_chamber_moment(scene, density=_DENSE)
-    below = found_of(light, "moment", 0)
-    above = found_of(dense, "moment", 0)
-    ratio = above.value / below.value
-    capacity = scaled(chamber, math.sqrt(2))
+        capacity = without_plates(capacity)
+    below, above = (found_of(ring, "moment", 0) for ring in (light, dense))
+    ratio = 1.0 if defect == "density_without_effect" else above.value / below.value
     oil = _oil_density()
     return Evidence(
         found={

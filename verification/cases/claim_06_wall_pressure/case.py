@@ -13,10 +13,10 @@ from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
 from ringbalance.reduced_model.paper.formulas import wall_pressure_paper
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.evidence import Curve, Evidence, Level, Reference, Series, Table, figure
-from ringbalance.verification.paper_numbers import plate_effect, with_plate
-from ringbalance.verification.reference.exact_chamber import wall_pressure_of
-from ringbalance.verification.rings import found_of, mesh_table, ring_of
+from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, Series, Table, figure
+from ringbalance.verification.paper_numbers import with_plate
+from ringbalance.verification.reference.exact_chamber import wall_pressure_of, whole_ring_pressure
+from ringbalance.verification.rings import found_of, mesh_table, ring_of, scaled
 
 _SHARES: Final = (0.1, 0.3, 0.5, 0.7, 0.9, 1.0)
 """Of the largest fill."""
@@ -28,7 +28,14 @@ _SPEEDS: Final = (0.1, 0.2, 0.5, 1.0)
 def reference(scene: Scene) -> Mapping[str, Reference]:
     fills = np.array(_fills(scene))
     by_eq_12 = _eq_12(scene, scene.disc, fills)
-    return {name: Reference(value=float(by_eq_12[index])) for name, index in _JUDGED.items()}
+    return {name: Reference(value=float(by_eq_12[index])) for name, index in _JUDGED.items()} | {
+        "without_plates": Reference(value=1.0)
+    }
+
+
+def values(scene: Scene) -> Mapping[str, float]:
+    pressure = wall_pressure_of(scene, np.array(_fills(scene)))
+    return {name: float(pressure[index]) for name, index in _JUDGED.items()}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -37,17 +44,23 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     x = np.array(fills)
     shortfall = 1 - _eq_12(scene, scene.disc, x) / ring.wall_pressure.value
     bare = with_plate(scene.disc, 0.0)
-    bare_ratio = _eq_12(scene, bare, x) / wall_pressure_of(scene, x, disc=bare)
+    by_eq_12 = _eq_12(scene, bare, x)
+    # What Eq. 12 gives for a volume is its pressure in a ring that no plates take anything from.
+    same_volume = x * chamber_volume(disc=scene.disc) / chamber_volume(disc=bare)
+    corrected = wall_pressure_of(scene, same_volume, disc=bare)
     gravity = _gravity_table(scene)
     return Evidence(
         found={
-            name: found_of(ring, "wall_pressure", index, input_=_standard_uncertainty(scene, fills[index]))
+            name: dataclasses.replace(
+                found_of(ring, "wall_pressure", index), corrected=float(corrected[index])
+            )
             for name, index in _JUDGED.items()
-        },
+        }
+        | {"without_plates": _shape(scene, bare, float(by_eq_12[-1]), whole_ring=defect == "whole_ring")},
         numbers={
             "shortfall_full": float(shortfall[-1]),
             "shortfall_thin": float(shortfall[0]),
-            "bare_difference": float(np.max(np.abs(bare_ratio - 1))),
+            "bare_difference": float(np.max(np.abs(by_eq_12 / wall_pressure_of(scene, x, disc=bare) - 1))),
             "gravity": float(gravity.columns["change by gravity"][-1]),
         },
         series=(_over_fill(scene, ring), _over_plates(scene)),
@@ -70,14 +83,13 @@ def _eq_12(scene: Scene, disc: Disc, fill: FloatArray) -> FloatArray:
     )
 
 
-def _standard_uncertainty(scene: Scene, fill: float) -> float:
-    """Input uncertainty of the difference: the plates are in the finite elements and in Eq. 12's volume."""
-
-    def difference(disc: Disc) -> float:
-        x = np.array([fill])
-        return float((wall_pressure_of(scene, x, disc=disc) - _eq_12(scene, disc, x))[0])
-
-    return plate_effect(scene, difference)
+def _shape(scene: Scene, bare: Disc, by_eq_12: float, *, whole_ring: bool) -> Found:
+    """Finite elements over Eq. 12 at the largest fill of a disc without plates."""
+    given = dataclasses.replace(scene, disc=bare)
+    pressure = found_of(ring_of(given, (bare.max_fill_ratio,)), "wall_pressure", 0)
+    if whole_ring:
+        pressure = dataclasses.replace(pressure, value=whole_ring_pressure(given))
+    return scaled(pressure, 1 / by_eq_12)
 
 
 def _over_fill(scene: Scene, ring: RingQuantities) -> Series:

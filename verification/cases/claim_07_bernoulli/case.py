@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from typing import Final
 
 import numpy as np
 
-from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene.models import Scene
-from ringbalance.verification.comparison import from_half_width, from_range
+from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
 from ringbalance.verification.loops import calibration_of
-from ringbalance.verification.paper_numbers import plate_uncertainty
 from ringbalance.verification.reference.tube_running import (
     driving_head,
     running_tube,
@@ -27,27 +24,23 @@ _PRESSURES: Final = np.geomspace(0.77, 2.53, 9)
 """In units of the scene's."""
 _FILLS: Final = np.linspace(0.02, 1.0, 50)
 """In units of the largest."""
-_HUMP: Final = "hump_radius"
+
+
+def values(scene: Scene) -> dict[str, float]:
+    return {"siphon_share": _siphon_share(scene), "one_k": _one_k(scene).value}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    share = _siphon_share(scene)
-    low, high = _hump_bounds(scene)
-    at_low, at_high = (_siphon_share(_with_hump(scene, radius)) for radius in (low, high))
     excess, by_exit = _exit(scene)
     bare = second_reading(scene)
     return Evidence(
         found={
             "one_k": _one_k(scene),
             "exit_velocity": Found(value=by_exit),
-            "siphon_share": Found(value=share, input=_hump_uncertainty(scene, at_low, at_high)),
+            "siphon_share": Found(value=_siphon_share(scene)),
         },
         numbers={
             "exit_excess": excess,
-            "hump_low": low,
-            "hump_high": high,
-            "share_low": at_low,
-            "share_high": at_high,
             "bare_bore": bare.tube.bore,
             "share_bare": _siphon_share(bare),
         },
@@ -88,31 +81,6 @@ def _siphon_share(scene: Scene) -> float:
         primed=False,
     )
     return float(np.mean(flow.regime == Regime.SIPHON))
-
-
-def _with_hump(scene: Scene, radius: float) -> Scene:
-    if scene.tube.hump_radius is None:
-        return scene
-    return dataclasses.replace(scene, tube=dataclasses.replace(scene.tube, hump_radius=radius))
-
-
-def _hump_bounds(scene: Scene) -> tuple[float, float]:
-    """From the chamber's inner wall to just inside the fullest ring: beyond that the tube is never dry."""
-    ring = float(surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio))
-    return scene.disc.inner_radius, min(0.999 * ring, scene.tube.port_radius)
-
-
-def _hump_uncertainty(scene: Scene, at_low: float, at_high: float) -> float:
-    """Stated, or for the paper's own disc, whose crest is inferred, anything within its bounds."""
-    if scene.tube.hump_radius is None:
-        return 0.0
-    for stated in scene.uncertainty:
-        if stated.quantity == _HUMP:
-            width = stated.half_width * (scene.tube.hump_radius if stated.relative else 1.0)
-            ends = [_siphon_share(_with_hump(scene, scene.tube.hump_radius + s * width)) for s in (-1, 1)]
-            return from_half_width(abs(ends[1] - ends[0]) / 2)
-    inferred = plate_uncertainty(scene) > 0
-    return from_range((at_low, at_high)) if inferred else 0.0
 
 
 def _figure(scene: Scene) -> Series:

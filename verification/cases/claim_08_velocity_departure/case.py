@@ -19,9 +19,10 @@ from ringbalance.verification.paper_numbers import (
     LOW_PRESSURE,
     RING_RADIUS,
     at_paper_density,
-    plate_effect,
+    rounded_radius,
 )
 from ringbalance.verification.reference.exact_chamber import wall_pressure_of
+from ringbalance.verification.rings import without_plates
 
 _PRESSURES: Final = {"low": LOW_PRESSURE, "high": HIGH_PRESSURE}
 _POINTS: Final = 41
@@ -34,14 +35,19 @@ reference = {
 }
 
 
+def values(scene: Scene) -> dict[str, float]:
+    given = at_paper_density(scene)
+    return {f"departure_{name}": _physics(given, p).value for name, p in _PRESSURES.items()}
+
+
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     given = at_paper_density(scene)
     arithmetic = {f"arithmetic_{name}": _arithmetic(given, p) for name, p in _PRESSURES.items()}
     physics = {f"departure_{name}": _physics(given, p) for name, p in _PRESSURES.items()}
     if defect == "eq_12_used":
-        physics = {f"departure_{name}": arithmetic[f"arithmetic_{name}"] for name in _PRESSURES}
+        physics = {name: without_plates(found) for name, found in physics.items()}
     share = np.linspace(0, 1, _POINTS)
-    fall = _relative_velocity(given, LOW_PRESSURE, share)
+    fall = _relative_velocity(given, LOW_PRESSURE, share[::-1] if defect == "chambers_exchanged" else share)
     level_now = _level(given, given.disc)
     return Evidence(
         found={
@@ -50,6 +56,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "slope": Found(value=float(np.min(np.diff(fall)) * (_POINTS - 1))),
         },
         numbers={
+            **{f"rounded_{name}": _eq_19(given, p, RING_RADIUS.value) for name, p in _PRESSURES.items()},
             "shortfall": 1 - _stall(given) / level_now,
             "law_low": _by_law(given, LOW_PRESSURE),
             "law_high": _by_law(given, HIGH_PRESSURE),
@@ -69,30 +76,28 @@ def _stall(scene: Scene) -> float:
 
 
 def _physics(scene: Scene, pressure: float) -> Found:
-    def fall(disc: Disc) -> float:
-        level = _level(scene, disc)
-        return 1 - float(np.sqrt((pressure - level) / (pressure + level)))
-
-    return Found(value=fall(scene.disc), input=plate_effect(scene, fall))
+    level = _level(scene, scene.disc)
+    by_eq_12 = _eq_19(scene, pressure, RING_RADIUS.value)
+    return Found(value=1 - float(np.sqrt((pressure - level) / (pressure + level))), corrected=by_eq_12)
 
 
 def _arithmetic(scene: Scene, pressure: float) -> Found:
-    rounded = scene.disc.axial_width * float(
-        flat_strip_area(disc=scene.disc, surface_radius=RING_RADIUS.value)
+    rounding = rounded_radius(lambda radius: _eq_19(scene, pressure, radius))
+    return Found(value=_eq_19(scene, pressure), input=rounding)
+
+
+def _eq_19(scene: Scene, pressure: float, radius: float | None = None) -> float:
+    """Fall of the velocity by Eq. 19, with the liquid volume that a radius of the ring implies by Eq. 3."""
+    disc, area = scene.disc, flat_strip_area
+    volume = None if radius is None else disc.axial_width * float(area(disc=disc, surface_radius=radius))
+    fall = departure(
+        disc=disc,
+        density=DENSITY,
+        angular_velocity=scene.rotor.speed,
+        gas_pressure=pressure,
+        pair_volume=volume,
     )
-
-    def by_eq_18(pair_volume: float | None) -> float:
-        return float(
-            departure(
-                disc=scene.disc,
-                density=DENSITY,
-                angular_velocity=scene.rotor.speed,
-                gas_pressure=pressure,
-                pair_volume=pair_volume,
-            )
-        )
-
-    return Found(value=by_eq_18(None), corrected=by_eq_18(rounded))
+    return float(fall)
 
 
 def _relative_velocity(scene: Scene, pressure: float, share: FloatArray) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import Final
 
@@ -13,7 +14,7 @@ from ringbalance.reduced_model.paper.formulas import PAPER_LAMBDA
 from ringbalance.scene.models import Scene
 from ringbalance.verification.comparison import from_half_width, from_rounding
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, Series, figure
-from ringbalance.verification.paper_numbers import LAMBDA_TOLERANCE, plate_effect, with_plate
+from ringbalance.verification.paper_numbers import LAMBDA_TOLERANCE, with_plate
 from ringbalance.verification.reference.exact_chamber import central_lambda
 from ringbalance.verification.rings import found_of, mesh_table, ring_of, scaled
 
@@ -29,38 +30,37 @@ _STATED: Final = math.hypot(from_half_width(LAMBDA_TOLERANCE * PAPER_LAMBDA), fr
 reference = {"central": Reference(value=PAPER_LAMBDA, uncertainty=_STATED)}
 
 
+def values(scene: Scene) -> dict[str, float]:
+    return {"central": central_lambda(disc=scene.disc)}
+
+
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     fills = tuple(share * scene.disc.max_fill_ratio for share in _SHARES)
     ring = ring_of(scene, fills)
     per_density = 2 / scene.liquid.density
-    central = scaled(
-        found_of(ring, "moment_per_volume", _CENTRE, input_=_standard_uncertainty(scene)), per_density
-    )
-    curve = _over_range(scene, ring, central.value)
+    bare = central_lambda(disc=with_plate(scene.disc, 0.0))
+    by_elements = scaled(found_of(ring, "moment_per_volume", _CENTRE), per_density)
+    central = dataclasses.replace(by_elements, corrected=bare)
+    curve = _over_range(scene, ring, central.value, alone=defect == "opposite_chamber_left_out")
     return Evidence(
         found={
             "central": central,
             "variation": Found(value=float(np.ptp(curve)) / central.value),
         },
-        numbers={"bare": central_lambda(disc=with_plate(scene.disc, 0.0))},
+        numbers={"bare": bare},
         series=(_figure(np.array(fills), curve),),
         convergence=(mesh_table(ring, "moment_per_volume", "kg/m^2", _CENTRE),),
         status=ring.status,
     )
 
 
-def _standard_uncertainty(scene: Scene) -> float:
-    """Of dU/dV', from the plate thickness."""
-    scale = scene.liquid.density / 2
-    return scale * plate_effect(scene, lambda disc: central_lambda(disc=disc))
-
-
-def _over_range(scene: Scene, ring: RingQuantities, central: float) -> np.ndarray:
+def _over_range(scene: Scene, ring: RingQuantities, central: float, *, alone: bool) -> np.ndarray:
     moment = ring.moment.value
+    opposite = np.full_like(moment, moment[_CENTRE]) if alone else moment[::-1]
     away = ring.fill_ratio - scene.disc.max_fill_ratio / 2
     away[_CENTRE] = 1.0
     transferred = scene.liquid.density * chamber_volume(disc=scene.disc) * away
-    curve = (moment - moment[::-1]) / transferred
+    curve = (moment - opposite) / transferred
     curve[_CENTRE] = central
     return np.asarray(curve)
 

@@ -26,6 +26,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     exact = float(exact_moment(disc=scene.disc, density=DENSITY, fill_ratio=full))
     numbers = {
         "exact": exact,
+        "halved": chamber / 2,
         "halved_against_eq_7": chamber / 2 / CHAMBER_MOMENT.value - 1,
         "halved_against_exact": chamber / 2 / exact - 1,
         "literal_over_exact": chamber / exact,
@@ -38,9 +39,9 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 
 
 def _found(moment: float) -> Found:
-    """Literal moment, its half beside it, with the spread that lambda is claimed to have."""
+    """Literal moment with the spread that lambda is claimed to have."""
     relative = math.hypot(from_half_width(LAMBDA_TOLERANCE), from_rounding(_LAMBDA_DIGIT) / PAPER_LAMBDA)
-    return Found(value=moment, input=relative * moment / 2, corrected=moment / 2)
+    return Found(value=moment, input=relative * moment)
 
 
 def _table(chamber: float, both: float, exact: float) -> Table:

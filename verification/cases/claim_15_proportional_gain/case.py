@@ -22,8 +22,6 @@ _GAINS: Final = (0.04e6, 0.08e6, 0.12e6, 0.16e6, 0.20e6)
 _SEARCHED: Final = tuple((np.arange(2, 41) * 0.01e6).tolist())
 _LAST_WITHOUT: Final = 0.12e6
 _FIRST_WITH: Final = 0.16e6
-_UNKNOWN: Final = 0.25
-"""Standard uncertainty of the rate, relative: influence coefficient and bore are not in the paper."""
 
 
 _BETWEEN: Final = (_LAST_WITHOUT, _FIRST_WITH)
@@ -34,6 +32,10 @@ reference = {
 }
 
 
+def values(scene: Scene) -> dict[str, float]:
+    return {"onset": _onset(scene)}
+
+
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     runs = {gain: _run(scene, gain) for gain in _GAINS}
     rate = _rate(scene, paper_model(scene))
@@ -42,7 +44,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     onset = _onset(scene)
     return Evidence(
         found={
-            "onset": Found(value=onset, input=_UNKNOWN * onset),
+            "onset": Found(value=onset),
             "overshoot_turn": _turn(scene),
         },
         numbers={

@@ -2,57 +2,73 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
 
 from ringbalance.controller.simulation import Simulation
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Evidence, Found, Level, Table
+from ringbalance.verification.evidence import Evidence, Level, Table
 from ringbalance.verification.loops import (
+    PERIODS,
     PHASES,
     amplitude_series,
     loop_scene,
     mistaken_lag,
+    over_period,
     run_loop,
     sampled_amplitudes,
     settling,
 )
 
-_PERIODS: Final = (0.25, 0.5, 1.0)
 _TRIAL: Final = {"first_trial": 0.02, "long_step": 0.1, "short_step": 0.005}
 """Steps with which the trial algorithm settles at every phase, s."""
 
 
+def values(scene: Scene) -> dict[str, float]:
+    return _judged(scene, *_runs(scene, scene, PERIODS[1]))
+
+
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    pairs = [(period, phase) for period in _PERIODS for phase in PHASES]
     aimed = mistaken_lag(scene) if defect == "lag_angle_wrong" else scene
-    target = [_run(aimed, "target_vector", *pair) for pair in pairs]
-    trial = [_run(scene, "trial", *pair, **_TRIAL) for pair in pairs]
-    longest = scene.run.time_limit
-    ratio = [
-        min(settling(slow), longest) / min(settling(fast), longest)
-        for slow, fast in zip(trial, target, strict=True)
-    ]
-    middle = len(PHASES)
+    runs = {period: _runs(aimed, scene, period) for period in PERIODS}
+    judged = [_judged(scene, *pair) for pair in runs.values()]
+    middle_target, middle_trial = runs[PERIODS[1]]
     return Evidence(
-        found={
-            "speed_ratio": Found(value=min(ratio)),
-            "largest_rise": Found(value=max(_largest_rise(run) for run in target)),
-            "misadjustments": Found(value=float(sum(run.misadjustments for run in target))),
-        },
+        found={name: over_period([one[name] for one in judged]) for name in judged[0]},
         numbers={
-            "periods": float(len(_PERIODS)),
-            "trial_misadjustments": float(min(run.misadjustments for run in trial)),
+            "periods": float(len(PERIODS)),
+            "trial_misadjustments": float(
+                min(run.misadjustments for _, trial in runs.values() for run in trial)
+            ),
         },
         series=(
             amplitude_series(
                 "amplitude, 90 degrees, a period of 0.5 s",
-                {"target vector": target[middle], "trial": trial[middle]},
+                {"target vector": middle_target[0], "trial": middle_trial[0]},
             ),
         ),
-        tables=(_table(pairs, target, trial),),
+        tables=(_table(runs),),
     )
+
+
+def _runs(aimed: Scene, scene: Scene, period: float) -> tuple[list[Simulation], list[Simulation]]:
+    """Runs at every phase under the target-vector and under the trial algorithm."""
+    target = [_run(aimed, "target_vector", period, phase) for phase in PHASES]
+    return target, [_run(scene, "trial", period, phase, **_TRIAL) for phase in PHASES]
+
+
+def _judged(scene: Scene, target: list[Simulation], trial: list[Simulation]) -> dict[str, float]:
+    longest = scene.run.time_limit
+    return {
+        "speed_ratio": min(
+            min(settling(slow), longest) / min(settling(fast), longest)
+            for slow, fast in zip(trial, target, strict=True)
+        ),
+        "largest_rise": max(map(_largest_rise, target)),
+        "misadjustments": float(sum(run.misadjustments for run in target)),
+    }
 
 
 def _run(scene: Scene, kind: Any, period: float, phase: float, **settings: float) -> Simulation:
@@ -64,19 +80,25 @@ def _largest_rise(run: Simulation) -> float:
     return float(np.max(np.diff(amplitude), initial=-np.inf)) if amplitude.size > 1 else 0.0
 
 
-def _table(pairs: list[tuple[float, float]], target: list[Simulation], trial: list[Simulation]) -> Table:
-    def times(runs: list[Simulation]) -> list[float | str]:
-        return [run.settling_time if run.settling_time is not None else "not settled" for run in runs]
+def _table(runs: Mapping[float, tuple[list[Simulation], list[Simulation]]]) -> Table:
+    rows = [
+        (period, phase, target, trial)
+        for period, both in runs.items()
+        for phase, target, trial in zip(PHASES, *both, strict=True)
+    ]
+
+    def time(run: Simulation) -> float | str:
+        return run.settling_time if run.settling_time is not None else "not settled"
 
     return Table(
         name="settling times of both algorithms",
         columns={
-            "period": [period for period, _ in pairs],
-            "phase": [phase for _, phase in pairs],
-            "target vector": times(target),
-            "trial": times(trial),
-            "misadjustments, target vector": [float(run.misadjustments) for run in target],
-            "misadjustments, trial": [float(run.misadjustments) for run in trial],
+            "period": [period for period, _, _, _ in rows],
+            "phase": [phase for _, phase, _, _ in rows],
+            "target vector": [time(target) for _, _, target, _ in rows],
+            "trial": [time(trial) for _, _, _, trial in rows],
+            "misadjustments, target vector": [float(target.misadjustments) for _, _, target, _ in rows],
+            "misadjustments, trial": [float(trial.misadjustments) for _, _, _, trial in rows],
         },
         units={"period": "s", "phase": "rad", "target vector": "s", "trial": "s"},
     )

@@ -18,6 +18,7 @@ _GRIDS = ((30, 45), (60, 90))
 """Radial and angular cells, coarse and fine."""
 _ANGLES = np.linspace(0.0, np.pi, 181)
 """Of the shaft; the chamber is symmetric about its centre line."""
+_JUDGED = ("stopped", "running", "any_speed")
 _DOWNWARD = _ANGLES[:1]
 _OFFSETS = np.array([0.02, 0.1, 0.3, 0.6, 1.0, 2.0, 5.0, 20.0])
 """g/omega^2 in units of R2: from a centred ring to almost a plane."""
@@ -33,6 +34,10 @@ class _Cells:
     """Of the chamber's area."""
     width: FloatArray
     """Distance over which the surface passes a cell, m."""
+
+
+def values(scene: Scene) -> dict[str, float]:
+    return _margins(scene, _ANGLES, _GRIDS[0])
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -53,7 +58,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             value=fill - disc.max_fill_ratio, numerical=from_half_width(abs(fill - rough[state]))
         )
         for state, fill in safe.items()
-        if state != "turning"
+        if state in _JUDGED
     }
     ring = float(surface_radius(disc=disc, fill_ratio=disc.max_fill_ratio))
     return Evidence(
@@ -69,6 +74,13 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         },
         series=(_figure(disc, fine, offset),),
     )
+
+
+def _margins(scene: Scene, angles: FloatArray, grid: tuple[int, int]) -> dict[str, float]:
+    disc, offset = scene.disc, scene.environment.gravity / scene.rotor.speed**2
+    cells = _cells(disc, *grid)
+    safe = _safe_fills(disc, cells, _safest_radius(disc, cells, angles), offset, angles)
+    return {f"margin_{state}": safe[state] - disc.max_fill_ratio for state in _JUDGED}
 
 
 def _safe_fills(

@@ -7,12 +7,15 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.pressure.ring import RingQuantities
 from ringbalance.scene.models import Scene
 from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, Series, figure
-from ringbalance.verification.reference.exact_chamber import exact_moment, wall_pressure_of
+from ringbalance.verification.reference.exact_chamber import (
+    exact_moment,
+    wall_pressure_of,
+    whole_ring_pressure,
+)
 from ringbalance.verification.rings import found_of, mesh_table, ring_of
 
 
@@ -26,21 +29,14 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     ring = ring_of(scene, fills)
     pressure = found_of(ring, "wall_pressure", -1)
     if defect == "whole_ring":
-        pressure = dataclasses.replace(pressure, value=_whole_ring(scene))
+        pressure = dataclasses.replace(pressure, value=whole_ring_pressure(scene))
     return Evidence(
         found={"wall_pressure": pressure, "force_balance": _balance(scene, ring)},
-        numbers={"whole_ring": 1 - _whole_ring(scene) / float(wall_pressure_of(scene, fills[-1]))},
+        numbers={"whole_ring": 1 - whole_ring_pressure(scene) / float(wall_pressure_of(scene, fills[-1]))},
         series=(_figure(scene, ring),),
         convergence=(mesh_table(ring, "wall_pressure", "Pa", len(fills) - 1),),
         status=ring.status,
     )
-
-
-def _whole_ring(scene: Scene) -> float:
-    """Centrifugal force of a ring of unit angle over its outer face, integral of rho omega^2 r^2 dr / R2."""
-    outer = scene.disc.outer_radius
-    inner = float(surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio))
-    return scene.liquid.density * scene.rotor.speed**2 * (outer**3 - inner**3) / (3 * outer)
 
 
 def _balance(scene: Scene, ring: RingQuantities) -> Found:

@@ -3,31 +3,33 @@
 from __future__ import annotations
 
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
-from ringbalance.scene.models import Scene
+from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.verification.eccentric_mass.bound import motion_bound
 from ringbalance.verification.eccentric_mass.runs import figure_seven
-from ringbalance.verification.eccentric_mass.scenes import driven_scene
-from ringbalance.verification.evidence import Evidence, Found, Level, no_reference
+from ringbalance.verification.evidence import Evidence, Found, Level
 
 _RATE = 1.0
 """rad/s, of the masses against the rotor."""
 
 
-reference = no_reference
-
-
-def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+def compute(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
     """Forces and amplitudes against their bounds."""
-    rotor = driven_scene()
-    speed = rotor.rotor.speed_profile[0].speed
-    parameters = plant_parameters(rotor)
+    speed = scene.rotor.speed_profile[0].speed
+    parameters = plant_parameters(scene)
     turning = motion_bound(parameters, speed=speed, rate=_RATE)
-    judged = turning if defect is None else motion_bound(parameters, speed=0.0, rate=_RATE)
-    largest = max(run.worst_amplitude for run in figure_seven(rotor).runs)
+    judged = motion_bound(parameters, speed=0.0, rate=_RATE) if defect == "rotor_at_rest" else turning
+    bound = turning.amplitude
+    if defect == "response_left_out":
+        bound = parameters.unbalance * speed**2 / parameters.stiffness
+    missing = 2 * parameters.moment * speed**2
+    largest = max(run.worst_amplitude for run in figure_seven(scene).runs)
     return Evidence(
         found={
-            "force_ratio": Found(value=judged.printed_force / judged.force),
-            "amplitude_ratio": Found(value=largest / turning.amplitude),
+            "force_ratio": Found(
+                value=judged.printed_force / judged.force,
+                corrected=(judged.printed_force + missing) / judged.force,
+            ),
+            "amplitude_ratio": Found(value=largest / bound),
         },
         numbers={"bound": turning.amplitude, "largest": largest},
     )

@@ -4,30 +4,42 @@ from __future__ import annotations
 
 import numpy as np
 
-from ringbalance.scene.models import Scene
+from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.verification.eccentric_mass.imbalance import FigureFour, figure_four
-from ringbalance.verification.eccentric_mass.scenes import driven_scene, thinned
-from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series, no_reference
+from ringbalance.verification.eccentric_mass.scenes import thinned
+from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series
 
 PRINTED = 3.5
 """Middle of the printed 3 to 4 s."""
 
 
-reference = no_reference
+def values(scene: EccentricScene) -> dict[str, float]:
+    return _judged(figure_four(scene, scales=(1.0,)))
 
 
-def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Convergence times under honest and under ever less honest covariances."""
-    found = figure_four(driven_scene())
-    honest = max(found.honest_time) if defect is None else float(found.scaled_time[-1])
+def _judged(found: FigureFour) -> dict[str, float]:
     norm = found.covariance_norm
+    return {
+        "honest": _within(found, max(found.honest_time)),
+        "covariance": float(np.max(norm[:, -1] / norm[:, 0])),
+    }
+
+
+def _within(found: FigureFour, time: float) -> float:
+    """A time, at most that of the whole record."""
+    return min(time, float(found.time[-1]))
+
+
+def compute(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
+    """Convergence times under honest and under ever less honest covariances."""
+    found = figure_four(scene)
+    judged = _judged(found)
+    if defect is not None:
+        judged["honest"] = _within(found, float(found.scaled_time[-1]))
     reached = np.isfinite(found.scaled_time)
     scale = np.exp(np.interp(PRINTED, found.scaled_time[reached], np.log(found.scales[reached])))
     return Evidence(
-        found={
-            "honest": Found(value=honest),
-            "covariance": Found(value=float(np.max(norm[:, -1] / norm[:, 0]))),
-        },
+        found={name: Found(value=value) for name, value in judged.items()},
         numbers={"printed": PRINTED, "scale": float(scale)},
         series=(_estimates(found), _times(found)),
     )

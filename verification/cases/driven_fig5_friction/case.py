@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from ringbalance.scene.models import Scene
+from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.verification.eccentric_mass.runs import FigureFive, figure_five
-from ringbalance.verification.eccentric_mass.scenes import driven_scene, thinned
-from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series, no_reference
+from ringbalance.verification.eccentric_mass.scenes import thinned
+from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series
 
 _BEFORE, _AFTER = 0.1, 0.6
 """Shown around the beginning of the friction stage, s."""
 
 
-reference = no_reference
-
-
-def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+def compute(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
     """Errors of the friction arms and the time they take."""
-    found = figure_five(driven_scene())
+    found = figure_five(scene)
     wrong = 1.1 if defect == "another_friction" else 1.0
     last = [run.estimates.friction_arm[-1] for run in found.runs]
     error = max(float(np.max(np.abs(a / (wrong * arm) - 1))) for a, arm in zip(last, found.arms, strict=True))

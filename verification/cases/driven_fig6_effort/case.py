@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from ringbalance.scene.models import Scene
+from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.verification.eccentric_mass.effort import FigureSix, figure_six
-from ringbalance.verification.eccentric_mass.scenes import driven_scene
-from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series, no_reference
+from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series
 
 _STEP = {"light": 4e-4, "heavy": 1e-4}
 """s, of the integration; the effort hangs on it by a thousandth."""
 
 
-reference = no_reference
-
-
-def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+def compute(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
     """Growth of the effort with the speed."""
-    found = figure_six(driven_scene(), step=_STEP[level])
+    found = figure_six(scene, step=_STEP[level])
     judged = found.exact if defect is None else found.without
     without = found.growth(found.without)
     return Evidence(

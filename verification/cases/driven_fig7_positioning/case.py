@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from ringbalance.scene.models import Scene
+from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.verification.eccentric_mass.runs import BalancingFigure, figure_eight, figure_seven
-from ringbalance.verification.eccentric_mass.scenes import driven_scene, envelope, thinned
-from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series, no_reference
+from ringbalance.verification.eccentric_mass.scenes import envelope, thinned
+from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series
 
 _SHOWN = 12.0
 """s."""
 
 
-reference = no_reference
-
-
-def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+def compute(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
     """Amplitudes before, on the way and after."""
-    rotor = driven_scene()
-    found = figure_seven(rotor) if defect is None else figure_eight(rotor, time_limit=30.0)
+    found = figure_seven(scene) if defect is None else figure_eight(scene, time_limit=30.0)
     ratios = np.divide(found.positioned, found.before)
     arrived = [stage.end for run in found.runs for stage in run.stages if stage.name == "positioning"]
     return Evidence(

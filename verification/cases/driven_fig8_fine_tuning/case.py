@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from ringbalance.scene.models import Scene
+from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.verification.eccentric_mass.runs import BalancingFigure, figure_eight
-from ringbalance.verification.eccentric_mass.scenes import driven_scene, envelope, thinned
-from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series, no_reference
+from ringbalance.verification.eccentric_mass.scenes import envelope, thinned
+from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series
 
 _TIME = {None: 200.0, "tuning_given_up": 25.0}
 """s."""
 
 
-reference = no_reference
-
-
-def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+def compute(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
     """Amplitudes after positioning and after fine tuning."""
-    found = figure_eight(driven_scene(), time_limit=_TIME[defect])
+    found = figure_eight(scene, time_limit=_TIME[defect])
     left = np.divide(found.positioned, found.before)
     ended = np.divide(found.after, found.before)
     settled = [run.settling_time or run.time[-1] for run in found.runs]

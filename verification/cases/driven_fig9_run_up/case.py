@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ringbalance.scene.models import Scene
+from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.verification.eccentric_mass.runs import FigureNine, figure_nine
-from ringbalance.verification.eccentric_mass.scenes import driven_scene, envelope, thinned
+from ringbalance.verification.eccentric_mass.scenes import envelope, thinned
 from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
 
 _RPM = 30 / np.pi
@@ -16,14 +16,14 @@ _PRINTED = 135.0
 _ROUNDED = 0.5 / np.sqrt(3)
 
 
-def reference(scene: Scene) -> Mapping[str, Reference]:
+def reference(scene: EccentricScene) -> Mapping[str, Reference]:
     """The printed critical speed."""
     return {"critical": Reference(value=_PRINTED, uncertainty=_ROUNDED)}
 
 
-def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+def compute(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
     """Peaks and critical speeds."""
-    found = figure_nine(driven_scene())
+    found = figure_nine(scene)
     balanced = found.balanced_peak[0] if defect is None else found.locked_peak[0]
     critical, without = _RPM * found.critical_speed, _RPM * found.rotor_critical_speed
     return Evidence(

@@ -1,0 +1,192 @@
+"""What nobody gave widens a claim, and can only take a verdict away."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ringbalance.scene.models import InputUncertainty, Scene
+from ringbalance.verification.assumptions import assumptions_of
+from ringbalance.verification.case import CaseDefinition, RestsOn, parse_case
+from ringbalance.verification.catalogue import case_code, load_case
+from ringbalance.verification.evidence import Evidence, Found, Level, Reference
+from ringbalance.verification.judging import references
+from ringbalance.verification.runner import run_definition
+from ringbalance.verification.verdicts import Metric, Verdict, judge_quantity
+
+BORE = RestsOn(path="tube.bore")
+
+
+def with_origin(scene: Scene, path: str, origin: str) -> Scene:
+    others = [(known, word) for known, word in scene.origins if known != path]
+    return dataclasses.replace(scene, origins=(*others, (path, origin)))  # type: ignore[arg-type]
+
+
+def stating(scene: Scene, quantity: str, half_width: float) -> Scene:
+    stated = InputUncertainty(quantity=quantity, half_width=half_width, relative=True)
+    return dataclasses.replace(scene, uncertainty=(stated,))
+
+
+@pytest.mark.parametrize(("origin", "named"), [("given", 0), ("measured", 0), ("assumed", 1), ("default", 1)])
+def test_what_somebody_vouches_for_is_no_assumption(paper_scene: Scene, origin: str, named: int) -> None:
+    assert len(assumptions_of([BORE], with_origin(paper_scene, "tube.bore", origin))) == named
+
+
+def test_an_assumed_part_has_the_wider_range_and_an_inferred_value_the_stated_one(paper_scene: Scene) -> None:
+    def ends(origin: str, share: float) -> tuple[float, float]:
+        scene = stating(with_origin(paper_scene, "tube.bore", origin), "bore", share)
+        (found,) = assumptions_of([BORE], scene)
+        return found.low / found.value, found.high / found.value
+
+    assert ends("assumed", 0.01) == pytest.approx((0.5, 1.5))
+    assert ends("assumed", 0.9) == pytest.approx((0.1, 1.9))
+    assert ends("inferred", 0.01) == pytest.approx((0.99, 1.01))
+
+
+def test_a_range_of_its_own_goes_first_and_none_at_all_is_an_error(paper_scene: Scene) -> None:
+    scene = stating(with_origin(paper_scene, "tube.bore", "inferred"), "bore", 0.01)
+    (own,) = assumptions_of([RestsOn(path="tube.bore", low=1e-3, high=2e-3, why="so")], scene)
+    assert (own.low, own.high, own.why) == (1e-3, 2e-3, "so")
+    with pytest.raises(ValueError, match=r"environment\.gravity: nobody gave it"):
+        assumptions_of([RestsOn(path="environment.gravity")], dataclasses.replace(scene, uncertainty=()))
+
+
+def test_half_a_range_is_refused() -> None:
+    for text in ({"low": 1.0}, {"low": 1.0, "high": 2.0}, {"documented": True}, {"why": "so"}):
+        with pytest.raises(ValueError, match="low, high and why"):
+            RestsOn(path="tube.bore", **text)
+
+
+class Thick:
+    """Ten, and as much more as the plates are thicker than those of the paper."""
+
+    reference: Any
+
+    def __init__(self, *, per_mm: float, offset: float = 0.0, shared: bool = False) -> None:
+        self.per_mm, self.offset, self.shared = per_mm, offset, shared
+
+    def reference_of(self, scene: Scene) -> float:
+        return 10.0 + (self._more(scene) if self.shared else 0.0)
+
+    def _more(self, scene: Scene) -> float:
+        return self.per_mm * (1e3 * scene.disc.plate_thickness - 2.777)
+
+    def compute(self, scene: Scene, level: Level, defect: str | None = None) -> Evidence:  # noqa: ARG002
+        found = Found(value=10.0 + self.offset + self._more(scene))
+        return Evidence(found={"answer": found}, numbers={"doubt": 0.0})
+
+
+RESTS = (
+    '[[rests_on]]\npath = "disc.plate_thickness"\nlow = 2.577e-3\nhigh = 2.977e-3\nwhy = "so"\n\n[[quantity]]'
+)
+
+
+@pytest.mark.parametrize(
+    ("per_mm", "offset", "shared", "expected"),
+    [
+        (0.0, 0.0, False, "confirmed"),
+        (1.0, 0.0, False, "confirmed"),
+        (5.0, 0.0, False, "inconclusive"),
+        (5.0, 0.0, True, "confirmed"),
+        (0.0, 2.0, False, "refuted"),
+        (5.0, 2.0, False, "refuted"),
+        (15.0, 2.0, False, "inconclusive"),
+        (15.0, 2.0, True, "refuted"),
+    ],
+)
+def test_a_claim_is_decided_where_it_is_so_over_the_whole_range(
+    claim_text: str, paper_scene: Scene, per_mm: float, offset: float, shared: bool, expected: str
+) -> None:
+    """Over 0.2 mm either way; a departure of 5 % of ten is what the case lets pass."""
+    definition = parse_case(claim_text.replace("[[quantity]]", RESTS, 1), source="x")
+    code: Any = Thick(per_mm=per_mm, offset=offset, shared=shared)
+    code.reference = lambda scene: {"answer": Reference(value=code.reference_of(scene))}
+    result = run_definition(definition, code, scene=paper_scene)
+    assert result.verdict == expected
+    assert [one.path for one in result.assumptions] == ["disc.plate_thickness"]
+    given_by_all = with_origin(paper_scene, "disc.plate_thickness", "given")
+    alone = run_definition(definition, code, scene=given_by_all)
+    assert alone.verdict == ("refuted" if offset else "confirmed")
+    assert alone.assumptions == ()
+
+
+numbers = st.floats(-20.0, 20.0)
+widths = st.floats(0.0, 5.0)
+
+
+@given(
+    metric=st.sampled_from(["validation", "at_most", "at_least"]),
+    value=numbers,
+    corrected=st.none() | numbers,
+    known=widths,
+    reach=st.tuples(widths, widths),
+    wider=st.floats(1.0, 100.0),
+)
+def test_widening_an_assumption_only_weakens(
+    metric: Metric,
+    value: float,
+    corrected: float | None,
+    known: float,
+    reach: tuple[float, float],
+    wider: float,
+) -> None:
+    def verdict(factor: float) -> Verdict:
+        found = Found(value=value, input=known, corrected=corrected)
+        found = found.moved(-factor * reach[0], factor * reach[1])
+        reference = Reference(value=10.0, uncertainty=0.1)
+        judged = judge_quantity(kind="claim", metric=metric, limit=0.5, found=found, reference=reference)
+        return judged.verdict
+
+    assert verdict(wider) in (verdict(1.0), Verdict.INCONCLUSIVE)
+    assert verdict(1.0) in (verdict(0.0), Verdict.INCONCLUSIVE)
+
+
+CHEAP = (
+    "claim_01_volume",
+    "claim_02_ring_radius",
+    "claim_03_chamber_moment",
+    "claim_04_disc_capacity",
+    "claim_05_density",
+    "claim_06_wall_pressure",
+    "claim_08_velocity_departure",
+    "claim_10_working_pressure",
+    "claim_11_lambda",
+    "claim_12_correction_mass",
+    "claim_13_explicit_segments",
+    "claim_18_gas_hole",
+    "claim_20_rectangular_element",
+)
+NUMBERS = {
+    "disc": ("plate_thickness",),
+    "liquid": ("kinematic_viscosity", "vapour_pressure"),
+    "tube": ("bore", "hump_radius", "hump_position", "length", "roughness"),
+    "gas": ("ambient_pressure",),
+    "rotor": ("influence_coefficient", "lag_angle"),
+    "sensor": ("amplitude_noise", "phase_noise"),
+}
+
+
+@pytest.mark.parametrize("case", CHEAP)
+def test_no_verdict_rests_on_an_assumption_that_it_does_not_name(paper_scene: Scene, case: str) -> None:
+    definition: CaseDefinition = load_case(case)
+    named = {one.path for one in definition.rests_on}
+    changed = paper_scene
+    for table, keys in NUMBERS.items():
+        part = getattr(changed, table)
+        new = {key: 1.02 * getattr(part, key) for key in keys if f"{table}.{key}" not in named}
+        changed = dataclasses.replace(changed, **{table: dataclasses.replace(part, **new)})
+    code = case_code(case)
+    errors = []
+    for scene in (paper_scene, changed):
+        found, against = code.compute(scene, "light").found, references(code, scene)
+        errors.append(
+            {n: one.value - (against[n].value if n in against else 0.0) for n, one in found.items()}
+        )
+    for quantity in definition.quantity:
+        passes = quantity.limit * (against[quantity.name].value if quantity.name in against else 1.0)
+        moved = errors[1][quantity.name] - errors[0][quantity.name]
+        assert abs(moved) <= 0.01 * abs(passes) + 1e-9, quantity.name

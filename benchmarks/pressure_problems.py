@@ -13,7 +13,7 @@ import numpy as np
 
 from ringbalance.mesh.chamber import ChamberMesh
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.physics.pressure.assembly import at_cells, volume_points
+from ringbalance.physics.pressure.assembly import at_points, volume_points
 from ringbalance.physics.pressure.solve import PressureProblem, PressureSolution
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loader import bundled_scene, load_scene
@@ -105,8 +105,8 @@ def right_hand_sides(problem: str, disc: Disc) -> PressureProblem:
 
 def relative_error(problem: str, chamber: ChamberMesh, solution: PressureSolution) -> float:
     """Error of our solution. Returns: |p_h - p| / |p| in L2 over the mesh."""
-    volume = volume_points(chamber.mesh)
+    volume = volume_points(chamber)
     surface = float(chamber.surface_radius.mean()) / chamber.length_scale
     true = exact(problem, volume.points, surface)
-    difference = at_cells(volume, solution.pressure) - true
+    difference = at_points(volume, solution.pressure) - true
     return float(np.sqrt(np.sum(volume.weights * difference**2) / np.sum(volume.weights * true**2)))

@@ -10,7 +10,7 @@ from ringbalance.controller.liquid_ring.plant import Operation
 from ringbalance.physics.gas.column import compression_work, normal_volume, nozzle_flow
 from ringbalance.physics.gas.supply import gas_line
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.tube.residual import residual_fill_ratio
+from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.scene.models import Scene
 
 _LITRE = 1e-3

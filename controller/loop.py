@@ -26,9 +26,9 @@ from ringbalance.controller.simulation import Injection, Outcome, Sample, Simula
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor
 from ringbalance.reduced_model.chamber.gravity import check_ring
+from ringbalance.reduced_model.chamber.range import chamber_status
 from ringbalance.reduced_model.gas_line import line_answers
 from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw, balancer_model
-from ringbalance.reduced_model.selection.chamber_range import chamber_status
 from ringbalance.reduced_model.selection.registry import ModelUsed
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene

@@ -9,50 +9,53 @@ chamber, y with the rotation, z along the shaft, the chamber between -B/2 and B/
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from copy import copy
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from skfem import Mesh, MeshHex1, MeshHex2, MeshQuad1, MeshQuad2
+from numpy.lib.stride_tricks import sliding_window_view
 
 from ringbalance.mesh.geometry import half_angle
+from ringbalance.mesh.quadratic import cell_shapes, jacobians
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.models import Disc
 
 Geometry = Literal["quadratic", "straight"]
 SurfaceFunction = Callable[[FloatArray, FloatArray], FloatArray]
 
-# Node sides of the grid: (axis, index) in the order radial, angular, axial.
-_SIDES = {
-    "free_surface": (0, 0),
-    "outer_wall": (0, -1),
-    "plate_right": (1, 0),
-    "plate_left": (1, -1),
-    "end_back": (2, 0),
-    "end_front": (2, -1),
-}
-# Order in which scikit-fem takes the axes so that its cells come out right-handed in a VTK file.
-_CELL_AXES = {2: (1, 0), 3: (0, 1, 2)}
+SIDES: Mapping[str, tuple[int, int]] = MappingProxyType(
+    {
+        "free_surface": (0, 0),
+        "outer_wall": (0, -1),
+        "plate_right": (1, 0),
+        "plate_left": (1, -1),
+        "end_back": (2, 0),
+        "end_front": (2, -1),
+    }
+)
+"""Boundaries: axis of the grid (radial, angular, axial), and which of its ends; the last two in 3-D only."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ChamberMesh:
     """A structured mesh of the liquid in one chamber."""
 
-    mesh: MeshQuad2 | MeshHex2
-    """Coordinates in units of `length_scale`, boundaries by name."""
+    nodes: FloatArray
+    """Places in units of `length_scale`, shape (dimension, nodes), in the order of `grid`."""
     length_scale: float
-    """Length of one unit of `mesh`, m: the outer radius."""
+    """Length of one unit of `nodes`, m: the outer radius."""
     cells: tuple[int, ...]
     """Cells along the radius, the angle and, in three dimensions, the axis."""
     geometry: Geometry
     """Whether mid-nodes lie on the arcs or half-way between their neighbours."""
     grid: IntArray
-    """Node numbers by structured place, shape 2 cells + 1 along each axis."""
+    """Node numbers by structured place, shape 2 cells + 1 along each axis; the last runs fastest."""
+    cell_nodes: IntArray
+    """Node numbers of each cell, shape (cells, 3^dimension), both with the last axis running fastest."""
     surface_radius: FloatArray
     """Radius of the free surface at its nodes, m, the shape of grid[0]."""
 
@@ -60,6 +63,11 @@ class ChamberMesh:
     def dimension(self) -> int:
         """Two for a cross-section (per unit depth), three for the whole chamber."""
         return len(self.cells)
+
+    @property
+    def boundaries(self) -> tuple[str, ...]:
+        """Names of the sides."""
+        return tuple(name for name, (axis, _) in SIDES.items() if axis < self.dimension)
 
 
 def default_cells(*, disc: Disc, dimension: int = 2) -> tuple[int, ...]:
@@ -89,8 +97,7 @@ def chamber_mesh(
         cells: along the radius, the angle and, for a three-dimensional mesh, the axis; default
             `default_cells` in two dimensions.
         geometry: "quadratic" puts mid-nodes on the arcs, "straight" half-way between their neighbours.
-    Returns: The mesh, with boundaries free_surface, outer_wall, plate_left (at the larger angle), plate_right
-        and, in three dimensions, end_front (at B/2) and end_back.
+    Returns: The mesh; plate_left is the one at the larger angle, end_front the one at B/2.
     Raises: ValueError: cells that are not two or three positive numbers, or a surface that does not lie
         between the plate's edge and the outer radius everywhere.
     """
@@ -104,18 +111,14 @@ def chamber_mesh(
     places = _positions(disc, surface, counts) / disc.outer_radius
     if geometry == "straight":
         places = _straightened(places)
-    template, grid = _topology(counts)
-    doflocs = np.empty((len(counts), grid.size))
-    doflocs[:, grid.ravel()] = places.reshape(len(counts), -1)
-    # A shallow copy shares the connectivity, which would otherwise be derived again for every surface.
-    mesh = copy(template)
-    mesh.doflocs = doflocs
+    grid, cell_nodes = _topology(counts)
     return ChamberMesh(
-        mesh=mesh,
+        nodes=places.reshape(len(counts), -1),
         length_scale=disc.outer_radius,
         cells=counts,
         geometry=geometry,
         grid=grid,
+        cell_nodes=cell_nodes,
         surface_radius=surface,
     )
 
@@ -167,23 +170,15 @@ def _straightened(places: FloatArray) -> FloatArray:
 
 
 @lru_cache(maxsize=16)
-def _topology(cells: tuple[int, ...]) -> tuple[MeshQuad2 | MeshHex2, IntArray]:
-    """Mesh in grid units, with its boundaries, and the node numbers by structured place."""
-    first, second = (MeshQuad1, MeshQuad2) if len(cells) == 2 else (MeshHex1, MeshHex2)
-    order = _CELL_AXES[len(cells)]
-    mesh = second.from_mesh(first.init_tensor(*(np.arange(cells[axis] + 1.0) for axis in order)))
-    radial, angular, *axial = np.rint(2 * mesh.doflocs[np.argsort(order)]).astype(np.int64)
-    grid = np.empty(tuple(2 * n + 1 for n in cells), dtype=np.int64)
-    grid[(radial, angular, *axial)] = np.arange(mesh.doflocs.shape[1])
-    middle = mesh.p[:, mesh.facets].mean(axis=1)[np.argsort(order)]
-    named = {
-        name: np.nonzero(np.abs(middle[axis] - (0 if end == 0 else cells[axis])) < 0.25)[0].astype(np.int32)
-        for name, (axis, end) in _SIDES.items()
-        if axis < len(cells)
-    }
-    template = second(mesh.doflocs, mesh.t, named)
-    _ = template.dofs, template.f2t  # derived here once, for every mesh of this topology
-    return template, grid
+def _topology(cells: tuple[int, ...]) -> tuple[IntArray, IntArray]:
+    """Node numbers by structured place, and those of each cell."""
+    shape = tuple(2 * n + 1 for n in cells)
+    grid = np.arange(np.prod(shape), dtype=np.int64).reshape(shape)
+    windows = sliding_window_view(grid, (3,) * len(cells))[(slice(None, None, 2),) * len(cells)]
+    cell_nodes = windows.reshape(-1, 3 ** len(cells))
+    for shared in (grid, cell_nodes):
+        shared.flags.writeable = False
+    return grid, cell_nodes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -199,23 +194,19 @@ class MeshQuality:
     nodes: int
 
 
-def mesh_quality(mesh: Mesh) -> MeshQuality:
-    """Quality of a mesh of quadratic quadrilaterals or hexahedra, judged at the nodes of every cell.
+def mesh_quality(chamber: ChamberMesh) -> MeshQuality:
+    """Quality of a mesh, judged at the nodes of every cell.
 
     scaled Jacobian = det(J) / prod_b |J_b| with J_b = dx/dX_b, aspect = max_b |J_b| / min_b |J_b|.
-    Args: `mesh`: scikit-fem mesh, coordinates in any unit.
     Source: the scaled Jacobian of the Verdict library (Knupp et al., SAND2007-1751), at all nodes of a
     quadratic cell instead of its corners alone.
     """
-    points = np.asarray(mesh.elem.doflocs, dtype=np.float64).T
-    jacobian = np.moveaxis(mesh.mapping().DF(points), (0, 1), (-2, -1))
+    _, gradients = cell_shapes([np.array([-1.0, 0.0, 1.0])] * chamber.dimension)
+    jacobian = jacobians(chamber.nodes[:, chamber.cell_nodes], gradients)
     lengths = np.linalg.norm(jacobian, axis=-2)
-    # scikit-fem numbers the corners of a hexahedron so that its local axes are left-handed.
-    handedness = 1 if jacobian.shape[-1] == 2 else -1
-    scaled = handedness * np.linalg.det(jacobian / lengths[..., None, :])
     return MeshQuality(
-        minimum_scaled_jacobian=float(scaled.min()),
+        minimum_scaled_jacobian=float(np.linalg.det(jacobian / lengths[..., None, :]).min()),
         maximum_aspect=float((lengths.max(axis=-1) / lengths.min(axis=-1)).max()),
-        cells=int(mesh.t.shape[1]),
-        nodes=int(mesh.doflocs.shape[1]),
+        cells=len(chamber.cell_nodes),
+        nodes=chamber.nodes.shape[1],
     )

@@ -11,9 +11,12 @@ from typing import Any, Final
 
 _HOME: Final = MappingProxyType(
     {
+        "factorised": "ringbalance.physics.pressure.sparse",
+        "linear_prolongation": "ringbalance.physics.pressure.sparse",
         "multigrid": "ringbalance.physics.pressure.multigrid",
         "sloshing_response": "ringbalance.physics.sloshing.response",
         "nnls": "scipy.optimize",
+        "sparse_matrix": "ringbalance.physics.pressure.sparse",
     }
 )
 

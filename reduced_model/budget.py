@@ -14,11 +14,11 @@ from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, Cu
 from ringbalance.reduced_model.chamber.inputs import half_widths, shifted
 from ringbalance.reduced_model.device import HEAD_INPUTS, Device, device_of
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.tube.crest_margin import directed_state, margin_of
+from ringbalance.reduced_model.operating.crest_margin import directed_state, margin_of
+from ringbalance.reduced_model.operating.point import OperatingPoint
+from ringbalance.reduced_model.operating.residual import ResidualLiquid, usable_moment_uncertainty
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
 from ringbalance.reduced_model.tube.heads import without_inputs
-from ringbalance.reduced_model.tube.operating_point import OperatingPoint
-from ringbalance.reduced_model.tube.residual import ResidualLiquid, usable_moment_uncertainty
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 
@@ -110,7 +110,7 @@ def budgets(*, scene: Scene, calibration: Calibrated) -> Mapping[str, Budget]:
     one without a flow over a crest neither crest pressure nor margin.
     """
     parts = _chamber_parts(calibration.chamber) | _flow_parts(scene, calibration)
-    effects = _input_effects(scene, calibration.operating_point)
+    effects = _input_effects(scene, calibration)
     return {
         name: Budget(
             quantity=name,
@@ -219,9 +219,10 @@ def _law_without_inputs(scene: Scene, calibration: Calibrated) -> CalibratedLaw:
     )
 
 
-def _input_effects(scene: Scene, point: OperatingPoint) -> dict[str, dict[str, float]]:
+def _input_effects(scene: Scene, calibration: Calibrated) -> dict[str, dict[str, float]]:
     """Larger change of every quantity to either side, by the input's path in the scene."""
-    here = device_of(scene, near=point.loss_velocity or 1.0)
+    near = calibration.operating_point.loss_velocity or 1.0
+    here = device_of(scene, near=near, near_fill=calibration.residual.fill_ratio)
     values, found = here.values(), {}
     for quantity, width in half_widths(scene).items():
         sides = [_moved(here, quantity, change).values() for change in (-width, width)]
@@ -235,4 +236,9 @@ def _input_effects(scene: Scene, point: OperatingPoint) -> dict[str, dict[str, f
 
 def _moved(device: Device, quantity: str, change: float) -> Device:
     scene = shifted(scene=device.scene, quantity=quantity, change=change)
-    return device_of(scene, near=device.near, heads=None if quantity in HEAD_INPUTS else device.heads)
+    return device_of(
+        scene,
+        near=device.near,
+        near_fill=device.near_fill,
+        heads=None if quantity in HEAD_INPUTS else device.heads,
+    )

@@ -20,10 +20,10 @@ from ringbalance.reduced_model.law.building import calibrated_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.model import BalancerModel, balancer_model
 from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_law
+from ringbalance.reduced_model.operating.point import OperatingPoint, operating_point
+from ringbalance.reduced_model.operating.residual import ResidualLiquid, residual_liquid
 from ringbalance.reduced_model.selection.registry import ModelUsed, models_used
 from ringbalance.reduced_model.tube.heads import tube_heads
-from ringbalance.reduced_model.tube.operating_point import OperatingPoint, operating_point
-from ringbalance.reduced_model.tube.residual import ResidualLiquid, residual_liquid
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene

@@ -37,8 +37,8 @@ HEAD_INPUTS: Final = frozenset(
 _SPAN: Final = (-5.0, 2.5)
 """Of the tabulated velocities, ln(u/near)."""
 _NODES: Final = 121
-_ROUNDS: Final = 12
-"""Of the fixed point of the residual fill, each of which multiplies the error by less than a half."""
+_ROUNDS: Final = 2
+"""Of the fixed point of the residual fill, each of which leaves a tenth of the error or less."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -50,44 +50,34 @@ class Device:
     gas_factor: float
     near: float
     """Velocity that the heads are tabulated around, m/s."""
+    near_fill: float
+    """Residual fill that its own is looked for from."""
     heads: tuple[FloatArray, ...]
     """Those of `log_heads`."""
 
     def values(self) -> dict[str, float]:
         """The quantities of an uncertainty budget, SI; those of a flow only where there is one."""
         disc = self.scene.disc
-        half = disc.max_fill_ratio / 2
-        pressure, moment, ratio = chamber_closed_forms(
-            scene=self.scene, fill_ratio=np.array([disc.max_fill_ratio, half])
-        )
-        return (
-            {
-                "chamber_volume": chamber_volume(disc=disc),
-                "wall_pressure": float(pressure[0]),
-                "moment": float(moment[0]),
-                "lambda": float(ratio[1]),
-                "usable_moment": self._usable_moment(),
-                "stall_pressure": max(self._ends(0.0, disc.max_fill_ratio).stall_pressure(), 0.0)
-                / self.gas_factor,
-            }
-            | self._priming(half)
-            | self._flow_values(half)
-        )
-
-    def _priming(self, fill: float) -> dict[str, float]:
-        """With the driven chamber empty and the crest's gas vented; at equal fills and with it trapped."""
-        crest = self.path.crest
-        if crest is None:
-            return {}
-        vented, trapped = (replace(crest, trapped=kept) for kept in (False, True))
-        empty, equal = self._ends(0.0, self.scene.disc.max_fill_ratio), self._ends(fill, fill)
-        return {
-            "priming_pressure_vented": vented.priming_pressure(empty) / self.gas_factor,
-            "priming_pressure_trapped": trapped.priming_pressure(equal) / self.gas_factor,
+        fills = np.array([0.0, disc.max_fill_ratio / 2, disc.max_fill_ratio])
+        pressure, moment, ratio = chamber_closed_forms(scene=self.scene, fill_ratio=fills)
+        empty, half, full = (float(p) for p in pressure)
+        equal, uneven = self._ends(half, half), self._ends(empty, full)
+        found = {
+            "chamber_volume": chamber_volume(disc=disc),
+            "wall_pressure": full,
+            "moment": float(moment[2]),
+            "lambda": float(ratio[1]),
+            "usable_moment": self._usable_moment(),
+            "stall_pressure": max(uneven.stall_pressure(), 0.0) / self.gas_factor,
         }
+        crest = self.path.crest
+        if crest is not None:
+            vented, trapped = (replace(crest, trapped=kept) for kept in (False, True))
+            found["priming_pressure_vented"] = vented.priming_pressure(uneven) / self.gas_factor
+            found["priming_pressure_trapped"] = trapped.priming_pressure(equal) / self.gas_factor
+        return found | self._flow_values(equal)
 
-    def _flow_values(self, fill: float) -> dict[str, float]:
-        ends = self._ends(fill, fill)
+    def _flow_values(self, ends: TubeEnds[float]) -> dict[str, float]:
         flow = self._flow(ends, primed=False)
         found = {"velocity": flow.velocity}
         u = flow.velocity or self._flow(ends, primed=True).velocity
@@ -102,12 +92,12 @@ class Device:
         return found
 
     def _ends(self, own: float, other: float) -> TubeEnds[float]:
-        pressure, _, _ = chamber_closed_forms(scene=self.scene, fill_ratio=np.array([own, other]))
+        """For hydrostatic pressures of the two chambers."""
         return TubeEnds(
             upstream_gas=self.gas_factor * self.scene.gas.pressure,
             downstream_gas=0.0,
-            upstream_hydrostatic=float(pressure[0]),
-            downstream_hydrostatic=float(pressure[1]),
+            upstream_hydrostatic=own,
+            downstream_hydrostatic=other,
             port_pressure=self.path.port_pressure,
         )
 
@@ -135,9 +125,10 @@ class Device:
         disc, top = self.scene.disc, self.scene.disc.max_fill_ratio
         area = float(liquid_area(disc=disc, surface_radius=disc.inner_radius))
         acceleration = self.scene.rotor.speed**2 * self.scene.tube.port_radius
-        section, x = math.pi / 4 * self.scene.tube.bore**2, top
+        section, x = math.pi / 4 * self.scene.tube.bore**2, self.near_fill
         for _ in range(_ROUNDS):
-            u = self._flow(self._ends(x, top - x), primed=True).velocity
+            pressure, _, _ = chamber_closed_forms(scene=self.scene, fill_ratio=np.array([x, top - x]))
+            u = self._flow(self._ends(float(pressure[0]), float(pressure[1])), primed=True).velocity
             depth = float(draw_down_depth(flow_rate=section * u, acceleration=acceleration))
             level = min(max(self.scene.tube.port_radius - depth, disc.inner_radius), disc.outer_radius)
             x = min(float(liquid_area(disc=disc, surface_radius=level)) / area, top)
@@ -146,16 +137,23 @@ class Device:
         return float(moment[0] - moment[1])
 
 
-def device_of(scene: Scene, *, near: float, heads: tuple[FloatArray, ...] | None = None) -> Device:
+def device_of(
+    scene: Scene, *, near: float, near_fill: float = 0.0, heads: tuple[FloatArray, ...] | None = None
+) -> Device:
     """Set a device up from a scene.
 
-    Args: `near`: velocity around which the heads are tabulated, m/s. `heads`: those of a device that differs
-        in none of `HEAD_INPUTS`.
+    Args: `near`: velocity around which the heads are tabulated, m/s. `near_fill`: of the residual liquid,
+        about. `heads`: those of a device that differs in none of `HEAD_INPUTS`.
     """
     if heads is None:
         heads = tuple(head(_log_velocities(near)) for head in log_heads(scene))
     return Device(
-        scene=scene, path=tube_path(scene), gas_factor=pressure_factor(scene), near=near, heads=heads
+        scene=scene,
+        path=tube_path(scene),
+        gas_factor=pressure_factor(scene),
+        near=near,
+        near_fill=near_fill,
+        heads=heads,
     )
 
 

@@ -198,7 +198,7 @@ def _tube_table(calibration: Calibration) -> Table:
     terms = {name: term for name, term in tube.terms.items() if np.any(term)}
     table = _table("Tube", "u m/s", "Re", "k", "±", "state", *terms)
     table.columns[4].justify = "left"
-    for i in np.unique(np.linspace(0, tube.velocity.size - 1, 9).astype(int)):
+    for i in dict.fromkeys(np.linspace(0, tube.velocity.size - 1, 9).astype(int).tolist()):
         table.add_row(
             f"{tube.velocity[i]:.3g}",
             f"{tube.reynolds[i]:.0f}",

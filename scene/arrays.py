@@ -1,4 +1,4 @@
-"""Types of the arrays that functions take and return, the same in every room."""
+"""Arrays as every room has them: their types, and what numpy has only at the price of a slow start."""
 
 from __future__ import annotations
 
@@ -10,3 +10,9 @@ IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 ComplexArray = npt.NDArray[np.complex128]
 StringArray = npt.NDArray[np.str_]
+
+
+def distinct(values: npt.ArrayLike) -> FloatArray:
+    """The different values in rising order, as np.unique gives them: that imports numpy's masked arrays."""
+    ordered = np.sort(np.asarray(values, dtype=np.float64).ravel())
+    return ordered[np.append(True, ordered[1:] != ordered[:-1])] if ordered.size else ordered

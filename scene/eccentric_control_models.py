@@ -1,7 +1,5 @@
 """Records of filters, regulator and stages of two eccentric masses; `eccentric_models` has the machine."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

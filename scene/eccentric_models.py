@@ -5,8 +5,6 @@ the standard deviation gathered within 1 s, so its square is a spectral density:
 field's key takes and means stands in its annotation, see `ringbalance.scene.keys.declaration`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated, Literal
 

@@ -1,7 +1,5 @@
 """Records of the rotor, its sensor, the controller and the run, as `models` has those of the balancer."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated, Literal
 

@@ -5,8 +5,6 @@ radians, positive with the rotation; amplitudes are zero-to-peak; gas pressures 
 absolute.  What a field's key takes and means, and its default, stand in its annotation, see `scene.keys`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 

@@ -1,7 +1,5 @@
 """What a scene keeps of its file, whatever its balancer: names, hashes, and where each value comes from."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 

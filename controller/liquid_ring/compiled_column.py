@@ -190,7 +190,8 @@ def _directed(
     margin, cleared = _crest_margin(plant, at, direction, primed and not plant.one_way, log_speed)
     broken = _velocity(plant, _crest_table(direction), margin, log_speed)
     covered = at[3] >= plant.port_pressure
-    keeps = broken >= full or (covered and (primed or cleared > 0.5))
+    swept = cleared > 0.5 and _cleared(plant, full) > 0.5
+    keeps = (primed or swept) and (broken >= full or covered)
     return min(broken, full), broken < full, keeps
 
 

@@ -1,61 +1,33 @@
-"""Assembly of the Poisson problem on curved quadratic cells, and integrals over cells and named boundaries.
+"""Assembly of the Poisson problem on the quadratic cells of a chamber, and integrals over them and its sides.
 
-scikit-fem gives mesh, elements and quadrature; the sums over cells are matrix products here, because a loop
-over pairs of its 27 shape functions costs more than the solve.  Facets are integrated from inside their
-cells, at the cell's own reference points: finding those points again by Newton's method, as a general facet
-basis does, fails in a cell a thousand times longer than deep.
+The sums over cells are matrix products.  A side is integrated from inside its cells, at the cells' own
+reference points: finding those points again by Newton's method, as a general facet basis does, fails in a
+cell a thousand times longer than deep.  Three Gauss points along each axis are exact for the load on the
+cells of a chamber, of order six for the rest.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix
-from skfem import ElementHex2, ElementQuad2, Mesh
-from skfem.quadrature import get_quadrature
-from skfem.refdom import RefHex, RefLine, RefQuad
 
+from ringbalance.mesh.chamber import SIDES, ChamberMesh
+from ringbalance.mesh.quadratic import cell_shapes, jacobians, products
+from ringbalance.physics import deferred
 from ringbalance.scene.arrays import FloatArray, IntArray
 
-PointFunction = Callable[[FloatArray], FloatArray]
-NormalFunction = Callable[[FloatArray, FloatArray], FloatArray]
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
-# Three Gauss points along each axis: exact for the load on the cells of a chamber, of order six for the rest.
-_ORDER = 5
+    Matrix: TypeAlias = FloatArray | csr_matrix
+
+DENSE_LIMIT = 450
+"""Unknowns up to which a matrix is dense: its solve is then shorter than the import of sparse matrices."""
+_GAUSS, _WEIGHT = np.sqrt(0.6) * np.array([-1.0, 0.0, 1.0]), np.array([5.0, 8.0, 5.0]) / 9
 _CHUNK = 8192
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Rule:
-    """Shape functions of one reference cell at the points of a quadrature."""
-
-    weights: FloatArray
-    """Shape (points,)."""
-    values: FloatArray
-    """Shape (functions, points)."""
-    gradients: FloatArray
-    """Shape (functions, points, dimension)."""
-    normal: FloatArray
-    """Outward on the reference cell for a rule on one of its facets; zero for the cell itself."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Facets:
-    """Quadrature points of one named boundary; lengths in the mesh's unit."""
-
-    points: FloatArray
-    """Shape (dimension, facets, points)."""
-    normals: FloatArray
-    """Outward unit normals, the shape of `points`."""
-    weights: FloatArray
-    """Shape (facets, points)."""
-    values: FloatArray
-    """Shape functions, shape (facets, functions, points)."""
-    nodes: IntArray
-    """Shape (facets, functions)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,61 +44,47 @@ class Volume:
     """Shape functions, shape (functions, points)."""
 
 
-def _element(dimension: int) -> ElementQuad2 | ElementHex2:
-    return ElementQuad2() if dimension == 2 else ElementHex2()
+@dataclass(frozen=True, kw_only=True)
+class Facets(Volume):
+    """Quadrature points of one side, one facet for each cell at it; the functions that are not zero there."""
+
+    normals: FloatArray
+    """Outward unit normals, the shape of `points`."""
 
 
-def _rule(dimension: int, points: FloatArray, weights: FloatArray, normal: FloatArray) -> _Rule:
-    element = _element(dimension)
-    shapes = [element.lbasis(points, i) for i in range(element.doflocs.shape[0])]
-    return _Rule(
-        weights=weights,
-        values=np.stack([np.broadcast_to(value, weights.shape) for value, _ in shapes]),
-        gradients=np.stack([np.asarray(gradient).T for _, gradient in shapes]),
-        normal=normal,
-    )
+@dataclass(frozen=True, kw_only=True)
+class _Rule:
+    """Shape functions of one reference cell at the points of a quadrature."""
 
-
-@lru_cache(maxsize=4)
-def _cell_rule(dimension: int) -> _Rule:
-    """Shape functions at the Gauss points of a cell.
-
-    Args: `dimension`: 2 or 3.
-    """
-    points, weights = get_quadrature(RefQuad if dimension == 2 else RefHex, _ORDER)
-    return _rule(dimension, points, weights, np.zeros(dimension))
+    weights: FloatArray
+    """Shape (points,)."""
+    values: FloatArray
+    """Shape (functions, points)."""
+    gradients: FloatArray
+    """Shape (functions, points, dimension)."""
 
 
 @lru_cache(maxsize=16)
-def _facet_rule(dimension: int, side: int) -> _Rule:
-    """Shape functions at the Gauss points of one side of a reference cell.
-
-    Args: `dimension`: 2 or 3. `side`: number of the side, in scikit-fem's order.
-    Returns: The rule, three points along each axis of the side.
-    """
-    normal = np.asarray((RefQuad if dimension == 2 else RefHex).normals[side], dtype=np.float64)
-    axis = int(np.argmax(np.abs(normal)))
-    inside, weights = get_quadrature(RefLine if dimension == 2 else RefQuad, _ORDER)
-    points = np.insert(inside, axis, 0.5 + 0.5 * normal[axis], axis=0)
-    return _rule(dimension, points, weights, normal)
+def _rule(dimension: int, axis: int = -1, end: float = 0.0) -> _Rule:
+    """Gauss points of a cell, or of its side at the `end`, -1 or 1, of an axis."""
+    points, weights = [_GAUSS] * dimension, [_WEIGHT] * dimension
+    if axis >= 0:
+        points[axis], weights[axis] = np.array([end]), np.ones(1)
+    values, gradients = cell_shapes(points)
+    return _Rule(weights=products(weights), values=values, gradients=gradients)
 
 
 @lru_cache(maxsize=4)
 def _gradient_products(dimension: int) -> FloatArray:
     """Products of reference gradients, shape (points * dimension^2, functions^2)."""
-    gradients = _cell_rule(dimension).gradients
+    gradients = _rule(dimension).gradients
     products = np.einsum("iqa,jqb->qabij", gradients, gradients)
-    functions = gradients.shape[0]
-    return np.ascontiguousarray(products.reshape(-1, functions**2))
+    return np.ascontiguousarray(products.reshape(-1, gradients.shape[0] ** 2))
 
 
-def _jacobians(mesh: Mesh, nodes: IntArray, rule: _Rule) -> tuple[FloatArray, FloatArray]:
+def _jacobians(chamber: ChamberMesh, nodes: IntArray, rule: _Rule) -> tuple[FloatArray, FloatArray]:
     """Cofactor matrix and determinant of dx/dX, shapes (cells, points, dim, dim) and (cells, points)."""
-    corner = mesh.doflocs[:, nodes[:, :1]]
-    local = mesh.doflocs[:, nodes] - corner  # differences first: a film's depth would cancel in the sums
-    dimension, functions = local.shape[0], local.shape[2]
-    flat = local.reshape(-1, functions) @ rule.gradients.reshape(functions, -1)
-    jacobian = flat.reshape(dimension, len(nodes), -1, dimension).transpose(1, 2, 0, 3)
+    jacobian = jacobians(chamber.nodes[:, nodes], rule.gradients)
     cofactor = _cofactor(jacobian)
     determinant = np.einsum("eqa,eqa->eq", jacobian[..., 0], cofactor[..., 0])
     return cofactor, determinant
@@ -140,133 +98,90 @@ def _cofactor(jacobian: FloatArray) -> FloatArray:
     return np.stack(columns, axis=-1)
 
 
-def _chunks(mesh: Mesh) -> Iterator[IntArray]:
-    nodes = mesh.dofs.element_dofs.T
-    for start in range(0, len(nodes), _CHUNK):
-        yield np.asarray(nodes[start : start + _CHUNK])
-
-
-def stiffness(mesh: Mesh) -> csr_matrix:
+def stiffness(chamber: ChamberMesh) -> Matrix:
     """Matrix of the integrals of grad u . grad v.
 
-    Args: `mesh`: quadratic quadrilaterals or hexahedra.
-    Returns: Symmetric matrix over the mesh's nodes; in the mesh's unit to the power dimension - 2.
+    Returns: Symmetric matrix over the nodes; in the mesh's unit to the power dimension - 2.
     Source: standard Galerkin form, Gauss quadrature with three points along each axis.
     """
-    dimension, unknowns = mesh.dim(), mesh.doflocs.shape[1]
-    rule = _cell_rule(dimension)
-    total = csr_matrix((unknowns, unknowns))
-    for nodes in _chunks(mesh):
-        cofactor, determinant = _jacobians(mesh, nodes, rule)
+    dimension, unknowns = chamber.dimension, chamber.grid.size
+    rule, total = _rule(dimension), None
+    for start in range(0, len(chamber.cell_nodes), _CHUNK):
+        nodes = chamber.cell_nodes[start : start + _CHUNK]
+        cofactor, determinant = _jacobians(chamber, nodes, rule)
         scale = rule.weights / np.abs(determinant)
         metric = np.einsum("eq,eqka,eqkb->eqab", scale, cofactor, cofactor, optimize=True)
         local = metric.reshape(len(nodes), -1) @ _gradient_products(dimension)
-        functions = nodes.shape[1]
-        rows = np.repeat(nodes, functions, axis=1).ravel()
-        columns = np.tile(nodes, (1, functions)).ravel()
-        total = total + coo_matrix((local.ravel(), (rows, columns)), shape=total.shape).tocsr()
+        part = _matrix(nodes, local, unknowns)
+        total = part if total is None else total + part
     return total
 
 
-def volume_points(mesh: Mesh) -> Volume:
-    """Quadrature points over all cells.
+def _matrix(nodes: IntArray, local: FloatArray, unknowns: int) -> Matrix:
+    """Sum of the cells' matrices, given as rows of functions^2 numbers."""
+    functions = nodes.shape[1]
+    rows = np.repeat(nodes, functions, axis=1).ravel()
+    columns = np.tile(nodes, (1, functions)).ravel()
+    if unknowns > DENSE_LIMIT:
+        return deferred.sparse_matrix(rows, columns, local.ravel(), unknowns)
+    return _summed(rows * unknowns + columns, local, unknowns**2).reshape(unknowns, unknowns)
 
-    Args: `mesh`: quadratic quadrilaterals or hexahedra.
-    Returns: Points, weights and shape functions, in the mesh's unit.
-    """
-    rule, nodes = _cell_rule(mesh.dim()), np.asarray(mesh.dofs.element_dofs.T)
-    _, determinant = _jacobians(mesh, nodes, rule)
+
+def _summed(places: IntArray, local: FloatArray, size: int) -> FloatArray:
+    total = np.bincount(places.ravel(), weights=local.ravel(), minlength=size)
+    return np.asarray(total, dtype=np.float64)
+
+
+def volume_points(chamber: ChamberMesh) -> Volume:
+    """Quadrature points over all cells, in the mesh's unit."""
+    rule, nodes = _rule(chamber.dimension), chamber.cell_nodes
+    _, determinant = _jacobians(chamber, nodes, rule)
     return Volume(
-        points=np.asarray(mesh.doflocs[:, nodes] @ rule.values),
+        points=np.asarray(chamber.nodes[:, nodes] @ rule.values),
         weights=np.asarray(np.abs(determinant) * rule.weights),
         nodes=nodes,
         values=rule.values,
     )
 
 
-def facet_points(mesh: Mesh, boundary: str) -> Facets:
-    """Quadrature points over one named boundary, with outward normals.
+def facet_points(chamber: ChamberMesh, boundary: str) -> Facets:
+    """Quadrature points over one side, with outward normals, in the mesh's unit.
 
-    Args: `mesh`: quadratic quadrilaterals or hexahedra with named boundaries. `boundary`: its name.
-    Returns: Points, normals, weights and shape functions, in the mesh's unit.
-    Raises: KeyError: the mesh has no boundary of that name.
+    Args: `boundary`: one of `chamber.boundaries`.
     Source: Nanson's formula, n dS = det(J) J^-T N dS_ref.
     """
-    facets = np.asarray(mesh.boundaries[boundary])
-    cells = mesh.f2t[0, facets]
-    sides = np.argmax(mesh.t2f[:, cells] == facets, axis=0)
-    parts = [_side_points(mesh, cells[sides == side], int(side)) for side in np.unique(sides)]
-    return Facets(
-        points=np.concatenate([part.points for part in parts], axis=1),
-        normals=np.concatenate([part.normals for part in parts], axis=1),
-        weights=np.concatenate([part.weights for part in parts]),
-        values=np.concatenate([part.values for part in parts]),
-        nodes=np.concatenate([part.nodes for part in parts]),
-    )
-
-
-def _side_points(mesh: Mesh, cells: IntArray, side: int) -> Facets:
-    rule = _facet_rule(mesh.dim(), side)
-    nodes = np.asarray(mesh.dofs.element_dofs[:, cells].T)
-    cofactor, determinant = _jacobians(mesh, nodes, rule)
-    vector = np.moveaxis(cofactor @ rule.normal, -1, 0) * np.sign(determinant)
+    dimension, (axis, end) = chamber.dimension, SIDES[boundary]
+    outward = 2 * end + 1  # the last place is -1, the first is 0
+    rule = _rule(dimension, axis, -float(outward))
+    nodes = np.take(chamber.cell_nodes.reshape(*chamber.cells, -1), end, axis=axis)
+    nodes = nodes.reshape(-1, 3**dimension)
+    cofactor, determinant = _jacobians(chamber, nodes, rule)
+    vector = -outward * np.moveaxis(cofactor[..., axis], -1, 0) * np.sign(determinant)
     size = np.linalg.norm(vector, axis=0)
+    present = np.take(np.arange(3**dimension).reshape((3,) * dimension), end, axis=axis).ravel()
     return Facets(
-        points=np.asarray(mesh.doflocs[:, nodes] @ rule.values),
+        points=np.asarray(chamber.nodes[:, nodes] @ rule.values),
         normals=vector / size,
         weights=size * rule.weights,
-        values=np.broadcast_to(rule.values, (len(cells), *rule.values.shape)),
-        nodes=nodes,
+        values=rule.values[present],
+        nodes=nodes[:, present],
     )
 
 
-def volume_load(volume: Volume, density: FloatArray, *, unknowns: int) -> FloatArray:
-    """Vector of the integrals of f v over the cells.
+def load(over: Volume, density: FloatArray, *, unknowns: int) -> FloatArray:
+    """Vector of the integrals of f v over the cells or a side.
 
-    Args: `unknowns`: number of nodes of the mesh.
+    Args: `density`: f at the points.
     """
-    local = (density * volume.weights) @ volume.values.T
-    return _summed(volume.nodes, local, unknowns)
+    return _summed(over.nodes, (density * over.weights) @ over.values.T, unknowns)
 
 
-def facet_load(facets: Facets, density: FloatArray, *, unknowns: int) -> FloatArray:
-    """Vector of the integrals of f v over a boundary.
-
-    Args: `unknowns`: number of nodes of the mesh.
-    """
-    local = np.einsum("fq,fiq->fi", density * facets.weights, facets.values)
-    return _summed(facets.nodes, local, unknowns)
+def mass(over: Volume, *, unknowns: int) -> Matrix:
+    """Symmetric matrix of the integrals of u v over the cells or a side, among the first `unknowns` nodes."""
+    local = np.einsum("fq,iq,jq->fij", over.weights, over.values, over.values, optimize=True)
+    return _matrix(over.nodes, local.reshape(len(local), -1), unknowns)
 
 
-def _summed(nodes: IntArray, local: FloatArray, unknowns: int) -> FloatArray:
-    total = np.bincount(nodes.ravel(), weights=local.ravel(), minlength=unknowns)
-    return np.asarray(total, dtype=np.float64)
-
-
-def facet_mass(facets: Facets, *, unknowns: int) -> csr_matrix:
-    """Matrix of the integrals of u v over a boundary.
-
-    Args: `facets`: quadrature points. `unknowns`: number of nodes of the mesh.
-    Returns: Symmetric matrix over all nodes, zero away from the boundary.
-    """
-    local = np.einsum("fq,fiq,fjq->fij", facets.weights, facets.values, facets.values, optimize=True)
-    functions = facets.nodes.shape[1]
-    rows = np.repeat(facets.nodes, functions, axis=1).ravel()
-    columns = np.tile(facets.nodes, (1, functions)).ravel()
-    return coo_matrix((local.ravel(), (rows, columns)), shape=(unknowns, unknowns)).tocsr()
-
-
-def at_facets(facets: Facets, nodal: FloatArray) -> FloatArray:
-    """Values of a nodal field at the quadrature points of a boundary.
-
-    Args: `nodal`: the field at the mesh's nodes, shape (unknowns,).
-    """
-    return np.asarray(np.einsum("fi,fiq->fq", nodal[facets.nodes], facets.values))
-
-
-def at_cells(volume: Volume, nodal: FloatArray) -> FloatArray:
-    """Values of a nodal field at the quadrature points of all cells.
-
-    Args: `nodal`: the field at the mesh's nodes, shape (unknowns,).
-    """
-    return np.asarray(nodal[volume.nodes] @ volume.values)
+def at_points(over: Volume, nodal: FloatArray) -> FloatArray:
+    """Values at the quadrature points of a field given at the mesh's nodes."""
+    return np.asarray(nodal[over.nodes] @ over.values)

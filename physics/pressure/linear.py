@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import csr_matrix, diags_array, eye_array, kron, vstack
-from scipy.sparse.linalg import splu
 
-from ringbalance.mesh.chamber import ChamberMesh
 from ringbalance.physics import deferred
 from ringbalance.physics.results import Statistics, Status, StatusCode
 from ringbalance.scene.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
+
+    from ringbalance.physics.pressure.assembly import Matrix
 
 # Above these a factorisation costs more time and memory than multigrid does.
 DIRECT_LIMIT = {2: 100_000, 3: 20_000}
@@ -34,7 +37,7 @@ class LinearSolution:
 
 
 def solve_linear(
-    matrix: csr_matrix,
+    matrix: Matrix,
     right: FloatArray,
     *,
     dimension: int,
@@ -44,7 +47,7 @@ def solve_linear(
     """Solve A u = b: by factorisation when small, else by conjugate gradients with algebraic multigrid.
 
     Args:
-        matrix: A, symmetric positive definite.
+        matrix: A, symmetric positive definite, dense or sparse.
         right: b, shape (unknowns,).
         dimension: of the mesh behind the matrix, 2 or 3; decides where factorisation ends.
         prolongation: gives, when multigrid asks for it, the interpolation that `linear_prolongation` makes;
@@ -58,7 +61,7 @@ def solve_linear(
     unknowns = right.size
     limit = DIRECT_LIMIT[dimension] if direct_limit is None else direct_limit
     if unknowns <= limit:
-        values, iterations, extra = _factorise(matrix, right), 0, dict[str, float]()
+        values, iterations, extra = _factorised(matrix, right), 0, dict[str, float]()
     else:
         values, iterations, extra = deferred.multigrid(
             matrix, right, prolongation() if prolongation else None
@@ -71,62 +74,13 @@ def solve_linear(
     return LinearSolution(values=values, status=_status(residual, _ROUNDING * terms), statistics=statistics)
 
 
-def linear_prolongation(chamber: ChamberMesh, *, pinned_surface: bool) -> csr_matrix:
-    """Interpolation to the free nodes from those that linear elements on the same mesh would have.
-
-    Only axes along which cells are short become linear: along a long axis neighbours are coupled too weakly
-    for sweeps to smooth, and coarsening there would cost more steps than it saves.
-    Args: `pinned_surface`: True when all nodes of the free surface are fixed, False when the last node alone
-        is.
-    Returns: Matrix with a row for every free node, in the order of `ChamberMesh.grid`.
-    """
-    factors = [
-        _halfway(n) if short else csr_matrix(eye_array(2 * n + 1))
-        for n, short in zip(chamber.cells, _short_axes(chamber), strict=True)
-    ]
-    if pinned_surface:
-        factors[0] = factors[0][1:, 1:]
-    total = factors[0]
-    for factor in factors[1:]:
-        total = kron(total, factor, format="csr")
-    return csr_matrix(total if pinned_surface else total[:-1, :-1])
-
-
-def _short_axes(chamber: ChamberMesh) -> list[bool]:
-    """Axes along which cells are at most eight times as long as along the shortest, in the middle of the
-
-    mesh.
-    """
-    places = chamber.mesh.doflocs[:, chamber.grid]
-    lengths = []
-    for axis, count in enumerate(chamber.cells):
-        line = tuple(slice(None) if k == axis else n for k, n in enumerate(chamber.cells))
-        steps = np.linalg.norm(np.diff(places[(slice(None), *line)], axis=1), axis=0)
-        lengths.append(float(steps.sum()) / count)
-    return [length <= 8 * min(lengths) for length in lengths]
-
-
-def _halfway(cells: int) -> csr_matrix:
-    """Corners, and means of neighbouring corners between them, along one axis."""
-    corners = diags_array(np.ones(cells + 1), format="csr")
-    means = (corners[:-1] + corners[1:]) / 2
-    rows = np.arange(2 * cells + 1)
-    order = np.where(rows % 2 == 0, rows // 2, cells + 1 + rows // 2)
-    return csr_matrix(vstack([corners, means], format="csr")[order])
-
-
-def _factorise(matrix: csr_matrix, right: FloatArray) -> FloatArray:
-    # Symmetric mode halves the fill of the default ordering; a positive definite matrix needs no pivoting.
+def _factorised(matrix: Matrix, right: FloatArray) -> FloatArray:
     try:
-        factor = splu(
-            matrix.tocsc(),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
-    except RuntimeError:  # singular to rounding; the residual of zeros says so
+        if isinstance(matrix, np.ndarray):
+            return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
+        return np.asarray(deferred.factorised(matrix, right))
+    except np.linalg.LinAlgError:  # the residual of zeros says so
         return np.zeros_like(right)
-    return np.asarray(factor.solve(right))
 
 
 def _status(residual: float, rounding: float) -> Status:

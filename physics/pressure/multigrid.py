@@ -21,6 +21,7 @@ def multigrid(
     Args: `prolongation`: interpolation from linear elements on the same mesh, where there is one.
     Returns: u, the number of steps, and the hierarchy's operator complexity.
     """
+    matrix = csr_matrix(matrix)
     hierarchy = _hierarchy(matrix, prolongation)
     preconditioner: LinearOperator = hierarchy.aspreconditioner(cycle="V")
     count = 0

@@ -9,12 +9,7 @@ import numpy as np
 
 from ringbalance.mesh.chamber import chamber_mesh
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.physics.pressure.integrals import (
-    LiquidIntegrals,
-    liquid_integrals,
-    over_width,
-    section_integrals,
-)
+from ringbalance.physics.pressure.integrals import LiquidIntegrals, liquid_integrals
 from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, solve_pressure
 from ringbalance.physics.pressure.surface import refined_surface, solve_with_gravity
 from ringbalance.physics.results import Status
@@ -89,7 +84,10 @@ def turn_mean(
         if not solution.status.ok:
             return _failed(solution.status)
         solutions.append(solution)
-    rows = np.array([_both_sides(_integrals(s, liquid.density, disc.axial_width)) for s in solutions])
+    totals = (
+        liquid_integrals(solution=s, density=liquid.density, axial_width=disc.axial_width) for s in solutions
+    )
+    rows = np.array([_both_sides(total) for total in totals])
     ripple = 2 * (weights * np.cos(angles)) @ rows[:, 1:3] if len(angles) > 1 else np.zeros(2)
     return Sample(
         values=weights @ rows,
@@ -142,13 +140,6 @@ def _solve(
     radius = surface_radius(disc=disc, fill_ratio=fill_ratio)
     chamber = chamber_mesh(disc=disc, surface_radius=radius, cells=cells)
     return solve_pressure(chamber=chamber, problem=liquid.problem())
-
-
-def _integrals(solution: PressureSolution, density: float, axial_width: float) -> LiquidIntegrals:
-    if solution.chamber.dimension == 3:
-        return liquid_integrals(solution=solution, density=density)
-    section = section_integrals(solution=solution, density=density)
-    return over_width(section=section, axial_width=axial_width)
 
 
 def _both_sides(totals: LiquidIntegrals) -> FloatArray:

@@ -15,22 +15,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import csr_matrix
 
 from ringbalance.mesh.chamber import ChamberMesh
-from ringbalance.physics.pressure.assembly import (
-    facet_load,
-    facet_mass,
-    facet_points,
-    stiffness,
-    volume_load,
-    volume_points,
-)
-from ringbalance.physics.pressure.linear import LinearSolution, linear_prolongation, solve_linear
+from ringbalance.physics import deferred
+from ringbalance.physics.pressure.assembly import facet_points, load, mass, stiffness, volume_points
+from ringbalance.physics.pressure.linear import LinearSolution, solve_linear
 from ringbalance.physics.results import Statistics, Status
 from ringbalance.scene.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from ringbalance.physics.pressure.assembly import Matrix
 
 FREE_SURFACE = "free_surface"
 
@@ -91,7 +88,7 @@ class PressureSolution:
 
     chamber: ChamberMesh
     pressure: FloatArray
-    """At the nodes of `chamber.mesh`, Pa, gauge, shape (nodes,)."""
+    """At the nodes of `chamber`, Pa, gauge, shape (nodes,)."""
     surface_gradient: FloatArray
     """n . grad p at the nodes of the free surface, Pa/m, n out of the liquid; the shape of
     chamber.grid[0]."""
@@ -103,7 +100,7 @@ class PressureSolution:
 class _DiscreteProblem:
     """Matrix and load of the weak form, before any condition on the free surface; lengths in mesh units."""
 
-    matrix: csr_matrix
+    matrix: Matrix
     load: FloatArray
     """- int f v + int_walls q v."""
 
@@ -133,7 +130,7 @@ def solve_pressure(
         rows[:, free],
         discrete.load[free] - rows @ pressure,
         dimension=chamber.dimension,
-        prolongation=lambda: linear_prolongation(chamber, pinned_surface=True),
+        prolongation=lambda: deferred.linear_prolongation(chamber, pinned_surface=True),
         direct_limit=direct_limit,
     )
     pressure[free] = linear.values
@@ -146,14 +143,12 @@ def discretise(*, chamber: ChamberMesh, problem: PressureProblem) -> _DiscretePr
     Args: `chamber`: mesh with its named boundaries. `problem`: right-hand sides.
     Returns: Matrix and load in the mesh's unit of length, pressures in Pa.
     """
-    mesh, unit = chamber.mesh, chamber.length_scale
-    unknowns = mesh.doflocs.shape[1]
-    volume = volume_points(mesh)
-    load = -(unit**2) * volume_load(volume, problem.source(unit * volume.points), unknowns=unknowns)
-    for name in mesh.boundaries:
+    unit, volume = chamber.length_scale, volume_points(chamber)
+    total = -(unit**2) * load(volume, problem.source(unit * volume.points), unknowns=chamber.grid.size)
+    for name in chamber.boundaries:
         if name != FREE_SURFACE:
-            load += wall_load(chamber=chamber, problem=problem, boundary=name)
-    return _DiscreteProblem(matrix=stiffness(mesh), load=load)
+            total += wall_load(chamber=chamber, problem=problem, boundary=name)
+    return _DiscreteProblem(matrix=stiffness(chamber), load=total)
 
 
 def wall_load(*, chamber: ChamberMesh, problem: PressureProblem, boundary: str) -> FloatArray:
@@ -163,14 +158,14 @@ def wall_load(*, chamber: ChamberMesh, problem: PressureProblem, boundary: str) 
     Returns: Vector over the nodes, in the mesh's unit of length.
     """
     unit = chamber.length_scale
-    facets = facet_points(chamber.mesh, boundary)
+    facets = facet_points(chamber, boundary)
     flux = problem.wall_flux(unit * facets.points, facets.normals)
-    return unit * facet_load(facets, flux, unknowns=chamber.mesh.doflocs.shape[1])
+    return unit * load(facets, flux, unknowns=chamber.grid.size)
 
 
 def places(chamber: ChamberMesh) -> FloatArray:
     """Places of the nodes. Returns: m, shape (dimension, nodes)."""
-    return np.asarray(chamber.length_scale * chamber.mesh.doflocs)
+    return np.asarray(chamber.length_scale * chamber.nodes)
 
 
 def _solution(
@@ -195,5 +190,6 @@ def _surface_gradient(
     """
     nodes = chamber.grid[0].ravel()
     residual = discrete.matrix[nodes] @ pressure - discrete.load[nodes]
-    mass = facet_mass(facet_points(chamber.mesh, FREE_SURFACE), unknowns=pressure.size)
-    return solve_linear(mass[nodes][:, nodes], residual, dimension=chamber.dimension)
+    # The nodes of the free surface are the first.
+    matrix = mass(facet_points(chamber, FREE_SURFACE), unknowns=nodes.size)
+    return solve_linear(matrix, residual, dimension=chamber.dimension)

@@ -13,8 +13,9 @@ import numpy as np
 
 from ringbalance.mesh.chamber import ChamberMesh, chamber_mesh
 from ringbalance.mesh.geometry import half_angle, liquid_area, surface_radius
-from ringbalance.physics.pressure.assembly import at_facets, facet_points, volume_points
-from ringbalance.physics.pressure.linear import linear_prolongation, solve_linear
+from ringbalance.physics import deferred
+from ringbalance.physics.pressure.assembly import at_points, facet_points, volume_points
+from ringbalance.physics.pressure.linear import solve_linear
 from ringbalance.physics.pressure.solve import (
     FREE_SURFACE,
     PressureSolution,
@@ -192,11 +193,11 @@ def surface_flux_mismatch(*, solution: PressureSolution, liquid: RotatingLiquid)
     Args: `solution`: with the gas pressure imposed on the surface. `liquid`: whose force should balance it.
     Returns: |n.grad p - rho (omega^2 r + g).n| / |rho (omega^2 r + g).n| over the surface.
     """
-    facets = facet_points(solution.chamber.mesh, FREE_SURFACE)
+    facets = facet_points(solution.chamber, FREE_SURFACE)
     gradient = np.zeros(solution.pressure.size)
     gradient[solution.chamber.grid[0]] = solution.surface_gradient
     force = _normal_force(liquid, solution.chamber.length_scale * facets.points, facets.normals)
-    difference = at_facets(facets, gradient) - force
+    difference = at_points(facets, gradient) - force
     return float(np.sqrt(np.sum(facets.weights * difference**2) / np.sum(facets.weights * force**2)))
 
 
@@ -211,7 +212,7 @@ def _target(disc: Disc, fill_ratio: float, dimension: int) -> float:
 
 
 def _measure(chamber: ChamberMesh) -> float:
-    return float(volume_points(chamber.mesh).weights.sum())
+    return float(volume_points(chamber).weights.sum())
 
 
 def _no_ring(disc: Disc, liquid: RotatingLiquid, radius: float) -> Status | None:
@@ -249,7 +250,7 @@ def _free_pressure(chamber: ChamberMesh, liquid: RotatingLiquid) -> FloatArray:
         discrete.matrix[free][:, free],
         load[free],
         dimension=chamber.dimension,
-        prolongation=lambda: linear_prolongation(chamber, pinned_surface=False),
+        prolongation=lambda: deferred.linear_prolongation(chamber, pinned_surface=False),
     )
     pressure = np.zeros(load.size)
     pressure[free] = linear.values
@@ -259,9 +260,9 @@ def _free_pressure(chamber: ChamberMesh, liquid: RotatingLiquid) -> FloatArray:
 def _wanted_move(chamber: ChamberMesh, liquid: RotatingLiquid, target: float) -> FloatArray:
     """Radial move of every surface node, m."""
     pressure, unit = _free_pressure(chamber, liquid), chamber.length_scale
-    facets = facet_points(chamber.mesh, FREE_SURFACE)
+    facets = facet_points(chamber, FREE_SURFACE)
     compliance = facets.weights / _normal_force(liquid, unit * facets.points, facets.normals)
-    here = at_facets(facets, pressure)
+    here = at_points(facets, pressure)
     shortage = unit * (target - _measure(chamber))
     level = (shortage + np.sum(compliance * here)) / np.sum(compliance)
     nodes = places(chamber)[:, chamber.grid[0]]
@@ -281,7 +282,7 @@ def _hold_volume(disc: Disc, chamber: ChamberMesh, target: float) -> ChamberMesh
     """Take the last rounding out of the volume by equal moves of all nodes."""
     for _ in range(3):
         measure = _measure(chamber)
-        facets = facet_points(chamber.mesh, FREE_SURFACE)
+        facets = facet_points(chamber, FREE_SURFACE)
         move = chamber.length_scale * (measure - target) / facets.weights.sum()
         radius = chamber.surface_radius + move
         chamber = chamber_mesh(disc=disc, surface_radius=radius, cells=chamber.cells)

@@ -80,8 +80,8 @@ def sloshing_system(*, disc: Disc, surface_radius: float, cells: tuple[int, int]
     Source: the equations at the head of this module, derived there.
     """
     chamber = chamber_mesh(disc=disc, surface_radius=surface_radius, cells=cells)
-    stiffness = stiffness_of(chamber.mesh).tocsc()
-    grid, nodes = chamber.grid, chamber.mesh.doflocs
+    stiffness = csc_matrix(stiffness_of(chamber))
+    grid, nodes = chamber.grid, chamber.nodes
     kept, inner = grid[0, 1:-1], grid[1:-1, 1:-1].ravel()
     extension = _extension(stiffness, inner, kept)
     condensed = stiffness[kept][:, kept] + stiffness[kept][:, inner] @ extension[kept.size :]

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from fluids.fittings import bend_rounded
 
 from ringbalance.physics.tube.friction import turbulent_share
-from ringbalance.physics.tube.rotation import rotating_friction_ratio
+from ringbalance.physics.tube.rotation import laminar_ratio
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Bend, Tube
 
@@ -77,10 +77,7 @@ def _laminar_excess(
     dean, shift = re * math.sqrt(tight), MOMENTUM_FACTOR * re * tight
     shape = bend.angle / (math.pi / 2) * math.sqrt(tight) / 0.5
     rest = LARGEST_EXCESS * shape * dean**2 / (dean**2 + HALF_WAY_DEAN**2)
-    more, less = (
-        rotating_friction_ratio(reynolds=re, rotation_reynolds=np.abs(rotation + sign * shift)).value
-        for sign in (1.0, -1.0)
-    )
+    more, less = laminar_ratio(reynolds=re, rotation_reynolds=np.abs([rotation + shift, rotation - shift]))
     turning = 64 / re * bend.angle * bend.radius / bore * (more - less) / 2
     return rest * shift**2 / (shift**2 + rotation**2), np.hypot(LAMINAR_BEND_UNCERTAINTY * rest, turning)
 

@@ -13,13 +13,18 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.physics.results import Estimate
-from ringbalance.physics.tube.rotation_table import rotating_friction_ratio, rotation_table_covers
+from ringbalance.physics.tube.rotation_table import (
+    laminar_ratio,
+    rotating_friction_ratio,
+    rotation_table_covers,
+)
 from ringbalance.scene.arrays import BoolArray, FloatArray
 
 __all__ = [
     "STRAIGHT_CRITICAL_REYNOLDS",
     "critical_reynolds",
     "curved_friction_ratio",
+    "laminar_ratio",
     "rotating_friction_ratio",
     "rotation_in_range",
     "turbulent_friction_ratio",

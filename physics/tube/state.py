@@ -15,7 +15,7 @@ from ringbalance.physics.tube.numbers import reynolds_number, rotation_reynolds_
 from ringbalance.physics.tube.rotation import (
     STRAIGHT_CRITICAL_REYNOLDS,
     critical_reynolds,
-    rotating_friction_ratio,
+    laminar_ratio,
     turbulent_friction_ratio,
 )
 from ringbalance.scene.arrays import FloatArray
@@ -83,7 +83,7 @@ def tube_state_at(*, tube: Tube, reynolds: npt.ArrayLike, rotation_reynolds: npt
     critical = critical_reynolds(rotation_reynolds=rotation) / STRAIGHT_CRITICAL_REYNOLDS
     rough = tube.roughness / tube.bore
     straight = friction_factor(reynolds=re, relative_roughness=rough)
-    laminar = rotating_friction_ratio(reynolds=re, rotation_reynolds=rotation).value
+    laminar = laminar_ratio(reynolds=re, rotation_reynolds=rotation)
     turning = friction_factor(
         reynolds=re,
         relative_roughness=rough,

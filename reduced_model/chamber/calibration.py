@@ -14,9 +14,9 @@ from ringbalance.physics.results import Estimate, Statistics, Status
 from ringbalance.reduced_model.chamber.element_check import ElementCheck, element_check
 from ringbalance.reduced_model.chamber.gravity import SAFETY, GravityEffect, gravity_effect
 from ringbalance.reduced_model.chamber.inputs import InputEffect, input_effects
+from ringbalance.reduced_model.chamber.range import chamber_status, mean_gravity
 from ringbalance.reduced_model.chamber.ring_values import RingValues, ring_values
-from ringbalance.reduced_model.selection.chamber_range import chamber_status, mean_gravity
-from ringbalance.reduced_model.selection.chamber_terms import unmodelled_fractions
+from ringbalance.reduced_model.chamber.terms import unmodelled_fractions
 from ringbalance.reduced_model.tables.fit import table_from_samples
 from ringbalance.reduced_model.tables.hermite import HermiteTable
 from ringbalance.scene.arrays import FloatArray

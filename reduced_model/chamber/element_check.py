@@ -49,14 +49,14 @@ class ElementCheck:
 
 
 def element_check(scene: Scene, *, values: RingValues, gravity: bool) -> ElementCheck:
-    """Solve the pressure at the thinnest ring of the table, at equal fills and at the largest fill.
+    """Solve the pressure at the thinnest ring of the table and at the largest fill.
 
     Args: `values`: by the closed forms. `gravity`: whether these hold gravity.
     Returns: ElementCheck; its status is NOT_CONVERGED where the two differ by more than both errors, or where
         the finite elements found no tilted surface.
     Raises: SceneError: as `scene_ring`, a chamber so narrow that nothing could be checked.
     """
-    at = _checked_fills(scene, values)
+    at = _checked_fills(values)
     held = gravity and bool(np.any(values.closed[at]))
     at = at[values.closed[at]] if held else at
     elements = scene_ring(
@@ -82,11 +82,11 @@ def element_check(scene: Scene, *, values: RingValues, gravity: bool) -> Element
     )
 
 
-def _checked_fills(scene: Scene, values: RingValues) -> np.ndarray:
-    """Places in `values` of the thinnest ring, of equal fills and of the largest fill."""
-    fills, largest = values.fill_ratio, scene.disc.max_fill_ratio
+def _checked_fills(values: RingValues) -> np.ndarray:
+    """Places in `values` of the thinnest ring and of the largest fill."""
+    fills = values.fill_ratio
     thinnest = float(fills[fills > 0].min())
-    return np.array([int(np.argmin(np.abs(fills - x))) for x in (thinnest, largest / 2, largest)])
+    return np.array([int(np.argmin(np.abs(fills - x))) for x in (thinnest, fills.max())])
 
 
 def _axial(scene: Scene, gravity: bool) -> bool:

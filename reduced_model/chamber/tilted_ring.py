@@ -28,6 +28,8 @@ _RULES: Final = tuple(np.polynomial.legendre.leggauss(n) for n in (POINTS, _OPEN
 _TURN: Final = (8, 96)
 """Fewest and most angles of gravity over a turn."""
 _AVERAGING: Final = 1e-12
+_ROUND_OFF: Final = 4 * float(np.finfo(np.float64).eps)
+"""Of an area, over R2^2."""
 _RADIAL, _RADIAL_WEIGHT = np.polynomial.legendre.leggauss(RADIAL_POINTS)
 
 
@@ -191,6 +193,8 @@ def _across(disc: Disc, length: float, fills: FloatArray, turn: int, cut: bool) 
             radius = _held(disc, radius - (level - search.value[..., None]) / slope)
         opening = np.where(radius < outer, 2 * half_angle(disc=disc, radius=radius) * radius / slope, 0.0)
         area = np.sum(weight * liquid_area(disc=disc, surface_radius=radius), axis=2)
+        if not cut and np.all(np.abs(area - target) <= _ROUND_OFF * outer**2):
+            break
         search = search.narrowed(area - target, np.sum(weight * opening, axis=2))
     _, slope = _level(disc, length, radius, eta, psi)
     half = half_angle(disc=disc, radius=radius)

@@ -15,15 +15,13 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume
-from ringbalance.reduced_model.chamber.values import by_closed_form
-from ringbalance.reduced_model.gas_line import LineEnd, line_ends
-from ringbalance.reduced_model.selection.chamber_range import (
+from ringbalance.reduced_model.chamber.range import (
     chamber_fills,
     mean_gravity,
     range_contributions,
     range_fills,
 )
-from ringbalance.reduced_model.selection.chamber_terms import (
+from ringbalance.reduced_model.chamber.terms import (
     PLATES,
     RIPPLE,
     SLOSHING,
@@ -31,6 +29,8 @@ from ringbalance.reduced_model.selection.chamber_terms import (
     capillary_share,
     wall_layers,
 )
+from ringbalance.reduced_model.chamber.values import by_closed_form
+from ringbalance.reduced_model.gas_line import LineEnd, line_ends
 from ringbalance.reduced_model.selection.tube_terms import (
     HUMP,
     LOSS,
@@ -145,8 +145,8 @@ def _chamber(scene: Scene) -> dict[str, TermEstimate]:
     closed, found = chamber_fills(scene), range_contributions(scene)
     fills = closed if closed.size else range_fills(scene)
     pressure, moment = ({t: c.value or 0.0 for t, c in found[p].items()} for p in ("pressures", "moments"))
-    capillary = capillary_share(scene, fills)["pressures"]
-    layers, ekman = wall_layers(scene, float(fills[-1]))
+    capillary = float(np.max(capillary_share(scene, fills)["pressures"]))
+    layers, ekman = wall_layers(scene, fills[-1])
     return _by_term(
         scene,
         (PLATES, pressure[PLATES], "1 - V/(B theta (R2^2 - R1^2)/2)", None),
@@ -165,7 +165,7 @@ def _chamber(scene: Scene) -> dict[str, TermEstimate]:
         (SURFACE_TENSION, capillary, "sigma (2/B + 1/(a alpha) + 1/a)/P, an inverse Bond number", None),
         (
             WALL_FRICTION,
-            layers,
+            float(layers),
             f"g/(omega^2 a) sqrt(Ek), Ek = nu/(omega R2^2) = {ekman:.1e}",
             None,
         ),
@@ -175,7 +175,7 @@ def _chamber(scene: Scene) -> dict[str, TermEstimate]:
 def _sloshing_formula(scene: Scene, fills: np.ndarray) -> str:
     if scene.environment.shaft == "vertical":
         return "on a vertical shaft gravity does not turn in the disc's frame"
-    largest = max(amplification(scene, float(x)) for x in fills)
+    largest = float(np.max(amplification(scene, fills)))
     return (
         "first order in g/(omega^2 a), times 1 + 2 max(1, n) in the wall pressure, where the liquid's swing "
         f"at 1x makes n = |1/(1 - 1/s^2)| up to {largest:.2g} over the range of fills, at every speed"

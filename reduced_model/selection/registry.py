@@ -13,10 +13,10 @@ from typing import Final, Literal
 
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.physics.gas.supply import HEAT_CAPACITY_RATIO
+from ringbalance.reduced_model.chamber.range import mean_gravity
+from ringbalance.reduced_model.chamber.terms import PLATES
 from ringbalance.reduced_model.chamber.values import by_closed_form
 from ringbalance.reduced_model.paper import formulas as paper
-from ringbalance.reduced_model.selection.chamber_range import mean_gravity
-from ringbalance.reduced_model.selection.chamber_terms import PLATES
 from ringbalance.reduced_model.selection.estimates import (
     CREST,
     FILLING,

@@ -12,11 +12,11 @@ import numpy as np
 from ringbalance.physics.tube.friction import turbulent_share
 from ringbalance.physics.tube.numbers import reynolds_number, rotation_reynolds_number
 from ringbalance.reduced_model.chamber.gravity import closed_ring
+from ringbalance.reduced_model.chamber.terms import MEAN, PLATES, chamber_contributions
 from ringbalance.reduced_model.chamber.values import by_closed_form
+from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.reduced_model.law.building import tube_path
 from ringbalance.reduced_model.paper.formulas import PAPER_DRAG_COEFFICIENT
-from ringbalance.reduced_model.selection.chamber_terms import MEAN, PLATES, chamber_contributions
-from ringbalance.reduced_model.selection.contribution import Contribution
 from ringbalance.reduced_model.selection.loss_models import (
     CORRELATIONS,
     ROTATING,

@@ -29,7 +29,7 @@ TABLE_VELOCITIES: Final = (1e-5, 1e3)
 """m/s; below, the flow creeps and the head is proportional to u; above, to a power of u."""
 TABLE_ERROR: Final = 1e-9
 """Aimed at, relative, between the nodes."""
-_UNCERTAINTY_NODES: Final = 2049
+_UNCERTAINTY_NODES: Final = 513
 
 LogHead = Callable[[FloatArray], FloatArray]
 

@@ -284,9 +284,9 @@ def column_flow(
     separated = broken < full
     # At exact balance nothing flows, yet a column that holds is still there.
     rests = primed & (driving == 0) & (margin > 0) & ends.upstream_covered()
-    keeps = (broken >= full) | (
-        (ends.downstream_hydrostatic >= ends.port_pressure) & (primed | (cleared > 0.5))
-    )
+    # Gas stays over the crest of a tube that was unprimed until what flows through it carries the gas out.
+    swept = (cleared > 0.5) & (crest.cleared(full) > 0.5)
+    keeps = (primed | swept) & ((broken >= full) | (ends.downstream_hydrostatic >= ends.port_pressure))
     return ColumnFlow(
         velocity=_choose(separated, broken, full),
         siphon_velocity=full,

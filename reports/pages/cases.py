@@ -212,12 +212,12 @@ def _in_brief(case: Record) -> Record:
     if quantity is None:
         return dict.fromkeys(("paper", "found", "half_width"), MISSING) | {"what": ""}
     unit, reference = quantity.get("unit") or "1", quantity.get("reference")
-    value, path = quantity.get("value"), f"{path}.{case['quantities'].index(quantity)}"
-    paper = MISSING if reference is None else traced(given(reference, unit, digits=4), f"{path}.reference")
+    path = f"{path}.{case['quantities'].index(quantity)}"
     value_text = _without_half_width(_value(quantity, quantity.get("value_uncertainty")))
+    paper = MISSING if reference is None else traced(given(reference, unit, digits=4), f"{path}.reference")
     return {
         "paper": _criterion(quantity) if reference is None else paper,
-        "found": value_text if value is None else traced(value_text, f"{path}.value"),
+        "found": value_text if quantity.get("value") is None else traced(value_text, f"{path}.value"),
         "half_width": _width(quantity),
         "what": quantity.get("title") or "",
     }

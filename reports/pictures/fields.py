@@ -63,7 +63,7 @@ def write_field(*, field: ChamberField, path: Path) -> Path:
         "pressure_Pa": field.solution.pressure,
         "depth_m": np.maximum(radius - field.surface_radius, 0.0),
     }
-    return write_vtu(path, mesh=chamber.mesh, length_scale=chamber.length_scale, fields=fields)
+    return write_vtu(path, chamber=chamber, fields=fields)
 
 
 def pressure_profile(*, scene: Scene, field: ChamberField) -> Record:
@@ -94,7 +94,7 @@ def pressure_profile(*, scene: Scene, field: ChamberField) -> Record:
 def mesh_record(field: ChamberField) -> Record:
     """Sizes and quality of the mesh, and how the solve ended."""
     chamber, solution = field.solution.chamber, field.solution
-    quality = mesh_quality(chamber.mesh)
+    quality = mesh_quality(chamber)
     return {
         "cells": list(chamber.cells),
         "unknowns": quality.nodes,

@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.tube.pressure_profile import hump_profile
+from ringbalance.reduced_model.operating.pressure_profile import hump_profile
 from ringbalance.reports.numbers import given
 from ringbalance.scene import Scene
 from ringbalance.scene.arrays import FloatArray

@@ -16,8 +16,8 @@ import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
 from ringbalance.reduced_model.calibration import Calibration
+from ringbalance.reduced_model.operating.thresholds import priming_pressure
 from ringbalance.reduced_model.paper import formulas as paper
-from ringbalance.reduced_model.tube.thresholds import priming_pressure
 from ringbalance.reports.studies.drag_point import DragPoint, LiquidBatch, drag_point
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.liquids import known_liquids, liquid_at

@@ -5,7 +5,8 @@
 A field is a key when its annotation holds a `Presence`. What may be written there is the `Reader` of the
 annotation, or follows from the type: a `Literal`, a record, or a tuple of records. Reading, defaults,
 uncertainties, descriptions and the reference in the documentation derive from these declarations.  Values are
-SI: in the first unit that `DIMENSIONS` has for the reader's dimension.
+SI: in the first unit that `DIMENSIONS` has for the reader's dimension.  Modules with such records do without
+`from __future__ import annotations`: each annotation would be compiled again at every start.
 """
 
 from __future__ import annotations

@@ -107,6 +107,38 @@ def test_no_room_imports_from_a_later_room(modules: Mapping[str, Path], room_ord
     assert faults == []
 
 
+def parts_imported(sources: Mapping[str, str], room: str) -> dict[str, set[str]]:
+    """Sub-packages and plain modules of a room, each with those that it imports."""
+
+    def part(module: str) -> str:
+        return ".".join(module.split(".")[:3])
+
+    graph: dict[str, set[str]] = {}
+    for module, imported in import_graph(sources).items():
+        inside = {part(m) for m in imported if m.startswith(f"ringbalance.{room}.")}
+        if module.startswith(f"ringbalance.{room}."):
+            graph[part(module)] = graph.get(part(module), set()) | inside - {part(module)}
+    return graph
+
+
+@pytest.mark.parametrize("room", ["reduced_model"])
+def test_sub_packages_do_not_import_both_ways(modules: Mapping[str, Path], room: str) -> None:
+    sources = {name: path.read_text() for name, path in modules.items()}
+    order = list(TopologicalSorter(parts_imported(sources, room)).static_order())
+    assert order.index(f"ringbalance.{room}.chamber") < order.index(f"ringbalance.{room}.law")
+
+
+def test_sub_packages_that_import_both_ways_are_seen() -> None:
+    sources = {
+        "ringbalance.mesh.a.one": "import ringbalance.mesh.b.two",
+        "ringbalance.mesh.a.other": "",
+        "ringbalance.mesh.b.two": "import ringbalance.mesh.a.other",
+    }
+    assert cycle(sources) == []
+    with pytest.raises(CycleError):
+        TopologicalSorter(parts_imported(sources, "mesh")).prepare()
+
+
 def test_no_import_cycle(modules: Mapping[str, Path]) -> None:
     assert cycle({name: path.read_text() for name, path in modules.items()}) == []
 

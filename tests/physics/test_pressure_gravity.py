@@ -105,7 +105,7 @@ def test_volume_is_the_one_asked_for(disc: Disc) -> None:
         found = find_surface(disc=disc, liquid=liquid, fill_ratio=0.35, cells=cells)
         unit = found.chamber.length_scale ** len(cells)
         depth = 1.0 if len(cells) == 3 else disc.axial_width
-        volume = unit * depth * float(volume_points(found.chamber.mesh).weights.sum())
+        volume = unit * depth * float(volume_points(found.chamber).weights.sum())
         assert volume == pytest.approx(0.35 * chamber_volume(disc=disc), rel=1e-13)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from ringbalance.mesh.chamber import Geometry, SurfaceFunction, chamber_mesh
-from ringbalance.physics.pressure.assembly import at_cells, facet_points, volume_points
+from ringbalance.physics.pressure.assembly import at_points, facet_points, volume_points
 from ringbalance.physics.pressure.solve import PressureProblem, PressureSolution, solve_pressure
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
@@ -93,9 +93,9 @@ class ManufacturedPressure:
 
     def relative_error(self, solution: PressureSolution) -> float:
         """Error of a solution over its own mesh, |p_h - p| / |p| in the norm of L2."""
-        volume = volume_points(solution.chamber.mesh)
+        volume = volume_points(solution.chamber)
         exact = self.value(solution.chamber.length_scale * volume.points)
-        difference = at_cells(volume, solution.pressure) - exact
+        difference = at_points(volume, solution.pressure) - exact
         return float(np.sqrt(np.sum(volume.weights * difference**2) / np.sum(volume.weights * exact**2)))
 
 
@@ -176,11 +176,11 @@ def bound(disc: Disc, dimension: int, geometry: Geometry) -> float:
     made_up = ManufacturedPressure(amplitude=1e6, length=disc.outer_radius, dimension=dimension)
     cells = levels(dimension)[-1]
     chamber = chamber_mesh(disc=disc, surface_radius=SURFACE, cells=cells, geometry=geometry)
-    volume = volume_points(chamber.mesh)
+    volume = volume_points(chamber)
     points = chamber.length_scale * volume.points
-    exact, nodal = made_up.value(points), made_up.value(chamber.length_scale * chamber.mesh.doflocs)
+    exact, nodal = made_up.value(points), made_up.value(chamber.length_scale * chamber.nodes)
     if geometry == "quadratic":
-        error = at_cells(volume, nodal) - exact
+        error = at_points(volume, nodal) - exact
         return 2 * float(np.sqrt(np.sum(volume.weights * error**2) / np.sum(volume.weights * exact**2)))
     chord = disc.outer_radius * (disc.central_angle / cells[1]) ** 2 / 8
     steepest = np.linalg.norm(made_up.gradient(points), axis=0).max()
@@ -222,7 +222,7 @@ def test_every_wall_has_its_say(disc: Disc, wall: str) -> None:
     """Leaving out the flux of any one wall is noticed."""
     made_up = ManufacturedPressure(amplitude=1e6, length=disc.outer_radius, dimension=3)
     chamber = chamber_mesh(disc=disc, surface_radius=SURFACE, cells=(4, 12, 4))
-    there = facet_points(chamber.mesh, wall).points * chamber.length_scale
+    there = facet_points(chamber, wall).points * chamber.length_scale
     whole = made_up.problem()
 
     def without(places: FloatArray, normals: FloatArray) -> FloatArray:

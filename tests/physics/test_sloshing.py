@@ -14,6 +14,7 @@ from skfem import Basis, ElementQuad2, FacetBasis, LinearForm, condense, solve
 from skfem.models.poisson import laplace
 
 from ringbalance.mesh.chamber import chamber_mesh
+from ringbalance.mesh.export import scikit_fem_mesh
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.results import StatusCode
 from ringbalance.physics.sloshing.modes import resonant_fills, sloshing_modes
@@ -140,7 +141,9 @@ class Potential:
 
     def __init__(self, disc: Disc, *, radius: float, cells: tuple[int, int]) -> None:
         chamber = chamber_mesh(disc=disc, surface_radius=radius, cells=cells)
-        self.mesh, self.grid = chamber.mesh, chamber.grid
+        self.mesh, numbers = scikit_fem_mesh(chamber)
+        # Places of the chamber's grid in that mesh.
+        self.grid = np.argsort(numbers)[chamber.grid]
         self.basis = Basis(self.mesh, ElementQuad2())
         self.dofs = cKDTree(self.basis.doflocs.T).query(self.mesh.doflocs.T)[1]
 

@@ -222,7 +222,8 @@ def test_a_device_is_what_the_calibration_tabulates(table_1_scene: Scene, change
         scene = with_value(scene=scene, quantity=quantity, value=value)
     calibration = calibrate(scene)
     told = budgets(scene=scene, calibration=calibration)
-    found = device_of(scene, near=calibration.operating_point.loss_velocity or 1.0).values()
+    near = calibration.operating_point.loss_velocity or 1.0
+    found = device_of(scene, near=near, near_fill=calibration.residual.fill_ratio).values()
     assert set(told) == set(found)
     for name, budget in told.items():
         # Of the device's tables: heads every 0.06 in ln u.

@@ -15,8 +15,8 @@ from ringbalance.reduced_model.chamber.calibration import calibrate_chamber
 from ringbalance.reduced_model.law.building import calibrated_law, column_pressure
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.operating.thresholds import priming_pressure, siphon_stall_pressure
 from ringbalance.reduced_model.tube.heads import tube_heads
-from ringbalance.reduced_model.tube.thresholds import priming_pressure, siphon_stall_pressure
 from ringbalance.scene.models import Scene
 
 AMBIENT = 101325.0
@@ -283,7 +283,8 @@ def test_spread_of_the_heads_never_falls_below_that_of_k(
     loss = tube_loss(tube=scene.tube, liquid=scene.liquid, angular_velocity=speed, velocity=u)
     exact = loss.k.uncertainty / (loss.k.value + 1)
     tabulated = heads.uncertainty(np.log(u))
-    neighbours = np.lib.stride_tricks.sliding_window_view(np.pad(exact, 12, mode="edge"), 25)
+    # Within one interval of the table, 3.7 % of the velocity: 43 places.
+    neighbours = np.lib.stride_tricks.sliding_window_view(np.pad(exact, 43, mode="edge"), 87)
     assert np.all(tabulated > 0.99 * neighbours.min(axis=1))
     assert np.all(tabulated < 1.01 * neighbours.max(axis=1))
     assert np.median(np.abs(tabulated / exact - 1)) < 1e-4

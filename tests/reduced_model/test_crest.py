@@ -18,9 +18,9 @@ from ringbalance.reduced_model.chamber.calibration import calibrate_chamber
 from ringbalance.reduced_model.law.building import calibrated_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.operating.pressure_profile import hump_profile
 from ringbalance.reduced_model.tube.heads import tube_heads
 from ringbalance.reduced_model.tube.path import crest_span, path_radius, share_at_radius
-from ringbalance.reduced_model.tube.pressure_profile import hump_profile
 from ringbalance.scene.models import InputUncertainty, Scene
 
 AMBIENT, VAPOUR, DENSITY = 101325.0, 2339.0, 1000.0

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ringbalance.reduced_model.selection.contribution import Contribution
+from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.verification.selection_studies.choice import MARGIN, Values, choose
 from ringbalance.verification.selection_studies.cost import CostModel
 from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy, relative_error

@@ -16,8 +16,8 @@ from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, ca
 from ringbalance.reduced_model.law.building import calibrated_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.operating.pressure_profile import HumpProfile, hump_profile
 from ringbalance.reduced_model.tube.heads import tube_heads
-from ringbalance.reduced_model.tube.pressure_profile import HumpProfile, hump_profile
 from ringbalance.reports.studies.apparent_drag import apparent_drag
 from ringbalance.scene.models import InputUncertainty, Scene
 

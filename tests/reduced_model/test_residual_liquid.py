@@ -14,7 +14,7 @@ from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.tube.draw_down import draw_down_depth
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.law.flow_law import Flow
-from ringbalance.reduced_model.tube.residual import residual_fill_ratio
+from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 

@@ -14,13 +14,13 @@ from ringbalance.physics.pressure.ring import ring_quantities
 from ringbalance.physics.results import StatusCode
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.calibration import Calibration
+from ringbalance.reduced_model.chamber import terms as chamber_terms
 from ringbalance.reduced_model.chamber.values import (
     by_closed_form,
     by_elements,
     by_paper,
     by_quadrature,
 )
-from ringbalance.reduced_model.selection import chamber_terms
 from ringbalance.reduced_model.selection.loss_models import (
     CONSTANT,
     CORRELATIONS,

@@ -88,6 +88,21 @@ def test_a_separated_column_over_an_open_port_is_lost() -> None:
     assert (flow.separated, flow.primed) == (True, False)
 
 
+@pytest.mark.parametrize(
+    ("froude_velocity", "primed"), [(0.0, True), (0.5, True), (1.0, False), (5.0, False)]
+)
+def test_a_started_tube_is_primed_once_its_flow_carries_the_gas_out(
+    froude_velocity: float, primed: bool
+) -> None:
+    # Driving 5 - 1 + 7 - 10.5 = 0.5, gas margin 5 + 7 - 9 - 1 = 2: more could spill than drains, so the tube
+    # is full under its gas; a Froude number of 0.71 does not carry that out, one of 1.4 does.
+    slow, crest = replace(ENDS, downstream_hydrostatic=10.5), replace(CREST, froude_velocity=froude_velocity)
+    flow = flow_of(slow, crest=crest, primed=False)
+    assert (flow.velocity, flow.separated) == (math.sqrt(0.5), False)
+    assert flow.primed is primed
+    assert flow_of(slow, crest=crest, primed=True).primed
+
+
 @pytest.mark.parametrize("crest", [None, CREST, replace(CREST, trapped=True)])
 def test_arrays_agree_with_numbers(crest: SiphonCrest[float] | None) -> None:
     random = np.random.default_rng(1)

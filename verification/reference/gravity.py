@@ -19,7 +19,7 @@ import numpy.typing as npt
 from scipy.optimize import brentq
 
 from ringbalance.mesh.geometry import half_angle, liquid_area, surface_radius
-from ringbalance.physics.pressure.assembly import at_cells, volume_points
+from ringbalance.physics.pressure.assembly import at_points, volume_points
 from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, places
 from ringbalance.physics.pressure.surface import solve_with_gravity
 from ringbalance.scene.arrays import FloatArray
@@ -223,8 +223,8 @@ def _surface_error(disc: Disc, solution: PressureSolution, exact: _ExactRing) ->
 
 
 def _field_error(solution: PressureSolution, exact: _ExactRing) -> float:
-    volume = volume_points(solution.chamber.mesh)
+    volume = volume_points(solution.chamber)
     true = exact.pressure(solution.chamber.length_scale * volume.points)
-    difference = at_cells(volume, solution.pressure) - true
+    difference = at_points(volume, solution.pressure) - true
     squares = [np.sum(volume.weights * field**2) for field in (difference, true)]
     return float(np.sqrt(squares[0] / squares[1]))

@@ -16,7 +16,7 @@ import numpy as np
 
 from ringbalance.mesh.chamber import ChamberMesh, Geometry, chamber_mesh
 from ringbalance.mesh.geometry import half_angle, surface_radius
-from ringbalance.physics.pressure.assembly import at_cells, at_facets, facet_points, volume_points
+from ringbalance.physics.pressure.assembly import at_points, facet_points, volume_points
 from ringbalance.physics.pressure.solve import PressureProblem, PressureSolution, solve_pressure
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc
@@ -184,9 +184,9 @@ def _study(disc: Disc, cells: Sequence[tuple[int, ...]], geometry: Geometry, def
 
 
 def _field_error(solution: PressureSolution, exact: Callable[[FloatArray], FloatArray]) -> float:
-    volume = volume_points(solution.chamber.mesh)
+    volume = volume_points(solution.chamber)
     true = exact(solution.chamber.length_scale * volume.points)
-    difference = at_cells(volume, solution.pressure) - true
+    difference = at_points(volume, solution.pressure) - true
     squares = [np.sum(volume.weights * field**2) for field in (difference, true)]
     return float(np.sqrt(squares[0] / squares[1]))
 
@@ -194,8 +194,8 @@ def _field_error(solution: PressureSolution, exact: Callable[[FloatArray], Float
 def _wall_integral(solution: PressureSolution) -> float:
     """Integral of the pressure over the outer wall, N or N/m."""
     chamber: ChamberMesh = solution.chamber
-    facets = facet_points(chamber.mesh, "outer_wall")
-    total = float(np.sum(facets.weights * at_facets(facets, solution.pressure)))
+    facets = facet_points(chamber, "outer_wall")
+    total = float(np.sum(facets.weights * at_points(facets, solution.pressure)))
     return total * chamber.length_scale ** (chamber.dimension - 1)
 
 

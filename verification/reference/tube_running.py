@@ -12,9 +12,11 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ringbalance.physics.tube.loss import TubeLoss, tube_loss
+from ringbalance.reduced_model.chamber.calibration import calibrate_chamber
+from ringbalance.reduced_model.law.building import calibrated_law
 from ringbalance.reduced_model.paper.formulas import PAPER_DRAG_COEFFICIENT
+from ringbalance.reduced_model.tube.heads import tube_heads
 from ringbalance.scene.models import Scene
-from ringbalance.verification.loops import calibration_of
 from ringbalance.verification.reference.exact_chamber import wall_pressure_of
 
 _VELOCITIES: Final = (1e-4, 3000.0, 401)
@@ -101,8 +103,11 @@ def second_reading(scene: Scene) -> Scene:
     head = scene.gas.pressure / scene.liquid.density
     target = math.sqrt(2 * head / (PAPER_DRAG_COEFFICIENT + 1))
 
+    chamber = calibrate_chamber(scene)
+
     def excess(factor: float) -> float:
-        law = calibration_of(with_bore(scene, factor)).flow_law
+        own = with_bore(scene, factor)
+        law = calibrated_law(scene=own, chamber=chamber, heads=tube_heads(own))
         flow = law.evaluate(fill_ratio=law.max_fill_ratio / 2, gas_pressure=scene.gas.pressure, primed=True)
         return factor**2 * float(flow.velocity) - target
 

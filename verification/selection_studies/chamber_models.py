@@ -10,6 +10,19 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.chamber import default_cells
+from ringbalance.reduced_model.chamber.range import chamber_fills, chamber_status
+from ringbalance.reduced_model.chamber.terms import (
+    COARSE_MESH,
+    FINE_MESH,
+    MEAN,
+    PLATES,
+    RIPPLE,
+    SLOSHING,
+    amplification,
+    capillary_share,
+    chamber_contributions,
+    mesh_error,
+)
 from ringbalance.reduced_model.chamber.tilted_ring import (
     POINTS,
     RADIAL_POINTS,
@@ -25,20 +38,7 @@ from ringbalance.reduced_model.chamber.values import (
     sloshing_meshes,
     with_sloshing,
 )
-from ringbalance.reduced_model.selection.chamber_range import chamber_fills, chamber_status
-from ringbalance.reduced_model.selection.chamber_terms import (
-    COARSE_MESH,
-    FINE_MESH,
-    MEAN,
-    PLATES,
-    RIPPLE,
-    SLOSHING,
-    amplification,
-    capillary_share,
-    chamber_contributions,
-    mesh_error,
-)
-from ringbalance.reduced_model.selection.contribution import Contribution
+from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy, Work
@@ -76,7 +76,7 @@ def chamber_hierarchies(scene: Scene) -> tuple[ModelHierarchy, ModelHierarchy]:
     status = chamber_status(scene)
     terms = chamber_contributions(scene, fills)
     floor = mesh_error(scene, default_cells(disc=scene.disc)[1])
-    capillary = capillary_share(scene, fills)
+    capillary = {part: np.max(s, initial=0.0) for part, s in capillary_share(scene, fills).items()}
     swing = _swing_uncertainty(scene, fills, terms)
     memo: Memo = {}
     labels = tuple(f"fill ratio {x:.3g}" for x in fills)
@@ -112,7 +112,7 @@ def _swing_uncertainty(
     scene: Scene, fills: FloatArray, terms: Mapping[str, Mapping[str, Contribution]]
 ) -> Mapping[str, float]:
     """What linear sloshing leaves open: its square, and the meshes of the swinging liquid."""
-    factor = max((amplification(scene, float(x)) for x in fills), default=1.0)
+    factor = float(np.max(amplification(scene, fills), initial=1.0))
     if scene.environment.shaft == "vertical":
         return {"pressures": 0.0, "moments": 0.0}
 

@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.reduced_model.selection.contribution import NEGLIGIBLE, Contribution
+from ringbalance.reduced_model.contribution import NEGLIGIBLE, Contribution
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.selection_studies.cost import CostModel, committed_costs
 from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy, relative_error

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from ringbalance.reduced_model.selection.contribution import Contribution
+from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Found, Table
 from ringbalance.verification.selection_studies.chamber_models import chamber_hierarchies

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from ringbalance.physics.results import Status
-from ringbalance.reduced_model.selection.contribution import Contribution
+from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.scene.arrays import FloatArray
 
 Work = Mapping[str, float]

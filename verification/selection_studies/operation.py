@@ -16,10 +16,10 @@ from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Integrator
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.terms import dynamics_of
+from ringbalance.reduced_model.chamber.range import chamber_status
+from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.reduced_model.law.model import CompleteLaw, balancer_model
 from ringbalance.reduced_model.law.paper_law import paper_law
-from ringbalance.reduced_model.selection.chamber_range import chamber_status
-from ringbalance.reduced_model.selection.contribution import Contribution
 from ringbalance.reduced_model.selection.estimates import (
     FILLING,
     INERTIA,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ringbalance.mesh.geometry import surface_radius
+from ringbalance.reduced_model.chamber.terms import amplification, surface_tension
 from ringbalance.reduced_model.law.building import column_pressure
-from ringbalance.reduced_model.selection.chamber_terms import amplification, surface_tension
 from ringbalance.reduced_model.selection.estimates import (
     FILLING,
     INERTIA,
@@ -45,7 +45,7 @@ def _ring(scene: Scene) -> tuple[Number, ...]:
     depth, gravity = disc.outer_radius - a, scene.environment.gravity
     ekman = scene.liquid.kinematic_viscosity / (omega * disc.outer_radius**2)
     bond = scene.liquid.density * omega**2 * a * depth**2 / surface_tension(scene)
-    swing = amplification(scene, disc.max_fill_ratio / 2)
+    swing = float(amplification(scene, disc.max_fill_ratio / 2))
     across = scene.environment.shaft == "horizontal" and gravity > 0
     return (
         _number(

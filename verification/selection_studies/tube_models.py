@@ -10,8 +10,8 @@ from typing import Final
 import numpy as np
 
 from ringbalance.physics.tube.loss import tube_loss
+from ringbalance.reduced_model.chamber.range import chamber_status
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.selection.chamber_range import chamber_status
 from ringbalance.reduced_model.selection.loss_models import (
     CONSTANT,
     CORRELATIONS,

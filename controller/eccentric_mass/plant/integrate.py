@@ -1,4 +1,5 @@
-"""One step of the plant: fixed steps of fifth order, cut where a mass stops, sticks or breaks away.
+"""One step of the plant: fixed steps of fifth order, cut where a mass stops, sticks or breaks away; in closed
+form while friction holds both masses at constant speed.
 
 Between such events the motion is smooth and a Runge-Kutta step of Dormand and Prince's fifth-order formula
 carries it; within the step that holds an event the event's time is found by bisection to the last digits,
@@ -24,6 +25,7 @@ from ringbalance.controller.eccentric_mass.plant.friction import (
     motions,
     slips,
 )
+from ringbalance.controller.eccentric_mass.plant.held import held_step
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.plant.plant import SIZE, Drive, drive_of, loads, write_derivative
 from ringbalance.scene.arrays import FloatArray, IntArray
@@ -191,6 +193,8 @@ def plant_step(
         if flags[mass] == LOCKED:
             after[6 + mass] = 0.0
     drive = drive_of(parameters, command, speed_rate)
+    if held_step(parameters, after, flags, speed, drive, step):
+        return after, flags
     parts = substeps(parameters, speed, speed_rate, step)
     short = step / parts
     work, trial = np.empty((_STAGES + 1, SIZE)), np.empty(SIZE)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
 
 from ringbalance.controller.eccentric_mass.plant.friction import (
     BACKWARDS,
@@ -23,10 +24,17 @@ from ringbalance.controller.eccentric_mass.plant.friction import (
     angular_accelerations,
     motions,
 )
+from ringbalance.controller.eccentric_mass.plant.held import held_step
 from ringbalance.controller.eccentric_mass.plant.integrate import plant_step
 from ringbalance.controller.eccentric_mass.plant.open_loop import run_steps
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
-from ringbalance.controller.eccentric_mass.plant.plant import rest_state, stuck_flags
+from ringbalance.controller.eccentric_mass.plant.plant import (
+    Drive,
+    drive_of,
+    rest_state,
+    stuck_flags,
+    write_derivative,
+)
 from ringbalance.controller.eccentric_mass.plant.whirl import steady_whirl
 from ringbalance.scene import bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.arrays import FloatArray, IntArray
@@ -259,3 +267,47 @@ def test_the_motion_from_rest_is_the_one_that_the_law_allows(
     # At the bound of the torque two motions are the same: what counts is the acceleration.
     for allowed in consistent_motions(torques):
         assert angular_accelerations(torques, *allowed) == pytest.approx(accelerations, abs=1e-9)
+
+
+def carried(
+    parameters: PlantParameters, state: FloatArray, speed: float, drive: Drive, time: float
+) -> FloatArray:
+    """The state of held masses by an adaptive solution of the plant's own equations."""
+
+    def rates(_: float, now: FloatArray) -> FloatArray:
+        out = np.empty(8)
+        write_derivative(parameters, now, speed, drive, (HELD, HELD), out)
+        return out
+
+    found = solve_ivp(rates, (0.0, time), state, method="DOP853", rtol=1e-12, atol=1e-16)
+    return np.asarray(found.y[:, -1])
+
+
+@pytest.mark.parametrize("damping", [0.0, 20.0, 3000.0])
+def test_a_step_with_held_masses_is_exact(damping: float, parameters: PlantParameters) -> None:
+    """Undamped, underdamped, and overdamped; the step is as long as the transient."""
+    rotor = parameters._replace(damping=damping, friction_arm_1=1e3, friction_arm_2=1e3)
+    speed, state = 150 * RPM, rest_state((0.4, 2.9))
+    state[:4] = 1e-3, -2e-3, 0.01, 0.02
+    drive, after, stuck = drive_of(rotor, np.array([0.01, -0.02]), 0.0), state.copy(), stuck_flags(SLIDING)
+    assert held_step(rotor, after, stuck, speed, drive, 0.3)
+    np.testing.assert_allclose(after, carried(rotor, state, speed, drive, 0.3), rtol=1e-9, atol=1e-13)
+    assert np.all(stuck == STUCK)
+
+
+def test_masses_that_the_transient_could_break_loose_are_not_taken_as_held(
+    parameters: PlantParameters,
+) -> None:
+    """Friction that holds the steady whirl, and not the transient on top."""
+    speed, angles = 150 * RPM, (1.2, 4.0)
+    whirl = steady_whirl(parameters, speed, angles)
+    arm = 1.5 * max(abs((whirl * cmath.exp(-1j * angle)).imag) for angle in angles)
+    rotor = parameters._replace(friction_arm_1=arm, friction_arm_2=arm)
+    drive, step = drive_of(rotor, OFF, 0.0), 1e-3
+    settled, shaken = at_rest_on(rotor, speed, angles), rest_state(angles)
+    assert held_step(rotor, settled, stuck_flags(STUCK), speed, drive, step)
+    before = shaken.copy()
+    assert not held_step(rotor, shaken, stuck_flags(STUCK), speed, drive, step)
+    assert not held_step(rotor, shaken, stuck_flags(STUCK), speed, drive._replace(rate=1.0), step)
+    np.testing.assert_array_equal(shaken, before)
+    assert held_step(rotor, shaken, stuck_flags(LOCKED), speed, drive, step)

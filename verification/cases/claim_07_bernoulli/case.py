@@ -12,7 +12,7 @@ from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene.models import Scene
 from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
-from ringbalance.verification.loops import calibration_of
+from ringbalance.verification.loops import flow_law_of
 from ringbalance.verification.reference.tube_running import (
     driving_head,
     running_tube,
@@ -70,7 +70,7 @@ def _exit(scene: Scene) -> tuple[float, float]:
 
 
 def _law(scene: Scene) -> CalibratedLaw:
-    return calibration_of(scene).flow_law
+    return flow_law_of(scene)
 
 
 def _siphon_share(scene: Scene) -> float:

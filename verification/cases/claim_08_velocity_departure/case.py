@@ -10,7 +10,7 @@ from ringbalance.reduced_model.paper.formulas import departure, flat_strip_area,
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
-from ringbalance.verification.loops import calibration_of
+from ringbalance.verification.loops import flow_law_of
 from ringbalance.verification.paper_numbers import (
     DENSITY,
     DEPARTURE_HIGH,
@@ -110,7 +110,7 @@ def _relative_velocity(scene: Scene, pressure: float, share: FloatArray) -> Floa
 
 
 def _law_velocity(scene: Scene, pressure: float, share: FloatArray) -> FloatArray:
-    law = calibration_of(scene).flow_law
+    law = flow_law_of(scene)
     return law.evaluate(fill_ratio=share * law.max_fill_ratio, gas_pressure=pressure, primed=True).velocity
 
 

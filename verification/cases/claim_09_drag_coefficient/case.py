@@ -17,7 +17,7 @@ from ringbalance.scene import known_liquids, liquid_at
 from ringbalance.scene.models import Liquid, Scene
 from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, Series, Table, figure
-from ringbalance.verification.loops import calibration_of
+from ringbalance.verification.loops import flow_law_of
 from ringbalance.verification.reference.tube_running import (
     Running,
     driving_head,
@@ -171,7 +171,7 @@ def _differences(scene: Scene, bare: Scene) -> Table:
             _velocity(paper_law(_filled(scene, row[0])), *row[1:]) for row in rows.values()
         ],
         "by the calibrated law": [
-            _velocity(calibration_of(_filled(bare, row[0])).flow_law, *row[1:]) for row in rows.values()
+            _velocity(flow_law_of(_filled(bare, row[0])), *row[1:]) for row in rows.values()
         ],
     }
     return Table(

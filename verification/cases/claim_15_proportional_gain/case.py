@@ -9,12 +9,12 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.simulation import Simulation
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.model import BalancerModel, balancer_model
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.models import Scene
 from ringbalance.verification.comparison import from_range
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table
-from ringbalance.verification.loops import amplitude_series, calibration_of, loop_scene, run_loop, settling
+from ringbalance.verification.loops import amplitude_series, flow_law_of, loop_scene, run_loop, settling
 from ringbalance.verification.reference.tube_running import second_reading
 
 _GAINS: Final = (0.04e6, 0.08e6, 0.12e6, 0.16e6, 0.20e6)
@@ -40,7 +40,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     runs = {gain: _run(scene, gain) for gain in _GAINS}
     rate = _rate(scene, paper_model(scene))
     bare = second_reading(scene)
-    calibrated = _rate(bare, calibration_of(bare).model)
+    calibrated = _rate(bare, balancer_model(flow_law_of(bare)))
     onset = _onset(scene)
     return Evidence(
         found={

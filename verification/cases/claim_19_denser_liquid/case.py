@@ -21,7 +21,7 @@ from ringbalance.verification.evidence import (
     Series,
     figure,
 )
-from ringbalance.verification.loops import calibration_of
+from ringbalance.verification.loops import flow_law_of
 from ringbalance.verification.reference.exact_chamber import exact_moment, wall_pressure_of
 from ringbalance.verification.rings import found_of, ring_of
 
@@ -91,7 +91,7 @@ def _wall(scene: Scene, density: float, fill: float) -> float:
 
 def _law(scene: Scene, density: float) -> FlowLaw:
     liquid = dataclasses.replace(scene.liquid, density=density)
-    return calibration_of(dataclasses.replace(scene, liquid=liquid)).flow_law
+    return flow_law_of(dataclasses.replace(scene, liquid=liquid))
 
 
 def _reach(law: FlowLaw, gas_pressure: float, *, full: bool = False) -> float:

@@ -9,8 +9,8 @@ import numpy as np
 
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.mesh.geometry import chamber_volume
-from ringbalance.physics.pressure.assembly import at_facets, facet_points, volume_points
-from ringbalance.physics.pressure.integrals import liquid_integrals, section_integrals
+from ringbalance.physics.pressure.assembly import at_points, facet_points, volume_points
+from ringbalance.physics.pressure.integrals import liquid_integrals
 from ringbalance.physics.pressure.solve import FREE_SURFACE, PressureSolution, RotatingLiquid
 from ringbalance.physics.pressure.surface import solve_with_gravity
 from ringbalance.scene.arrays import FloatArray
@@ -53,16 +53,15 @@ def _section_balance(scene: Scene, fill: float, cells: tuple[int, ...], defect: 
     true = tilted_liquid(disc=scene.disc, density=scene.liquid.density, fill_ratio=fill, shaft="horizontal")
     with mutated_pressure(wall=1.01 if defect == "wall_condition_off_by_a_percent" else 1.0):
         solution = _solved(scene, true, fill, cells)
-    loads = section_integrals(solution=solution, density=true.density)
-    forces = dict(loads.force_per_depth)
+    loads = liquid_integrals(solution=solution, density=true.density, axial_width=scene.disc.axial_width)
+    forces = dict(loads.force)
     if defect == "plate_force_dropped":
-        forces["plate_left"] = np.zeros(2)
-    gravity = np.array(true.gravity)
-    body = true.angular_velocity**2 * loads.first_moment_per_depth + true.density * loads.area * gravity
-    moment = loads.first_moment_per_depth
+        forces["plate_left"] = np.zeros(3)
+    gravity, moment = np.array((*true.gravity, 0.0)), loads.first_moment
+    body = true.angular_velocity**2 * moment + true.density * loads.volume * gravity
     turning = moment[0] * gravity[1] - moment[1] * gravity[0]
     size = float(np.linalg.norm(body))
-    torque = sum(loads.torque_per_depth.values()) - turning
+    torque = sum(loads.torque.values()) - turning
     return _Balance(
         force=float(np.linalg.norm(sum(forces.values()) - body)) / size,
         torque=abs(float(torque)) / (size * scene.disc.outer_radius),
@@ -80,24 +79,26 @@ def _solved(scene: Scene, liquid: RotatingLiquid, fill: float, cells: tuple[int,
 
 def _flux_residual(solution: PressureSolution, liquid: RotatingLiquid) -> float:
     """Flux out through the surface plus flux through the walls, less the source, relative to the source."""
-    unit, mesh = solution.chamber.length_scale, solution.chamber.mesh
+    chamber = solution.chamber
+    unit = chamber.length_scale
     problem = liquid.problem()
-    volume = volume_points(mesh)
+    volume = volume_points(chamber)
     source = unit * float(np.sum(volume.weights * problem.source(unit * volume.points)))
     gradient = np.zeros(solution.pressure.size)
-    gradient[solution.chamber.grid[0]] = solution.surface_gradient
-    surface = facet_points(mesh, FREE_SURFACE)
-    total = float(np.sum(surface.weights * at_facets(surface, gradient)))
-    for name in mesh.boundaries:
+    gradient[chamber.grid[0]] = solution.surface_gradient
+    surface = facet_points(chamber, FREE_SURFACE)
+    total = float(np.sum(surface.weights * at_points(surface, gradient)))
+    for name in chamber.boundaries:
         if name != FREE_SURFACE:
-            wall = facet_points(mesh, name)
+            wall = facet_points(chamber, name)
             total += float(np.sum(wall.weights * problem.wall_flux(unit * wall.points, wall.normals)))
     return abs(total / source - 1)
 
 
 def _weight_balance(scene: Scene, fill: float, cells: tuple[int, ...]) -> float:
     liquid = tilted_liquid(disc=scene.disc, density=scene.liquid.density, fill_ratio=fill, shaft="vertical")
-    loads = liquid_integrals(solution=_solved(scene, liquid, fill, cells), density=liquid.density)
+    solution = _solved(scene, liquid, fill, cells)
+    loads = liquid_integrals(solution=solution, density=liquid.density, axial_width=scene.disc.axial_width)
     weight = liquid.density * loads.volume * liquid.gravity[2]
     axial: FloatArray = np.array([force[2] for force in loads.force.values()])
     return abs(float(axial.sum()) / weight - 1)

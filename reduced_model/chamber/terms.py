@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Final
 
@@ -11,8 +10,8 @@ import numpy as np
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_area, surface_radius
 from ringbalance.reduced_model.chamber.values import by_closed_form, by_quadrature
+from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.reduced_model.paper import formulas as paper
-from ringbalance.reduced_model.selection.contribution import Contribution
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
@@ -33,6 +32,8 @@ METAL_DENSITY: Final = 3000.0
 """kg/m^3."""
 LARGEST_SWING: Final = 30.0
 """Amplification that damping leaves at resonance, about."""
+_MODES: Final = 24
+"""Of a chamber; what higher ones hold of gravity's tilt falls with the square of their number."""
 _SWING_FLOOR: Final = 0.2
 """Of the moment's ripple: by so much the estimate of the amplification may be off."""
 _CORIOLIS: Final = 2.0
@@ -49,15 +50,13 @@ def surface_tension(scene: Scene) -> float:
     return METAL_SURFACE_TENSION if scene.liquid.density > METAL_DENSITY else SURFACE_TENSION
 
 
-def capillary_share(scene: Scene, fills: FloatArray) -> Mapping[str, float]:
-    """Largest share of the wall pressure that surface tension can make, sigma (2/B + 1/(a alpha) + 1/a)/P.
+def capillary_share(scene: Scene, fills: FloatArray) -> Mapping[str, FloatArray]:
+    """Share of the wall pressure that surface tension can make, sigma (2/B + 1/(a alpha) + 1/a)/P.
 
     The moment hardly feels it: the same share of a surface's shape, taken as a whole.
-    Returns: Shares by "pressures" and "moments"; zero for no fills.
+    Returns: Shares by "pressures" and "moments", along the fills, which are above zero.
     Source: contact line over area of the free surface, contact angle zero, plus the ring's own curvature.
     """
-    if fills.size == 0:
-        return {"pressures": 0.0, "moments": 0.0}
     disc, square = scene.disc, scene.rotor.speed**2
     a = surface_radius(disc=disc, fill_ratio=fills)
     alpha = half_angle(disc=disc, radius=a)
@@ -67,18 +66,18 @@ def capillary_share(scene: Scene, fills: FloatArray) -> Mapping[str, float]:
     length = np.sqrt(surface_tension(scene) / (scene.liquid.density * square * a))
     depth = disc.outer_radius - a
     moved = length**2 * (1 / (a * alpha * depth) + 2 / (disc.axial_width * depth))
-    return {"pressures": float(np.max(jump / pressure)), "moments": float(np.max(moved))}
+    return {"pressures": jump / pressure, "moments": moved}
 
 
-def wall_layers(scene: Scene, fill: float) -> tuple[float, float]:
-    """Estimated contribution of friction at the walls, relative, and the Ekman number.
+def wall_layers(scene: Scene, fills: FloatArray) -> tuple[FloatArray, float]:
+    """Estimated contribution of friction at the walls, relative, along the fills; and the Ekman number.
 
     Source: g/(omega^2 a) sqrt(Ek), Ek = nu/(omega R2^2), of the liquid's swing on a horizontal shaft.
     """
-    omega, a = abs(scene.rotor.speed), float(surface_radius(disc=scene.disc, fill_ratio=fill))
+    omega, a = abs(scene.rotor.speed), surface_radius(disc=scene.disc, fill_ratio=fills)
     ekman = scene.liquid.kinematic_viscosity / (omega * scene.disc.outer_radius**2)
-    tilt = scene.environment.gravity / (omega**2 * a) if scene.environment.shaft == "horizontal" else 0.0
-    return tilt * ekman**0.5, ekman
+    gravity = scene.environment.gravity if scene.environment.shaft == "horizontal" else 0.0
+    return gravity / (omega**2 * a) * ekman**0.5, ekman
 
 
 def unmodelled_fractions(scene: Scene, fills: FloatArray) -> Mapping[str, FloatArray]:
@@ -87,49 +86,61 @@ def unmodelled_fractions(scene: Scene, fills: FloatArray) -> Mapping[str, FloatA
     Returns: Relative, of "pressures" and "moments", shape (n,) each; zero without liquid.
     Source: sum of the estimates, errors of one sign at worst.
     """
-    found = {"pressures": np.zeros(fills.shape), "moments": np.zeros(fills.shape)}
-    for place in np.flatnonzero(fills > 0):
-        layers, _ = wall_layers(scene, float(fills[place]))
-        waves = wave_mean(scene, float(fills[place]))
-        for part, share in capillary_share(scene, fills[place : place + 1]).items():
-            found[part][place] = share + layers + waves
+    found, wet = {}, fills > 0
+    common = wall_layers(scene, fills[wet])[0] + wave_mean(scene, fills[wet])
+    for part, share in capillary_share(scene, fills[wet]).items():
+        found[part] = np.zeros(fills.shape)
+        found[part][wet] = share + common
     return found
 
 
-def amplification(scene: Scene, fill: float) -> float:
+def amplification(scene: Scene, fills: FloatArray | float) -> FloatArray:
     """Estimate of how much the swinging liquid enlarges gravity's ripple, |1/(1 - 1/s^2)|.
 
-    Returns: Factor, at most 30; 1 on a vertical shaft.
+    Returns: Factors along the fills, at most 30; 1 on a vertical shaft.
     Source: s^2 = k tanh(k ln(R2/a)), the lowest mode without Coriolis force, undamped, driven at s = 1.
     """
     if scene.environment.shaft == "vertical":
-        return 1.0
+        return np.ones(np.shape(fills))
     disc, k = scene.disc, np.pi / scene.disc.central_angle
-    square = k * np.tanh(k * np.log(disc.outer_radius / float(surface_radius(disc=disc, fill_ratio=fill))))
-    return float(min(1 / max(abs(1 - 1 / square), 1e-9), LARGEST_SWING))
+    square = k * np.tanh(k * np.log(disc.outer_radius / surface_radius(disc=disc, fill_ratio=fills)))
+    return _swing(square)
 
 
-def wave_height(scene: Scene, fill: float) -> float:
+def wave_height(scene: Scene, fills: FloatArray) -> FloatArray:
     """Estimated height of the waves that gravity makes, zero-to-peak, over the depth of the ring.
 
-    A surface across gravity alone reaches g/omega^2 sin(alpha) at the plates; the swing enlarges that. Within
-    a factor of two of finite elements; of three in thin rings, where higher modes are near resonance.
+    A surface across gravity alone, g/omega^2 sin(phi) and cos(phi), is taken apart into the modes of a
+    chamber with half-angle alpha, k = j pi/(2 alpha), each of which answers with 1/(1 - 1/s^2) as in
+    `amplification`. For the 90 deg of the liquid-ring paper within a factor of three of finite elements,
+    thin rings included; half circles from a quarter of them up.
     """
     if scene.environment.shaft == "vertical":
-        return 0.0
-    a = float(surface_radius(disc=scene.disc, fill_ratio=fill))
+        return np.zeros(np.shape(fills))
+    a = surface_radius(disc=scene.disc, fill_ratio=fills)[..., None]
+    alpha, mode = half_angle(disc=scene.disc, radius=a), np.arange(1, _MODES + 1)
+    k = mode * np.pi / (2 * alpha)
+    less, more = (alpha * np.sinc((k + sign) * alpha / np.pi) for sign in (-1, 1))
+    shares = np.abs(less + np.where(mode % 2, -more, more)) / alpha
+    answers = shares * _swing(k * np.tanh(k * np.log(scene.disc.outer_radius / a)))
+    # The two parts follow each other by a quarter of a turn.
+    height = np.hypot(answers[..., ::2].sum(axis=-1), answers[..., 1::2].sum(axis=-1))
     tilt = scene.environment.gravity / scene.rotor.speed**2
-    tilt *= math.sin(min(float(half_angle(disc=scene.disc, radius=a)), math.pi / 2))
-    return amplification(scene, fill) * tilt / (scene.disc.outer_radius - a)
+    return np.asarray(height * tilt / (scene.disc.outer_radius - a[..., 0]))
 
 
-def wave_mean(scene: Scene, fill: float) -> float:
+def _swing(square: FloatArray) -> FloatArray:
+    """|1/(1 - 1/s^2)|, at most `LARGEST_SWING`."""
+    return np.asarray(np.minimum(1 / np.maximum(np.abs(1 - 1 / square), 1e-9), LARGEST_SWING))
+
+
+def wave_mean(scene: Scene, fills: FloatArray) -> FloatArray:
     """Bound of what waves do to the means over a turn, relative: (eta/h)^2/4, at most 1.
 
     In shallow waves the mean square of the velocity is g_c <eta^2>/h, of which Bernoulli's equation takes
     half from the wall pressure and as much from the surface's mean place; <eta^2> is at most eta^2/2.
     """
-    return min(wave_height(scene, fill) ** 2 / 4, 1.0)
+    return np.minimum(wave_height(scene, fills) ** 2 / 4, 1.0)
 
 
 def resonant_fill(scene: Scene) -> float | None:
@@ -168,7 +179,7 @@ def chamber_contributions(scene: Scene, fills: FloatArray) -> Mapping[str, Terms
 def _at(scene: Scene, fill: float) -> Mapping[str, Mapping[str, float]]:
     base = by_closed_form(scene, fill)
     tilted = by_quadrature(scene, fill) if scene.environment.gravity else base
-    factor = amplification(scene, fill)
+    factor = float(amplification(scene, np.array(fill)))
 
     def gravity(ripple: float, mean: float, swing: float) -> dict[str, float]:
         return {RIPPLE: ripple, SLOSHING: ripple * swing, MEAN: mean}

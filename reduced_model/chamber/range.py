@@ -10,15 +10,15 @@ import numpy as np
 
 from ringbalance.physics.results import Status, StatusCode
 from ringbalance.physics.sloshing.range import SMALL
-from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing, tilted_ring
-from ringbalance.reduced_model.selection.chamber_terms import (
+from ringbalance.reduced_model.chamber.terms import (
     MEAN,
     chamber_contributions,
     resonant_fill,
     wave_height,
 )
-from ringbalance.reduced_model.selection.contribution import Contribution
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing, tilted_ring
+from ringbalance.reduced_model.contribution import Contribution
+from ringbalance.scene.arrays import FloatArray, distinct
 from ringbalance.scene.models import Scene
 
 FILLS: Final = (0.2, 0.5, 1.0)
@@ -39,7 +39,7 @@ def range_fills(scene: Scene) -> FloatArray:
     fills, resonant = scene.disc.max_fill_ratio * np.array(FILLS), resonant_fill(scene)
     if resonant is None or not fills[0] < resonant < fills[-1]:
         return fills
-    return np.unique(np.append(fills, resonant))
+    return distinct(np.append(fills, resonant))
 
 
 def range_contributions(scene: Scene) -> Mapping[str, Mapping[str, Contribution]]:
@@ -74,7 +74,7 @@ def chamber_status(scene: Scene) -> Status:
 
 def _waves(scene: Scene, fills: FloatArray) -> Status:
     """Whether the swinging surface stays small against the ring's depth, by the estimate of its swing."""
-    swing = np.array([wave_height(scene, float(x)) for x in fills])
+    swing = wave_height(scene, fills)
     worst = int(np.argmax(swing))
     if swing[worst] <= SMALL:
         return Status()

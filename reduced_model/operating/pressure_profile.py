@@ -12,7 +12,8 @@ from ringbalance.physics.tube.state import TubeState, tube_state
 from ringbalance.reduced_model.law.building import column_pressure
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Flow, Regime
-from ringbalance.reduced_model.tube.crest_margin import DirectedState, directed_state, margin_of
+from ringbalance.reduced_model.operating.crest_margin import DirectedState, directed_state, margin_of
+from ringbalance.reduced_model.operating.rest import rest
 from ringbalance.reduced_model.tube.path import (
     Places,
     crest_span,
@@ -24,7 +25,6 @@ from ringbalance.reduced_model.tube.path import (
     reversed_tube,
 )
 from ringbalance.reduced_model.tube.regime import TubeEnds
-from ringbalance.reduced_model.tube.rest import rest
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Scene, Tube
 

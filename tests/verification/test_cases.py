@@ -200,7 +200,7 @@ def test_moments_in_consequences_follow_from_the_integral(
     disc, t = paper_scene.disc, paper_scene.disc.plate_thickness
 
     def antiderivative(r: float) -> float:
-        return (r**2 - t**2) ** 1.5 / 3 - t * r**2 / 2
+        return float((r**2 - t**2) ** 1.5 / 3 - t * r**2 / 2)
 
     inner = results["claim_02_ring_radius"].numbers["ring_radius"]
     depth = antiderivative(disc.outer_radius) - antiderivative(inner)

@@ -68,9 +68,9 @@ def parameters(scene: EccentricScene) -> list[Record]:
             "group": name.replace("_", " ").capitalize(),
             "quantity": key.replace("_", " "),
             "value": _written(value, entry.takes),
+            "uncertainty": "",
             "note": entry.presence.meaning,
             "origin": scene.origin_of(f"{name}.{key}"),
-            "uncertainty": "",
             "path": f"{name}.{key}",
         }
         for name, table in ECCENTRIC_MASS.tables.items()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,9 +14,9 @@ from ringbalance.reports.prose import typeset
 from ringbalance.reports.section import Record
 from ringbalance.scene.arrays import FloatArray
 
-_COLOURS: Final = (style.FOUND, style.THIRD, style.FOURTH, style.FIFTH, style.MUTED, style.INK)
-_LONGEST_LABEL: Final = 36
-_MARKERS: Final = ("o", "s", "^", "D", "v", "P")
+_LONGEST_LABEL: Final = 28
+_SPARE: Final = (*(style.line(index) for index in (2, 3, 5)), {"color": style.INK})
+"""Lines of further curves of a style that is taken."""
 
 
 def _positive(values: list[float | None]) -> bool:
@@ -35,18 +35,11 @@ def order_plot(case: Record) -> Drawing | None:
     def paint(axes: Axes) -> None:
         for index, sequence in enumerate(sequences):
             size, error = np.asarray(sequence["h"]), np.asarray(sequence["error"])
-            colour = _COLOURS[index % len(_COLOURS)]
-            axes.plot(
-                size,
-                error,
-                color=colour,
-                marker=_MARKERS[index % len(_MARKERS)],
-                markersize=4,
-                label=sequence["label"],
-            )
+            line = style.line(index, size=4)
+            axes.plot(size, error, label=sequence["label"], **line)
             if sequence.get("formal_order"):
                 slope = 0.6 * error[-1] * (size / size[-1]) ** sequence["formal_order"]
-                axes.plot(size, slope, color=colour, linewidth=0.8, linestyle=":")
+                axes.plot(size, slope, color=line["color"], linewidth=0.8, linestyle=":")
         style.logarithmic(axes, "x", ticks=sorted({float(f"{size:.3g}") for size in sequences[0]["h"]}))
         style.logarithmic(axes, "y")
 
@@ -64,13 +57,13 @@ def order_plot(case: Record) -> Drawing | None:
     )
 
 
-_STYLES: Final = {
-    "paper": (style.PAPER, (0, (5, 2))),
-    "found": (style.FOUND, "-"),
-    "reference": (style.THIRD, (0, (1, 1.5))),
-    "points": (style.THIRD, "none"),
+_STYLES: Final[dict[str, dict[str, Any]]] = {
+    "paper": style.AS_PAPER,
+    "found": {"color": style.FOUND},
+    "reference": {"color": style.THIRD, "linestyle": (0, (1, 1.5))},
+    "points": {"color": style.INK, "linestyle": "", "marker": "o", "markersize": 2.5},
 }
-"""Colour and line of a curve; "points" has markers alone."""
+"""Drawing of a curve by its style."""
 
 
 def series_plots(case: Record) -> list[Drawing]:
@@ -84,33 +77,36 @@ def _with_gaps(values: list[float | None], unit: DisplayUnit) -> FloatArray:
     return np.array([np.nan if value is None else value * unit.factor for value in values])
 
 
+def _few(limits: tuple[float, float]) -> tuple[float, float] | None:
+    """Limits of a logarithmic axis on which decades alone would be too few labels."""
+    return limits if 0 < limits[0] < limits[1] < 50 * limits[0] else None
+
+
 def _label(name: str, unit: str) -> str:
     return f"{name} in {unit}" if name and unit not in {"", "1"} else name or unit
 
 
 def _series_plot(name: str, series: Record) -> Drawing:
-    x_unit = display_unit(series["x"]["unit"], *series["x"]["values"])
+    x_unit = display_unit(series["x"]["unit"].replace("*", " "), *series["x"]["values"])
     x = _with_gaps(series["x"]["values"], x_unit)
     curves, told = series["y"], typeset(series["name"][:1].upper() + series["name"][1:])
     unit = display_unit(curves[0]["unit"], *(value for curve in curves for value in curve["values"]))
-    spare = iter((style.FOURTH, style.FIFTH, style.MUTED, style.INK) * len(curves))
-    used: set[str] = set()
+    spare = iter(_SPARE * len(curves))
+    used: list[Record] = []
 
     def paint(axes: Axes) -> None:
         for curve in curves:
-            colour, dashes = _STYLES[curve.get("style") or "found"]
-            colour = next(spare) if colour in used else colour
-            used.add(colour)
+            line = _STYLES[curve.get("style") or "found"]
+            line = next(spare) if line in used else line
+            used.append(line)
             y = _with_gaps(curve["values"], unit)
-            marker = "o" if dashes == "none" else None
-            label = typeset(curve["name"])
-            axes.plot(x, y, color=colour, linestyle=dashes, label=label, marker=marker, markersize=2.5)
+            axes.plot(x, y, label=typeset(curve["name"]), **line)
             if curve.get("uncertainty"):
                 band = _with_gaps(curve["uncertainty"], unit)
-                axes.fill_between(x, y - band, y + band, color=colour, alpha=0.2, linewidth=0)
+                style.band(axes, x, y, band, line["color"])
         if series.get("log"):
-            style.logarithmic(axes, "x")
-            style.logarithmic(axes, "y")
+            style.logarithmic(axes, "x", within=_few(axes.get_xlim()))
+            style.logarithmic(axes, "y", within=_few(axes.get_ylim()))
 
     names = typeset(", ".join(curve["name"] for curve in curves))
     return draw(

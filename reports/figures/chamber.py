@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from matplotlib.axes import Axes
 
@@ -103,7 +105,8 @@ def transfer_lambda(chamber: Record, summary: Record, paper: Record) -> Drawing:
     fill = chamber["fill_ratio"]
     found = np.asarray(chamber["lambda_per_transferred_mass_m"]) * 1e3
     printed, spread = paper["lambda_m"] * 1e3, paper["lambda_spread"]
-    half_width = summary["uncertainty_m"] * 1e3
+    total = math.hypot(summary["uncertainty_m"], summary["input_uncertainty_m"])
+    half_width = total * 1e3
 
     def paint(axes: Axes) -> None:
         axes.axhspan(
@@ -113,7 +116,7 @@ def transfer_lambda(chamber: Record, summary: Record, paper: Record) -> Drawing:
         style.band(axes, fill, found, half_width, style.FOUND)
         axes.plot(fill, found, color=style.FOUND, marker="o", markersize=3, label="finite elements")
 
-    centre = shown(summary["per_transferred_mass_m"], "m", summary["uncertainty_m"])
+    centre = shown(summary["per_transferred_mass_m"], "m", total)
     varies = percent(summary["variation_over_range"])
     return draw(
         x="fill ratio of the driven chamber",

@@ -17,7 +17,6 @@ _LAWS: Final[dict[str, dict[str, Any]]] = {
     "calibrated": {"color": style.FOUND, "label": "the calibrated law"},
     "paper": {**style.AS_PAPER, "label": "the paper’s law"},
 }
-CHAMBER_COLOURS: Final = (style.FOUND, style.PAPER, style.THIRD, style.FOURTH, style.FIFTH, style.MUTED)
 
 
 def early_time(runs: Record) -> float:
@@ -147,9 +146,7 @@ def fill_ratios(run: Record, until: float) -> Drawing:
 
     def paint(axes: Axes) -> None:
         for index, (letter, values) in enumerate(run["fill_ratio"].items()):
-            axes.plot(
-                run["time_s"], values, color=CHAMBER_COLOURS[index % len(CHAMBER_COLOURS)], label=letter
-            )
+            axes.plot(run["time_s"], values, label=letter, **style.line(index))
         axes.set_xlim(0, until)
 
     letters = ", ".join(run["fill_ratio"])

@@ -152,7 +152,7 @@ def _panel(bars: Axes, title: str, budget: Record) -> None:
     bars.set_xticks(
         ticks[:: len(ticks) // 2], [f"{style.plain_number(t)} %" for t in ticks[:: len(ticks) // 2]]
     )
-    bars.set_title(title, loc="left", x=-0.9, fontsize="medium", weight="bold", color=style.INK)
+    bars.set_title(title.split(",")[0], loc="left", x=-0.9, fontsize="medium", weight="bold", color=style.INK)
     bars.grid(visible=False, axis="y")
     bars.spines["left"].set_visible(False)
 
@@ -211,38 +211,42 @@ def _histogram(panel: Axes, sample: Record) -> None:
     panel.set(xlabel="settling time in s", xlim=(ends[0], place + width), ylim=(0, 112))
 
 
-def residual_polar(run: Record, reach: Record) -> Drawing:
+def residual_polar(run: Record, reach: Record | None = None) -> Drawing:
     """Residual vibration as a vector over a run, with the limit's circle and what the disc can cancel.
 
     Args: `run`: a simulation document. `reach`: of a pair alone, `vibration_m`, and of the first pair,
-    `direction_rad` as vibration, with the number of `pairs`.
+    `direction_rad` as vibration, with the number of `pairs`; None: not shown.
     """
     vector = np.asarray(run["amplitude_m"]) * np.exp(1j * np.asarray(run["phase_rad"])) * _MICROMETRE
     limit = run["limit_m"] * _MICROMETRE
-    steps = reachable(reach["vibration_m"] * _MICROMETRE, reach["direction_rad"], reach["pairs"])
+    ends = np.zeros(0, dtype=np.complex128)
+    if reach is not None:
+        ends = reachable(reach["vibration_m"] * _MICROMETRE, reach["direction_rad"], reach["pairs"])
 
     def paint(axes: Axes) -> None:
         axes.set_axis_off()
         panels = [style.figure_of(axes).add_axes((left, 0.02, 0.42, 0.9)) for left in (0.02, 0.55)]
-        whole, close = (1.15 * max(float(np.abs(x).max()) for x in (vector, steps)), 4 * limit)
+        whole, close = 1.15 * float(np.abs([*vector, *ends, limit]).max()), 4 * limit
         for panel, span, title in zip(panels, (whole, close), ("whole run", "near the limit"), strict=True):
             _residual(panel, vector, limit, span)
             panel.set_title(title, loc="left", fontsize="medium", color=style.INK)
-        panels[0].fill(steps.real, steps.imag, facecolor="none", edgecolor=style.THIRD, linestyle=(0, (5, 2)))
-        panels[0].text(-0.98 * whole, -0.98 * whole, "dashed: what the disc can cancel", color=style.THIRD)
         panels[1].text(-0.98 * close, -0.98 * close, "circle: limit", color=style.PAPER)
+        if ends.size:
+            closed, corner = np.append(ends, ends[0]), -0.98 * whole
+            panels[0].plot(closed.real, closed.imag, color=style.THIRD, linestyle=(0, (5, 2)))
+            panels[0].text(corner, corner, "dashed: what the disc can cancel", color=style.THIRD)
 
-    start, end = (shown(float(abs(vector[i])) / _MICROMETRE, "m", digits=2) for i in (0, -1))
+    first, last = (shown(float(abs(vector[i])) / _MICROMETRE, "m", digits=2) for i in (0, -1))
+    dashed = " Dashed: vibrations that the pairs can cancel together, each within its usable moment."
     return draw(
         name="residual-polar",
         paint=paint,
         columns=0,
         wide=True,
         height=3.7,
-        alt=f"Residual vibration as a vector in the rotor’s plane, from {start} to {end}.",
-        caption=f"Residual vibration as a vector, from {start} (ring) to {end} (dot); radius in µm, angle as "
-        "the sensor’s phase. Solid circle: the limit. Dashed: vibrations that the pairs can cancel together, "
-        "each within its usable moment.",
+        alt=f"Residual vibration as a vector in the rotor’s plane, from {first} to {last}.",
+        caption=f"Residual vibration as a vector, from {first} (ring) to {last} (dot); radius in µm, angle "
+        f"as the sensor’s phase. Solid circle: the limit.{dashed if ends.size else ''}",
     )
 
 

@@ -13,8 +13,6 @@ from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import given, percent, short, shown
 from ringbalance.reports.section import Record
 
-_COLOURS: Final = (style.FOUND, style.THIRD, style.FOURTH, style.PAPER, style.FIFTH)
-_MARKERS: Final = ("o", "s", "^", "D", "v")
 _FLOOR: Final = 5e-9
 """m: smaller amplitudes are drawn here."""
 
@@ -94,8 +92,7 @@ def _fall(told: Record) -> str:
 
 
 def _line(index: int, label: str) -> dict[str, Any]:
-    marks = {"marker": _MARKERS[index], "markersize": 2.6, "linewidth": 1.2}
-    return {"color": _COLOURS[index], "label": label, **marks}
+    return {"label": label, "linewidth": 1.2, **style.line(index, size=2.6)}
 
 
 def _amplitudes(axes: Axes, runs: list[Record], labels: list[str], limit: float) -> None:

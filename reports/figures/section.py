@@ -62,9 +62,7 @@ def disc_section(found: Record) -> Drawing:
 
 
 def _assumed(found: Record) -> str:
-    names = [
-        name.replace("_", " ") for name, origin in found.get("origins", {}).items() if origin == "assumed"
-    ]
+    names = [name.replace("_", " ") for name, origin in found["origins"].items() if origin == "assumed"]
     return f" Assumed: {', '.join(names)}." if names else ""
 
 
@@ -103,7 +101,7 @@ def _across(panel: Axes, found: Record, size: dict[str, float]) -> None:
         panel.text(place.real, place.imag, chr(ord("A") + index), ha="center", va="center", weight="bold")
     panel.plot(0, 0, "+", color=style.INK, markersize=9)
     _tube(panel, size)
-    _radius(panel, outer, -0.5, f"R₂ {number(outer, digits=4)}")
+    _radius(panel, outer, -0.5, f"R₂ {number(outer, digits=4)}", share=1.34)
     _radius(panel, inner, -2.1, f"R₁ {number(inner, digits=4)}")
     _radius(panel, surface, -2.62, f"R₁′ {number(surface, digits=4)}")
     arc = 1.1 * outer

@@ -178,6 +178,8 @@ _RIGHT: Final = 0.14
 _BOTTOM: Final = 0.42
 _TOP: Final = 0.1
 _LEGEND_ROW: Final = 0.175
+_DECADE: Final = 8.0
+"""Range of a logarithmic axis up to which ticks at 1, 2 and 5 would be too few."""
 _MANY: Final = 1e4
 """Range of a logarithmic axis from which on decades alone are labelled."""
 _TOP_AXIS: Final = 0.42
@@ -219,7 +221,8 @@ def logarithmic(
     getattr(axes, f"set_{axis}scale")("log")
     target = getattr(axes, f"{axis}axis")
     if within is not None:
-        steps = (step * 10.0**exponent for exponent in range(-9, 10) for step in (1, 2, 5))
+        fine = (1, 2, 5) if within[1] > _DECADE * within[0] else (1, 1.5, 2, 2.5, 3, 4, 5, 6, 7, 8)
+        steps = (step * 10.0**exponent for exponent in range(-9, 10) for step in fine)
         ticks = [step for step in steps if within[0] <= step <= within[1]]
     if ticks is not None:
         target.set_ticks(ticks)
@@ -302,7 +305,7 @@ def draw(
     return Drawing(name=name, svg=_to_page(buffer.getvalue(), name, alt), alt=alt, caption=caption, wide=wide)
 
 
-def band(axes: Axes, x: ArrayLike, y: FloatArray, width: FloatArray, colour: str) -> None:
+def band(axes: Axes, x: ArrayLike, y: FloatArray, width: FloatArray | float, colour: str) -> None:
     """Shades a value's half-width, in the value's unit, about its line."""
     axes.fill_between(x, y - width, y + width, color=colour, alpha=0.2, linewidth=0)
 

@@ -17,7 +17,6 @@ from ringbalance.reports.section import Record
 from ringbalance.scene.arrays import FloatArray
 
 _VELOCITY_TICKS: Final = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0]
-_TERM_COLOURS: Final = (style.FOUND, style.THIRD, style.FOURTH, style.FIFTH, style.PAPER, style.MUTED)
 
 
 def _nice_ticks(low: float, high: float) -> list[float]:
@@ -104,15 +103,8 @@ def drag_terms(tube: Record) -> Drawing:
     def paint(axes: Axes) -> None:
         style.logarithmic(axes, "x", ticks=_VELOCITY_TICKS)
         for index, (name, values) in enumerate(shown_terms.items()):
-            colour = _TERM_COLOURS[index % len(_TERM_COLOURS)]
-            dashes = "-" if index < len(_TERM_COLOURS) else (0, (5, 2))
-            axes.plot(
-                velocity,
-                np.where(values > 0, values, np.nan),
-                color=colour,
-                linestyle=dashes,
-                label=name.replace("_", " "),
-            )
+            positive, label = np.where(values > 0, values, np.nan), name.replace("_", " ")
+            axes.plot(velocity, positive, label=label, **style.line(index))
         style.logarithmic(axes, "y")
         axes.set_xlim(velocity[0], velocity[-1])
 

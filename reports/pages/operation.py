@@ -69,6 +69,7 @@ def _disc(work: Work) -> Record:
         "crest_radius_m": tube.hump_radius,
         "bore_m": tube.bore,
         "length_m": tube.length,
+        "origins": {key: work.scene.origin_of(f"tube.{key}") for key in ("bore", "length", "hump_radius")},
     }
 
 

@@ -117,7 +117,7 @@ def _section_figure(record: Record) -> Drawing:
         axes.set_xlim(-0.53, 0.53)
         axes.set_ylim(-0.53, 0.53)
         _place(axes, 1.0, 1.0)
-        _colour_bar(axes, levels, "axial velocity over its mean")
+        _colour_bar(axes, levels, "axial, over the mean")
 
     re, rotation = (number(record[key], digits=3) for key in ("reynolds", "rotation_reynolds"))
     more = percent(record["friction_ratio"] - 1, signed=True, digits=2)

@@ -22,7 +22,7 @@ SECTION = re.compile(
 )
 ENTRY = re.compile(r"(?:^ {4}|`)\*{0,2}(\w+)`?:(?=\s|$)", re.MULTILINE)
 """A line of its own, or `name`: in running text."""
-CASE_INTERFACE = ("compute", "reference")
+CASE_INTERFACE = ("compute", "reference", "values")
 NO_CONTENT = """
     a an and are as at be by each every for from given gives hand here in into is it its new no not of off
     on one or own returns that the their them there these this those to used value values which whose with

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import Any
+from typing import Any, get_args
 from xml.etree import ElementTree
 
 import pytest
@@ -11,6 +11,7 @@ import pytest
 from ringbalance.reports.figures.cases import series_plots
 from ringbalance.reports.figures.style import DARK, LIGHT, Drawing, decade, plain_number, standalone
 from ringbalance.reports.page import page_content
+from ringbalance.verification.evidence import CurveStyle
 
 Record = dict[str, Any]
 
@@ -119,6 +120,17 @@ def test_a_gap_in_a_series_is_no_number() -> None:
     (drawing,) = series_plots({"id": "some_case", "series": [series]})
     assert drawing.name == "case-some-case-0"
     assert "nan" not in drawing.svg.lower()
+
+
+@pytest.mark.parametrize("kind", get_args(CurveStyle))
+def test_every_style_of_a_curve_can_be_drawn(kind: str) -> None:
+    series = {
+        "name": "speed",
+        "x": {"name": "time", "unit": "s", "values": [0.0, 1.0]},
+        "y": [{"name": "found", "unit": "m/s", "values": [1.0, 2.0], "style": kind}],
+    }
+    (drawing,) = series_plots({"id": "some_case", "series": [series]})
+    assert "found" in drawing.svg
 
 
 def test_tick_labels_are_plain_text() -> None:

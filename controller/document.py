@@ -42,6 +42,7 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         "fill_ratio": {letter: fill.tolist() for letter, fill in simulation.fill_ratio.items()},
         "overshoots": simulation.overshoots,
         "misadjustments": simulation.misadjustments,
+        "injections_shortened": simulation.shortened,
         "energy_J": simulation.energy,
         "gas": {
             "fillings": simulation.gas.fillings,

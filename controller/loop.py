@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
@@ -29,6 +29,7 @@ from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.chamber.range import chamber_status
 from ringbalance.reduced_model.gas_line import line_answers
 from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw, balancer_model
+from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.reduced_model.selection.registry import ModelUsed
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
@@ -60,6 +61,7 @@ def simulate(
     progress: Progress | None = None,
     modelled: Collection[str] | None = None,
     to_time_limit: bool = False,
+    residual_fill: float | None = None,
 ) -> Simulation:
     """One closed-loop run of a scene under a balancer model.
 
@@ -74,6 +76,8 @@ def simulate(
         sensor: default the scene's noise from the scene's seed.
         modelled: of "tube inertia", "gas filling" and "valve lag" those to model; default those whose
             estimated contribution is above the scene's tolerance.
+        residual_fill: of a driven chamber; injections are shortened so that none falls below it. Default the
+            fill at which gas enters the port.
     Raises: SceneError: an algorithm that this program does not have, settings without a meaning, a rotor too
         slow to form a ring, or a model made for another disc.
     Raises: ValueError: both a model and a flow law, or neither; terms to model beside an integrator, or ones
@@ -89,7 +93,8 @@ def simulate(
     quasi_steady = integrator or (closed_form if has_closed_form(balancer.flow) else quadrature)
     asked = () if integrator is not None else modelled
     used = run_models(scene=scene, model=balancer, asked=asked)
-    dynamics = dynamics_of(scene=scene, model=balancer, modelled=terms_modelled(used))
+    residual = residual_fill_ratio(scene, law=balancer.flow) if residual_fill is None else residual_fill
+    dynamics = dynamics_of(scene=scene, model=balancer, modelled=terms_modelled(used), residual_fill=residual)
     used_controller = controller or controller_of(scene, balancer)
     run = _Run(
         scene=scene,
@@ -101,6 +106,7 @@ def simulate(
             gas_pressure=scene.gas.pressure,
             integrator=quasi_steady,
             dynamics=dynamics,
+            residual_fill=residual,
         ),
         controller=used_controller,
         sensor=sensor or noisy_sensor(sensor=scene.sensor, seed=scene.run.seed),
@@ -151,6 +157,10 @@ class _Run:
     """s, from which on the true amplitude has not been above the limit; infinite while it is."""
     held_since: float = math.inf
     """The same of the first time that it held."""
+    shortened: int = 0
+    """Injections shortened or left out so that the driven chamber keeps its residual fill."""
+    refused: tuple[str, ...] = ()
+    """Chambers of those in the last command."""
     cut: bool = False
     """Whether the time limit has shortened a valve-open time or a wait."""
 
@@ -222,8 +232,13 @@ class _Run:
         if not command.valves:
             self._wait()
             return
-        gas_times = {valve.chamber: min(valve.duration, self.remaining) for valve in command.valves}
+        asked = {valve.chamber: min(valve.duration, self.remaining) for valve in command.valves}
         self.cut = any(valve.duration > self.remaining for valve in command.valves)
+        gas_times = self._permitted(asked)
+        if not gas_times:
+            self.idle += 1
+            self._wait()
+            return
         advance = self.plant.advance(
             self.state, gas_times=gas_times, duration=max(gas_times.values()), points=GAS_POINTS
         )
@@ -245,6 +260,16 @@ class _Run:
         self.idle = 0 if working else self.idle + 1
         if self.plant.dynamics is None:
             self._wait()
+
+    def _permitted(self, asked: Mapping[int, float]) -> dict[int, float]:
+        """The valve-open times that leave each driven chamber its residual fill."""
+        least = self.scene.controller.minimum_gas_time
+        found = self.plant.permitted(self.state, gas_times=asked)
+        kept = {i: time for i, time in found.items() if time == asked[i] or time >= least}
+        letters = chamber_letters(self.plant.chambers)
+        self.refused = tuple(letters[i] for i, time in asked.items() if kept.get(i) != time)
+        self.shortened += len(self.refused)
+        return kept
 
     def _conclude(self, count: int) -> None:
         """The last command's injections with what they have done until now."""
@@ -309,6 +334,7 @@ def _record(run: _Run, cause: Cause, *, integrator: str, used: tuple[ModelUsed, 
         injections=facts.injections,
         samples=facts.samples,
         overshoots=facts.overshoots,
+        shortened=run.shortened,
         misadjustments=misadjustments(run.samples, floor=run.floor),
         noise_floor=run.floor,
         limit=run.scene.controller.limit,
@@ -342,4 +368,6 @@ def _facts(run: _Run, cause: Cause, amplitude: FloatArray) -> Facts:
         overshoots=overshoots(run.samples, limit=limit),
         samples=tuple(run.samples),
         injections=tuple(run.injections),
+        shortened=run.shortened,
+        refused=run.refused,
     )

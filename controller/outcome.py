@@ -62,6 +62,10 @@ class Facts:
     overshoots: int
     samples: tuple[Sample, ...]
     injections: tuple[Injection, ...]
+    shortened: int
+    """Injections shortened or left out so that the driven chamber keeps its residual fill."""
+    refused: tuple[str, ...]
+    """Letters of the driven chambers of those in the last command."""
 
     @property
     def wanted_moment(self) -> complex:
@@ -108,6 +112,8 @@ def outcome_of(facts: Facts) -> Outcome:
         return Outcome.UNSTABLE
     if min(facts.since, facts.held_since) < math.inf:
         return Outcome.HOLD_INCOMPLETE if facts.loop.stays else Outcome.HOVERING
+    if facts.refused and facts.cause is Cause.IDLE:
+        return Outcome.CHAMBER_EMPTY
     if facts.last_command and not _longest(facts).operation.moved:
         if _longest(facts).operation.event in {Event.EMPTY, Event.FULL}:
             return Outcome.CHAMBER_EMPTY
@@ -154,7 +160,13 @@ def status_text(facts: Facts, outcome: Outcome) -> str:
 
     Args: `outcome`: as classified.
     """
-    return _TEXTS[outcome](facts)
+    if not facts.shortened:
+        return _TEXTS[outcome](facts)
+    return (
+        f"{_TEXTS[outcome](facts)}; {facts.shortened} "
+        f"{'injection was' if facts.shortened == 1 else 'injections were'} shortened or left out to keep the "
+        f"residual fill of {facts.plant.residual_fill:.3g} in the driven chamber"
+    )
 
 
 def _um(length: float) -> str:
@@ -268,6 +280,7 @@ def _capacity(facts: Facts) -> str:
 
 def _empty(facts: Facts) -> str:
     control = facts.scene.controller
+    chamber = facts.refused[0] if facts.refused else _longest(facts).chamber
     cure = "check rotor.influence_coefficient, the assumed lag angle, and the sense of rotation"
     if facts.plant.chambers > MANY_CHAMBERS and control.kind != "law_based":
         cure = (
@@ -275,7 +288,7 @@ def _empty(facts: Facts) -> str:
             f'"law_based" does; or {cure}'
         )
     return (
-        f"{_not_settled(facts)}; no liquid can leave chamber {_longest(facts).chamber} although the "
+        f"{_not_settled(facts)}; no usable liquid is left in chamber {chamber} although the "
         f"unbalance is within the disc's capacity: {cure}"
     )
 

@@ -103,6 +103,8 @@ class Simulation:
     samples: tuple[Sample, ...]
     overshoots: int
     """Times that the residual turned by more than 90 degrees between samples while above the limit."""
+    shortened: int
+    """Injections shortened or left out so that the driven chamber keeps its residual fill."""
     misadjustments: int
     """Operations after which the measured amplitude was higher by more than the noise floor."""
     noise_floor: float

@@ -32,8 +32,10 @@ def terms_modelled(used: Sequence[ModelUsed]) -> tuple[str, ...]:
     return tuple(row.term for row in used if row.term in IN_INJECTIONS and row.modelled)
 
 
-def dynamics_of(*, scene: Scene, model: BalancerModel, modelled: Collection[str]) -> Dynamics | None:
-    """The plant's terms; None when none is modelled."""
+def dynamics_of(
+    *, scene: Scene, model: BalancerModel, modelled: Collection[str], residual_fill: float = 0.0
+) -> Dynamics | None:
+    """The plant's terms; None when none is modelled. `residual_fill` is that of a driven chamber."""
     _check(scene, model, modelled)
     line = gas_line(scene.gas) if FILLING in modelled else None
     gas_off = 0.0 if line is None else VENTED * scene.gas.ambient_pressure
@@ -51,6 +53,7 @@ def dynamics_of(*, scene: Scene, model: BalancerModel, modelled: Collection[str]
         tube_area=model.tube_area,
         chamber_volume=model.chamber_volume,
         max_fill_ratio=model.flow.max_fill_ratio,
+        residual=residual_fill,
     )
 
 

@@ -13,7 +13,8 @@ from ringbalance.reduced_model.budget import Budget
 from ringbalance.reduced_model.calibration import Calibration, lambda_over_fill, lambda_variation
 from ringbalance.reduced_model.chamber.calibration import Curve
 from ringbalance.reduced_model.chamber.element_check import CHECKED, ElementCheck
-from ringbalance.reduced_model.chamber.row_status import row_status
+from ringbalance.reduced_model.chamber.gravity import closed_ring
+from ringbalance.reduced_model.chamber.row_status import RowStatus, row_status
 from ringbalance.reduced_model.gas_line import line_document
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.paper import formulas as paper
@@ -180,6 +181,7 @@ def _law(calibration: Calibration) -> dict[str, Any]:
         "fill_ratio": _listed(fills),
         "velocity_m_s": _listed(flow.velocity),
         "velocity_uncertainty": _listed(flow.uncertainty),
+        "column_status": [str(status) for status in velocity_status(calibration, fills)],
         "regime": [[Regime(int(r)).label for r in row] for row in flow.regime],
         "velocity_paper_m_s": _listed(by_paper.velocity),
     }
@@ -195,6 +197,16 @@ def _budget(budget: Budget) -> dict[str, Any]:
         "total": budget.total,
         "inputs": dict(budget.inputs),
     }
+
+
+def velocity_status(calibration: Calibration, fill_ratio: FloatArray) -> tuple[RowStatus, ...]:
+    """What limits a velocity out of a chamber at fill ratios, under the scene's gas pressure."""
+    return row_status(
+        calibration.scene,
+        fill_ratio=fill_ratio,
+        closed=closed_ring(calibration.scene, fill_ratio),
+        residual=calibration.residual.fill_ratio,
+    )
 
 
 def _operating_point(calibration: Calibration) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from rich.text import Text
 from ringbalance.reduced_model.budget import Budget, rounded
 from ringbalance.reduced_model.calibration import Calibration, lambda_variation
 from ringbalance.reduced_model.chamber.row_status import REMEDIES, row_status
-from ringbalance.reduced_model.documents import PRESSURE_FACTORS, paper_columns
+from ringbalance.reduced_model.documents import PRESSURE_FACTORS, paper_columns, velocity_status
 from ringbalance.reduced_model.gas_line import line_text, line_warning
 from ringbalance.reduced_model.law.flow_law import Regime
 
@@ -218,7 +218,7 @@ def _short(value: float) -> str:
 def _law_table(calibration: Calibration) -> Table:
     x = np.linspace(0, calibration.flow_law.max_fill_ratio, 5)
     table = _table("Velocity from an empty tube, m/s (Eq. 19)", "MPa", *(f"x = {v:.3g}" for v in x))
-    table.caption = (
+    caption = (
         "* separated at the siphon crest, ? siphon or separated cannot be told, r reverse, - blocked; "
         "x is the driven chamber's fill ratio"
     )
@@ -231,6 +231,12 @@ def _law_table(calibration: Calibration) -> Table:
             for r, *values in zip(flow.regime, flow.velocity, flow.uncertainty, by_paper, strict=True)
         )
         table.add_row(f"{p / 1e6:.3g}", *cells)
+    states = velocity_status(calibration, x)
+    limited = [state for state in REMEDIES if state in states]
+    if limited:
+        table.add_row("state", *(str(state) for state in states))
+        caption += "; " + "; ".join(f"{state}: {REMEDIES[state]}" for state in limited)
+    table.caption = caption
     return table
 
 

@@ -103,7 +103,7 @@ def _with_seed(scene: AnyScene, seed: int | None) -> AnyScene:
 
 
 def _ring(scene: Scene, law: str, outputs: _Outputs) -> bool:
-    with activity("simulate", f"flow law: {law} ...") as shown:
+    with activity("simulate", f"flow law: {law} (the first run compiles) ...") as shown:
         found = run_loop(scene, law_by_name(scene, law), progress=_clock(shown))
     if outputs.csv is not None:
         write_whole(outputs.csv, csv_text(simulation_history(found)))

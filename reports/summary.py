@@ -75,15 +75,6 @@ def common_causes(cases: list[Record]) -> list[Record]:
     ]
 
 
-def assumed_inputs(cases: list[Record]) -> dict[str, list[int]]:
-    """Inputs that nobody gave, by scene path, each with the numbers of the claims that rest on it."""
-    found: dict[str, list[int]] = {}
-    for case in cases:
-        for one in case.get("rests_on") or []:
-            found.setdefault(one["path"], []).append(case["number"])
-    return found
-
-
 def lead_sentence(evidence: Record) -> str:
     """The whole result in two sentences, counted from the verdicts."""
     parts = counted(claims(evidence))

@@ -15,6 +15,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from flow_at_points import probe
 from rich.console import Console
 from rich.progress import Progress
 
@@ -25,7 +26,6 @@ from ringbalance.verification.navier_stokes.continuation import StepRule, follow
 from ringbalance.verification.navier_stokes.end_losses import (
     End,
     EndMesh,
-    end_loss_times_reynolds,
     end_system,
     solve_end,
 )
@@ -33,6 +33,24 @@ from ringbalance.verification.navier_stokes.newton import FlowSolution, FlowSyst
 
 ENDS: tuple[End, End] = ("entrance", "exit")
 REYNOLDS_SCALE, REYNOLDS_LIMIT = 5.0, 2000.0
+DEVELOPED_SLOPE = 32.0
+"""-dp/dx of developed flow, over mu U/d^2."""
+
+
+def end_loss_times_reynolds(
+    *, system: FlowSystem, solution: FlowSolution, end: End, cells: EndMesh, share: float = 0.9
+) -> float:
+    """K Re of an end, from the pressure deep in the tube beyond developed friction.
+
+    K_ent Re = -2 (p + 32 x), K_exit Re = 2 (p - 32 |x|), p on the axis at |x| = share of the tube's length.
+    Args: `end`: "entrance" or "exit". `share`: where to take the pressure.
+    """
+    distance = share * cells.tube
+    at = distance if end == "entrance" else -distance
+    pressure = float(probe(system=system, solution=solution, points=[[at], [0.0]])[-1, 0])
+    if end == "entrance":
+        return -2 * (pressure + DEVELOPED_SLOPE * distance)
+    return 2 * (pressure - DEVELOPED_SLOPE * distance)
 
 
 @dataclass(frozen=True, kw_only=True)

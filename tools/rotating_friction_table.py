@@ -19,6 +19,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from flow_at_points import transfer
 from rich.console import Console
 from rich.progress import MofNCompleteColumn, Progress, TimeElapsedColumn
 
@@ -44,7 +45,6 @@ from ringbalance.verification.navier_stokes.rotating_section import (
     solve_section,
     solve_section_without_inertia,
 )
-from ringbalance.verification.navier_stokes.transfer import transfer
 
 COLUMNS = ("table", "a", "b", "coarse", "medium", "fine", "uncertainty")
 

@@ -120,7 +120,7 @@ class Convergence:
     observed_order: Sequence[float] = ()
     """Of each pair of levels, or of each triplet where there is no exact value."""
     gci: float | None = None
-    """Expanded uncertainty (95 %) of the finest value, relative to it."""
+    """Grid convergence index of the finest value, relative to it: a bound, of no stated probability."""
     geometry: str = ""
     """ "quadratic" or "straight" where it matters."""
     note: str = ""

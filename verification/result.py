@@ -75,9 +75,6 @@ class CaseResult:
         evidence's own.
         """
         named: dict[str, float] = {}
-        for one in self.assumptions:
-            key = one.path.partition(".")[2]
-            named |= {f"{key}_low": one.low, f"{key}_high": one.high}
         for result in self.quantities:
             named |= _named_numbers(result)
         return named | dict(self.evidence.numbers if self.evidence else {})

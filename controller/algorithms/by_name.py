@@ -13,6 +13,7 @@ from ringbalance.controller.liquid_ring.plant import LiquidRing, initial_state
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.rotor import chamber_letters, influence
 from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
@@ -82,6 +83,7 @@ def law_based_of(scene: Scene, model: BalancerModel) -> LawBased:
             chambers=scene.disc.chambers,
             gas_pressure=scene.gas.pressure,
             integrator=closed_form if has_closed_form(model.flow) else quadrature,
+            residual_fill=residual_fill_ratio(scene, law=model.flow),
         ),
         initial=initial_state(disc=scene.disc),
         influence=influence(

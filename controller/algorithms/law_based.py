@@ -16,7 +16,8 @@ from ringbalance.controller.algorithms.algorithm import (
     usable,
     valve_commands,
 )
-from ringbalance.controller.algorithms.law_based_times import fill_for_moment, gas_time, pair_changes
+from ringbalance.controller.algorithms.law_based_times import fill_for_moment, pair_changes
+from ringbalance.controller.liquid_ring.opening import gas_time
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing, PairState
 from ringbalance.controller.liquid_ring.transfer import Drive
 from ringbalance.controller.rotor import disc_unbalance
@@ -179,8 +180,10 @@ class LawBased:
         return float(found[0]), float(found[1]), float(found[2])
 
     def _range(self, pair: PairState) -> tuple[float, float]:
-        largest = self.ring.model.flow.max_fill_ratio
-        return max(0.0, pair.total - largest), min(pair.total, largest)
+        lowest = max(
+            min(self.ring.residual_fill, pair.total / 2), pair.total - self.ring.model.flow.max_fill_ratio
+        )
+        return lowest, pair.total - lowest
 
     def _pair_time(self, index: int, pair: PairState, moment: float) -> tuple[int, float]:
         low, high = self._range(pair)

@@ -1,4 +1,4 @@
-"""From a wanted balancing moment to valve-open times: which pairs, which fills, how long by the flow law."""
+"""From a wanted balancing moment to the fills of the pairs."""
 
 from __future__ import annotations
 
@@ -7,16 +7,12 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.liquid_ring.transfer import Drive, Event, Integrator
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.reduced_model.law.model import MomentCurve
 from ringbalance.scene.arrays import FloatArray
 
 SCAN: Final = 33
 ROUNDS: Final = 11
-FILL_ERROR: Final = 1e-9
-"""Error in fill ratio at which a valve-open time is good enough."""
-MAX_NEWTON: Final = 30
 END_STEP: Final = 1e-3
 """Share of the range of x over which a slope at its end is taken."""
 
@@ -82,6 +78,8 @@ def fill_for_moment(
         other = np.clip(total - x, lowest, highest)
         return moment.pair_moment(fill_ratio=x, opposite_fill_ratio=other)
 
+    if highest <= lowest:
+        return lowest
     step = END_STEP * (highest - lowest)
     ends = of(np.array([lowest, lowest + step, highest - step, highest]))
     if wanted <= ends[0]:
@@ -96,56 +94,3 @@ def fill_for_moment(
         first = int(np.argmax(above))
         low, high = float(x[first - 1]), float(x[first])
     return high
-
-
-def gas_time(*, drive: Drive, fill: float, integrator: Integrator, longest: float) -> float:
-    """Valve-open time, s, that lowers the driven chamber to a fill ratio, t = (V/S) integral dx/u(x).
-
-    Found by inverting an integrator's x(t) with Newton's method, dx/dt = -(S/V) u, within a bracket. At most
-    `longest`; zero when the fill is not below the present one or nothing flows; the time of the stall when
-    the flow stalls before; below the smallest possible fill the last velocity is kept.
-    Source: section 5.1 of the liquid-ring paper in the limit of small segments, solved for the time.
-    """
-    if fill >= drive.fill:
-        return 0.0
-    instants = np.linspace(0.0, longest, SCAN)
-    path = integrator(drive, instants)
-    if path.event is Event.BLOCKED:
-        return 0.0
-    reached = path.fill <= fill
-    if not np.any(reached):
-        return _time_to_the_end(drive, fill, path.event, path.event_time, longest)
-    first = int(np.argmax(reached))
-    before, after = float(instants[first - 1]), float(instants[first])
-    if path.event_time is not None:
-        after = min(after, path.event_time)
-    above, below = float(path.fill[first - 1]), float(path.fill[first])
-    guess = before + (after - before) * (above - fill) / (above - below)
-    return _inverted(drive, fill, integrator, (before, guess, after))
-
-
-def _time_to_the_end(
-    drive: Drive, fill: float, event: Event, event_time: float | None, longest: float
-) -> float:
-    if event_time is None:
-        return longest
-    if event not in {Event.EMPTY, Event.FULL}:
-        return min(event_time, longest)
-    velocity = float(drive.flow(drive.lowest).velocity)
-    more = (drive.lowest - fill) / (drive.exchange_rate * velocity) if velocity > 0 else 0.0
-    return min(event_time + more, longest)
-
-
-def _inverted(
-    drive: Drive, fill: float, integrator: Integrator, bracket: tuple[float, float, float]
-) -> float:
-    low, t, high = bracket
-    for _ in range(MAX_NEWTON):
-        x = float(integrator(drive, np.array([t])).fill[-1])
-        if abs(x - fill) <= FILL_ERROR or high - low <= 4e-16 * high:
-            break
-        low, high = (t, high) if x > fill else (low, t)
-        rate = drive.exchange_rate * float(drive.flow(x).velocity)
-        step = t + (x - fill) / rate if rate > 0 else high
-        t = step if low < step < high else (low + high) / 2
-    return t

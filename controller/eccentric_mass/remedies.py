@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
@@ -16,8 +17,9 @@ from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import (
 from ringbalance.controller.eccentric_mass.estimation.imbalance_model import ProcessNoise
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
 from ringbalance.controller.eccentric_mass.plant.whirl import influence
-from ringbalance.controller.eccentric_mass.run_record import Remedy
+from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, Remedy, RunFacts
 from ringbalance.controller.eccentric_mass.sampled_loops import SampledLoop, recommended_gains
+from ringbalance.controller.eccentric_mass.strategy.plan import Stage
 from ringbalance.controller.eccentric_mass.strategy.settings import (
     FRICTION_ERROR,
     believed_whirl,
@@ -31,6 +33,8 @@ _LONGEST_STEPS: Final = 2_000
 _ATTAINED: Final = 0.3
 """Share of what a gate allows that a filter should come down to when its walks are lowered."""
 _MARGIN: Final = 1.5
+_TRIALS: Final = 40
+"""Of fine tuning that a longer time should allow."""
 _NO_GATE: Final = 0.5
 """Relative standard deviation beyond which a gate lets anything pass."""
 
@@ -76,7 +80,7 @@ def friction_floor(scene: EccentricScene, *, speed: float) -> float:
     return math.sqrt(told.friction_walk * told.rate_walk * track.inertia / (track.moment * speed**2))
 
 
-def friction_allowed(scene: EccentricScene, *, arm: float, speed: float) -> float:
+def _friction_allowed(scene: EccentricScene, *, arm: float, speed: float) -> float:
     """Standard deviation of a friction arm, m, that lets the strategy proceed."""
     torque = FRICTION_ERROR * drive_law(scene).position_gain * scene.supervisor.arrival_angle
     share = scene.friction_filter.gate * max(arm, 0.0)
@@ -101,7 +105,7 @@ def found_beforehand(scene: EccentricScene) -> tuple[str, ...]:
 
 
 def _weak_drive(scene: EccentricScene) -> list[str]:
-    missing = stall_remedy(scene, margin=1.0)
+    missing = _stall_remedy(scene, margin=1.0)
     return (
         [f"the drives cannot overcome the friction in the friction stage: {missing.text}"] if missing else []
     )
@@ -113,41 +117,41 @@ def _gates(scene: EccentricScene, speed: float) -> list[str]:
     reach = abs(influence(plant, speed)) if plant.damping > 0 else math.inf
     needed = 2 * deviation * reach > 0.1 * scene.supervisor.limit
     if needed and deviation > scene.imbalance_filter.gate * plant.unbalance:
-        remedy = imbalance_remedy(scene, deviation=deviation, imbalance=plant.unbalance, reach=reach)
+        remedy = _imbalance_remedy(scene, deviation=deviation, imbalance=plant.unbalance, reach=reach)
         found.append(f"the imbalance filter cannot reach its gate at this speed: {remedy.text}")
     for arm in scene.masses.friction_arm:
-        allowed = friction_allowed(scene, arm=arm, speed=speed)
+        allowed = _friction_allowed(scene, arm=arm, speed=speed)
         if friction_floor(scene, speed=speed) > allowed:
-            text = friction_remedy(scene, arm=arm, speed=speed).text
+            text = _friction_remedy(scene, arm=arm, speed=speed).text
             found.append(f"the friction filter cannot reach its gate: {text}")
             break
     return found
 
 
-def imbalance_remedy(scene: EccentricScene, *, deviation: float, imbalance: float, reach: float) -> Remedy:
+def _imbalance_remedy(scene: EccentricScene, *, deviation: float, imbalance: float, reach: float) -> Remedy:
     """A gate that is reached, or an amplitude that makes no more precision necessary."""
     share = _MARGIN * deviation / imbalance if imbalance > 0 else math.inf
     if share < _NO_GATE:
-        return remedy(scene, ("imbalance_filter.gate", share))
-    return remedy(scene, ("supervisor.limit", _MARGIN * 20 * deviation * reach))
+        return _remedy(scene, ("imbalance_filter.gate", share))
+    return _remedy(scene, ("supervisor.limit", _MARGIN * 20 * deviation * reach))
 
 
-def friction_remedy(scene: EccentricScene, *, arm: float, speed: float) -> Remedy:
+def _friction_remedy(scene: EccentricScene, *, arm: float, speed: float) -> Remedy:
     """A slower walk of the rate if the filter's own floor is above the gate; else more time, and a wider
     gate.
     """
-    floor, allowed = friction_floor(scene, speed=speed), friction_allowed(scene, arm=arm, speed=speed)
+    floor, allowed = friction_floor(scene, speed=speed), _friction_allowed(scene, arm=arm, speed=speed)
     told = scene.friction_filter
     if floor > _ATTAINED * allowed:
-        return remedy(
+        return _remedy(
             scene, ("friction_filter.rate_walk", told.rate_walk * (_ATTAINED * allowed / floor) ** 2)
         )
     longer = 4 * scene.supervisor.friction_time
     total = scene.run.time_limit + longer
-    return remedy(scene, ("supervisor.friction_time", longer), ("run.time_limit", total))
+    return _remedy(scene, ("supervisor.friction_time", longer), ("run.time_limit", total))
 
 
-def gain_remedy(scene: EccentricScene) -> Remedy | None:
+def _gain_remedy(scene: EccentricScene) -> Remedy | None:
     """Stable values of all gains whose loops are not; None when all are stable."""
     gains = recommended_gains(scene)
     changes = [(loop.key, loop.recommended) for loop in gains.loops if not loop.stable]
@@ -155,10 +159,10 @@ def gain_remedy(scene: EccentricScene) -> Remedy | None:
         changes = [change for change in changes if change[0] != gains.pair.key]
     if not gains.speed.stable and gains.drive_speed > scene.friction_filter.drive_speed:
         changes.append(("friction_filter.drive_speed", gains.drive_speed))
-    return remedy(scene, *changes) if changes else None
+    return _remedy(scene, *changes) if changes else None
 
 
-def stall_remedy(scene: EccentricScene, *, margin: float = _MARGIN) -> Remedy | None:
+def _stall_remedy(scene: EccentricScene, *, margin: float = _MARGIN) -> Remedy | None:
     """Gain, drive speed and voltage whose torque is friction's with a margin; None when the scene's have
     it.
     """
@@ -174,11 +178,20 @@ def stall_remedy(scene: EccentricScene, *, margin: float = _MARGIN) -> Remedy | 
     # What the whirl asks for comes on top of friction.
     if plant.maximum_voltage < 2 * margin * volts:
         changes.append(("motor.maximum_voltage", 4 * _MARGIN * volts))
-    return remedy(scene, *changes) if changes else None
+    return _remedy(scene, *changes) if changes else None
+
+
+def remedies_of(facts: RunFacts, outcome: EccentricOutcome) -> tuple[Remedy, ...]:
+    """What would mend the run, the likeliest first.  An unstable loop comes before all else."""
+    if outcome in {EccentricOutcome.SETTLED, EccentricOutcome.LOCKED}:
+        return ()
+    own = _REMEDIES[outcome](facts) if outcome in _REMEDIES else ()
+    gains = None if outcome is EccentricOutcome.TIME_LIMIT else _gain_remedy(facts.scene)
+    return (gains, *own) if gains else own
 
 
 def _lowered(scene: EccentricScene, loop: SampledLoop) -> Remedy:
-    return remedy(scene, (loop.key, loop.recommended))
+    return _remedy(scene, (loop.key, loop.recommended))
 
 
 _UNITS: Final = {
@@ -203,7 +216,7 @@ _UNITS: Final = {
 }
 
 
-def remedy(scene: EccentricScene, *changes: tuple[str, float | str]) -> Remedy:
+def _remedy(scene: EccentricScene, *changes: tuple[str, float | str]) -> Remedy:
     """Changes that are made together, each to three digits, with their text."""
     rounded = [(key, value if isinstance(value, str) else _rounded(key, value)) for key, value in changes]
     return Remedy(changes=tuple(rounded), text=" and ".join(_change_text(scene, *each) for each in rounded))
@@ -224,3 +237,98 @@ def _change_text(scene: EccentricScene, key: str, value: float | str) -> str:
     if old is None:
         return f"set {key} = {new}"
     return f"{'raise' if value > old else 'lower'} {key} from {old / factor:.3g} to {new}"
+
+
+def _more_time(facts: RunFacts) -> tuple[Remedy, ...]:
+    """For all that the stages may take, so that the next run does not end within one."""
+    told, tuning = facts.scene.supervisor, facts.scene.fine_tuning
+    stages = told.start + told.imbalance_time + told.friction_time + told.positioning_time
+    tuned = told.fine_tuning_time if facts.stage >= Stage.CHECK else 0.0
+    return (
+        _remedy(facts.scene, ("run.time_limit", stages + tuning.wait + tuning.average + tuned + facts.time)),
+    )
+
+
+def _more_volts(facts: RunFacts) -> list[Remedy]:
+    volts = facts.scene.motor.maximum_voltage
+    if volts is None or facts.saturation == 0:
+        return []
+    return [_remedy(facts.scene, ("motor.maximum_voltage", 4 * volts))]
+
+
+def _stalled_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
+    found = _stall_remedy(facts.scene)
+    faster = _remedy(
+        facts.scene, ("friction_filter.drive_speed", 4 * facts.scene.friction_filter.drive_speed)
+    )
+    return (*([found] if found else []), *_more_volts(facts), *([] if found else [faster]))
+
+
+def _arrival_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
+    scene = facts.scene
+    if scene.lqr.friction_compensation != "break_away":
+        return (_remedy(scene, ("lqr.friction_compensation", "break_away")),)
+    found = _more_volts(facts)
+    most, weight = recommended_gains(scene).regulator.recommended, scene.lqr.state_weight
+    if most > 2 * weight:
+        found.append(_remedy(scene, ("lqr.state_weight", min(30 * weight, most))))
+    angle, rate = 4 * scene.supervisor.arrival_angle, 10 * scene.supervisor.arrival_rate
+    found.append(_remedy(scene, ("supervisor.arrival_angle", angle), ("supervisor.arrival_rate", rate)))
+    return tuple(found)
+
+
+def _limit_remedy(facts: RunFacts) -> tuple[Remedy, ...]:
+    last = float(np.max(facts.amplitude[-(facts.amplitude.size // 20 + 1) :]))
+    worst = last if facts.left is None else max(last, float(facts.amplitude[facts.left]))
+    return (_remedy(facts.scene, ("supervisor.limit", 1.2 * max(worst, facts.scene.supervisor.limit))),)
+
+
+def _tuning_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
+    told = facts.scene.fine_tuning
+    longer = max(3 * facts.scene.supervisor.fine_tuning_time, _TRIALS * (told.wait + told.average))
+    total = facts.scene.run.time_limit + longer
+    more = _remedy(facts.scene, ("supervisor.fine_tuning_time", longer), ("run.time_limit", total))
+    return (more, *_limit_remedy(facts))
+
+
+def _imbalance_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
+    reach = abs(influence(plant_parameters(facts.scene), float(facts.speed[-1])))
+    told = (facts.deviation, facts.imbalance, reach)
+    return (_imbalance_remedy(facts.scene, deviation=told[0], imbalance=told[1], reach=told[2]),)
+
+
+def _friction_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
+    scene, speed = facts.scene, float(facts.speed[-1])
+    arm = min(scene.masses.friction_arm)
+    found, gate = [_friction_remedy(scene, arm=arm, speed=speed)], 2 * friction_floor(scene, speed=speed)
+    if scene.friction_filter.gate * arm < gate < 0.5 * arm:
+        found.append(_remedy(scene, ("friction_filter.gate", gate / arm)))
+    return tuple(found)
+
+
+def _heavier(facts: RunFacts) -> tuple[Remedy, ...]:
+    masses = facts.scene.masses
+    reach = 2 * masses.guide_radius * math.cos(0.5 * masses.arc_length / masses.guide_radius)
+    return (_remedy(facts.scene, ("masses.mass", 1.2 * facts.imbalance / reach)),) if reach > 0 else ()
+
+
+def _weaker(facts: RunFacts) -> tuple[Remedy, ...]:
+    if _gain_remedy(facts.scene):
+        return ()
+    weight, gain = facts.scene.lqr.state_weight / 30, facts.scene.friction_filter.speed_gain / 4
+    return (_remedy(facts.scene, ("lqr.state_weight", weight), ("friction_filter.speed_gain", gain)),)
+
+
+_REMEDIES: Final[dict[EccentricOutcome, Callable[[RunFacts], tuple[Remedy, ...]]]] = {
+    EccentricOutcome.RISES_AGAIN: _limit_remedy,
+    EccentricOutcome.SATURATED: _heavier,
+    EccentricOutcome.RESIDUAL: _limit_remedy,
+    EccentricOutcome.TUNING_TIME: _tuning_remedies,
+    EccentricOutcome.MASSES_MOVE: lambda facts: tuple(_more_volts(facts)) or _arrival_remedies(facts),
+    EccentricOutcome.IMBALANCE_UNCERTAIN: _imbalance_remedies,
+    EccentricOutcome.FRICTION_UNCERTAIN: _friction_remedies,
+    EccentricOutcome.STALLED: _stalled_remedies,
+    EccentricOutcome.NOT_ARRIVED: _arrival_remedies,
+    EccentricOutcome.TIME_LIMIT: _more_time,
+    EccentricOutcome.DIVERGED: _weaker,
+}

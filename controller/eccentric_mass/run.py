@@ -16,7 +16,7 @@ from ringbalance.controller.eccentric_mass.plant.plant import rest_state, stuck_
 from ringbalance.controller.eccentric_mass.plant.speed import profile_arrays
 from ringbalance.controller.eccentric_mass.plant.substep_limit import check_substeps
 from ringbalance.controller.eccentric_mass.plant.whirl import steady_whirl
-from ringbalance.controller.eccentric_mass.remedies import expected_deviation
+from ringbalance.controller.eccentric_mass.remedies import expected_deviation, remedies_of
 from ringbalance.controller.eccentric_mass.run_loop import (
     NOISES,
     Profile,
@@ -26,14 +26,13 @@ from ringbalance.controller.eccentric_mass.run_loop import (
     measure,
     run_stretch,
 )
-from ringbalance.controller.eccentric_mass.run_record import EccentricEstimates, EccentricRun, StageSpan
-from ringbalance.controller.eccentric_mass.run_status import (
+from ringbalance.controller.eccentric_mass.run_record import (
+    EccentricEstimates,
+    EccentricRun,
     RunFacts,
-    outcome_of,
-    remedies_of,
-    status_text,
-    warnings_of,
+    StageSpan,
 )
+from ringbalance.controller.eccentric_mass.run_status import outcome_of, status_text, warnings_of
 from ringbalance.controller.eccentric_mass.strategy.plan import (
     RELEASED,
     STAGE_NAMES,

@@ -1,14 +1,22 @@
-"""The record of one run with two eccentric masses, frozen."""
+"""The record of one run with two eccentric masses, frozen, and what it is judged by."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Final
 
 import numpy as np
 
+from ringbalance.controller.eccentric_mass.strategy.plan import Cause, Findings, Stage
 from ringbalance.controller.eccentric_mass.strategy.targets import Targets
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray
+from ringbalance.scene.eccentric_models import EccentricScene
+
+_NOTHING: Final = 1e-6
+"""Share of the limit below which a vibration is round-off."""
+_FINAL_TIME: Final = 1.0
+"""Over which the final amplitude is averaged, s."""
 
 
 class EccentricOutcome(StrEnum):
@@ -126,7 +134,7 @@ class EccentricRun:
     @property
     def final_amplitude(self) -> float:
         """Mean over the last second, m."""
-        last = self.time >= self.time[-1] - FINAL_TIME
+        last = self.time >= self.time[-1] - _FINAL_TIME
         return float(np.mean(self.amplitude[last]))
 
     @property
@@ -135,7 +143,7 @@ class EccentricRun:
 
         At constant speed that is final over initial steady amplitude.  None where nothing would vibrate.
         """
-        if self.unbalanced_amplitude < NOTHING * self.limit:
+        if self.unbalanced_amplitude < _NOTHING * self.limit:
             return None
         return self.final_amplitude / self.unbalanced_amplitude
 
@@ -150,7 +158,40 @@ class EccentricRun:
         return float(np.max(self.amplitude))
 
 
-NOTHING = 1e-6
-"""Share of the limit below which a vibration is round-off."""
-FINAL_TIME = 1.0
-"""Over which the final amplitude is averaged, s."""
+@dataclass(frozen=True, kw_only=True)
+class RunFacts:
+    """What status, remedies and warnings are made of."""
+
+    scene: EccentricScene
+    cause: Cause
+    stage: Stage
+    """At the end of the run."""
+    findings: Findings
+    time: float
+    """End of the run, s."""
+    diverged: bool
+    """Whether it ended early, at the last sample that means anything."""
+    speed: FloatArray
+    """rad/s, shape (n,)."""
+    amplitude: FloatArray
+    """m, shape (n,)."""
+    left: int | None
+    """Sample of the largest vibration after the rotor was balanced, if that is above the limit."""
+    innovation: float | None
+    """Mean square of the normalised innovations."""
+    settling_time: float | None
+    """From when on the amplitude is within the limit, s; None when it is not at the end."""
+    deviation: float
+    """Standard deviation of the imbalance, kg m."""
+    imbalance: float
+    """Its estimated magnitude, kg m."""
+    saturation: float
+    """Seconds for which a voltage was at its limit."""
+    hold: int
+    """Of the drives at the end."""
+    least_gap: float
+    """Smallest angle between the masses on the way, rad."""
+    euler_limit: float
+    """Longest step of the paper's transition at the highest speed of the estimation, s."""
+    predicted: float
+    """Standard deviation of the imbalance to be expected after the longest estimation, kg m."""

@@ -4,77 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Final
 
-import numpy as np
-
-from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
-from ringbalance.controller.eccentric_mass.plant.whirl import influence
-from ringbalance.controller.eccentric_mass.remedies import (
-    found_beforehand,
-    friction_floor,
-    friction_remedy,
-    gain_remedy,
-    imbalance_remedy,
-    remedy,
-    stall_remedy,
-)
-from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, Remedy
-from ringbalance.controller.eccentric_mass.sampled_loops import recommended_gains
-from ringbalance.controller.eccentric_mass.strategy.plan import HELD, Cause, Findings, Stage
+from ringbalance.controller.eccentric_mass.remedies import found_beforehand
+from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, Remedy, RunFacts
+from ringbalance.controller.eccentric_mass.strategy.plan import HELD, STAGE_NAMES, Cause, Stage
 from ringbalance.controller.eccentric_mass.strategy.supervisor import STALLED_SHARE
-from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.eccentric_models import EccentricScene
 
-MICROMETRE: Final = 1e-6
-RPM: Final = 2 * math.pi / 60
-NOTICEABLE_STALL: Final = 0.05
+_MICROMETRE: Final = 1e-6
+_RPM: Final = 2 * math.pi / 60
+_NOTICEABLE_STALL: Final = 0.05
 """Share of the friction stage with a mass nearly at a standstill that is worth a warning."""
-TRIALS: Final = 40
-"""Of fine tuning that a longer time should allow."""
-WRONG_MODEL: Final = 1.5
+_WRONG_MODEL: Final = 1.5
 """Mean normalised innovation squared beyond which the filter's model is called wrong; chance alone keeps it
 within 1 +- 0.1 after 100 samples, by the chi-square distribution."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class RunFacts:
-    """What status and warnings are made of."""
-
-    scene: EccentricScene
-    cause: Cause
-    stage: Stage
-    """At the end of the run."""
-    findings: Findings
-    time: float
-    """End of the run, s."""
-    diverged: bool
-    """Whether it ended early, at the last sample that means anything."""
-    speed: FloatArray
-    """rad/s, shape (n,)."""
-    amplitude: FloatArray
-    """m, shape (n,)."""
-    left: int | None
-    """Sample of the largest vibration after the rotor was balanced, if that is above the limit."""
-    innovation: float | None
-    """Mean square of the normalised innovations."""
-    settling_time: float | None
-    """From when on the amplitude is within the limit, s; None when it is not at the end."""
-    deviation: float
-    """Standard deviation of the imbalance, kg m."""
-    imbalance: float
-    """Its estimated magnitude, kg m."""
-    saturation: float
-    """Seconds for which a voltage was at its limit."""
-    hold: int
-    """Of the drives at the end."""
-    least_gap: float
-    """Smallest angle between the masses on the way, rad."""
-    euler_limit: float
-    """Longest step of the paper's transition at the highest speed of the estimation, s."""
-    predicted: float
-    """Standard deviation of the imbalance to be expected after the longest estimation, kg m."""
 
 
 def outcome_of(facts: RunFacts) -> EccentricOutcome:
@@ -111,15 +54,6 @@ def status_text(facts: RunFacts, outcome: EccentricOutcome, remedies: Sequence[R
     return f"{_not_settled(facts)}; {_REASONS[outcome](facts)}{advice}"
 
 
-def remedies_of(facts: RunFacts, outcome: EccentricOutcome) -> tuple[Remedy, ...]:
-    """What would mend the run, the likeliest first.  An unstable loop comes before all else."""
-    if outcome in {EccentricOutcome.SETTLED, EccentricOutcome.LOCKED}:
-        return ()
-    own = _REMEDIES[outcome](facts) if outcome in _REMEDIES else ()
-    gains = None if outcome is EccentricOutcome.TIME_LIMIT else gain_remedy(facts.scene)
-    return (gains, *own) if gains else own
-
-
 def warnings_of(facts: RunFacts) -> tuple[str, ...]:
     """What the user should know although the run continued."""
     return (*found_beforehand(facts.scene), *(text for is_due, text in _warnings(facts) if is_due))
@@ -127,14 +61,14 @@ def warnings_of(facts: RunFacts) -> tuple[str, ...]:
 
 def _warnings(facts: RunFacts) -> list[tuple[bool, str]]:
     scene, findings = facts.scene, facts.findings
-    unlike = facts.innovation is not None and facts.innovation > WRONG_MODEL
+    unlike = facts.innovation is not None and facts.innovation > _WRONG_MODEL
     share = findings.stalled / max(findings.driven, 1)
     gap = scene.masses.arc_length / scene.masses.guide_radius
     euler = scene.imbalance_filter.discretisation == "euler"
     step = scene.imbalance_filter.step
     return [
         (
-            share > NOTICEABLE_STALL,
+            share > _NOTICEABLE_STALL,
             f"a drive nearly stalled during {100 * share:.3g} % of the friction stage: raise "
             "friction_filter.drive_speed or speed_gain, or motor.maximum_voltage",
         ),
@@ -167,8 +101,8 @@ def _warnings(facts: RunFacts) -> list[tuple[bool, str]]:
 
 def length_text(length: float) -> str:
     """A vibration or a friction arm in millimetres, or in micrometres below a tenth of one."""
-    small = abs(length) < 100 * MICROMETRE
-    return f"{length / MICROMETRE:.4g} um" if small else f"{1e3 * length:.4g} mm"
+    small = abs(length) < 100 * _MICROMETRE
+    return f"{length / _MICROMETRE:.4g} um" if small else f"{1e3 * length:.4g} mm"
 
 
 def _end(facts: RunFacts) -> str:
@@ -180,7 +114,8 @@ def _limit(facts: RunFacts) -> str:
 
 
 def _not_settled(facts: RunFacts) -> str:
-    return f"not settled: {_end(facts)} against {_limit(facts)}"
+    within = facts.amplitude[-1] <= facts.scene.supervisor.limit
+    return f"not settled: {_end(facts)}, {'within' if within else 'above'} {_limit(facts)}"
 
 
 def _settled(facts: RunFacts) -> str:
@@ -196,7 +131,7 @@ def _rises(facts: RunFacts) -> str:
     return (
         f"not settled: balanced to within {_limit(facts)} as measured, but "
         f"{length_text(float(facts.amplitude[facts.left]))} came later, at "
-        f"{facts.speed[facts.left] / RPM:.4g} rpm, and {_end(facts)}; correct what imbalance_filter assumes "
+        f"{facts.speed[facts.left] / _RPM:.4g} rpm, and {_end(facts)}; correct what imbalance_filter assumes "
         "of the rotor, or accept more"
     )
 
@@ -221,7 +156,7 @@ def _saturated(facts: RunFacts) -> str:
 def _too_slow(facts: RunFacts) -> str:
     return (
         "the rotor turned slower than supervisor.lowest_speed, "
-        f"{facts.scene.supervisor.lowest_speed / RPM:.4g} rpm, where an imbalance cannot be seen; estimate "
+        f"{facts.scene.supervisor.lowest_speed / _RPM:.4g} rpm, where an imbalance cannot be seen; estimate "
         "at a higher speed of rotor.speed_profile"
     )
 
@@ -267,98 +202,7 @@ _REASONS: Final[dict[EccentricOutcome, _Text]] = {
         "the masses did not come to rest on their targets within "
         f"{facts.scene.supervisor.positioning_time:.4g} s"
     ),
-    EccentricOutcome.TIME_LIMIT: lambda _: "the run ended before the strategy did",
-}
-
-
-def _more_time(facts: RunFacts) -> tuple[Remedy, ...]:
-    """For all that the stages may take, so that the next run does not end within one."""
-    told, tuning = facts.scene.supervisor, facts.scene.fine_tuning
-    stages = told.start + told.imbalance_time + told.friction_time + told.positioning_time
-    tuned = told.fine_tuning_time if facts.stage >= Stage.CHECK else 0.0
-    return (
-        remedy(facts.scene, ("run.time_limit", stages + tuning.wait + tuning.average + tuned + facts.time)),
-    )
-
-
-def _more_volts(facts: RunFacts) -> list[Remedy]:
-    volts = facts.scene.motor.maximum_voltage
-    if volts is None or facts.saturation == 0:
-        return []
-    return [remedy(facts.scene, ("motor.maximum_voltage", 4 * volts))]
-
-
-def _stalled_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
-    found = stall_remedy(facts.scene)
-    faster = remedy(facts.scene, ("friction_filter.drive_speed", 4 * facts.scene.friction_filter.drive_speed))
-    return (*([found] if found else []), *_more_volts(facts), *([] if found else [faster]))
-
-
-def _arrival_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
-    scene = facts.scene
-    if scene.lqr.friction_compensation != "break_away":
-        return (remedy(scene, ("lqr.friction_compensation", "break_away")),)
-    found = _more_volts(facts)
-    most, weight = recommended_gains(scene).regulator.recommended, scene.lqr.state_weight
-    if most > 2 * weight:
-        found.append(remedy(scene, ("lqr.state_weight", min(30 * weight, most))))
-    angle, rate = 4 * scene.supervisor.arrival_angle, 10 * scene.supervisor.arrival_rate
-    found.append(remedy(scene, ("supervisor.arrival_angle", angle), ("supervisor.arrival_rate", rate)))
-    return tuple(found)
-
-
-def _limit_remedy(facts: RunFacts) -> tuple[Remedy, ...]:
-    last = float(np.max(facts.amplitude[-(facts.amplitude.size // 20 + 1) :]))
-    worst = last if facts.left is None else max(last, float(facts.amplitude[facts.left]))
-    return (remedy(facts.scene, ("supervisor.limit", 1.2 * max(worst, facts.scene.supervisor.limit))),)
-
-
-def _tuning_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
-    told = facts.scene.fine_tuning
-    longer = max(3 * facts.scene.supervisor.fine_tuning_time, TRIALS * (told.wait + told.average))
-    total = facts.scene.run.time_limit + longer
-    more = remedy(facts.scene, ("supervisor.fine_tuning_time", longer), ("run.time_limit", total))
-    return (more, *_limit_remedy(facts))
-
-
-def _imbalance_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
-    reach = abs(influence(plant_parameters(facts.scene), float(facts.speed[-1])))
-    told = (facts.deviation, facts.imbalance, reach)
-    return (imbalance_remedy(facts.scene, deviation=told[0], imbalance=told[1], reach=told[2]),)
-
-
-def _friction_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
-    scene, speed = facts.scene, float(facts.speed[-1])
-    arm = min(scene.masses.friction_arm)
-    found, gate = [friction_remedy(scene, arm=arm, speed=speed)], 2 * friction_floor(scene, speed=speed)
-    if scene.friction_filter.gate * arm < gate < 0.5 * arm:
-        found.append(remedy(scene, ("friction_filter.gate", gate / arm)))
-    return tuple(found)
-
-
-def _heavier(facts: RunFacts) -> tuple[Remedy, ...]:
-    masses = facts.scene.masses
-    reach = 2 * masses.guide_radius * math.cos(0.5 * masses.arc_length / masses.guide_radius)
-    return (remedy(facts.scene, ("masses.mass", 1.2 * facts.imbalance / reach)),) if reach > 0 else ()
-
-
-def _weaker(facts: RunFacts) -> tuple[Remedy, ...]:
-    if gain_remedy(facts.scene):
-        return ()
-    weight, gain = facts.scene.lqr.state_weight / 30, facts.scene.friction_filter.speed_gain / 4
-    return (remedy(facts.scene, ("lqr.state_weight", weight), ("friction_filter.speed_gain", gain)),)
-
-
-_REMEDIES: Final[dict[EccentricOutcome, Callable[[RunFacts], tuple[Remedy, ...]]]] = {
-    EccentricOutcome.RISES_AGAIN: _limit_remedy,
-    EccentricOutcome.SATURATED: _heavier,
-    EccentricOutcome.RESIDUAL: _limit_remedy,
-    EccentricOutcome.TUNING_TIME: _tuning_remedies,
-    EccentricOutcome.MASSES_MOVE: lambda facts: tuple(_more_volts(facts)) or _arrival_remedies(facts),
-    EccentricOutcome.IMBALANCE_UNCERTAIN: _imbalance_remedies,
-    EccentricOutcome.FRICTION_UNCERTAIN: _friction_remedies,
-    EccentricOutcome.STALLED: _stalled_remedies,
-    EccentricOutcome.NOT_ARRIVED: _arrival_remedies,
-    EccentricOutcome.TIME_LIMIT: _more_time,
-    EccentricOutcome.DIVERGED: _weaker,
+    EccentricOutcome.TIME_LIMIT: lambda facts: (
+        f"the run ended during the stage {STAGE_NAMES[facts.stage]}, before the strategy was done"
+    ),
 }

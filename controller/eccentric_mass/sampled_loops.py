@@ -16,8 +16,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
-from ringbalance.controller.eccentric_mass.strategy.lqr import lqr_gain
-from ringbalance.controller.eccentric_mass.strategy.settings import track_model
+from ringbalance.controller.eccentric_mass.strategy.settings import lqr_gain, track_model
 from ringbalance.scene.arrays import ComplexArray
 from ringbalance.scene.eccentric_models import EccentricScene
 

@@ -1,5 +1,7 @@
-"""The disc of one member in plain numbers: all pairs through a command's valve-open time and through a
-wait."""
+"""The disc of one member in plain numbers: all pairs through a command's valve-open time and through a wait.
+
+By the flow law alone; `compiled_motion` carries on a motion of its own.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +12,7 @@ from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.controller.ensemble.compiled_records import Record
 from ringbalance.controller.ensemble.compiled_transfer import gas_off, gas_on
 from ringbalance.controller.formulas.path_piece import piece_rise
+from ringbalance.controller.liquid_ring.opening import FILL_ERROR, TIME_ERROR
 
 _piece_rise: Final = compiled(piece_rise)
 
@@ -23,7 +26,7 @@ def reset(shared: Record, run: Record) -> None:
 
 @compiled
 def any_wet(shared: Record, run: Record) -> bool:
-    """Whether any tube holds a column."""
+    """Whether any tube holds a column, or any pair moves."""
     found = False
     for i in range(shared.chambers // 2):
         found = found or run.wet[i] > 0.0
@@ -73,6 +76,23 @@ def _pair_at(shared: Record, run: Record, i: int, time: float) -> tuple[float, b
     driven, wet = gas_off(shared, driven, left * run.speed)
     after = driven if first else shared.total - driven
     return after, wet, first, abs(after - fill)
+
+
+@compiled
+def opening(shared: Record, run: Record, pair: int, first: bool, duration: float) -> float:
+    """Longest valve-open time, at most `duration`, s, that leaves the driven chamber its residual fill."""
+    fill = run.fill[pair] if first else shared.total - run.fill[pair]
+    wet, least = run.wet[pair] > 0.0, shared.residual_fill
+    if gas_on(shared, fill, wet, duration * run.speed)[0] >= least:
+        return duration
+    low, high = 0.0, duration
+    while high - low > TIME_ERROR * duration:
+        middle = (low + high) / 2.0
+        if gas_on(shared, fill, wet, middle * run.speed)[0] >= least + FILL_ERROR:
+            low = middle
+        else:
+            high = middle
+    return low
 
 
 @compiled

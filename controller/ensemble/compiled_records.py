@@ -40,6 +40,7 @@ _REAL: Final = (
     "derivative_time",  # s
     "minimum_gas_time",  # s
     "maximum_gas_time",  # s
+    "residual_fill",  # of a driven chamber, that no command goes below
 )
 _WHOLE: Final = (
     "linear",  # whether the law has a closed form
@@ -48,8 +49,10 @@ _WHOLE: Final = (
     "chambers",
     "rises_tolerated",
     "idle_tolerated",
+    "moving",  # whether liquid, gas and valves have dynamics of their own
     "gas_points",
     "drift_points",
+    "tail_points",
     "most_samples",
 )
 INTERVALS: Final = 256
@@ -106,6 +109,8 @@ _RUN_REAL: Final = (
     "noise_before",  # of the phase of the last sample taken in full, in standard deviations
     "drift",  # how far liquid has run back with the gas off
     "start",  # first amplitude, m
+    "real_before",  # vibration before the last command, m
+    "imaginary_before",
     "settling_time",  # s, infinite when not settled
 )
 _RUN_WHOLE: Final = (
@@ -124,6 +129,7 @@ _RUN_WHOLE: Final = (
     "idle",
     "overshoots",
     "misadjustments",
+    "shortened",  # injections, to keep the residual fill
     "samples",
     "cause",
     "settled",

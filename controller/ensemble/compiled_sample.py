@@ -6,7 +6,15 @@ import math
 from typing import Any, Final
 
 from ringbalance.controller.compilation.compiled import compiled
-from ringbalance.controller.ensemble.compiled_disc import any_wet, move, note_settling, reset, vibration
+from ringbalance.controller.ensemble.compiled_disc import (
+    any_wet,
+    move,
+    note_settling,
+    opening,
+    reset,
+    vibration,
+)
+from ringbalance.controller.ensemble.compiled_motion import begin, open_valves, pass_moving
 from ringbalance.controller.ensemble.compiled_noise import noise_pair, uniform_radii
 from ringbalance.controller.ensemble.compiled_records import Record
 from ringbalance.controller.formulas.control_law import valve_time, vector_gas_time, vector_shares
@@ -22,6 +30,8 @@ from ringbalance.controller.formulas.stopping import (
     has_turned,
     stop_cause,
 )
+from ringbalance.controller.liquid_ring.compiled_march import opening_within
+from ringbalance.scene.arrays import FloatArray
 
 _CERTAIN: Final = 1 + 1e-9
 _vector_gas_time: Final = compiled(vector_gas_time)
@@ -35,11 +45,14 @@ _has_turned: Final = compiled(has_turned)
 
 
 @compiled
-def run_members(shared: Record, runs: Any) -> None:
-    """Run members one after the other; `runs`, of type `RUN`, holds what differs and is filled."""
+def run_members(shared: Record, plant: Record, runs: Any, motions: Any, workspace: FloatArray) -> None:
+    """Run members one after the other; `runs`, of type `RUN`, holds what differs and is filled.
+
+    `motions`, of type `MOTION`, has room for every pair and one more; it counts where `shared.moving`.
+    """
     for i in range(runs.size):
         run = runs[i]
-        _start(shared, run)
+        _start(shared, plant, run, motions)
         while run.cause == NONE and run.samples < shared.most_samples:
             if run.calm:
                 _pass_calm(shared, run)
@@ -47,9 +60,10 @@ def run_members(shared: Record, runs: Any) -> None:
                 run.samples += 1
                 _sample(shared, run)
                 if run.cause == NONE:
+                    _keep_residual(shared, plant, run, motions, workspace)
                     if run.pair >= 0:
-                        _gas(shared, run)
-                    _wait(shared, run)
+                        _gas(shared, plant, run, motions, workspace)
+                    _wait(shared, plant, run, motions, workspace)
         _judge(shared, run)
 
 
@@ -89,9 +103,12 @@ def _holds(shared: Record, run: Record, time: float) -> bool:
 
 
 @compiled
-def _start(shared: Record, run: Record) -> None:
+def _start(shared: Record, plant: Record, run: Record, motions: Any) -> None:
     """Level chambers, nothing remembered."""
     reset(shared, run)
+    if shared.moving:
+        for i in range(shared.chambers // 2):
+            begin(plant, motions[i], shared.initial_fill, run.speed)
     _forget(run)
     _look(shared, run)
     _expect(shared, run)
@@ -182,36 +199,102 @@ def _cause(shared: Record, run: Record) -> int:
 
 
 @compiled
-def _wait(shared: Record, run: Record) -> None:
+def _wait(shared: Record, plant: Record, run: Record, motions: Any, workspace: FloatArray) -> None:
     """Until the next sample, or the end; liquid moves where a tube is full."""
     length = max(min(shared.period, shared.time_limit - run.time), 0.0)
+    working = _working(run)
     run.pair, run.other_pair = -1, -1
     run.cut = 1 if length < shared.period else run.cut
-    if length > 0.0 and any_wet(shared, run):
+    if shared.moving and any_wet(shared, run):
+        pass_moving(shared, plant, run, motions, workspace, length, shared.tail_points)
+    elif length > 0.0 and any_wet(shared, run):
         move(shared, run, length)
         _look(shared, run)
         note_settling(shared, run, length, shared.drift_points)
     run.time += length
+    if working >= 0 and shared.moving:
+        _count_idle(shared, run, working)
     if run.stale:
         _expect(shared, run)
     run.calm = 0 if run.operated or run.rises >= shared.rises_tolerated or any_wet(shared, run) else 1
 
 
 @compiled
-def _gas(shared: Record, run: Record) -> None:
+def _working(run: Record) -> int:
+    """The pair that is given the most gas."""
+    if run.other_pair >= 0 and run.other_duration > run.duration:
+        return int(run.other_pair)
+    return int(run.pair)
+
+
+@compiled
+def _gas(shared: Record, plant: Record, run: Record, motions: Any, workspace: FloatArray) -> None:
     """All valves of a command open together; pairs flow in parallel."""
-    both = run.other_pair >= 0
-    length = max(run.duration, run.other_duration) if both else run.duration
-    working = run.other_pair if both and run.other_duration > run.duration else run.pair
-    real, imaginary = run.real, run.imaginary
-    move(shared, run, length)
-    _look(shared, run)
-    note_settling(shared, run, length, shared.gas_points)
-    change = math.hypot(run.real - real, run.imaginary - imaginary)
-    moved = abs(run.fill[working] - run.fill_before[working]) > NOTICEABLE or change > shared.limit
-    run.idle = 0 if moved else run.idle + 1
+    length = max(run.duration, run.other_duration) if run.other_pair >= 0 else run.duration
+    run.real_before, run.imaginary_before = run.real, run.imaginary
+    if shared.moving:
+        open_valves(shared, plant, run, motions)
+        pass_moving(shared, plant, run, motions, workspace, length, shared.gas_points)
+    else:
+        move(shared, run, length)
+        _look(shared, run)
+        note_settling(shared, run, length, shared.gas_points)
+        _count_idle(shared, run, _working(run))
     run.time += length
     run.operated = 1
+
+
+@compiled
+def _count_idle(shared: Record, run: Record, working: int) -> None:
+    """Whether the last command has moved anything."""
+    change = math.hypot(run.real - run.real_before, run.imaginary - run.imaginary_before)
+    moved = abs(run.fill[working] - run.fill_before[working]) > NOTICEABLE or change > shared.limit
+    run.idle = 0 if moved else run.idle + 1
+
+
+@compiled
+def _keep_residual(shared: Record, plant: Record, run: Record, motions: Any, workspace: FloatArray) -> None:
+    """Shorten the valve-open times that would take a chamber below its residual fill."""
+    if shared.residual_fill <= 0.0 or run.pair < 0:
+        return
+    run.duration = _permitted(shared, plant, run, motions, workspace, run.pair, run.first > 0, run.duration)
+    if run.other_pair >= 0:
+        run.other_duration = _permitted(
+            shared, plant, run, motions, workspace, run.other_pair, run.other_first > 0, run.other_duration
+        )
+        if run.other_duration == 0.0:
+            run.other_pair = -1
+    if run.duration == 0.0:
+        run.pair, run.first, run.duration = run.other_pair, run.other_first, run.other_duration
+        run.other_pair = -1
+        if run.pair < 0:
+            run.idle += 1
+
+
+@compiled
+def _permitted(
+    shared: Record,
+    plant: Record,
+    run: Record,
+    motions: Any,
+    workspace: FloatArray,
+    pair: int,
+    first: bool,
+    duration: float,
+) -> float:
+    """A valve-open time, s, that leaves the residual fill; zero where it would be below the minimum."""
+    driven = run.fill[pair] if first else shared.total - run.fill[pair]
+    found = 0.0
+    if driven > shared.residual_fill:
+        if shared.moving:
+            spare, chamber = shared.chambers // 2, 0 if first else 1
+            found = opening_within(plant, motions, pair, spare, chamber, duration, workspace)
+        else:
+            found = opening(shared, run, pair, first, duration)
+    if found == duration:
+        return duration
+    run.shortened += 1
+    return found if found >= shared.minimum_gas_time else 0.0
 
 
 @compiled

@@ -22,9 +22,10 @@ from ringbalance.controller.ensemble.samples import (
     members_alike,
 )
 from ringbalance.controller.ensemble.transfer import PairTransfer, pair_transfer
-from ringbalance.controller.terms import run_models, terms_modelled
+from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw, balancer_model
+from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.scene.arrays import IntArray
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.faults import SceneError
@@ -68,8 +69,6 @@ class Ensemble:
     diverged: Probability
     drifted: Probability
     """Not settled, and liquid ran back with the gas off."""
-    left_out: tuple[str, ...]
-    """Terms that `simulate` models for this scene and an ensemble does not."""
     settling_quantiles: tuple[float | None, ...]
     """s, by which fractions of all members have settled, `QUANTILES` by default; None: fewer have."""
     bin_width: float
@@ -97,8 +96,8 @@ def simulate_ensemble(
     """Distributions over n noisy runs of the target-vector algorithm under a flow law.
 
     Every member has its own speed of flow, moment, influence coefficient, lag angle and noise; the algorithm
-    keeps the assumptions and the gain of the scene, whatever its `controller.kind`. The flow law alone drives
-    the liquid, whatever other terms a single run would model (`Ensemble.left_out`). The same seed gives the
+    keeps the assumptions and the gain of the scene, whatever its `controller.kind`. Inertia, gas filling and
+    valve lag are modelled as in a single run. The same seed gives the
     same numbers for any number of threads (`workers`), and a larger ensemble begins with the members of a
     smaller one.
     Raises: SceneError: a rotor too slow to form a ring, a model made for another disc, or more samples than a
@@ -120,11 +119,7 @@ def simulate_ensemble(
         tally.add(runs)
         if progress is not None:
             progress(tally.members, n)
-    return tally.ensemble(law=model.name, seed=seed, uncertainty_95=widths, left_out=_left_out(scene, model))
-
-
-def _left_out(scene: Scene, model: BalancerModel) -> tuple[str, ...]:
-    return terms_modelled(run_models(scene=scene, model=model))
+    return tally.ensemble(law=model.name, seed=seed, uncertainty_95=widths)
 
 
 def simulate_members(
@@ -161,7 +156,18 @@ def ensemble_transfer(scene: Scene, model: BalancerModel) -> PairTransfer:
             allowed=f"at least {longest / 50_000:.3g} s",
         )
         raise SceneError([fault])
-    return pair_transfer(model=model, total=2 * scene.disc.initial_fill, gas_pressure=scene.gas.pressure)
+    modelled = terms_modelled(run_models(scene=scene, model=model))
+    return pair_transfer(
+        model=model,
+        total=2 * scene.disc.initial_fill,
+        gas_pressure=scene.gas.pressure,
+        dynamics=dynamics_of(
+            scene=scene,
+            model=model,
+            modelled=modelled,
+            residual_fill=residual_fill_ratio(scene, law=model.flow),
+        ),
+    )
 
 
 def _block(
@@ -209,9 +215,7 @@ class _Tally:
         for counts, found in ((self.overshoots, runs.overshoots), (self.misadjustments, runs.misadjustments)):
             counts += np.bincount(np.minimum(found, MOST_COUNTED), minlength=MOST_COUNTED + 1)
 
-    def ensemble(
-        self, *, law: str, seed: int, uncertainty_95: MemberUncertainty, left_out: tuple[str, ...]
-    ) -> Ensemble:
+    def ensemble(self, *, law: str, seed: int, uncertainty_95: MemberUncertainty) -> Ensemble:
         """Freeze the counts."""
 
         def share(count: int) -> Probability:
@@ -228,7 +232,6 @@ class _Tally:
             misadjustment=share(self.members - int(self.misadjustments[0])),
             diverged=share(self.diverged),
             drifted=share(self.drifted),
-            left_out=left_out,
             settling_quantiles=self._quantiles(),
             bin_width=self.width,
             time_counts=self.times,
@@ -269,7 +272,7 @@ def ensemble_document(ensemble: Ensemble) -> dict[str, Any]:
         "members": ensemble.members,
         "seed": ensemble.seed,
         "spread_95": asdict(ensemble.uncertainty_95),
-        "left_out": list(ensemble.left_out),
+        "left_out": [],
         "probability": {name: asdict(getattr(ensemble, name)) for name in shares},
         "settling_time_s": {
             "quantiles": dict(zip(map(str, QUANTILES), ensemble.settling_quantiles, strict=True)),

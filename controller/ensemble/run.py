@@ -17,10 +17,12 @@ from ringbalance.controller.ensemble.moment import moment_table
 from ringbalance.controller.ensemble.samples import Members
 from ringbalance.controller.ensemble.transfer import PairTransfer
 from ringbalance.controller.judgement import noise_floor
-from ringbalance.controller.loop import DRIFT_POINTS, GAS_POINTS, IDLE_OPERATIONS
+from ringbalance.controller.liquid_ring.records import MOTION, WORKSPACE
+from ringbalance.controller.loop import DRIFT_POINTS, GAS_POINTS, IDLE_OPERATIONS, TAIL_POINTS
 from ringbalance.controller.rotor import chamber_directions, initial_vibration
 from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor
 from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene
@@ -41,6 +43,8 @@ class MemberRuns:
     diverged: BoolArray
     drifted: BoolArray
     """Not settled, and liquid ran back with the gas off."""
+    shortened: IntArray
+    """Injections shortened or left out to keep the residual fill."""
     samples: IntArray
     final_amplitude: FloatArray
     """m."""
@@ -52,6 +56,8 @@ class EnsemblePlan:
 
     shared: npt.NDArray[np.void]
     """Type `SHARED`, shape (1,)."""
+    plant: npt.NDArray[np.void]
+    """Type `PLANT`, shape (1,)."""
     loop: LoopFactor
     """Of a member with the scene's own values."""
     rotor: Rotor
@@ -66,7 +72,8 @@ class EnsemblePlan:
         runs["stays"] = self._stay(members)
         shared = self.shared.copy()
         shared["key_0"], shared["key_1"] = noise_key(seed=seed)
-        run_members(shared[0], runs)
+        motions = np.zeros(int(shared["chambers"][0]) // 2 + 1, dtype=MOTION)
+        run_members(shared[0], self.plant[0], runs, motions, np.zeros(WORKSPACE))
         return MemberRuns(
             settled=runs["settled"] > 0,
             settling_time=runs["settling_time"],
@@ -74,6 +81,7 @@ class EnsemblePlan:
             misadjustments=runs["misadjustments"],
             diverged=runs["diverged"] > 0,
             drifted=runs["drifted"] > 0,
+            shortened=runs["shortened"],
             samples=runs["samples"],
             final_amplitude=runs["amplitude"],
         )
@@ -97,7 +105,8 @@ def ensemble_plan(*, scene: Scene, model: BalancerModel, transfer: PairTransfer)
     for name, value in (_loop(scene) | _controller(scene)).items():
         shared[name] = value
     loop = loop_factor(scene, model, target_vector_of(scene))
-    return EnsemblePlan(shared=shared, loop=loop, rotor=scene.rotor)
+    shared["residual_fill"] = residual_fill_ratio(scene, law=model.flow)
+    return EnsemblePlan(shared=shared, plant=transfer.plant, loop=loop, rotor=scene.rotor)
 
 
 def _loop(scene: Scene) -> dict[str, float]:
@@ -117,6 +126,7 @@ def _loop(scene: Scene) -> dict[str, float]:
         "idle_tolerated": IDLE_OPERATIONS + scene.disc.chambers,
         "gas_points": GAS_POINTS,
         "drift_points": DRIFT_POINTS,
+        "tail_points": TAIL_POINTS,
         "most_samples": MOST_SAMPLES,
     }
 

@@ -15,11 +15,15 @@ import numpy.typing as npt
 from ringbalance.controller.ensemble.compiled_records import DRY, OFF, ON, PATH_NODES, SHARED
 from ringbalance.controller.ensemble.compiled_transfer import fills_after
 from ringbalance.controller.liquid_ring.closed_form import LinearSquaredVelocity, boundary_event
+from ringbalance.controller.liquid_ring.motion import Dynamics
 from ringbalance.controller.liquid_ring.pair_path import UntabulatedError, flow_paths
+from ringbalance.controller.liquid_ring.records import PLANT
 from ringbalance.controller.liquid_ring.transfer import Drive, Event
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.arrays import FloatArray
 
+RELATIVE_ERROR: Final = 1e-6
+"""Allowed to one step of a member's states: an injection then keeps its fills to 1e-5."""
 MOST_CHANGES: Final = 64
 """Of a law's regime, so that the table of its flows stays short."""
 
@@ -30,6 +34,8 @@ class PairTransfer:
 
     shared: npt.NDArray[np.void]
     """Type `SHARED`, shape (1,), with what concerns a pair filled in; for compiled code."""
+    plant: npt.NDArray[np.void]
+    """Type `PLANT`, shape (1,): terms beyond the flow law; empty numbers where there are none."""
 
     def after(self, fill: FloatArray, time: FloatArray) -> FloatArray:
         """Fill of the driven chamber after a time of gas, s, on a full tube; arguments broadcast."""
@@ -37,10 +43,13 @@ class PairTransfer:
         return fills_after(self.shared[0], x.flatten(), t.flatten()).reshape(x.shape)
 
 
-def pair_transfer(*, model: BalancerModel, total: float, gas_pressure: float) -> PairTransfer:
+def pair_transfer(
+    *, model: BalancerModel, total: float, gas_pressure: float, dynamics: Dynamics | None = None
+) -> PairTransfer:
     """Closed form of a pair when the law has one, else the paths of every flow, exact to 1e-11.
 
-    `total` is the sum of the two fill ratios, the gas pressure is gauge.
+    `total` is the sum of the two fill ratios, the gas pressure is gauge. With `dynamics` every pair moves by
+    them, each step to `RELATIVE_ERROR`, and nothing is tabulated.
     Raises: ValueError: a law whose regimes change more often than can be tabled.
     """
     drive = Drive(
@@ -56,13 +65,16 @@ def pair_transfer(*, model: BalancerModel, total: float, gas_pressure: float) ->
         shared[name] = getattr(drive, name)
     shared["lowest_empties"] = boundary_event(drive, drive.lowest) is Event.EMPTY
     shared["highest_empties"] = boundary_event(drive, drive.highest) is Event.EMPTY
+    if dynamics is not None:
+        shared["moving"] = True
+        return PairTransfer(shared=shared, plant=dynamics.plant(total=total, relative_error=RELATIVE_ERROR))
     if isinstance(model.flow, LinearSquaredVelocity):
         shared["linear"] = True
         shared["squared_per_pressure"] = model.flow.velocity_squared_per_pressure
         shared["pressure_per_fill"] = model.flow.pressure_per_fill_difference
     else:
         _fill_tables(drive, shared[0])
-    return PairTransfer(shared=shared)
+    return PairTransfer(shared=shared, plant=np.zeros(1, dtype=PLANT))
 
 
 def _fill_tables(drive: Drive, shared: np.void) -> None:

@@ -11,13 +11,24 @@ import math
 from typing import Final
 
 from ringbalance.controller.compilation.compiled import compiled
-from ringbalance.controller.liquid_ring.compiled_column import (
-    accelerations,
-    can_flow,
-    ends,
-    holds_at_rest,
-    open_to_gas,
-    steady,
+from ringbalance.controller.liquid_ring.compiled_column import open_to_gas
+from ringbalance.controller.liquid_ring.compiled_events import (
+    EMPTY,
+    FULL,
+    NONE,
+    STALLED,
+    changes,
+    flow_end,
+    gases,
+    limit_in_the_way,
+    outward,
+    pair_ends,
+    pair_steady,
+    primes,
+    regime,
+    separates,
+    starts,
+    would_start,
 )
 from ringbalance.controller.liquid_ring.compiled_step import (
     BETWEEN,
@@ -45,16 +56,9 @@ _AT_REST: Final = 1e-6
 """Relative distance of a gas from its end pressure that counts as there, with the liquid at rest."""
 _OPENINGS: Final = 40
 """Halvings of the valve-open time that leaves a chamber with its residual fill."""
-NONE: Final = EVENTS.index(Event.NONE)
-BLOCKED: Final = EVENTS.index(Event.BLOCKED)
-_STALLED: Final = EVENTS.index(Event.STALLED)
-_EMPTY: Final = EVENTS.index(Event.EMPTY)
-_FULL: Final = EVENTS.index(Event.FULL)
-UNFINISHED: Final = EVENTS.index(Event.UNFINISHED)
+_BLOCKED: Final = EVENTS.index(Event.BLOCKED)
+_UNFINISHED: Final = EVENTS.index(Event.UNFINISHED)
 _RESTING: Final = int(Regime.BLOCKED)
-_SIPHON: Final = int(Regime.SIPHON)
-_SEPARATED: Final = int(Regime.SEPARATED)
-_REVERSE: Final = int(Regime.REVERSE)
 
 
 @compiled
@@ -65,7 +69,7 @@ def command(plant: Record, motion: Record, chamber: int, duration: float) -> Non
     motion.fill_before = plant.total - x if chamber else x
     motion.least_fill = motion.fill_before
     motion.state[WORK], motion.state[WORK + 1] = 0.0, 0.0
-    motion.regime_start, motion.regime_end, motion.event = _RESTING, _RESTING, BLOCKED
+    motion.regime_start, motion.regime_end, motion.event = _RESTING, _RESTING, _BLOCKED
     motion.closing_pressure, motion.run_dry = 0.0, 0.0
 
 
@@ -73,7 +77,7 @@ def command(plant: Record, motion: Record, chamber: int, duration: float) -> Non
 def rests(plant: Record, motion: Record) -> bool:
     """Whether nothing moves, no gas is under pressure, and no valve is open or about to move."""
     waiting = min(motion.opens, motion.closes) < math.inf
-    p, q = _gases(plant, motion.state)
+    p, q = gases(plant, motion.state)
     still = motion.direction == 0 and p == 0.0 and q == 0.0
     return bool(still and not (motion.primed or motion.valve_0 or motion.valve_1 or waiting))
 
@@ -98,7 +102,7 @@ def advance(plant: Record, motion: Record, duration: float, w: FloatArray) -> No
 def _pause(plant: Record, motion: Record) -> None:
     """Liquid without mass has no motion of its own: the next instant finds it again."""
     if motion.direction != 0 and not plant.inertia:
-        motion.primed = 1 if _steady(plant, motion, motion.state, motion.primed > 0)[2] else 0
+        motion.primed = 1 if pair_steady(plant, motion, motion.state, motion.primed > 0)[2] else 0
         motion.direction = 0
 
 
@@ -142,107 +146,13 @@ def _least_after(
 
 
 @compiled
-def _gases(plant: Record, y: FloatArray) -> tuple[float, float]:
-    """Gauge pressures."""
-    return y[P] - plant.ambient_pressure, y[P + 1] - plant.ambient_pressure
-
-
-@compiled
-def _ends(plant: Record, y: FloatArray, direction: int) -> tuple[float, float, float, float]:
-    p, q = _gases(plant, y)
-    return ends(plant, y[X], plant.total - y[X], p, q, direction)
-
-
-@compiled
-def _steady(plant: Record, motion: Record, y: FloatArray, primed: bool) -> tuple[float, bool, bool]:
-    p, q = _gases(plant, y)
-    return steady(plant, y[X], plant.total - y[X], p, q, primed, motion.log_speed)
-
-
-@compiled
-def _outward(motion: Record) -> int:
-    """Direction of flow out of the chamber that was driven last."""
-    return 1 if motion.chamber == 0 else -1
-
-
-@compiled
-def _limit(plant: Record, x: float, direction: int) -> int:
-    """The event by which a chamber is in the way of flow in a direction; `NONE`: it is not."""
-    lowest, highest = max(0.0, plant.total - plant.max_fill_ratio), min(plant.total, plant.max_fill_ratio)
-    if direction > 0 and x <= lowest:
-        return _EMPTY if lowest == 0.0 else _FULL
-    if direction < 0 and x >= highest:
-        return _EMPTY if highest == plant.total else _FULL
-    return NONE
-
-
-@compiled
-def _start(plant: Record, y: FloatArray, primed: bool) -> int:
-    """Direction in which resting liquid would flow; zero for none."""
-    if can_flow(plant, _ends(plant, y, 1), primed):
-        return 1
-    return -1 if can_flow(plant, _ends(plant, y, -1), primed) else 0
-
-
-@compiled
-def _starts(plant: Record, motion: Record, y: FloatArray, primed: bool) -> int:
-    """Direction in which resting liquid does start to flow; zero for none."""
-    direction = _start(plant, y, primed)
-    if direction == 0 or motion.balanced or _limit(plant, y[X], direction) != NONE:
-        return 0
-    return direction if not plant.inertia or _push(plant, motion, y, direction, primed) > 0.0 else 0
-
-
-@compiled
-def _push(plant: Record, motion: Record, y: FloatArray, direction: int, primed: bool) -> float:
-    """Acceleration of a column at rest."""
-    at = _ends(plant, y, direction)
-    full, broken = accelerations(plant, at, 0.0, direction, primed, motion.log_speed)
-    return min(full, broken)
-
-
-@compiled
-def _separates(plant: Record, motion: Record, y: FloatArray) -> bool:
-    """Whether a primed column at rest separates."""
-    if not motion.primed or _start(plant, y, True) != 0:
-        return False
-    return not holds_at_rest(plant, _ends(plant, y, 1), True)
-
-
-@compiled
-def _flow_end(plant: Record, motion: Record, y: FloatArray) -> int:
-    """The event that ends the flow in the present direction; `NONE`: it continues."""
-    direction = motion.direction
-    event = _limit(plant, y[X], direction)
-    if event != NONE:
-        return event
-    if open_to_gas(plant, _ends(plant, y, direction)):
-        return _STALLED
-    primed = motion.primed > 0
-    if plant.inertia:
-        # Round-off of a creeping column's velocity is no stall: it is still driven.
-        slow = y[U] * direction < 0.0
-        return _STALLED if slow and _push(plant, motion, y, direction, primed) <= 0.0 else NONE
-    return NONE if _start(plant, y, primed) == direction else _STALLED
-
-
-@compiled
-def _changes(plant: Record, motion: Record, y: FloatArray) -> bool:
-    """Whether an event lies between the last step and this state."""
-    if motion.direction != 0:
-        primes = not motion.primed and _primes(plant, motion, y)
-        return primes or _flow_end(plant, motion, y) != NONE
-    return _separates(plant, motion, y) or _starts(plant, motion, y, motion.primed > 0) != 0
-
-
-@compiled
 def _march(plant: Record, motion: Record, duration: float, w: FloatArray) -> None:
     """Steps and their events, with the valves as they are."""
     left = duration
     while left > 0.0:
         _settle(plant, motion)
         if motion.steps >= plant.most_steps:
-            motion.event = UNFINISHED
+            motion.event = _UNFINISHED
             _pass(motion, left)
             return
         if _quiet(plant, motion):
@@ -265,13 +175,13 @@ def _pass(motion: Record, time: float) -> None:
 def _step(plant: Record, motion: Record, left: float, w: FloatArray) -> float:
     """One accepted step, cut at the first event within it. Returns: its length, s."""
     h = take(plant, motion, left, w)
-    if _changes(plant, motion, w[END]):
+    if changes(plant, motion, w[END]):
         rates_at_end(plant, motion, w)
         low, high = 0.0, 1.0
         for _ in range(_BISECTIONS):
             middle = (low + high) / 2.0
             between(motion, h, middle, w)
-            if _changes(plant, motion, w[BETWEEN]):
+            if changes(plant, motion, w[BETWEEN]):
                 high = middle
             else:
                 low = middle
@@ -281,43 +191,37 @@ def _step(plant: Record, motion: Record, left: float, w: FloatArray) -> float:
     before, y = motion.state[X], motion.state
     for i in range(8):
         y[i] = w[END, i]
-    if motion.direction == -_outward(motion) and not (motion.valve_0 or motion.valve_1):
+    if motion.direction == -outward(motion) and not (motion.valve_0 or motion.valve_1):
         motion.ran_back += abs(y[X] - before)
     if motion.direction != 0 and plant.inertia and y[U] * motion.direction < 0.0:
-        y[U] = 0.0 if _flow_end(plant, motion, y) == NONE else y[U]
+        y[U] = 0.0 if flow_end(plant, motion, y) == NONE else y[U]
     motion.least_fill = min(motion.least_fill, plant.total - y[X] if motion.chamber else y[X])
-    if motion.direction != 0 and not motion.primed and _primes(plant, motion, y):
+    if motion.direction != 0 and not motion.primed and primes(plant, motion, y):
         motion.primed = 1
     return h
-
-
-@compiled
-def _primes(plant: Record, motion: Record, y: FloatArray) -> bool:
-    """Whether the liquid that spills over the crest has filled the tube, by the law."""
-    return _steady(plant, motion, y, False)[2]
 
 
 @compiled
 def _settle(plant: Record, motion: Record) -> None:
     """Let moving liquid come to rest, and resting liquid start, where it has to."""
     if motion.direction != 0:
-        event = _flow_end(plant, motion, motion.state)
+        event = flow_end(plant, motion, motion.state)
         if event == NONE:
             return
         _stop(plant, motion, event)
     y = motion.state
-    if _separates(plant, motion, y):
+    if separates(plant, motion, y):
         motion.primed = 0
     primed = motion.primed > 0
-    wanted = _start(plant, y, primed)
-    limit = _limit(plant, y[X], wanted)
+    wanted = would_start(plant, y, primed)
+    limit = limit_in_the_way(plant, y[X], wanted)
     if wanted != 0 and limit != NONE:
-        motion.primed = 1 if primed and limit != _EMPTY else 0
+        motion.primed = 1 if primed and limit != EMPTY else 0
         _note(plant, motion, limit, wanted)
-    direction = _starts(plant, motion, y, primed)
+    direction = starts(plant, motion, y, primed)
     if direction == 0:
         return
-    motion.primed = 1 if _steady(plant, motion, y, primed)[2] else 0
+    motion.primed = 1 if pair_steady(plant, motion, y, primed)[2] else 0
     motion.direction, motion.length, motion.started = direction, FIRST_STEP, y[X]
     _note(plant, motion, NONE, direction)
 
@@ -331,11 +235,11 @@ def _stop(plant: Record, motion: Record, event: int) -> None:
     # A start that moved nothing will move nothing again, until a valve or a gas pressure does.
     motion.balanced = 1 if not plant.line and abs(y[X] - motion.started) < little else 0
     motion.stopped = direction
-    if event in (_EMPTY, _FULL):
+    if event in (EMPTY, FULL):
         lowest, highest = max(0.0, plant.total - plant.max_fill_ratio), min(plant.total, plant.max_fill_ratio)
         y[X] = lowest if direction > 0 else highest
-    gone = event == _EMPTY or open_to_gas(plant, _ends(plant, y, direction))
-    motion.primed = 1 if motion.primed and not gone and _steady(plant, motion, y, True)[2] else 0
+    gone = event == EMPTY or open_to_gas(plant, pair_ends(plant, y, direction))
+    motion.primed = 1 if motion.primed and not gone and pair_steady(plant, motion, y, True)[2] else 0
     y[U], motion.direction, motion.length = 0.0, 0, FIRST_STEP
 
 
@@ -390,13 +294,13 @@ def _rest_gases(plant: Record, motion: Record) -> None:
 @compiled
 def _note(plant: Record, motion: Record, event: int, direction: int) -> None:
     """Keep what happens to the flow out of the driven chamber."""
-    if direction == _outward(motion):
+    if direction == outward(motion):
         is_open = motion.valve_1 > 0 if motion.chamber else motion.valve_0 > 0
         if motion.regime_start == _RESTING and event == NONE:
-            motion.regime_start = _regime(plant, motion)
-        if event == _EMPTY and motion.event != _EMPTY:
+            motion.regime_start = regime(plant, motion)
+        if event == EMPTY and motion.event != EMPTY:
             motion.run_dry = motion.closes if is_open else 0.0
-        if event != _STALLED or is_open:
+        if event != STALLED or is_open:
             motion.event = event
     _note_regime(plant, motion)
 
@@ -404,17 +308,4 @@ def _note(plant: Record, motion: Record, event: int, direction: int) -> None:
 @compiled
 def _note_regime(plant: Record, motion: Record) -> None:
     if motion.direction != 0:
-        motion.regime_end = _regime(plant, motion)
-
-
-@compiled
-def _regime(plant: Record, motion: Record) -> int:
-    direction, y = motion.direction, motion.state
-    if direction != _outward(motion):
-        return _REVERSE
-    primed = motion.primed > 0
-    if not plant.inertia:
-        return _SEPARATED if _steady(plant, motion, y, primed)[1] else _SIPHON
-    at, speed = _ends(plant, y, direction), max(y[U] * direction, 0.0)
-    full, broken = accelerations(plant, at, speed, direction, primed, motion.log_speed)
-    return _SEPARATED if broken < full else _SIPHON
+        motion.regime_end = regime(plant, motion)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ringbalance.controller.liquid_ring.compiled_march import advance
+from ringbalance.controller.liquid_ring.compiled_march import advance, opening_within
 from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, packed, unpacked
 from ringbalance.controller.liquid_ring.records import WORKSPACE, X
 from ringbalance.scene.arrays import FloatArray
@@ -52,3 +52,19 @@ def pass_time(
         motion=unpacked(plant, state),
         ran_back=float(state["ran_back"][0]),
     )
+
+
+def longest_opening(
+    dynamics: Dynamics,
+    *,
+    fill: float,
+    total: float,
+    primed: bool,
+    motion: Motion,
+    chamber: int,
+    duration: float,
+) -> float:
+    """Longest valve-open time, at most `duration`, s, whose injection and tail leave the residual fill."""
+    plant = dynamics.kept_plant(total=total)
+    states = np.concatenate([packed(plant, fill=fill, primed=primed, motion=motion)] * 2)
+    return opening_within(plant[0], states, 0, 1, chamber, duration, np.zeros(WORKSPACE))

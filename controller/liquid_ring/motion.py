@@ -124,39 +124,30 @@ class Dynamics:
         return self._plants[total]
 
 
+_OF_COLUMN: Final = ("density", "length", "port_pressure", "gas_off", "gas_factor", "one_way")
+_OF_CREST: Final = ("column_pressure", "vapour_pressure", "trapped", "released", "froude_velocity")
+_OF_DYNAMICS: Final = (
+    "inertia",
+    "valve_lag",
+    "gas_pressure",
+    "ambient_pressure",
+    "dead_volume",
+    "tube_area",
+    "chamber_volume",
+    "max_fill_ratio",
+    "residual",
+)
+
+
 def _filled(dynamics: Dynamics, total: float, relative_error: float) -> npt.NDArray[np.void]:
-    plant, column, crest, line = (
-        np.zeros(1, dtype=PLANT),
-        dynamics.column,
-        dynamics.column.crest,
-        dynamics.line,
-    )
-    for name in ("density", "length", "port_pressure", "gas_off", "gas_factor", "one_way"):
-        plant[name] = getattr(column, name)
+    plant, column = np.zeros(1, dtype=PLANT), dynamics.column
+    for source, names in ((column, _OF_COLUMN), (column.crest, _OF_CREST), (dynamics, _OF_DYNAMICS)):
+        for name in names if source is not None else ():
+            plant[name] = getattr(source, name)
+    plant["crest"] = column.crest is not None
     plant["crest_end"], plant["return_crest_end"] = column.crest_ends
-    for name in (
-        "inertia",
-        "valve_lag",
-        "gas_pressure",
-        "ambient_pressure",
-        "dead_volume",
-        "tube_area",
-        "chamber_volume",
-        "max_fill_ratio",
-        "residual",
-    ):
-        plant[name] = getattr(dynamics, name)
     plant["total"], plant["relative_error"], plant["most_steps"] = total, relative_error, MOST_STEPS
-    if crest is not None:
-        plant["crest"] = True
-        for name in ("column_pressure", "vapour_pressure", "trapped", "released", "froude_velocity"):
-            plant[name] = getattr(crest, name)
-    plant["temperature"], plant["heat_capacity_ratio"] = 1.0, 1.0
-    if line is not None:
-        plant["line"], plant["temperature"] = True, line.temperature
-        plant["critical_ratio"] = line.critical_ratio
-        plant["passing"] = line.conductance * REFERENCE_PRESSURE / math.sqrt(REFERENCE_TEMPERATURE)
-        plant["heat_capacity_ratio"] = 1.0 if line.process == "isothermal" else HEAT_CAPACITY_RATIO
+    _fill_line(plant, dynamics.line)
     for which, table in enumerate(column.tables):
         pieces = table.coefficients.T
         if len(pieces) > PIECES:
@@ -165,6 +156,15 @@ def _filled(dynamics: Dynamics, total: float, relative_error: float) -> npt.NDAr
         plant["pieces"][0, which] = len(pieces)
         plant["table_start"][0, which], plant["table_step"][0, which] = table.start, table.step
     return plant
+
+
+def _fill_line(plant: npt.NDArray[np.void], line: GasLine | None) -> None:
+    plant["temperature"], plant["heat_capacity_ratio"] = 1.0, 1.0
+    if line is not None:
+        plant["line"], plant["temperature"] = True, line.temperature
+        plant["critical_ratio"] = line.critical_ratio
+        plant["passing"] = line.conductance * REFERENCE_PRESSURE / math.sqrt(REFERENCE_TEMPERATURE)
+        plant["heat_capacity_ratio"] = 1.0 if line.process == "isothermal" else HEAT_CAPACITY_RATIO
 
 
 def packed(

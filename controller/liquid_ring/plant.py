@@ -8,8 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ringbalance.controller.formulas.stopping import NOTICEABLE
-from ringbalance.controller.liquid_ring.interval import pass_time
+from ringbalance.controller.liquid_ring.interval import longest_opening, pass_time
 from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, Record, Switch
+from ringbalance.controller.liquid_ring.opening import opening_within
 from ringbalance.controller.liquid_ring.transfer import Drive, Event, Integrator, Transfer
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.model import BalancerModel
@@ -110,6 +111,37 @@ class LiquidRing:
     integrator: Integrator
     dynamics: Dynamics | None = None
     """Terms that the flow law does not know; None: none of them is modelled."""
+    residual_fill: float = 0.0
+    """Of a driven chamber, below which gas would enter its port; `permitted` keeps to it."""
+
+    def permitted(self, state: DiscState, *, gas_times: Mapping[int, float]) -> dict[int, float]:
+        """Valve-open times, s, shortened so that no driven chamber falls below its residual fill.
+
+        A chamber that is already there is left out.
+        """
+        half = self.chambers // 2
+        found = {i: self._permitted(state.pairs[i % half], i < half, time) for i, time in gas_times.items()}
+        return {chamber: time for chamber, time in found.items() if time > 0}
+
+    def _permitted(self, pair: PairState, first: bool, duration: float) -> float:
+        if self.residual_fill <= 0:
+            return duration
+        if (pair.fill if first else pair.opposite_fill) <= self.residual_fill:
+            return 0.0
+        if self.dynamics is not None:
+            return longest_opening(
+                self.dynamics,
+                fill=pair.fill,
+                total=pair.total,
+                primed=pair.primed,
+                motion=pair.motion,
+                chamber=0 if first else 1,
+                duration=duration,
+            )
+        drive = self._drive(pair, first=first, gas_pressure=self.gas_pressure)
+        return opening_within(
+            drive=drive, least=self.residual_fill, duration=duration, integrator=self.integrator
+        )
 
     def advance(
         self, state: DiscState, *, gas_times: Mapping[int, float], duration: float, points: int

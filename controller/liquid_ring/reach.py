@@ -15,12 +15,12 @@ _BISECTIONS: Final = 50
 
 
 def largest_pair_moment(*, plant: LiquidRing, state: DiscState) -> float:
-    """Moment of a pair with its liquid moved as far as it goes to one side, kg m; all pairs hold the same.
+    """Moment of a pair with its usable liquid moved to one side, kg m; all pairs hold the same.
 
     Source: Eq. 7 of the liquid-ring paper for a pair, by the model's own moment curve.
     """
     total = state.pairs[0].total
-    highest = min(total, plant.model.flow.max_fill_ratio)
+    highest = min(total - min(plant.residual_fill, total / 2), plant.model.flow.max_fill_ratio)
     moment = plant.model.moment.pair_moment(fill_ratio=highest, opposite_fill_ratio=total - highest)
     return float(moment)
 

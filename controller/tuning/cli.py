@@ -130,10 +130,7 @@ def _settling(tuning: Tuning) -> dict[str, str]:
         for name, time in settling.quantiles.items()
     )
     limit = tuning.scene.run.time_limit
-    rows = {
+    return {
         "settling time": times,
         "settled": f"{settling.settled.value:.2%} of {settling.runs} runs within {limit:.4g} s",
     }
-    if settling.left_out:
-        rows["left out of these runs"] = ", ".join(settling.left_out)
-    return rows

@@ -14,7 +14,7 @@ from ringbalance.controller.checks import check_settings
 from ringbalance.controller.ensemble.monte_carlo import Probability, binomial_share, simulate_ensemble
 from ringbalance.controller.ensemble.samples import MemberUncertainty, drawn_members
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.terms import run_models, terms_modelled
+from ringbalance.controller.terms import run_models
 from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor, vibration_rates
 from ringbalance.controller.tuning.margins import Margins, loop_margins
 from ringbalance.controller.tuning.recommendation import (
@@ -33,9 +33,9 @@ from ringbalance.scene.models import Scene
 Progress = Callable[[str], None]
 
 MEMBERS: Final = 2000
-"""Compiled runs, under the flow law alone."""
+"""Compiled runs of the target-vector algorithm."""
 RUNS: Final = 20
-"""Runs one by one, where an injection carries more than the flow law or the algorithm is not compiled."""
+"""Runs one by one, of an algorithm that is not compiled."""
 QUANTILES: Final = {"p50": 0.5, "p95": 0.95}
 
 
@@ -48,8 +48,6 @@ class SettlingTimes:
     """Within the scene's time limit."""
     quantiles: dict[str, float | None]
     """s, by which that fraction of all runs has settled; None: fewer have."""
-    left_out: tuple[str, ...]
-    """Terms that a single run models and these runs do not."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -185,15 +183,13 @@ def _dead_zone(scene: Scene, smallest: float) -> float:
 def _settling(
     scene: Scene, model: BalancerModel, widths: MemberUncertainty, *, members: int, runs: int, told: Progress
 ) -> SettlingTimes:
-    carried = terms_modelled(run_models(scene=scene, model=model))
-    if scene.controller.kind == "target_vector" and not carried:
+    if scene.controller.kind == "target_vector":
         return _of_ensemble(scene, model, widths, members=members, told=told)
     times = np.array([_one_run(scene, model, widths, number=i, told=told) for i in range(runs)])
     return SettlingTimes(
         runs=runs,
         settled=binomial_share(count=int(np.isfinite(times).sum()), of=runs),
         quantiles={name: _quantile(times, q) for name, q in QUANTILES.items()},
-        left_out=(),
     )
 
 
@@ -213,7 +209,6 @@ def _of_ensemble(
         runs=members,
         settled=found.settled,
         quantiles=dict(zip(QUANTILES, found.settling_quantiles, strict=True)),
-        left_out=found.left_out,
     )
 
 
@@ -306,7 +301,7 @@ def tuning_document(tuning: Tuning) -> dict[str, Any]:
         "fraction_settled": None if settling is None else settling.settled.value,
         "fraction_settled_95": None if settling is None else [settling.settled.low, settling.settled.high],
         "runs": 0 if settling is None else settling.runs,
-        "left_out": [] if settling is None else list(settling.left_out),
+        "left_out": [],
         "models_used": [asdict(used) for used in tuning.models_used],
     }
 

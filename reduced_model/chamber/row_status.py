@@ -21,6 +21,7 @@ class RowStatus(StrEnum):
     NO_RING = "no_ring"
     PORT_UNCOVERED = "port_uncovered"
     OVER_CREST = "over_crest"
+    GAS_DRAWN = "gas_drawn"
 
 
 REMEDIES: Final[Mapping[RowStatus, str]] = MappingProxyType(
@@ -30,24 +31,30 @@ REMEDIES: Final[Mapping[RowStatus, str]] = MappingProxyType(
         "cannot be emptied further: move tube.port_radius towards disc.outer_radius",
         RowStatus.OVER_CREST: "the level lies inside the siphon crest, so liquid runs back while the gas is "
         "off: lower disc.max_fill_ratio or tube.hump_radius",
+        RowStatus.GAS_DRAWN: "less than the residual liquid, so gas is drawn into the port and the velocity "
+        "is not that of liquid alone: empty a chamber down to its residual fill ratio only",
     }
 )
 
 
-def row_status(scene: Scene, *, fill_ratio: FloatArray, closed: BoolArray) -> tuple[RowStatus, ...]:
-    """Status of each fill ratio x > 0; an empty chamber is limited by nothing.
+def row_status(
+    scene: Scene, *, fill_ratio: FloatArray, closed: BoolArray, residual: float = 0.0
+) -> tuple[RowStatus, ...]:
+    """Status of each fill ratio x; an empty chamber is limited by its residual liquid alone.
 
-    NO_RING: not `closed` under gravity. PORT_UNCOVERED: a >= r_p. OVER_CREST: a <= r_m. With the radii a of
-    the concentric surface, r_p of the port and r_m of the crest.
+    NO_RING: not `closed` under gravity. PORT_UNCOVERED: a >= r_p. OVER_CREST: a <= r_m. GAS_DRAWN: x below
+    `residual`, for what flows out of the chamber. With the radii a of the concentric surface, r_p of the port
+    and r_m of the crest.
     """
     level, crest = surface_radius(disc=scene.disc, fill_ratio=fill_ratio), scene.tube.hump_radius
     inside = np.zeros(level.shape, dtype=np.bool_) if crest is None else level <= crest
     limits = (
-        (~closed, RowStatus.NO_RING),
-        (level >= scene.tube.port_radius, RowStatus.PORT_UNCOVERED),
-        (inside, RowStatus.OVER_CREST),
+        (~closed & (fill_ratio > 0), RowStatus.NO_RING),
+        ((level >= scene.tube.port_radius) & (fill_ratio > 0), RowStatus.PORT_UNCOVERED),
+        (inside & (fill_ratio > 0), RowStatus.OVER_CREST),
+        (fill_ratio < residual, RowStatus.GAS_DRAWN),
     )
     return tuple(
-        next((status for where, status in limits if where[row] and fill > 0), RowStatus.OK)
-        for row, fill in enumerate(fill_ratio)
+        next((status for where, status in limits if where[row]), RowStatus.OK)
+        for row in range(fill_ratio.size)
     )

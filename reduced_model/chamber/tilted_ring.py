@@ -9,6 +9,7 @@ outer wall runs dry the surface is cut off there; the integrals have kinks and t
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Final
 
 import numpy as np
@@ -24,13 +25,18 @@ _OPEN_POINTS: Final = 200
 """The same where part of the wall is dry: about four digits of gravity's effect."""
 _STEPS: Final = (12, 60)
 """Newton's method and halving."""
-_RULES: Final = tuple(np.polynomial.legendre.leggauss(n) for n in (POINTS, _OPEN_POINTS))
 _TURN: Final = (8, 96)
 """Fewest and most angles of gravity over a turn."""
 _AVERAGING: Final = 1e-12
 _ROUND_OFF: Final = 4 * float(np.finfo(np.float64).eps)
 """Of an area, over R2^2."""
-_RADIAL, _RADIAL_WEIGHT = np.polynomial.legendre.leggauss(RADIAL_POINTS)
+
+
+@cache
+def _rule(points: int) -> tuple[FloatArray, FloatArray]:
+    """Gauss points within [-1, 1] and their weights; most runs need no rule of many points."""
+    places, weights = np.polynomial.legendre.leggauss(points)
+    return np.asarray(places, dtype=np.float64), np.asarray(weights, dtype=np.float64)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,7 +151,7 @@ def _held(disc: Disc, radius: FloatArray) -> FloatArray:
 
 
 def _along(disc: Disc, length: float, fills: FloatArray, cut: bool) -> _Turned:
-    abscissa, weights = _RULES[cut]
+    abscissa, weights = _rule(_OPEN_POINTS if cut else POINTS)
     outer, start = disc.outer_radius, surface_radius(disc=disc, fill_ratio=fills) ** 2
     rise, weight = length * disc.axial_width * abscissa[None, :], weights[None, :] / 2
     target = liquid_area(disc=disc, surface_radius=np.sqrt(start))
@@ -175,7 +181,7 @@ def _along(disc: Disc, length: float, fills: FloatArray, cut: bool) -> _Turned:
 
 
 def _across(disc: Disc, length: float, fills: FloatArray, turn: int, cut: bool) -> _Turned:
-    abscissa, weights = _RULES[cut]
+    abscissa, weights = _rule(_OPEN_POINTS if cut else POINTS)
     outer, start = disc.outer_radius, surface_radius(disc=disc, fill_ratio=fills)
     psi = (2 * np.pi * np.arange(turn) / turn)[None, :, None]
     eta, weight = abscissa[None, None, :], weights[None, None, :] / 2
@@ -229,9 +235,8 @@ def _level(
 
 def _moment_on_rays(disc: Disc, radius: FloatArray, eta: FloatArray) -> FloatArray:
     """2 int r^2 cos(eta alpha) alpha dr from the surface to the wall, m^3; its mean over eta is int x dA."""
+    places, weights = _rule(RADIAL_POINTS)
     half = (disc.outer_radius - radius)[..., None] / 2
-    r = radius[..., None] + half * (1 + _RADIAL)
+    r = radius[..., None] + half * (1 + places)
     alpha = half_angle(disc=disc, radius=r)
-    return np.asarray(
-        2 * np.sum(half * _RADIAL_WEIGHT * r**2 * np.cos(eta[..., None] * alpha) * alpha, axis=-1)
-    )
+    return np.asarray(2 * np.sum(half * weights * r**2 * np.cos(eta[..., None] * alpha) * alpha, axis=-1))

@@ -129,6 +129,8 @@ class PaperLaw:
 def paper_law(scene: AnyScene) -> PaperLaw:
     """The paper's flow law for a scene, with k = 50 unless the scene fixes it.
 
+    The gas pressure counts as it is measured: Eq. 19 knows no gas column, and so not `gas.measured_at`.
+
     Raises: SceneError: a balancer without liquid.
     Source: Eqs. 4 and 19; lambda = 72 mm.
     """

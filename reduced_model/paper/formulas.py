@@ -18,7 +18,6 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Disc
 
@@ -47,21 +46,13 @@ def flat_strip_area(*, disc: Disc, surface_radius: npt.ArrayLike) -> FloatArray:
     return np.asarray(swept - 2 * disc.plate_thickness * (disc.outer_radius - a), dtype=np.float64)
 
 
-def chamber_area_paper(*, disc: Disc) -> float:
-    """Actual area of one chamber, S_a = theta (R2^2 - R1^2)/2 - 2 t (R2 - R1).
-
-    Source: Eq. 3.
-    """
-    return float(flat_strip_area(disc=disc, surface_radius=disc.inner_radius))
-
-
 def chamber_volume_paper(*, disc: Disc) -> float:
-    """Volume of one chamber, V = S_a B.
+    """Volume of one chamber, V = S_a B, S_a = theta (R2^2 - R1^2)/2 - 2 t (R2 - R1).
 
     Returns: Volume, m^3; printed as 67.7 ml, from which the plate thickness is inferred.
-    Source: Eq. 4.
+    Source: Eqs. 3 and 4.
     """
-    return chamber_area_paper(disc=disc) * disc.axial_width
+    return float(flat_strip_area(disc=disc, surface_radius=disc.inner_radius)) * disc.axial_width
 
 
 def max_liquid_volume_paper(*, disc: Disc) -> float:
@@ -71,15 +62,6 @@ def max_liquid_volume_paper(*, disc: Disc) -> float:
     Source: Eq. 5.
     """
     return disc.max_fill_ratio * chamber_volume_paper(disc=disc)
-
-
-def initial_liquid_volume_paper(*, disc: Disc) -> float:
-    """Liquid volume of each chamber before balancing, V'_initial = V'_max/2.
-
-    Returns: Volume, m^3; printed as 16.9 ml.
-    Source: Eq. 6.
-    """
-    return 0.5 * max_liquid_volume_paper(disc=disc)
 
 
 def surface_radius_paper(*, disc: Disc, liquid_volume: npt.ArrayLike) -> FloatArray:
@@ -120,20 +102,6 @@ def capacity(*, chamber_moment: npt.ArrayLike) -> FloatArray:
     return np.asarray(np.sqrt(2) * np.asarray(chamber_moment, dtype=np.float64), dtype=np.float64)
 
 
-def ring_pressure(
-    *, disc: Disc, density: float, angular_velocity: float, surface_radius: npt.ArrayLike
-) -> FloatArray:
-    """Liquid pressure on the outer wall, integral of dp = rho omega^2 r dr = rho omega^2 (R2^2 - R1'^2)/2.
-
-    Returns: Pressure above the gas pressure, Pa, the shape of `surface_radius`.
-    Source: Eqs. 9 to 11 integrated; exact without gravity.
-    """
-    a = np.asarray(surface_radius, dtype=np.float64)
-    return hydrostatic_pressure(
-        density=density, angular_velocity=angular_velocity, inner=a, outer=disc.outer_radius
-    )
-
-
 def wall_pressure_paper(
     *, disc: Disc, density: float, angular_velocity: float, liquid_volume: npt.ArrayLike
 ) -> FloatArray:
@@ -163,7 +131,7 @@ def velocity_from_pressures(
     return np.asarray(np.sqrt(2 * difference / (density * (k + 1))), dtype=np.float64)
 
 
-def velocity_from_volumes(
+def _velocity_from_volumes(
     *,
     disc: Disc,
     density: float,
@@ -203,7 +171,7 @@ def velocity_paper(
     Source: Eq. 19.
     """
     volume = chamber_volume_paper(disc=disc)
-    return velocity_from_volumes(
+    return _velocity_from_volumes(
         disc=disc,
         density=density,
         angular_velocity=angular_velocity,
@@ -249,7 +217,7 @@ def departure(
     """
     total = max_liquid_volume_paper(disc=disc) if pair_volume is None else pair_volume
     at_full, at_empty = (
-        velocity_from_volumes(
+        _velocity_from_volumes(
             disc=disc,
             density=density,
             angular_velocity=angular_velocity,
@@ -261,22 +229,6 @@ def departure(
         for v in (total, 0.0)
     )
     return np.asarray(1 - at_empty / at_full, dtype=np.float64)
-
-
-def explicit_segment(
-    *,
-    fill_ratio: npt.ArrayLike,
-    velocity: npt.ArrayLike,
-    tube_area: float,
-    chamber_volume: float,
-    time_step: npt.ArrayLike,
-) -> FloatArray:
-    """Fill ratio after one explicit segment of valve-open time, x_i = x_(i-1) - u_(i-1) S dt/V.
-
-    Source: Eq. 20.
-    """
-    x, u, dt = (np.asarray(v, dtype=np.float64) for v in (fill_ratio, velocity, time_step))
-    return np.asarray(x - u * tube_area * dt / chamber_volume, dtype=np.float64)
 
 
 def correction_mass(*, disc: Disc, density: float, fill_ratio: npt.ArrayLike) -> FloatArray:
@@ -301,14 +253,3 @@ def correction_moment(
     """
     real, imaginary = (np.asarray(m, dtype=np.float64) for m in (real_mass, imaginary_mass))
     return np.asarray(moment_per_mass * (real + 1j * imaginary), dtype=np.complex128)
-
-
-def residual_vibration(
-    *, initial_vibration: npt.ArrayLike, influence: complex, moment: npt.ArrayLike
-) -> ComplexArray:
-    """Vibration after a balancing operation, V_1 = V_0 + K U.
-
-    Source: Eq. 23.
-    """
-    v0, u = (np.asarray(v, dtype=np.complex128) for v in (initial_vibration, moment))
-    return np.asarray(v0 + influence * u, dtype=np.complex128)

@@ -18,6 +18,7 @@ from ringbalance.reports.numbers import (
     shown,
     with_unit,
 )
+from ringbalance.reports.pages.requirements import input_name
 from ringbalance.reports.section import Record, Table
 from ringbalance.reports.tables import FOLDER, is_long, table_file
 from ringbalance.reports.traces import traced
@@ -261,7 +262,7 @@ def case_view(case: Record) -> Record:
         "brief": _in_brief(case),
         "consequence": case.get("consequence") or "",
         "cause": case.get("cause") or "",
-        "rests_on": [f"{one['path']} ({one['origin']})" for one in case.get("rests_on") or []],
+        "rests_on": [f"{input_name(one['path'])} ({one['origin']})" for one in case.get("rests_on") or []],
         "facts": _facts(case),
         "equations": _equations(case),
         "rows": [

@@ -124,8 +124,19 @@ def test_no_flow_no_gain(scene: Scene, model: BalancerModel) -> None:
     record = find_consequences(weak, replace(model, name="calibrated"), paper=model, members=20)
     assert record.gains == ()
     assert record.retuned_proportional is None
-    assert len(record.notes) == 2
+    assert sum("drives no flow" in note for note in record.notes) == 2
     json.dumps(consequences_document(record), allow_nan=False)
+
+
+def test_what_the_loop_rests_on_and_nobody_gave_is_named(scene: Scene, model: BalancerModel) -> None:
+    given = ("tube.length", "tube.hump_radius", "rotor.influence_coefficient")
+    mixed: tuple[tuple[str, Any], ...] = (("tube.bore", "assumed"), *((path, "given") for path in given))
+    for origins, told in ((mixed, ["tube.bore (assumed)"]), ((), [])):
+        asked = replace(scene, origins=origins, run=replace(scene.run, time_limit=1.0))
+        notes = find_consequences(asked, replace(model, name="calibrated"), paper=model, members=20).notes
+        named = [note for note in notes if "nobody gave" in note]
+        assert len(named) == len(told)
+        assert all(path in note for path, note in zip(told, named, strict=True))
 
 
 def test_a_law_that_no_ensemble_can_follow_is_noted(

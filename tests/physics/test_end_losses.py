@@ -8,7 +8,8 @@ from importlib import resources
 
 import numpy as np
 import pytest
-from end_losses_table import EndSettings, run_path
+from end_losses_table import EndSettings, end_loss_times_reynolds, run_path
+from flow_at_points import probe
 from fluids.fittings import entrance_sharp, exit_normal
 from hypothesis import given
 from hypothesis import strategies as st
@@ -18,9 +19,7 @@ from ringbalance.physics.tube.end_losses_table import end_table, laminar_entranc
 from ringbalance.verification.navier_stokes.end_losses import (
     End,
     EndMesh,
-    end_loss_times_reynolds,
     end_system,
-    entry_length,
     solve_end,
 )
 from ringbalance.verification.navier_stokes.newton import FlowSolution, FlowSystem
@@ -57,6 +56,18 @@ def test_creeping_flow_is_reversible_and_near_the_orifice() -> None:
 def test_developed_flow_does_not_care_where_the_pressure_is_taken() -> None:
     flow = _creeping("entrance")
     assert _loss("entrance", flow, 0.3) == pytest.approx(_loss("entrance", flow, 0.9), rel=1e-6)
+
+
+def entry_length(*, system: FlowSystem, solution: FlowSolution, cells: EndMesh, share: float = 0.99) -> float:
+    """Way over the bore on which the velocity on the axis reaches a share of 2 U; the last crossing."""
+    x = np.geomspace(1e-2, 0.95 * cells.tube, 1500)
+    axis = probe(system=system, solution=solution, points=np.stack([x, np.zeros_like(x)]))[0]
+    below = np.flatnonzero(axis < 2 * share)
+    if below.size == 0:
+        return float(x[0])
+    last = min(int(below[-1]), x.size - 2)
+    rise = (2 * share - axis[last]) / (axis[last + 1] - axis[last])
+    return float(x[last] + rise * (x[last + 1] - x[last]))
 
 
 def test_entrance_loss_and_entry_length_at_reynolds_60() -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from flow_at_points import probe
 from published_flows import (
     FieldErrors,
     cavity_flow,
@@ -40,7 +41,6 @@ from ringbalance.verification.navier_stokes.system import (
     linear_entries,
     linear_product,
 )
-from ringbalance.verification.navier_stokes.transfer import probe
 
 DATA = Path(__file__).parent / "data"
 

@@ -10,6 +10,7 @@ from rich.console import Console
 
 import ringbalance as rb
 from ringbalance.mesh.geometry import surface_radius
+from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.chamber.row_status import REMEDIES, RowStatus, row_status
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.show import calibration_view
@@ -41,6 +42,19 @@ def test_a_crest_between_two_levels_limits_the_rows_above(table_1_scene: Scene) 
     assert RowStatus.OVER_CREST not in row_status(
         changed(table_1_scene, crest=None), fill_ratio=FILLS, closed=CLOSED
     )
+
+
+def test_gas_is_drawn_through_residual_liquid(table_1_scene: Scene) -> None:
+    states = row_status(table_1_scene, fill_ratio=FILLS, closed=CLOSED, residual=0.15)
+    assert states == (*[RowStatus.GAS_DRAWN] * 2, *[RowStatus.OK] * 4)
+
+
+def test_velocities_of_residual_liquid_are_marked(table_1_calibration: Calibration) -> None:
+    rest = table_1_calibration.residual.fill_ratio
+    law = calibration_document(table_1_calibration)["law"]
+    marked = [x for x, s in zip(law["fill_ratio"], law["column_status"], strict=True) if s == "gas_drawn"]
+    assert marked == [x for x in law["fill_ratio"] if x < rest]
+    assert 0.0 in marked
 
 
 def test_an_open_ring_comes_first(table_1_scene: Scene) -> None:

@@ -7,7 +7,6 @@ from typing import Any
 from ringbalance.reports.summary import (
     CHECK_VERDICTS,
     CLAIM_VERDICTS,
-    assumed_inputs,
     checks,
     claims,
     common_causes,
@@ -67,4 +66,3 @@ def test_claims_are_grouped_by_what_they_have_in_common() -> None:
     assert (first["cause"], first["numbers"]) == ("plates left out", [3, 4])
     assert first["verdicts"] == ["confirmed with correction", "refuted"]
     assert second["numbers"] == [2]
-    assert assumed_inputs(cases) == {"disc.plate_thickness": [1, 3]}

@@ -12,11 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ringbalance.controller.compilation.compiled import compiled
-from ringbalance.controller.eccentric_mass.strategy.lqr_law import (
-    DriveLaw,
-    friction_torque,
-    regulator_torque,
-)
+from ringbalance.controller.eccentric_mass.strategy.lqr_law import friction_torque, regulator_torque
+from ringbalance.controller.eccentric_mass.strategy.records import DriveLaw
 from ringbalance.controller.eccentric_mass.strategy.settings import drive_law
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.eccentric_models import EccentricScene

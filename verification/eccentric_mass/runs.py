@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,8 @@ from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.verification.eccentric_mass.imbalance import convergence_time
-from ringbalance.verification.eccentric_mass.scenes import RPM, at_constant_speed, changed
+from ringbalance.verification.eccentric_mass.scenes import RPM, at_constant_speed, changed, envelope, thinned
+from ringbalance.verification.evidence import Curve, Series, figure
 
 PAPER_ARMS = (0.01, 0.005)
 """Of Fig. 5, m."""
@@ -54,6 +56,11 @@ class BalancingFigure:
     after: tuple[float, ...]
     """Mean amplitude in the last second of the run, m."""
 
+    def amplitudes(self, *, until: float = math.inf) -> Series:
+        """Amplitude over time of every run."""
+        names = [f"imbalance at {phase:.0f} degrees" for phase in self.phases]
+        return amplitude_figure("amplitude", dict(zip(names, self.runs, strict=True)), until=until)
+
 
 @dataclass(frozen=True, kw_only=True)
 class FigureNine:
@@ -71,6 +78,19 @@ class FigureNine:
     """sqrt(K_B/m_r), which the paper prints as 135 rpm, rad/s."""
     steady_peak_speed: float
     """Of the largest steady whirl, rad/s."""
+
+
+def amplitude_figure(
+    name: str, runs: Mapping[str, EccentricRun], *, until: float = math.inf, beside: str = ""
+) -> Series:
+    """Amplitude over time of runs with the same samples, by curve name; `beside` is one to compare with."""
+    time = next(iter(runs.values())).time
+    shown = time <= until
+    curves = (
+        Curve(label, "m", envelope(run.amplitude[shown]), style="reference" if label == beside else "found")
+        for label, run in runs.items()
+    )
+    return figure(name, ("time", "s", thinned(time[shown])), *curves)
 
 
 def figure_five(scene: EccentricScene, *, time_limit: float = 12.0) -> FigureFive:

@@ -34,12 +34,8 @@ from ringbalance.verification.navier_stokes.newton import (
     solve_flow,
 )
 from ringbalance.verification.navier_stokes.space import taylor_hood
-from ringbalance.verification.navier_stokes.transfer import probe
 
 End = Literal["entrance", "exit"]
-
-DEVELOPED_SLOPE = 32.0
-"""-dp/dx of developed flow, over mu U/d^2."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,35 +131,3 @@ def solve_end(
     """
     c = Coefficients(inertia=reynolds, viscosity=1.0)
     return solve_flow(system=system, coefficients=c, start=start, settings=settings)
-
-
-def end_loss_times_reynolds(
-    *, system: FlowSystem, solution: FlowSolution, end: End, cells: EndMesh, share: float = 0.9
-) -> float:
-    """K Re of an end, from the pressure deep in the tube beyond developed friction.
-
-    K_ent Re = -2 (p + 32 x), K_exit Re = 2 (p - 32 |x|), p on the axis at |x| = share of the tube's length.
-    Args: `end`: "entrance" or "exit". `share`: where to take the pressure.
-    """
-    distance = share * cells.tube
-    at = distance if end == "entrance" else -distance
-    pressure = float(probe(system=system, solution=solution, points=[[at], [0.0]])[-1, 0])
-    if end == "entrance":
-        return -2 * (pressure + DEVELOPED_SLOPE * distance)
-    return 2 * (pressure - DEVELOPED_SLOPE * distance)
-
-
-def entry_length(*, system: FlowSystem, solution: FlowSolution, cells: EndMesh, share: float = 0.99) -> float:
-    """Length over the bore in which the velocity on the axis reaches a share of its developed value 2 U.
-
-    Args: `system`: from `end_system` for an entrance.
-    Returns: L/d, measured from the entrance; the last crossing counts.
-    """
-    x = np.geomspace(1e-2, 0.95 * cells.tube, 1500)
-    axis = probe(system=system, solution=solution, points=np.stack([x, np.zeros_like(x)]))[0]
-    below = np.flatnonzero(axis < 2 * share)
-    if below.size == 0:
-        return float(x[0])
-    last = min(int(below[-1]), x.size - 2)
-    rise = (2 * share - axis[last]) / (axis[last + 1] - axis[last])
-    return float(x[last] + rise * (x[last + 1] - x[last]))

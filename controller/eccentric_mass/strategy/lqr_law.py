@@ -8,56 +8,27 @@ to move.  Both come from the last sample, so that no voltage depends on itself.
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import Final
 
 from ringbalance.controller.compilation.compiled import compiled
-from ringbalance.controller.eccentric_mass.estimation.friction_filter import TrackModel
-from ringbalance.controller.eccentric_mass.estimation.imbalance_model import WhirlModel
-
-Pair = tuple[float, float]
+from ringbalance.controller.eccentric_mass.strategy.plan import RELEASED, Plan
+from ringbalance.controller.eccentric_mass.strategy.records import (
+    Beliefs,
+    DriveLaw,
+    Motion,
+    Pair,
+    Smoothed,
+    StrategySettings,
+)
+from ringbalance.controller.eccentric_mass.strategy.supervisor import FRICTION, IMBALANCE
+from ringbalance.controller.eccentric_mass.strategy.targets import wrapped
 
 BREAKS_AWAY: Final = 3.0
 """Standard deviations of a friction arm beyond its estimate with which a mass at rest is set going."""
 
 
-class DriveLaw(NamedTuple):
-    """What the law of the voltages knows of masses, drives and sensors."""
-
-    whirl: WhirlModel
-    track: TrackModel
-    mass_inertia: float
-    """J of one mass alone, kg m^2."""
-    torque_per_volt: float
-    """B_add, N m/V."""
-    maximum_voltage: float
-    """V; infinite for no limit."""
-    position_gain: float
-    rate_gain: float
-    breaks_away: bool
-    """Whether friction is compensated so that a mass at rest breaks away; else it is not compensated."""
-    slow: float
-    """Rate below which a mass counts as resting, rad/s."""
-    near: float
-    """Distance from its place within which a resting mass is left to friction, rad."""
-
-
-class Motion(NamedTuple):
-    """What the law sees of rotor and masses, in the rotor's frame."""
-
-    speed: float
-    """W, rad/s."""
-    speed_rate: float
-    """W', rad/s^2."""
-    position: complex
-    """z, m."""
-    velocity: complex
-    """z', m/s."""
-    angle: Pair
-    rate: Pair
-
-
 @compiled
-def rotor_load(law: DriveLaw, motion: Motion, imbalance: complex, wanted: Pair) -> Pair:
+def _rotor_load(law: DriveLaw, motion: Motion, imbalance: complex, wanted: Pair) -> Pair:
     """Torque that the rotor's motion and its speed rate ask of each mass's drive.
 
     b (c_i a_y - s_i a_x) + J W' with the rotor's absolute acceleration a along its axes, from
@@ -76,7 +47,7 @@ def rotor_load(law: DriveLaw, motion: Motion, imbalance: complex, wanted: Pair) 
 
 
 @compiled
-def steady_load(law: DriveLaw, motion: Motion) -> Pair:
+def _steady_load(law: DriveLaw, motion: Motion) -> Pair:
     """The same while the imbalance is not yet known, from a whirl without rotor-fixed acceleration.
 
     a = -W^2 z + 2 j W z' + j W' z.
@@ -137,3 +108,86 @@ def regulator_torque(law: DriveLaw, angle: float, rate: float, goal: float) -> f
 def voltage_for(law: DriveLaw, torque: float) -> float:
     """Voltage that gives a torque, as far as the supply allows. Returns: V."""
     return min(max(torque / law.torque_per_volt, -law.maximum_voltage), law.maximum_voltage)
+
+
+@compiled
+def motor_torques(
+    settings: StrategySettings, plan: Plan, beliefs: Beliefs, motion: Motion, smoothed: Smoothed
+) -> Pair:
+    """What the motors should give at standstill."""
+    law = settings.law
+    if plan.stage == FRICTION:
+        asked = _pair_torques(settings, motion)
+    else:
+        asked = (
+            regulator_torque(law, motion.angle[0], motion.rate[0], plan.goal[0]),
+            regulator_torque(law, motion.angle[1], motion.rate[1], plan.goal[1]),
+        )
+    if plan.stage <= IMBALANCE:
+        load = _steady_load(law, motion)
+        return asked[0] + load[0], asked[1] + load[1]
+    wanted = (
+        (asked[0] - law.track.damping * motion.rate[0]) / law.track.inertia,
+        (asked[1] - law.track.damping * motion.rate[1]) / law.track.inertia,
+    )
+    load = _rotor_load(law, motion, beliefs.imbalance, wanted)
+    if plan.hold == RELEASED:
+        return 0.0, 0.0
+    one = _friction_of(settings, plan, beliefs, motion, smoothed, 0)
+    two = _friction_of(settings, plan, beliefs, motion, smoothed, 1)
+    return asked[0] + load[0] + one, asked[1] + load[1] + two
+
+
+@compiled
+def _pair_torques(settings: StrategySettings, motion: Motion) -> Pair:
+    """The paper's speed control of each mass, and one of the 180 degrees between them."""
+    error = wrapped(motion.angle[1] - motion.angle[0] - math.pi)
+    told, per_volt = settings.friction, settings.law.torque_per_volt
+    first = told.speed_gain * (told.drive_speed - motion.rate[0]) + told.pair_gain * error
+    second = told.speed_gain * (told.drive_speed - motion.rate[1]) - told.pair_gain * error
+    return per_volt * first, per_volt * second
+
+
+@compiled
+def _friction_of(
+    settings: StrategySettings,
+    plan: Plan,
+    beliefs: Beliefs,
+    motion: Motion,
+    smoothed: Smoothed,
+    mass: int,
+) -> float:
+    known, distance = beliefs.friction[mass], plan.goal[mass] - smoothed.angle[mass]
+    deviation = math.sqrt(max(known.arm_variance, 0.0))
+    if plan.stage == FRICTION:
+        # The paper's law of the pair compensates nothing.
+        if settings.friction.pair_gain == 0:
+            return 0.0
+        # The arm is not yet known, and the masses are driven all the same.
+        distance, deviation = math.copysign(math.inf, settings.friction.drive_speed), 0.0
+    return friction_torque(settings.law, known.arm, deviation, motion.speed, motion.rate[mass], distance)
+
+
+@compiled
+def known_torques(law: DriveLaw, old: Pair, motion: Motion, imbalance: complex, voltage: Pair) -> Pair:
+    """The torques that the friction filter knows of, one sample more; accelerations are its own matter."""
+    load = _rotor_load(law, motion, imbalance, (0.0, 0.0))
+    return (
+        old[0] + law.torque_per_volt * voltage[0] - load[0],
+        old[1] + law.torque_per_volt * voltage[1] - load[1],
+    )
+
+
+@compiled
+def share_of_friction(
+    law: DriveLaw, motion: Motion, smoothed: Smoothed, imbalance: complex, arm: Pair
+) -> float:
+    """Largest share of what these friction arms hold at most that holding the masses takes."""
+    w, place, velocity = motion.speed, smoothed.position, smoothed.velocity
+    quiet = Motion(w, motion.speed_rate, place, velocity, smoothed.angle, (0.0, 0.0))
+    load = _rotor_load(law, quiet, imbalance, (0.0, 0.0))
+    share = 0.0
+    for i in range(2):
+        most = arm[i] * law.track.moment * w * w
+        share = max(share, abs(load[i]) / most if most > 0 else math.inf)
+    return share

@@ -194,16 +194,3 @@ def first_plan(goal: Pair, time: float) -> Plan:
 def setting_out(time: float) -> Progress:
     """Progress at the beginning of a move. Returns: Progress, with nothing arrived or averaged yet."""
     return Progress(time, NOT_YET, NOT_YET, 0.0j, 0)
-
-
-@compiled
-def enter(plan: Plan, stage: int, time: float, cause: int, goal: Pair) -> Plan:
-    """Begin a stage. Returns: The plan, with its tuning and findings."""
-    return Plan(stage, time, cause, goal, MOVING, setting_out(time), plan.tuning, plan.findings)
-
-
-@compiled
-def follow(plan: Plan, progress: Progress, findings: Findings) -> Plan:
-    """Stay in the stage."""
-    stage, entered, cause, goal, hold, _, tuning, _ = plan
-    return Plan(stage, entered, cause, goal, hold, progress, tuning, findings)

@@ -10,8 +10,11 @@ from ringbalance.controller.eccentric_mass.estimation.friction_filter import (
     TrackModel,
 )
 from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import ImbalanceEstimate
-from ringbalance.controller.eccentric_mass.estimation.imbalance_model import FilterMatrices, ProcessNoise
-from ringbalance.controller.eccentric_mass.strategy.lqr_law import DriveLaw
+from ringbalance.controller.eccentric_mass.estimation.imbalance_model import (
+    FilterMatrices,
+    ProcessNoise,
+    WhirlModel,
+)
 from ringbalance.controller.eccentric_mass.strategy.plan import Gates, Plan
 from ringbalance.scene.arrays import FloatArray
 
@@ -34,6 +37,42 @@ class EccentricMeasurement(NamedTuple):
     """Of the masses, rad, not wrapped."""
     rate: Pair
     """Of the masses, rad/s."""
+
+
+class DriveLaw(NamedTuple):
+    """What the law of the voltages knows of masses, drives and sensors."""
+
+    whirl: WhirlModel
+    track: TrackModel
+    mass_inertia: float
+    """J of one mass alone, kg m^2."""
+    torque_per_volt: float
+    """B_add, N m/V."""
+    maximum_voltage: float
+    """V; infinite for no limit."""
+    position_gain: float
+    rate_gain: float
+    breaks_away: bool
+    """Whether friction is compensated so that a mass at rest breaks away; else it is not compensated."""
+    slow: float
+    """Rate below which a mass counts as resting, rad/s."""
+    near: float
+    """Distance from its place within which a resting mass is left to friction, rad."""
+
+
+class Motion(NamedTuple):
+    """What the law sees of rotor and masses, in the rotor's frame."""
+
+    speed: float
+    """W, rad/s."""
+    speed_rate: float
+    """W', rad/s^2."""
+    position: complex
+    """z, m."""
+    velocity: complex
+    """z', m/s."""
+    angle: Pair
+    rate: Pair
 
 
 class ImbalanceSettings(NamedTuple):

@@ -30,18 +30,17 @@ from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import (
 )
 from ringbalance.controller.eccentric_mass.estimation.imbalance_model import FilterMatrices, filter_matrices
 from ringbalance.controller.eccentric_mass.strategy.lqr_law import (
-    DriveLaw,
-    Motion,
-    friction_torque,
-    regulator_torque,
-    rotor_load,
-    steady_load,
+    known_torques,
+    motor_torques,
+    share_of_friction,
     voltage_for,
 )
-from ringbalance.controller.eccentric_mass.strategy.plan import RELEASED, Facts, Plan, first_plan
+from ringbalance.controller.eccentric_mass.strategy.plan import Facts, Plan, first_plan
 from ringbalance.controller.eccentric_mass.strategy.records import (
     Beliefs,
+    DriveLaw,
     EccentricMeasurement,
+    Motion,
     Pair,
     Smoothed,
     StrategySettings,
@@ -56,7 +55,6 @@ from ringbalance.controller.eccentric_mass.strategy.supervisor import (
     REST,
     supervise,
 )
-from ringbalance.controller.eccentric_mass.strategy.targets import wrapped
 from ringbalance.scene.arrays import FloatArray
 
 LARGEST_TURN: Final = 0.05
@@ -102,11 +100,11 @@ def strategy_step(
         torque, rate = (0.0, 0.0), motion.rate
     facts = _facts(settings.law, old, beliefs, motion, smoothed, visible and whirl.running, measurement.time)
     plan = supervise(settings.gates, old, facts)
-    asked = _torques(settings, plan, beliefs, motion, smoothed)
+    asked = motor_torques(settings, plan, beliefs, motion, smoothed)
     if count % settings.voltage_every == 0:
         voltage = (voltage_for(settings.law, asked[0]), voltage_for(settings.law, asked[1]))
     if plan.stage == FRICTION:
-        torque = _known(settings.law, torque, motion, beliefs.imbalance, voltage)
+        torque = known_torques(settings.law, torque, motion, beliefs.imbalance, voltage)
     return StrategyState(count + 1, plan, smoothed, whirl, beliefs, torque, rate, voltage), voltage
 
 
@@ -250,16 +248,6 @@ def _one_friction(
 
 
 @compiled
-def _known(law: DriveLaw, old: Pair, motion: Motion, imbalance: complex, voltage: Pair) -> Pair:
-    """The torques that the friction filter knows of, one sample more; accelerations are its own matter."""
-    load = rotor_load(law, motion, imbalance, (0.0, 0.0))
-    return (
-        old[0] + law.torque_per_volt * voltage[0] - load[0],
-        old[1] + law.torque_per_volt * voltage[1] - load[1],
-    )
-
-
-@compiled
 def _facts(
     law: DriveLaw,
     plan: Plan,
@@ -276,7 +264,7 @@ def _facts(
     load = 0.0
     if plan.stage == CHECK or plan.stage == REST or plan.stage == FAILED:
         sure = (max(one.arm - 2 * deviation[0], 0.0), max(two.arm - 2 * deviation[1], 0.0))
-        load = _share_of_friction(law, motion, smoothed, beliefs.imbalance, sure)
+        load = share_of_friction(law, motion, smoothed, beliefs.imbalance, sure)
     return Facts(
         time,
         w,
@@ -292,76 +280,3 @@ def _facts(
         deviation,
         load,
     )
-
-
-@compiled
-def _share_of_friction(
-    law: DriveLaw, motion: Motion, smoothed: Smoothed, imbalance: complex, arm: Pair
-) -> float:
-    """Largest share of what these friction arms hold at most that holding the masses takes."""
-    w, place, velocity = motion.speed, smoothed.position, smoothed.velocity
-    quiet = Motion(w, motion.speed_rate, place, velocity, smoothed.angle, (0.0, 0.0))
-    load = rotor_load(law, quiet, imbalance, (0.0, 0.0))
-    share = 0.0
-    for i in range(2):
-        most = arm[i] * law.track.moment * w * w
-        share = max(share, abs(load[i]) / most if most > 0 else math.inf)
-    return share
-
-
-@compiled
-def _torques(
-    settings: StrategySettings, plan: Plan, beliefs: Beliefs, motion: Motion, smoothed: Smoothed
-) -> Pair:
-    """What the motors should give at standstill."""
-    law = settings.law
-    if plan.stage == FRICTION:
-        asked = _pair_torques(settings, motion)
-    else:
-        asked = (
-            regulator_torque(law, motion.angle[0], motion.rate[0], plan.goal[0]),
-            regulator_torque(law, motion.angle[1], motion.rate[1], plan.goal[1]),
-        )
-    if plan.stage <= IMBALANCE:
-        load = steady_load(law, motion)
-        return asked[0] + load[0], asked[1] + load[1]
-    wanted = (
-        (asked[0] - law.track.damping * motion.rate[0]) / law.track.inertia,
-        (asked[1] - law.track.damping * motion.rate[1]) / law.track.inertia,
-    )
-    load = rotor_load(law, motion, beliefs.imbalance, wanted)
-    if plan.hold == RELEASED:
-        return 0.0, 0.0
-    one = _friction_of(settings, plan, beliefs, motion, smoothed, 0)
-    two = _friction_of(settings, plan, beliefs, motion, smoothed, 1)
-    return asked[0] + load[0] + one, asked[1] + load[1] + two
-
-
-@compiled
-def _pair_torques(settings: StrategySettings, motion: Motion) -> Pair:
-    """The paper's speed control of each mass, and one of the 180 degrees between them."""
-    error = wrapped(motion.angle[1] - motion.angle[0] - math.pi)
-    told, per_volt = settings.friction, settings.law.torque_per_volt
-    first = told.speed_gain * (told.drive_speed - motion.rate[0]) + told.pair_gain * error
-    second = told.speed_gain * (told.drive_speed - motion.rate[1]) - told.pair_gain * error
-    return per_volt * first, per_volt * second
-
-
-@compiled
-def _friction_of(
-    settings: StrategySettings,
-    plan: Plan,
-    beliefs: Beliefs,
-    motion: Motion,
-    smoothed: Smoothed,
-    mass: int,
-) -> float:
-    known, distance = beliefs.friction[mass], plan.goal[mass] - smoothed.angle[mass]
-    deviation = math.sqrt(max(known.arm_variance, 0.0))
-    if plan.stage == FRICTION:
-        # The paper's law of the pair compensates nothing.
-        if settings.friction.pair_gain == 0:
-            return 0.0
-        # The arm is not yet known, and the masses are driven all the same.
-        distance, deviation = math.copysign(math.inf, settings.friction.drive_speed), 0.0
-    return friction_torque(settings.law, known.arm, deviation, motion.speed, motion.rate[mass], distance)

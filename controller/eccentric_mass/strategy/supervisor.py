@@ -23,11 +23,10 @@ from ringbalance.controller.eccentric_mass.strategy.plan import (
     Facts,
     Findings,
     Gates,
+    Pair,
     Plan,
     Progress,
     Stage,
-    enter,
-    follow,
     setting_out,
 )
 from ringbalance.controller.eccentric_mass.strategy.targets import assign, target_angles
@@ -52,7 +51,7 @@ def supervise(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     """
     if plan.stage == WAITING:
         begins = facts.time >= gates.start
-        return enter(plan, IMBALANCE, facts.time, NONE, plan.goal) if begins else plan
+        return _enter(plan, IMBALANCE, facts.time, NONE, plan.goal) if begins else plan
     if plan.stage == IMBALANCE:
         return _imbalance(gates, plan, facts)
     if plan.stage == FRICTION:
@@ -72,7 +71,7 @@ def _imbalance(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     known = facts.deviation <= gates.imbalance_gate * abs(facts.imbalance)
     settled = 2 * facts.deviation * facts.reach <= 0.1 * gates.limit
     if facts.visible and (known or settled) and facts.time - plan.entered >= gates.least_estimate:
-        return enter(plan, FRICTION, facts.time, NONE, facts.angle)
+        return _enter(plan, FRICTION, facts.time, NONE, facts.angle)
     if facts.time - plan.entered < gates.imbalance_time:
         return plan
     cause = IMBALANCE_UNCERTAIN
@@ -82,7 +81,7 @@ def _imbalance(gates: Gates, plan: Plan, facts: Facts) -> Plan:
         cause = SPEED_NOT_CONSTANT
     elif not facts.visible:
         cause = MASSES_MOVE
-    return enter(plan, FAILED, facts.time, cause, facts.angle)
+    return _enter(plan, FAILED, facts.time, cause, facts.angle)
 
 
 @compiled
@@ -103,7 +102,7 @@ def _friction(gates: Gates, plan: Plan, facts: Facts) -> Plan:
         return now
     stalled = now.findings.stalled > STALLED_SHARE * now.findings.driven
     cause = STALLED if stalled else FRICTION_UNCERTAIN
-    return enter(now, FAILED, facts.time, cause, facts.angle)
+    return _enter(now, FAILED, facts.time, cause, facts.angle)
 
 
 @compiled
@@ -112,9 +111,7 @@ def _watched(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     if facts.time - plan.entered < 0.5 * gates.least_drive:
         return plan
     slow = min(abs(facts.rate[0]), abs(facts.rate[1])) < gates.stall_rate
-    saturated, residual, objective, driven, stalled = plan.findings
-    found = Findings(saturated, residual, objective, driven + 1, stalled + (1 if slow else 0))
-    return follow(plan, plan.progress, found)
+    return _with_findings(plan, _with_stall(plan.findings, slow))
 
 
 @compiled
@@ -127,60 +124,62 @@ def _towards(gates: Gates, plan: Plan, facts: Facts) -> Plan:
         facts.angle[0] + travel.first + gates.target_error[0],
         facts.angle[1] + travel.second + gates.target_error[1],
     )
-    old = plan.findings
-    found = Findings(targets.saturated, targets.residual, old.objective, old.driven, old.stalled)
-    return enter(follow(plan, plan.progress, found), POSITIONING, facts.time, NONE, goal)
+    found = _with_targets(plan.findings, targets.saturated, targets.residual)
+    return _enter(_with_findings(plan, found), POSITIONING, facts.time, NONE, goal)
 
 
 @compiled
 def _positioning(gates: Gates, plan: Plan, facts: Facts) -> Plan:
-    now = _with_arrival(gates, plan, facts, gates.arrival_angle)
+    now = _arriving(gates, plan, facts, gates.arrival_angle)
     if _there(gates, now, facts):
-        return _averaging(enter(now, CHECK, facts.time, NONE, now.goal), facts.time + gates.wait)
+        found = _enter(now, CHECK, facts.time, NONE, now.goal)
+        return _with_progress(found, _averaging_from(found.progress, facts.time + gates.wait))
     late = facts.time - now.entered >= gates.positioning_time
-    return enter(now, FAILED, facts.time, NOT_ARRIVED, facts.angle) if late else now
+    return _enter(now, FAILED, facts.time, NOT_ARRIVED, facts.angle) if late else now
 
 
 @compiled
 def _check(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     if not facts.constant:
-        return enter(plan, REST, facts.time, SPEED_CHANGED, plan.goal)
-    now = _with_sample(_rest(gates, plan, facts), facts)
+        return _enter(plan, REST, facts.time, SPEED_CHANGED, plan.goal)
+    now = _sampled(_rest(gates, plan, facts), facts)
     if not _averaged(gates, now, facts):
         return now
     told = _judged(now, _mean(now))
     if told.findings.objective <= gates.limit:
-        return enter(told, REST, facts.time, BALANCED, now.goal)
+        return _enter(told, REST, facts.time, BALANCED, now.goal)
     if told.findings.saturated:
-        return enter(told, REST, facts.time, SATURATED, now.goal)
+        return _enter(told, REST, facts.time, SATURATED, now.goal)
     first = tuning_start(now.goal[0], now.goal[1], told.findings.objective, gates.tuning_step)
-    return _try(gates, enter(told, FINE_TUNING, facts.time, NONE, now.goal), first, facts)
+    return _try(gates, _enter(told, FINE_TUNING, facts.time, NONE, now.goal), first, facts)
 
 
 @compiled
 def _fine_tuning(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     if not facts.constant:
-        return enter(plan, REST, facts.time, SPEED_CHANGED, plan.tuning.base)
+        return _enter(plan, REST, facts.time, SPEED_CHANGED, plan.tuning.base)
     if facts.time - plan.entered >= gates.fine_tuning_time:
-        return enter(plan, REST, facts.time, TUNING_TIME, plan.tuning.base)
+        return _enter(plan, REST, facts.time, TUNING_TIME, plan.tuning.base)
     if plan.progress.averaging == NOT_YET:
         return _moving(gates, plan, facts)
-    now = _with_sample(plan, facts)
+    now = _sampled(plan, facts)
     if not _averaged(gates, now, facts):
         return now
     tuning = tuning_next(now.tuning, _mean(now), gates.margin, gates.tuning_stop)
     told = _judged(now, tuning.best)
     if tuning.best <= gates.limit:
-        return enter(told, REST, facts.time, BALANCED, tuning.base)
+        return _enter(told, REST, facts.time, BALANCED, tuning.base)
     return _try(gates, told, tuning, facts)
 
 
 @compiled
 def _moving(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     """A trial counts from where friction leaves the masses, even if not quite where they should be."""
-    now = _with_arrival(gates, plan, facts, max(0.1 * plan.tuning.step, gates.tuning_near))
+    now = _arriving(gates, plan, facts, max(0.1 * plan.tuning.step, gates.tuning_near))
     late = facts.time - now.progress.moving >= gates.move_time
-    return _averaging(now, facts.time + gates.wait) if late or _there(gates, now, facts) else now
+    if not late and not _there(gates, now, facts):
+        return now
+    return _with_progress(now, _averaging_from(now.progress, facts.time + gates.wait))
 
 
 @compiled
@@ -192,15 +191,14 @@ def _try(gates: Gates, plan: Plan, tuning: Tuning, facts: Facts) -> Plan:
         chosen = tuning_next(chosen, math.inf, gates.margin, gates.tuning_stop)
         place = tuning_place(chosen)
     if chosen.done:
-        return enter(plan, REST, facts.time, RESIDUAL, chosen.base)
-    stage, entered, cause = plan.stage, plan.entered, plan.cause
-    return Plan(stage, entered, cause, place, MOVING, setting_out(facts.time), chosen, plan.findings)
+        return _enter(plan, REST, facts.time, RESIDUAL, chosen.base)
+    return _with_trial(plan, facts.time, chosen, place)
 
 
 @compiled
 def _rest(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     """Bring the masses home; then the drives rest while friction holds for sure, or hold from then on."""
-    now = _with_arrival(gates, plan, facts, gates.tuning_near)
+    now = _arriving(gates, plan, facts, gates.tuning_near)
     hold = now.hold
     if hold == MOVING and (_there(gates, now, facts) or facts.time - now.progress.moving >= gates.move_time):
         hold = RELEASED
@@ -209,19 +207,17 @@ def _rest(gates: Gates, plan: Plan, facts: Facts) -> Plan:
         astray = astray or abs(facts.angle[i] - now.goal[i]) > 2 * gates.arrival_angle
     if hold == RELEASED and (astray or facts.load > HOLDS_FOR_SURE):
         hold = HELD
-    return Plan(now.stage, now.entered, now.cause, now.goal, hold, now.progress, now.tuning, now.findings)
+    return _with_hold(now, hold)
 
 
 @compiled
-def _with_arrival(gates: Gates, plan: Plan, facts: Facts, closeness: float) -> Plan:
+def _arriving(gates: Gates, plan: Plan, facts: Facts, closeness: float) -> Plan:
     there = True
     for i in range(2):
         close = abs(facts.angle[i] - plan.goal[i]) <= closeness
         there = there and close and abs(facts.rate[i]) <= gates.arrival_rate
-    moving, arrived, averaging, total, count = plan.progress
-    since = facts.time if arrived == NOT_YET else arrived
-    progress = Progress(moving, since if there else NOT_YET, averaging, total, count)
-    return follow(plan, progress, plan.findings)
+    since = facts.time if plan.progress.arrived == NOT_YET else plan.progress.arrived
+    return _with_progress(plan, _with_arrival(plan.progress, since if there else NOT_YET))
 
 
 @compiled
@@ -230,19 +226,11 @@ def _there(gates: Gates, plan: Plan, facts: Facts) -> bool:
 
 
 @compiled
-def _averaging(plan: Plan, begins: float) -> Plan:
-    moving, arrived, _, _, _ = plan.progress
-    return follow(plan, Progress(moving, arrived, begins, 0.0j, 0), plan.findings)
-
-
-@compiled
-def _with_sample(plan: Plan, facts: Facts) -> Plan:
+def _sampled(plan: Plan, facts: Facts) -> Plan:
     """The mean is of the rotor-fixed vector: noise averages out of it, but not out of amplitudes."""
-    moving, arrived, averaging, total, count = plan.progress
-    if facts.time < averaging:
+    if facts.time < plan.progress.averaging:
         return plan
-    more = Progress(moving, arrived, averaging, total + facts.position, count + 1)
-    return follow(plan, more, plan.findings)
+    return _with_progress(plan, _with_sample(plan.progress, facts.position))
 
 
 @compiled
@@ -257,5 +245,81 @@ def _mean(plan: Plan) -> float:
 
 @compiled
 def _judged(plan: Plan, objective: float) -> Plan:
-    saturated, residual, _, driven, stalled = plan.findings
-    return follow(plan, plan.progress, Findings(saturated, residual, objective, driven, stalled))
+    return _with_findings(plan, _with_objective(plan.findings, objective))
+
+
+# Numba builds tuples by position alone: each is rebuilt here and nowhere else.
+
+
+@compiled
+def _enter(plan: Plan, stage: int, time: float, cause: int, goal: Pair) -> Plan:
+    """Begin a stage. Returns: The plan, with its tuning and findings."""
+    return Plan(stage, time, cause, goal, MOVING, setting_out(time), plan.tuning, plan.findings)
+
+
+@compiled
+def _with_progress(plan: Plan, progress: Progress) -> Plan:
+    """The plan, farther on in its move or its mean."""
+    return Plan(
+        plan.stage, plan.entered, plan.cause, plan.goal, plan.hold, progress, plan.tuning, plan.findings
+    )
+
+
+@compiled
+def _with_findings(plan: Plan, findings: Findings) -> Plan:
+    """The plan with what a stage leaves behind."""
+    return Plan(
+        plan.stage, plan.entered, plan.cause, plan.goal, plan.hold, plan.progress, plan.tuning, findings
+    )
+
+
+@compiled
+def _with_hold(plan: Plan, hold: int) -> Plan:
+    """The plan with its drives moving, released or holding."""
+    return Plan(
+        plan.stage, plan.entered, plan.cause, plan.goal, hold, plan.progress, plan.tuning, plan.findings
+    )
+
+
+@compiled
+def _with_trial(plan: Plan, time: float, tuning: Tuning, goal: Pair) -> Plan:
+    """The plan that sets out to a trial of fine tuning."""
+    return Plan(plan.stage, plan.entered, plan.cause, goal, MOVING, setting_out(time), tuning, plan.findings)
+
+
+@compiled
+def _averaging_from(progress: Progress, begins: float) -> Progress:
+    """Progress that begins its mean at a time, s."""
+    return Progress(progress.moving, progress.arrived, begins, 0.0j, 0)
+
+
+@compiled
+def _with_arrival(progress: Progress, arrived: float) -> Progress:
+    """Progress with the time of arrival, s; NOT_YET."""
+    return Progress(progress.moving, arrived, progress.averaging, progress.total, progress.samples)
+
+
+@compiled
+def _with_sample(progress: Progress, position: complex) -> Progress:
+    """Progress with one sample more in its mean."""
+    total, samples = progress.total + position, progress.samples + 1
+    return Progress(progress.moving, progress.arrived, progress.averaging, total, samples)
+
+
+@compiled
+def _with_stall(findings: Findings, stalled: bool) -> Findings:
+    """Findings with one sample more of the friction stage."""
+    more = findings.stalled + (1 if stalled else 0)
+    return Findings(findings.saturated, findings.residual, findings.objective, findings.driven + 1, more)
+
+
+@compiled
+def _with_targets(findings: Findings, saturated: bool, residual: float) -> Findings:
+    """Findings with what the targets leave, kg m."""
+    return Findings(saturated, residual, findings.objective, findings.driven, findings.stalled)
+
+
+@compiled
+def _with_objective(findings: Findings, objective: float) -> Findings:
+    """Findings with the mean amplitude at the present place, m."""
+    return Findings(findings.saturated, findings.residual, objective, findings.driven, findings.stalled)

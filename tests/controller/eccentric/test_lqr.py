@@ -12,7 +12,7 @@ from ringbalance.controller.eccentric_mass.estimation.friction_filter import Tra
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
 from ringbalance.controller.eccentric_mass.remedies import found_beforehand
 from ringbalance.controller.eccentric_mass.sampled_loops import GAIN_MARGIN, recommended_gains
-from ringbalance.controller.eccentric_mass.strategy.lqr import lqr_gain
+from ringbalance.controller.eccentric_mass.strategy.settings import lqr_gain
 from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.verification.eccentric_mass.scenes import changed

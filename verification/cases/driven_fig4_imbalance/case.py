@@ -7,9 +7,9 @@ import numpy as np
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.verification.eccentric_mass.imbalance import FigureFour, figure_four
 from ringbalance.verification.eccentric_mass.scenes import thinned
-from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series
+from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
 
-PRINTED = 3.5
+_PRINTED = 3.5
 """Middle of the printed 3 to 4 s."""
 
 
@@ -37,10 +37,10 @@ def compute(scene: EccentricScene, level: Level, defect: str | None = None) -> E
     if defect is not None:
         judged["honest"] = _within(found, float(found.scaled_time[-1]))
     reached = np.isfinite(found.scaled_time)
-    scale = np.exp(np.interp(PRINTED, found.scaled_time[reached], np.log(found.scales[reached])))
+    scale = np.exp(np.interp(_PRINTED, found.scaled_time[reached], np.log(found.scales[reached])))
     return Evidence(
         found={name: Found(value=value) for name, value in judged.items()},
-        numbers={"printed": PRINTED, "scale": float(scale)},
+        numbers={"printed": _PRINTED, "scale": float(scale)},
         series=(_estimates(found), _times(found)),
     )
 
@@ -50,24 +50,20 @@ def _estimates(found: FigureFour) -> Series:
     error = np.linalg.norm(found.estimate - found.true[:, None, :], axis=2)
     size = np.linalg.norm(found.true, axis=1)
     shown = found.time <= 0.5
-    return Series(
-        name="error of the estimate over the imbalance, honest covariances",
-        x=Axis(name="time", unit="s", values=thinned(found.time[shown])),
-        y=tuple(
-            Curve(name=f"{phase:.0f} degrees", unit="1", values=thinned(row[shown] / one))
-            for phase, row, one in zip(found.phases, error, size, strict=True)
-        ),
+    curves = (
+        Curve(f"{phase:.0f} degrees", "1", thinned(row[shown] / one))
+        for phase, row, one in zip(found.phases, error, size, strict=True)
     )
+    name = "error of the estimate over the imbalance, honest covariances"
+    return figure(name, ("time", "s", thinned(found.time[shown])), *curves)
 
 
 def _times(found: FigureFour) -> Series:
     reached = np.isfinite(found.scaled_time)
-    return Series(
-        name="time to be within 2 % over the noise that the filter assumes",
-        x=Axis(name="assumed over true noise", unit="1", values=found.scales[reached]),
-        y=(
-            Curve(name="found", unit="s", values=found.scaled_time[reached]),
-            Curve(name="printed", unit="s", values=np.full(int(reached.sum()), PRINTED), style="paper"),
-        ),
+    return figure(
+        "time to be within 2 % over the noise that the filter assumes",
+        ("assumed over true noise", "1", found.scales[reached]),
+        Curve("found", "s", found.scaled_time[reached]),
+        Curve("printed", "s", np.full(int(reached.sum()), _PRINTED), style="paper"),
         log=True,
     )

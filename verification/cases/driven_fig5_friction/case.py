@@ -7,7 +7,7 @@ import numpy as np
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.verification.eccentric_mass.runs import FigureFive, figure_five
 from ringbalance.verification.eccentric_mass.scenes import thinned
-from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series
+from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
 
 _BEFORE, _AFTER = 0.1, 0.6
 """Shown around the beginning of the friction stage, s."""
@@ -29,21 +29,14 @@ def _figure(found: FigureFive) -> Series:
     begun = next(s.start for s in found.runs[0].stages if s.name == "friction estimation")
     time = found.runs[0].time - begun
     shown = (time > -_BEFORE) & (time < _AFTER)
+    pairs = list(zip(found.runs, found.arms, strict=True))
     curves = [
-        Curve(
-            name=f"{1e3 * arm:g} mm, first mass",
-            unit="m",
-            values=thinned(run.estimates.friction_arm[shown, 0]),
-        )
-        for run, arm in zip(found.runs, found.arms, strict=True)
+        Curve(f"{1e3 * arm:g} mm, first mass", "m", thinned(run.estimates.friction_arm[shown, 0]))
+        for run, arm in pairs
     ]
     count = curves[0].values.size
     true = [
-        Curve(name=f"{1e3 * arm:g} mm, printed", unit="m", values=np.full(count, arm), style="reference")
-        for arm in found.arms
+        Curve(f"{1e3 * arm:g} mm, printed", "m", np.full(count, arm), style="reference") for _, arm in pairs
     ]
-    return Series(
-        name="friction arm, estimated",
-        x=Axis(name="time since the masses started", unit="s", values=thinned(time[shown])),
-        y=(*curves, *true),
-    )
+    when = ("time since the masses started", "s", thinned(time[shown]))
+    return figure("friction arm, estimated", when, *curves, *true)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.verification.eccentric_mass.effort import FigureSix, figure_six
-from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series
+from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
 
 _STEP = {"light": 4e-4, "heavy": 1e-4}
 """s, of the integration; the effort hangs on it by a thousandth."""
@@ -30,13 +30,11 @@ def compute(scene: EccentricScene, level: Level, defect: str | None = None) -> E
 def _figure(found: FigureSix) -> Series:
     """The first mass ratio at the third weight, near the paper's own choice."""
     at = (0, 2)
-    return Series(
-        name="effort of one move over the speed",
-        x=Axis(name="speed over natural frequency", unit="1", values=found.speed_ratios),
-        y=(
-            Curve(name="compensated exactly", unit="N m s", values=found.exact[at]),
-            Curve(name="arm assumed a fifth too small", unit="N m s", values=found.short[at]),
-            Curve(name="not compensated", unit="N m s", values=found.without[at]),
-            Curve(name="as printed", unit="N m s", values=found.printed[at], style="paper"),
-        ),
+    return figure(
+        "effort of one move over the speed",
+        ("speed over natural frequency", "1", found.speed_ratios),
+        Curve("compensated exactly", "N m s", found.exact[at]),
+        Curve("arm assumed a fifth too small", "N m s", found.short[at]),
+        Curve("not compensated", "N m s", found.without[at]),
+        Curve("as printed", "N m s", found.printed[at], style="paper"),
     )

@@ -6,8 +6,8 @@ import numpy as np
 
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.verification.eccentric_mass.runs import BalancingFigure, figure_eight, figure_seven
-from ringbalance.verification.eccentric_mass.scenes import envelope, thinned
-from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series
+from ringbalance.verification.eccentric_mass.scenes import thinned
+from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
 
 _SHOWN = 12.0
 """s."""
@@ -26,30 +26,16 @@ def compute(scene: EccentricScene, level: Level, defect: str | None = None) -> E
             "second": found.positioned[1],
             "arrived": max(arrived),
         },
-        series=(_amplitudes(found), _angles(found)),
-    )
-
-
-def _amplitudes(found: BalancingFigure) -> Series:
-    shown = found.runs[0].time <= _SHOWN
-    return Series(
-        name="amplitude",
-        x=Axis(name="time", unit="s", values=thinned(found.runs[0].time[shown])),
-        y=tuple(
-            Curve(name=f"imbalance at {phase:.0f} degrees", unit="m", values=envelope(run.amplitude[shown]))
-            for phase, run in zip(found.phases, found.runs, strict=True)
-        ),
+        series=(found.amplitudes(until=_SHOWN), _angles(found)),
     )
 
 
 def _angles(found: BalancingFigure) -> Series:
     run = found.runs[0]
     shown = run.time <= _SHOWN
-    return Series(
-        name=f"angles of the masses, imbalance at {found.phases[0]:.0f} degrees",
-        x=Axis(name="time", unit="s", values=thinned(run.time[shown])),
-        y=tuple(
-            Curve(name=f"mass {index + 1}", unit="rad", values=thinned(angle[shown]))
-            for index, angle in enumerate(run.mass_angle)
-        ),
+    angles = zip(("mass 1", "mass 2"), run.mass_angle, strict=True)
+    return figure(
+        f"angles of the masses, imbalance at {found.phases[0]:.0f} degrees",
+        ("time", "s", thinned(run.time[shown])),
+        *(Curve(name, "rad", thinned(angle[shown])) for name, angle in angles),
     )

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ringbalance.scene.eccentric_models import EccentricScene
-from ringbalance.verification.eccentric_mass.runs import BalancingFigure, figure_eight
-from ringbalance.verification.eccentric_mass.scenes import envelope, thinned
-from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Series
+from ringbalance.verification.eccentric_mass.runs import figure_eight
+from ringbalance.verification.evidence import Evidence, Found, Level
 
 _TIME = {None: 200.0, "tuning_given_up": 25.0}
 """s."""
@@ -22,16 +21,5 @@ def compute(scene: EccentricScene, level: Level, defect: str | None = None) -> E
     return Evidence(
         found={"left": Found(value=float(left.min())), "ended": Found(value=float(ended.max()))},
         numbers={"left_m": min(found.positioned), "end": max(found.after), "time": float(max(settled))},
-        series=(_amplitudes(found),),
-    )
-
-
-def _amplitudes(found: BalancingFigure) -> Series:
-    return Series(
-        name="amplitude",
-        x=Axis(name="time", unit="s", values=thinned(found.runs[0].time)),
-        y=tuple(
-            Curve(name=f"imbalance at {phase:.0f} degrees", unit="m", values=envelope(run.amplitude))
-            for phase, run in zip(found.phases, found.runs, strict=True)
-        ),
+        series=(found.amplitudes(),),
     )

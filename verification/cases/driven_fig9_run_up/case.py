@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from ringbalance.scene.eccentric_models import EccentricScene
-from ringbalance.verification.eccentric_mass.runs import FigureNine, figure_nine
-from ringbalance.verification.eccentric_mass.scenes import envelope, thinned
-from ringbalance.verification.evidence import Axis, Curve, Evidence, Found, Level, Reference, Series
+from ringbalance.verification.comparison import from_rounding
+from ringbalance.verification.eccentric_mass.runs import amplitude_figure, figure_nine
+from ringbalance.verification.evidence import Evidence, Found, Level, Reference
 
 _RPM = 30 / np.pi
 _PRINTED = 135.0
-_ROUNDED = 0.5 / np.sqrt(3)
 
 
-def reference(scene: EccentricScene) -> Mapping[str, Reference]:
-    """The printed critical speed."""
-    return {"critical": Reference(value=_PRINTED, uncertainty=_ROUNDED)}
+reference = {"critical": Reference(value=_PRINTED, uncertainty=from_rounding(1.0))}
 
 
 def compute(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
@@ -37,16 +32,11 @@ def compute(scene: EccentricScene, level: Level, defect: str | None = None) -> E
             "peak_speed": _RPM * found.locked_peak[1],
             "without": without,
         },
-        series=(_figure(found),),
-    )
-
-
-def _figure(found: FigureNine) -> Series:
-    return Series(
-        name="amplitude during the run-up",
-        x=Axis(name="time", unit="s", values=thinned(found.locked.time)),
-        y=(
-            Curve(name="locked", unit="m", values=envelope(found.locked.amplitude), style="reference"),
-            Curve(name="balanced at 100 rpm", unit="m", values=envelope(found.balanced.amplitude)),
+        series=(
+            amplitude_figure(
+                "amplitude during the run-up",
+                {"locked": found.locked, "balanced at 100 rpm": found.balanced},
+                beside="locked",
+            ),
         ),
     )

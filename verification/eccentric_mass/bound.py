@@ -13,7 +13,7 @@ from typing import NamedTuple
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 
 
-class MotionBound(NamedTuple):
+class _MotionBound(NamedTuple):
     """Bounds on the rotor's motion in the fixed frame, for masses that move within given rates."""
 
     force: float
@@ -26,7 +26,7 @@ class MotionBound(NamedTuple):
 
 def motion_bound(
     parameters: PlantParameters, *, speed: float, rate: float, acceleration: float = 0.0
-) -> MotionBound:
+) -> _MotionBound:
     """Bound the rotor's motion for masses that move with at most a given rate and acceleration.
 
     M Z'' + C_B Z' + K_B Z = F with |F| <= Y = U W^2 + 2 b (W + w)^2 + 2 b w', so |Z| <= Y int |h| dt, where
@@ -42,4 +42,4 @@ def motion_bound(
     force = parameters.unbalance * w**2 + 2 * b * ((w + rate) ** 2 + acceleration)
     printed = parameters.unbalance * w**2 + 2 * b * (rate**2 + acceleration + 2 * w * rate)
     amplitude = force / parameters.stiffness / math.tanh(math.pi * ratio / (2 * root))
-    return MotionBound(force, printed, amplitude)
+    return _MotionBound(force, printed, amplitude)

@@ -113,7 +113,7 @@ def _values(code: CaseCode, level: Level, defect: str | None, scene: Any) -> Map
 
 
 def _broken_down(definition: CaseDefinition) -> Verdict:
-    return Verdict.INCONCLUSIVE if definition.kind == "claim" else Verdict.FAILED
+    return Verdict.INCONCLUSIVE if definition.kind in ("claim", "validation") else Verdict.FAILED
 
 
 def _outcome(

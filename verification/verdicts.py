@@ -120,7 +120,11 @@ def _by_bound(kind: Kind, metric: Metric, found: Found, comparison: Comparison) 
     low, high = found.reach
     uncertain = found.numerical > 0 or found.input > 0 or low < 0 or high > 0
     half_width = comparison.half_width
-    if kind == "claim" and uncertain and low - half_width <= -comparison.error <= high + half_width:
+    if (
+        kind in ("claim", "validation")
+        and uncertain
+        and low - half_width <= -comparison.error <= high + half_width
+    ):
         return Verdict.INCONCLUSIVE
     holds = comparison.error <= 0 if metric == "at_most" else comparison.error >= 0
     if kind == "claim" and not holds and found.corrected is not None:

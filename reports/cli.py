@@ -22,6 +22,8 @@ from ringbalance.reports.summary import lead_sentence
 from ringbalance.reports.traces import untraced
 from ringbalance.scene import liquid_ring_scene, load_scene, read_scene
 from ringbalance.scene.accuracy import Models, with_tolerance
+from ringbalance.scene.eccentric_models import EccentricScene
+from ringbalance.scene.faults import option_error
 from ringbalance.scene.platform.files import staged
 from ringbalance.scene.platform.progress import activity
 from ringbalance.scene.platform.terminal import messages_console
@@ -38,6 +40,7 @@ def report(
     level: Level = "light",
     tolerance: str | None = None,
     models: Models | None = None,
+    interactive: bool = False,
 ) -> int:
     """Verify, calibrate, simulate and draw: everything, into a report and its annex.
 
@@ -47,6 +50,7 @@ def report(
         level: "heavy" also runs the cases that take long.
         tolerance: in place of the scene's, such as "0.5 %" or 0.005.
         models: "finest" models every term that has a model, whatever the tolerance.
+        interactive: also write view.html, in which the liquid and the tube can be turned.
 
     Returns:
         Exit code: 0; 1 when a code-verification case failed, or the loop settled under neither law; the
@@ -57,6 +61,9 @@ def report(
         OSError: the folder cannot be written.
     """
     told, text = read_scene(scene)
+    if interactive and isinstance(told, EccentricScene):
+        problem = "a scene of eccentric masses holds no liquid"
+        raise option_error(option="--interactive", value=True, problem=problem, allowed="to leave it out")
     console = messages_console()
     with activity("report", "reading") as shown:
         finished = write_report(
@@ -66,6 +73,7 @@ def report(
             scene_text=text,
             workers=min(MOST_WORKERS, os.cpu_count() or 1),
             progress=shown.show,
+            interactive=interactive,
         )
     _summarise(console, finished)
     print(finished.page)

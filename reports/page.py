@@ -15,7 +15,7 @@ from PIL import Image
 
 from ringbalance.reports import summary
 from ringbalance.reports.equations import equation_svg, equations
-from ringbalance.reports.figures.chamber import moment, pressure_error, pressure_profile, transfer_lambda
+from ringbalance.reports.figures.chamber import moment, pressure_profile, transfer_lambda
 from ringbalance.reports.figures.loop import amplitude, early_amplitude, early_time, fill_ratios, regimes
 from ringbalance.reports.figures.style import Drawing
 from ringbalance.reports.figures.tube import drag, drag_terms, flow_laws
@@ -56,7 +56,6 @@ def _page_figures(evidence: Record) -> Record:
     calibration, paper, runs = evidence["calibration"], evidence["paper"], evidence["closed_loop"]
     return {
         "pressure_profile": pressure_profile(evidence["pressure"]["profile"]),
-        "pressure_error": pressure_error(calibration["chamber"]),
         "moment": moment(calibration["chamber"]),
         "transfer_lambda": transfer_lambda(calibration["chamber"], calibration["lambda"], paper),
         "drag": drag(calibration["tube"], evidence["operating_point"], paper),

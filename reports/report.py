@@ -23,6 +23,7 @@ from ringbalance.reports.pictures.process import (
     stop_drawing,
     write_fields,
 )
+from ringbalance.reports.pictures.view import VIEW, view_page
 from ringbalance.reports.render import render_pages
 from ringbalance.reports.saved import saved_cases
 from ringbalance.reports.section import Level, Record
@@ -67,10 +68,12 @@ def write_report(
     workers: int = 1,
     progress: Progress | None = None,
     opengl: OpenGL | None = None,
+    interactive: bool = False,
 ) -> Report:
     """Verify, calibrate, simulate and draw a scene into one folder.
 
-    Args: `scene_text`: the scene file's own text, for the appendix.
+    Args: `scene_text`: the scene file's own text, for the appendix. `interactive`: whether a liquid ring's
+    view.html is written, too.
     Raises: SceneError: a scene that cannot be calibrated or simulated; nothing is written.
     Raises: OSError: the folder cannot be written, or holds an evidence.json that is none; known before the
     work.
@@ -83,6 +86,8 @@ def write_report(
                 scene, level=level, scene_text=scene_text, workers=workers, progress=progress
             )
         else:
+            if interactive:
+                (stage / VIEW).write_text(view_page(scene), encoding="utf-8")
             with _pictures(scene, stage, opengl) as pictures:
                 evidence = collect_evidence(
                     scene, level=level, scene_text=scene_text, saved=saved, workers=workers, progress=progress

@@ -1,4 +1,4 @@
-"""Figures of the liquid at rest: pressure along the radius, error of Eq. 12, moment and lambda."""
+"""Figures of the liquid at rest: pressure along the radius, moment and lambda."""
 
 from __future__ import annotations
 
@@ -48,31 +48,6 @@ def pressure_profile(profile: Record) -> Drawing:
         alt=f"Pressure rises from the free surface to the outer wall: {found} found, {printed} by Eq. 12.",
         caption=f"Liquid pressure along the middle of a chamber at a fill ratio of {fill}. At the wall: "
         f"{found} by finite elements, {printed} by Eq. 12.",
-    )
-
-
-def pressure_error(chamber: Record) -> Drawing:
-    """Error of Eq. 12 over the fill ratio, with the finite elements' 95 % band."""
-    rows = np.asarray(chamber["wall_pressure_Pa"]) > 0
-    fill = np.asarray(chamber["fill_ratio"])[rows]
-    found = np.asarray(chamber["wall_pressure_Pa"])[rows]
-    band = 100 * np.asarray(chamber["wall_pressure_uncertainty"])[rows] / found
-    error = 100 * (np.asarray(chamber["wall_pressure_paper_Pa"])[rows] / found - 1)
-
-    def paint(axes: Axes) -> None:
-        axes.axhline(0, color=style.FOUND, linewidth=1.2, label="finite elements, 95 % band")
-        axes.fill_between(fill, -band, band, color=style.FOUND, alpha=0.25, linewidth=0)
-        axes.plot(fill, error, color=style.PAPER, marker="o", markersize=3, label="Eq. 12")
-
-    extremes = [percent(float(value) / 100, signed=True) for value in (error.min(), error.max())]
-    return draw(
-        x="fill ratio",
-        y="error of Eq. 12 in %",
-        name="pressure-error",
-        paint=paint,
-        alt=f"The error of Eq. 12 lies between {extremes[0]} and {extremes[1]} over the fill ratio.",
-        caption=f"Wall pressure by Eq. 12 against finite elements: between {extremes[0]} and {extremes[1]} "
-        "over the fill range. The band of the finite elements is as thin as the line.",
     )
 
 

@@ -13,6 +13,8 @@ from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import shown
 from ringbalance.reports.section import Record
 
+_MARKED: Final = 20
+"""Samples that are marked."""
 _LAWS: Final[dict[str, dict[str, Any]]] = {
     "calibrated": {"color": style.FOUND, "label": "the calibrated law"},
     "paper": {**style.AS_PAPER, "label": "the paper’s law"},
@@ -35,7 +37,8 @@ def early_time(runs: Record) -> float:
 
 def amplitude(runs: Record, limit: float) -> Drawing:
     """Vibration amplitude at the controller's samples, m, under the laws that were run."""
-    marks = {"linewidth": 1.2, "marker": "o", "markersize": 3}
+    # Samples at rest repeat one value: the first of them say enough.
+    marks = {"linewidth": 1.2, "marker": "o", "markersize": 3, "markevery": slice(0, _MARKED)}
     laws = {name: line for name, line in _LAWS.items() if name in runs}
 
     def curve(run: Record, line: dict[str, Any]) -> style.Curve:

@@ -88,7 +88,6 @@ def test_the_points_are_the_evidence(evidence: Record, drawings: dict[str, Drawi
 
 CHANGES: dict[str, tuple[Any, ...]] = {
     "drag": ("calibration", "tube", "k", 5),
-    "pressure-error": ("calibration", "chamber", "wall_pressure_paper_Pa", 5),
     "flow-law-0": ("flow_law", "velocity_m_s", 0, 5),
     "amplitude": ("closed_loop", "paper", "amplitude_m", 12),
     "order-manufactured-pressure": ("verification", 6, "convergence", 0, "error", 1),

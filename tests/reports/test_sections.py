@@ -20,6 +20,7 @@ from ringbalance.reports.pages import eccentric_scene
 from ringbalance.reports.pages import paper_figures as paper_again
 from ringbalance.reports.pages import siphon_crest as hump
 from ringbalance.reports.pages import tube_flow as inside
+from ringbalance.reports.pictures.view import VIEW
 from ringbalance.reports.render import render
 from ringbalance.reports.section import Section, Work
 from ringbalance.reports.sections import SECTIONS, drawings_in, viewed
@@ -36,6 +37,7 @@ def test_every_section_has_its_template_and_nothing_else_lies_there() -> None:
     assert present == {section.template for section in (*SECTIONS, *eccentric_scene.SECTIONS)} | {
         "report.html",
         "macros.html",
+        VIEW,
     }
 
 

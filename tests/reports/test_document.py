@@ -57,7 +57,7 @@ def test_provenance_names_neither_folder_nor_machine() -> None:
 
 
 def test_long_tables_become_files_with_every_row(evidence: Record) -> None:
-    table = {
+    table: Record = {
         "name": "Settled after, by period",
         "columns": {"period": [0.1 * i for i in range(LONG + 1)], "ending": ["settled"] * (LONG + 1)},
         "units": {"period": "s"},

@@ -24,6 +24,8 @@ help: ## list the targets
 env: ## make .venv from requirements/lock.txt and see to off-screen OpenGL; nothing to do when up to date
 	@sh tools/make_env.sh $(VENV) requirements/lock.txt
 	@sh tools/make_opengl.sh "$(CURDIR)/$(PYTHON_IN_VENV)"
+	@# Where Python may not write bytecode, the program would be compiled again at every start.
+	@$(PYTHON_IN_VENV) -m compileall -q ringbalance ringbalance/*/
 
 report: env ## the report on SCENE (the paper's disc) into OUT (out/)
 	$(VENV)/bin/ringbalance report $(SCENE) --out $(OUT)

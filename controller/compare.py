@@ -23,7 +23,7 @@ from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
 
-ModelOf = Callable[[Scene], BalancerModel]
+_ModelOf = Callable[[Scene], BalancerModel]
 """Makes the model of a liquid ring from its scene on the common rotor."""
 RUNS: Final = 5
 """Of each balancer, with the seeds that follow its scene's."""
@@ -99,7 +99,7 @@ class Comparison:
 
 
 def compare(
-    first: AnyScene, second: AnyScene, *, model_of: ModelOf, runs: int = RUNS, tuned: bool = True
+    first: AnyScene, second: AnyScene, *, model_of: _ModelOf, runs: int = RUNS, tuned: bool = True
 ) -> Comparison:
     """Put two balancers on the rotor of the first scene, tune each, and let each balance it over one span.
 
@@ -131,7 +131,7 @@ def _placed(first: AnyScene, fault: Fault) -> Fault:
 
 
 def _side(
-    rotor: OneRotor, scene: AnyScene, model_of: ModelOf, *, span: float, runs: int, tuned: bool
+    rotor: OneRotor, scene: AnyScene, model_of: _ModelOf, *, span: float, runs: int, tuned: bool
 ) -> Side:
     if isinstance(scene, EccentricScene):
         return _driven_side(rotor, scene, span=span, runs=runs, tuned=tuned)

@@ -27,9 +27,9 @@ from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
 
-FINEST_SHARE = 0.01
+_FINEST_SHARE = 0.01
 """Noise that a filter assumes, at the least, as a share of the amplitude to come below."""
-SETTLED_WHIRL = 12.0
+_SETTLED_WHIRL = 12.0
 """Time constants of the free whirl after which a run with eccentric masses starts to balance."""
 
 
@@ -177,8 +177,8 @@ def _driven_on(rotor: OneRotor, scene: EccentricScene) -> EccentricScene:
     believed = scene.imbalance_filter
     filtered = replace(
         believed,
-        position_noise=max(rotor.noise, FINEST_SHARE * rotor.limit),
-        velocity_noise=max(velocity_noise, FINEST_SHARE * rotor.limit * rotor.speed),
+        position_noise=max(rotor.noise, _FINEST_SHARE * rotor.limit),
+        velocity_noise=max(velocity_noise, _FINEST_SHARE * rotor.limit * rotor.speed),
         assumed_mass=believed.assumed_mass * (found.mass / before.mass),
         assumed_stiffness=believed.assumed_stiffness * (found.stiffness / before.stiffness),
         assumed_damping=_rescaled(believed.assumed_damping, before.damping, found.damping),
@@ -201,7 +201,7 @@ def _rescaled(believed: float, true: float, now: float) -> float:
 def _steady_start(scene: EccentricScene, speed: float) -> EccentricScene:
     """At constant speed; the strategy waits until the vibration from the rotor's start has died away."""
     whole = scene.rotor.mass + 2 * scene.masses.mass
-    start = SETTLED_WHIRL * 2 * whole / scene.rotor.damping
+    start = _SETTLED_WHIRL * 2 * whole / scene.rotor.damping
     start = math.ceil(start / scene.sensor.step) * scene.sensor.step
     first = scene.masses.initial_angle[0]
     return replace(

@@ -57,18 +57,23 @@ def dynamics_of(
     )
 
 
+def can_carry(scene: Scene, model: BalancerModel) -> bool:
+    """Whether a law gives the forces that terms of an injection need."""
+    return column_of(law=model.flow, tube=scene.tube) is not None
+
+
 def _check(scene: Scene, model: BalancerModel, asked: Collection[str]) -> None:
     for term in asked:
         if term not in IN_INJECTIONS:
             raise ValueError(f"no term {term!r}; there are {', '.join(IN_INJECTIONS)}")
         unknown = term != INERTIA and term_estimates(scene)[term].contribution is None
-        if unknown or column_of(law=model.flow, tube=scene.tube) is None:
+        if unknown or not can_carry(scene, model):
             raise ValueError(f"{term} cannot be modelled: the scene or the law gives no numbers for it")
 
 
 def _obstacles(scene: Scene, model: BalancerModel) -> dict[str, str]:
     """Why the law cannot carry a term, by term."""
-    if column_of(law=model.flow, tube=scene.tube) is None:
+    if not can_carry(scene, model):
         return dict.fromkeys(IN_INJECTIONS, "this law gives velocities and no forces")
     if isinstance(model.flow, PaperLaw):
         return {INERTIA: "the paper's law has no mass in the tube"}

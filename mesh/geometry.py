@@ -78,13 +78,15 @@ def surface_radius(*, disc: Disc, fill_ratio: npt.ArrayLike) -> FloatArray:
     if np.any(~((x >= 0) & (x <= 1))):
         raise ValueError("fill_ratio must lie within [0, 1]")
     r1, r2 = disc.inner_radius, disc.outer_radius
-    target = x * liquid_area(disc=disc, surface_radius=r1)
+    within = partial(swept_area, central_angle=disc.central_angle, plate_thickness=disc.plate_thickness)
+    whole = within(radius=r2)
+    target = x * (whole - within(radius=r1))
     # The depth form keeps full relative accuracy for a film of a micrometre, where a^2 = R2^2 - ... cancels.
     squared = r2**2 - x * (r2**2 - r1**2)
     for _ in range(60):
         a = np.sqrt(squared)
-        step = (liquid_area(disc=disc, surface_radius=a) - target) / half_angle(disc=disc, radius=a)
-        squared = np.clip(squared + step, r1**2, r2**2)
+        step = (whole - within(radius=a) - target) / half_angle(disc=disc, radius=a)
+        squared = np.minimum(np.maximum(squared + step, r1**2), r2**2)
         if np.all(np.abs(step) <= 4 * np.finfo(np.float64).eps * r2**2):
             break
     return np.asarray(np.sqrt(squared), dtype=np.float64)

@@ -90,17 +90,17 @@ class Surface:
         """Values, of the broadcast shape."""
         (i, s), (j, t) = _cell(self.x, x), _cell(self.y, y)
         value = np.zeros(np.broadcast(s, t).shape)
-        for row in self.coefficients[::-1]:
-            along = np.zeros_like(value)
-            for piece in row[::-1]:
-                along = along * t + piece[i, j]
+        for row in self.coefficients[:, :, i, j][::-1]:
+            along = row[-1]
+            for piece in row[-2::-1]:
+                along = along * t + piece
             value = value * s + along
         return value
 
 
 def _cell(knots: FloatArray, x: FloatArray) -> tuple[np.ndarray, FloatArray]:
     """Number of the piece, and the place in it from 0 to 1."""
-    cell = np.clip(np.searchsorted(knots, x, side="right") - 1, 0, knots.size - 2)
+    cell = np.minimum(np.maximum(np.searchsorted(knots, x, side="right") - 1, 0), knots.size - 2)
     return cell, (x - knots[cell]) / (knots[cell + 1] - knots[cell])
 
 

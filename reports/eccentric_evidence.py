@@ -13,8 +13,8 @@ from ringbalance.reports.section import Level, Record
 from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.eccentric_models import EccentricScene, SpeedPoint
 from ringbalance.scene.keys.declaration import keys_of
+from ringbalance.scene.keys.eccentric_schema import ECCENTRIC_MASS
 from ringbalance.scene.keys.fields import Reader
-from ringbalance.scene.keys.schema import ECCENTRIC_MASS
 from ringbalance.verification.catalogue import load_cases
 from ringbalance.verification.runner import DRIVEN, cases_under_way, paper_scene
 

@@ -17,6 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.document import simulation_document
+from ringbalance.controller.line_runs import line_runs, line_runs_document
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.calibration import Calibration, calibrate
 from ringbalance.reduced_model.documents import calibration_document
@@ -144,7 +145,11 @@ def _pressure(scene: Scene) -> Record:
 
 def _closed_loop(scene: Scene, calibration: Calibration) -> Record:
     models = {"calibrated": calibration.model, "paper": paper_model(scene)}
-    return {name: simulation_document(simulate(scene, model)) for name, model in models.items()}
+    return {
+        name: simulation_document(simulate(scene, model))
+        | {"gas_line_runs": line_runs_document(line_runs(scene, model))}
+        for name, model in models.items()
+    }
 
 
 def finished_cases(under_way: Iterator[CaseResult], tell: Progress) -> list[Record]:

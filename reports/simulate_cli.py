@@ -12,6 +12,7 @@ from ringbalance.controller.document import csv_text, simulation_document, simul
 from ringbalance.controller.eccentric_mass.document import eccentric_document, eccentric_history
 from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
 from ringbalance.controller.eccentric_mass.show import show_eccentric
+from ringbalance.controller.line_runs import line_runs, line_runs_document, line_runs_text
 from ringbalance.controller.loop import simulate as run_loop
 from ringbalance.controller.show import show
 from ringbalance.reduced_model.law_by_name import law_by_name
@@ -104,15 +105,20 @@ def _with_seed(scene: AnyScene, seed: int | None) -> AnyScene:
 
 def _ring(scene: Scene, law: str, outputs: _Outputs) -> bool:
     with activity("simulate", f"flow law: {law} (the first run compiles) ...") as shown:
-        found = run_loop(scene, law_by_name(scene, law), progress=_clock(shown))
+        model = law_by_name(scene, law)
+        found = run_loop(scene, model, progress=_clock(shown))
+        at_ends = line_runs(scene, model)
     if outputs.csv is not None:
         write_whole(outputs.csv, csv_text(simulation_history(found)))
     if outputs.plot is not None:
         _draw(outputs.plot, deferred.run_figures(simulation_document(found)))
     if outputs.json:
-        print(json_format.dumps(simulation_document(found), allow_nan=False))
+        document = simulation_document(found) | {"gas_line_runs": line_runs_document(at_ends)}
+        print(json_format.dumps(document, allow_nan=False))
     else:
         show(found, console=results_console())
+        if at_ends:
+            results_console().print(line_runs_text(at_ends), highlight=False, markup=False)
     return found.settled
 
 

@@ -78,7 +78,8 @@ def common_causes(cases: list[Record]) -> list[Record]:
 def lead_sentence(evidence: Record) -> str:
     """The whole result in two sentences, counted from the verdicts."""
     parts = counted(claims(evidence))
-    own = checks(evidence)
+    measured = [case for case in checks(evidence) if case["kind"] == "validation"]
+    own = [case for case in checks(evidence) if case not in measured]
     run = [case for case in own if case["verdict"] != "not run"]
     passed = sum(case["verdict"] == "passed" for case in run)
     told = f"Of {len(claims(evidence))} claims of the liquid-ring paper {_series(parts)}. "
@@ -87,7 +88,11 @@ def lead_sentence(evidence: Record) -> str:
         told += (
             f"{foreign} of them hold for the paper’s own disc alone and were judged on it, not on this one. "
         )
-    return told + f"Of {len(run)} checks of this program itself that were run, {passed} passed."
+    told += f"Of {len(run)} checks of this program itself that were run, {passed} passed."
+    if measured:
+        confirmed = sum(case["verdict"] == "confirmed" for case in measured)
+        told += f" Of {len(measured)} comparisons of parts with measurements, {confirmed} are confirmed."
+    return told
 
 
 def _series(parts: list[str]) -> str:

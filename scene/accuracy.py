@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Final, Literal, TypeVar
+from typing import TYPE_CHECKING, Final, Literal, TypeVar
 
-from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.faults import SceneError, option_error
 from ringbalance.scene.models import Scene
 from ringbalance.scene.units import FieldError, parse_quantity
+
+if TYPE_CHECKING:
+    from ringbalance.scene.eccentric_models import EccentricScene
 
 Models = Literal["finest"]
 FINEST: Final = 0.0
 """Tolerance at which every term is modelled that has a model."""
 ALLOWED: Final = 'a fraction above 0 and below 1, such as 0.005 or "0.5 %"'
 
-SomeScene = TypeVar("SomeScene", Scene, EccentricScene, Scene | EccentricScene)
+SomeScene = TypeVar("SomeScene", Scene, "EccentricScene", "Scene | EccentricScene")
 
 
 def with_tolerance(

@@ -11,15 +11,15 @@ from os import PathLike
 from pathlib import Path, PurePath
 from typing import Any, Literal
 
-from ringbalance.scene.eccentric_models import EccentricScene
+from ringbalance.scene import deferred
 from ringbalance.scene.faults import Fault, SceneError, closest, did_you_mean, toml_text
 from ringbalance.scene.keys.completion import completed, missing_faults
 from ringbalance.scene.keys.reading import Reading, read_document
-from ringbalance.scene.keys.schema import BALANCERS, ECCENTRIC_MASS, LIQUID_RING, ORIGIN, Schema
-from ringbalance.scene.models import InputUncertainty, Scene
+from ringbalance.scene.keys.schema import BALANCERS, LIQUID_RING, ORIGIN, Schema
+from ringbalance.scene.models import InputUncertainty
 from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.origins import Origin
-from ringbalance.scene.rules import eccentric, shape, working
+from ringbalance.scene.rules import shape, working
 from ringbalance.scene.rules.check import failed_checks
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 from ringbalance.scene.working_liquid import with_liquid
@@ -58,7 +58,8 @@ def scene_from(*, content: bytes, file: str) -> AnyScene:
     Raises: SceneError: anything in it is wrong; all of it is said at once.
     """
     document = _document(content, file)
-    reading, found = _READ[_kind(document)](document, file=file)
+    read = _read_liquid_ring if _kind(document) == "liquid_ring" else _read_eccentric_mass
+    reading, found = read(document, file=file)
     found = (*found, *_origin_faults(reading, found))
     if found:
         raise SceneError(_sorted(found, reading.schema))
@@ -73,9 +74,10 @@ def scene_from(*, content: bytes, file: str) -> AnyScene:
         "defaulted": _defaulted(reading),
         "origins": tuple(_origins(reading)),
     }
-    if reading.schema is ECCENTRIC_MASS:
-        return EccentricScene(**parts)
-    return Scene(**parts, uncertainty=_uncertainty(reading))
+    if reading.schema is LIQUID_RING:
+        parts["uncertainty"] = _uncertainty(reading)
+    scene: AnyScene = reading.schema.scene(**parts)
+    return scene
 
 
 def _records(reading: Reading) -> dict[str, Any]:
@@ -157,12 +159,9 @@ def _read_liquid_ring(document: Mapping[str, Any], *, file: str) -> tuple[Readin
 
 
 def _read_eccentric_mass(document: Mapping[str, Any], *, file: str) -> tuple[Reading, tuple[Fault, ...]]:
-    reading, faults = read_document(document, file=file, schema=ECCENTRIC_MASS)
+    reading, faults = read_document(document, file=file, schema=deferred.ECCENTRIC_MASS)
     reading = completed(reading)
-    return reading, (*faults, *missing_faults(reading), *failed_checks(reading, eccentric.CHECKS))
-
-
-_READ = {"liquid_ring": _read_liquid_ring, "eccentric_mass": _read_eccentric_mass}
+    return reading, (*faults, *missing_faults(reading), *failed_checks(reading, deferred.CHECKS))
 
 
 def _kind(document: Mapping[str, Any]) -> str:

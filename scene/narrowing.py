@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
-from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.models import Scene
 
-AnyScene: TypeAlias = Scene | EccentricScene
+if TYPE_CHECKING:
+    from ringbalance.scene.eccentric_models import EccentricScene
+
+AnyScene: TypeAlias = "Scene | EccentricScene"
 
 
 def liquid_ring_scene(scene: AnyScene) -> Scene:
@@ -21,7 +23,7 @@ def liquid_ring_scene(scene: AnyScene) -> Scene:
 
 def eccentric_scene(scene: AnyScene) -> EccentricScene:
     """The same scene, when its balancer is two eccentric masses. Raises: SceneError: it has another."""
-    if isinstance(scene, EccentricScene):
+    if not isinstance(scene, Scene):
         return scene
     problem = "this needs the rotor, masses and motor of driven eccentric masses"
     allowed = 'a scene with balancer = "eccentric_mass"; simulate and compare take both'

@@ -14,7 +14,10 @@ from ringbalance.reports.numbers import MINUS, SCALES
 from ringbalance.reports.traces import evidence_at
 
 _TRACED: Final = re.compile(r'<span data-from="([^"]+)">(.*?)</span>')
-_NUMBER: Final = re.compile(rf"\(?({MINUS}?[\d\u202f]+(?:\.\d+)?)(?:\u202f×\u202f10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?")
+_NUMBER: Final = re.compile(
+    rf"\(?({MINUS}?\d[\d\u202f]*(?<=\d)(?:\.\d+)?)(?:\u202f×\u202f10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?"
+)
+_OUTER: Final = re.compile("\\)\u202f×\u202f10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)")
 _RAISED: Final = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 _FACTORS: Final = frozenset({1.0, 100.0, 1e3, *(scale[1] for scales in SCALES.values() for scale in scales)})
 
@@ -29,17 +32,20 @@ def printed(text: str) -> tuple[float, float] | None:
     match = _NUMBER.match(text)
     if match is None:
         return None
+    outer = _OUTER.search(text) if text.startswith("(") else None
     digits = match[1].replace("\u202f", "").replace(MINUS, "-")
-    power = 10.0 ** int((match[2] or "0").translate(_RAISED))
+    power = 10.0 ** int((outer[1] if outer else match[2] or "0").translate(_RAISED))
     return float(digits) * power, 0.5 * 10.0 ** (_idle_zeros(text) - len(digits.partition(".")[2])) * power
 
 
 def _idle_zeros(text: str) -> int:
     """Zeros at the end of a whole number that its uncertainty leaves without a meaning: 1 in 920 ± 100."""
-    parts = [re.sub(r"\D", "", part) for part in text.split("±")]
-    if len(parts) < 2 or "." in text:
+    parts = [part.split("\u202f×")[0] for part in text.split("±")]
+    found = [match[0] for part in parts if (match := re.search(r"[\d\u202f.]*\d", part))]
+    if any("." in part for part in found):
         return 0
-    return min(len(part) - len(part.rstrip("0")) for part in parts)
+    bare = [part.replace("\u202f", "") for part in found]
+    return min(len(part) - len(part.rstrip("0")) for part in bare)
 
 
 def agrees(text: str, value: float | str) -> bool:

@@ -10,11 +10,11 @@ import numpy as np
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.scene.arrays import FloatArray, IntArray
 
-MOST_ROWS: Final = 2500
+_MOST_ROWS: Final = 2500
 """Instants in the document; a run has a hundred times as many."""
 
 
-def eccentric_document(run: EccentricRun, *, rows: int = MOST_ROWS) -> dict[str, Any]:
+def eccentric_document(run: EccentricRun, *, rows: int = _MOST_ROWS) -> dict[str, Any]:
     """Turn a run into plain numbers, lists and text, all in SI.
 
     Lists run along `time_s`: instants at equal distances, with the beginning and the end of each stage and
@@ -94,7 +94,7 @@ def _each(name: str, values: FloatArray) -> dict[str, FloatArray]:
     return {name.format(mass): row for mass, row in enumerate(values, start=1)}
 
 
-def thinned(run: EccentricRun, *, rows: int = MOST_ROWS) -> IntArray:
+def thinned(run: EccentricRun, *, rows: int = _MOST_ROWS) -> IntArray:
     """Which samples of a run to show.
 
     Returns: Their numbers, ascending: equally spaced, with the stages' edges and the largest vibration.

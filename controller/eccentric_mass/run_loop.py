@@ -9,8 +9,8 @@ import numpy as np
 
 from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.controller.eccentric_mass.plant.integrate import plant_step
-from ringbalance.controller.eccentric_mass.plant.motor import electrical_energy
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
+from ringbalance.controller.eccentric_mass.plant.plant import electrical_energy
 from ringbalance.controller.eccentric_mass.plant.speed import speed_at, turned
 from ringbalance.controller.eccentric_mass.strategy.records import (
     EccentricMeasurement,

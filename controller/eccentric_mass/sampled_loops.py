@@ -22,7 +22,7 @@ from ringbalance.scene.eccentric_models import EccentricScene
 
 GAIN_MARGIN: Final = 2.0
 """Factor by which the recommended gains could be higher before a pole leaves the unit circle."""
-TORQUE_MARGIN: Final = 1.5
+_TORQUE_MARGIN: Final = 1.5
 """Of the speed control at standstill over the friction of the scene, at the recommended drive speed."""
 _SMALL: Final = 1e-4
 _HALVINGS: Final = 60
@@ -166,7 +166,7 @@ def _drive_speed(scene: EccentricScene, gain: float) -> float:
     plant = plant_parameters(scene)
     speed = scene.rotor.speed_profile[0].speed
     friction = max(plant.friction_arm_1, plant.friction_arm_2) * plant.moment * speed**2
-    return max(scene.friction_filter.drive_speed, TORQUE_MARGIN * friction / (plant.drive_gain * gain))
+    return max(scene.friction_filter.drive_speed, _TORQUE_MARGIN * friction / (plant.drive_gain * gain))
 
 
 def _poles(

@@ -7,7 +7,7 @@ import math
 from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.controller.ensemble.compiled_disc import vibration
 from ringbalance.controller.ensemble.compiled_records import Record
-from ringbalance.controller.liquid_ring.compiled_march import FIRST_STEP, advance, command, rests
+from ringbalance.controller.liquid_ring.compiled_march import advance, command, rests
 from ringbalance.controller.liquid_ring.compiled_step import gas_volume
 from ringbalance.controller.liquid_ring.records import P, X
 from ringbalance.scene.arrays import FloatArray
@@ -22,7 +22,7 @@ def begin(plant: Record, motion: Record, fill: float, speed: float) -> None:
     y[P + 2] = plant.ambient_pressure * gas_volume(plant, fill) / plant.temperature
     y[P + 3] = plant.ambient_pressure * gas_volume(plant, plant.total - fill) / plant.temperature
     motion.opens, motion.closes, motion.log_speed = math.inf, math.inf, math.log(speed)
-    motion.length, motion.started, motion.ran_back = FIRST_STEP, fill, 0.0
+    motion.length, motion.started, motion.ran_back = plant.first_step, fill, 0.0
     motion.fill_before, motion.least_fill = fill, fill
     motion.closing_pressure, motion.run_dry = 0.0, 0.0
     motion.primed, motion.valve_0, motion.valve_1, motion.direction = 0, 0, 0, 0

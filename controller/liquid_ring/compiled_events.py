@@ -35,12 +35,14 @@ def gases(plant: Record, y: FloatArray) -> tuple[float, float]:
 
 @compiled
 def pair_ends(plant: Record, y: FloatArray, direction: int) -> tuple[float, float, float, float]:
+    """Pressures at the tube's ends in a state, as `compiled_column.ends`."""
     p, q = gases(plant, y)
     return ends(plant, y[X], plant.total - y[X], p, q, direction)
 
 
 @compiled
 def pair_steady(plant: Record, motion: Record, y: FloatArray, primed: bool) -> tuple[float, bool, bool]:
+    """Quasi-steady flow in a state, as `compiled_column.steady`."""
     p, q = gases(plant, y)
     return steady(plant, y[X], plant.total - y[X], p, q, primed, motion.log_speed)
 
@@ -129,6 +131,7 @@ def primes(plant: Record, motion: Record, y: FloatArray) -> bool:
 
 @compiled
 def regime(plant: Record, motion: Record) -> int:
+    """Value of `Regime` of moving liquid, seen from the chamber that was driven last."""
     direction, y = motion.direction, motion.state
     if direction != outward(motion):
         return _REVERSE

@@ -43,8 +43,6 @@ from ringbalance.controller.liquid_ring.transfer import Event
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene.arrays import FloatArray
 
-FIRST_STEP: Final = 1e-6
-"""s."""
 _ROUND_OFF: Final = 1e-12
 """s, of the clock of a valve."""
 _BISECTIONS: Final = 40
@@ -222,7 +220,7 @@ def _settle(plant: Record, motion: Record) -> None:
     if direction == 0:
         return
     motion.primed = 1 if pair_steady(plant, motion, y, primed)[2] else 0
-    motion.direction, motion.length, motion.started = direction, FIRST_STEP, y[X]
+    motion.direction, motion.length, motion.started = direction, plant.first_step, y[X]
     _note(plant, motion, NONE, direction)
 
 
@@ -240,7 +238,7 @@ def _stop(plant: Record, motion: Record, event: int) -> None:
         y[X] = lowest if direction > 0 else highest
     gone = event == EMPTY or open_to_gas(plant, pair_ends(plant, y, direction))
     motion.primed = 1 if motion.primed and not gone and pair_steady(plant, motion, y, True)[2] else 0
-    y[U], motion.direction, motion.length = 0.0, 0, FIRST_STEP
+    y[U], motion.direction, motion.length = 0.0, 0, plant.first_step
 
 
 @compiled
@@ -263,7 +261,7 @@ def _flip(plant: Record, motion: Record) -> None:
         motion.valve_0 = 1 if opens else 0
     else:
         motion.valve_1 = 1 if opens else 0
-    motion.balanced, motion.stopped, motion.length = 0, 0, FIRST_STEP
+    motion.balanced, motion.stopped, motion.length = 0, 0, plant.first_step
 
 
 @compiled

@@ -28,7 +28,7 @@ RELATIVE_ERROR: Final = 1e-9
 MOST_STEPS: Final = 200_000
 """Within one interval of time."""
 _FIRST_STEP: Final = 1e-6
-"""s."""
+"""s, after a jump of the rates, at `RELATIVE_ERROR`; it grows as the method's order lets it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,6 +147,7 @@ def _filled(dynamics: Dynamics, total: float, relative_error: float) -> npt.NDAr
     plant["crest"] = column.crest is not None
     plant["crest_end"], plant["return_crest_end"] = column.crest_ends
     plant["total"], plant["relative_error"], plant["most_steps"] = total, relative_error, MOST_STEPS
+    plant["first_step"] = _FIRST_STEP * (relative_error / RELATIVE_ERROR) ** 0.25
     _fill_line(plant, dynamics.line)
     for which, table in enumerate(column.tables):
         pieces = table.coefficients.T
@@ -186,7 +187,7 @@ def packed(
         state["opens" if switch.opens else "closes"], chamber = switch.after, switch.chamber
     for name, value in {
         "log_speed": log_speed,
-        "length": _FIRST_STEP,
+        "length": known["first_step"],
         "started": fill,
         "fill_before": record.fill,
         "least_fill": total - fill if chamber else fill,

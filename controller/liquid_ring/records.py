@@ -48,6 +48,7 @@ _PLANT_REAL: Final = (
     "total",  # x_A + x_C
     "residual",  # fill of a driven chamber that no command goes below
     "relative_error",  # allowed to one step
+    "first_step",  # s, after a jump of the rates
 )
 _PLANT_WHOLE: Final = (
     "crest",  # whether there is one

@@ -12,7 +12,7 @@ from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.scene.eccentric_models import EccentricScene
 
 
-def eccentric_status(gains: RecommendedGains) -> str:
+def _eccentric_status(gains: RecommendedGains) -> str:
     """Whether the scene's loops are stable and have their margin, and what to change."""
     unstable = ", ".join(loop.name for loop in gains.loops if not loop.stable)
     high = [loop for loop in gains.loops if loop.value > loop.recommended]
@@ -29,7 +29,7 @@ def eccentric_tuning_document(scene: EccentricScene, gains: RecommendedGains) ->
     return {
         "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
         "balancer": scene.balancer,
-        "status": eccentric_status(gains),
+        "status": _eccentric_status(gains),
         "gain": {loop.key: loop.recommended for loop in gains.loops},
         "loops": [
             {
@@ -54,7 +54,7 @@ def eccentric_tuning_document(scene: EccentricScene, gains: RecommendedGains) ->
 def show_eccentric_tuning(gains: RecommendedGains, console: Console) -> None:
     """Print the loops of a scene's drives."""
     stable = all(loop.stable for loop in gains.loops)
-    console.print(Text(eccentric_status(gains), style=f"bold {'green' if stable else 'yellow'}"))
+    console.print(Text(_eccentric_status(gains), style=f"bold {'green' if stable else 'yellow'}"))
     table = Table()
     for name in (
         "loop",

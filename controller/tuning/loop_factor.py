@@ -74,7 +74,7 @@ def loop_factor(scene: Scene, model: BalancerModel, controller: Controller[Any])
     learns the true one: what noise leaves is taken at a loop factor of one.  A trial has no linear loop, and
     the same bound on the noise is used for it.
     """
-    rate, noise = float(np.max(np.mean(vibration_rates(scene, model), axis=1))), noise_at_limit(scene)
+    rate, noise = float(np.max(np.mean(vibration_rates(scene, model), axis=1))), _noise_at_limit(scene)
     error = 0.0
     value: float | None = None
     integral = derivative = 0.0
@@ -105,7 +105,7 @@ def loop_factor(scene: Scene, model: BalancerModel, controller: Controller[Any])
     )
 
 
-def noise_at_limit(scene: Scene) -> float:
+def _noise_at_limit(scene: Scene) -> float:
     """Standard deviation of the measured vibration where its amplitude is at the limit, m."""
     sensor = scene.sensor
     return math.hypot(sensor.amplitude_noise, scene.controller.limit * sensor.phase_noise)

@@ -42,6 +42,7 @@ def range_fills(scene: Scene) -> FloatArray:
     return distinct(np.append(fills, resonant))
 
 
+@lru_cache(maxsize=8)
 def range_contributions(scene: Scene) -> Mapping[str, Mapping[str, Contribution]]:
     """Contributions to wall pressure and moment at the worst fill of the range, as `chamber_contributions`.
 

@@ -35,6 +35,8 @@ FORMULAS: Final = {CONSTANT: 1, CORRELATIONS: 20, ROTATING: 60, TABLES: 260}
 """Formulas per call, as counted work; the tables' look-ups among them."""
 _TURBULENT_PROFILE: Final = 1.06
 _LEAST_KL: Final = 220.0
+_MOST_STEPS: Final = 60
+_ROUND_OFF: Final = 1e-14
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -162,7 +164,7 @@ def head_at(
 def velocity_under_head(
     scene: Scene, *, loss: str, head: npt.ArrayLike, to_crest: bool = False
 ) -> FloatArray:
-    """Velocity of a full tube under a head, (k(u) + 1) u^2/2 = H, by 60 bisections in ln u.
+    """Velocity of a full tube under a head, (k(u) + 1) u^2/2 = H, by bracketed secants in ln u and ln H.
 
     Args: `loss`: one of `LOSSES`. `head`: H, m^2/s^2, above zero, any shape. `to_crest`: whether the head
         acts up to the siphon crest alone: (alpha + k_up) u^2/2 = H.
@@ -170,9 +172,17 @@ def velocity_under_head(
     """
     target = np.asarray(head, dtype=np.float64)
     low, high = np.full(target.shape, np.log(1e-8)), np.log(np.sqrt(2 * target) * 1.001 + 1e-6)
-    for _ in range(60):
-        middle = (low + high) / 2
-        u = np.exp(middle)
-        below = head_at(scene, loss=loss, velocity=u, to_crest=to_crest) < target
-        low, high = np.where(below, middle, low), np.where(below, high, middle)
-    return np.asarray(np.exp((low + high) / 2))
+    y, slope, before = high, np.full(target.shape, 2.0), None
+    for _ in range(_MOST_STEPS):
+        found = head_at(scene, loss=loss, velocity=np.exp(y), to_crest=to_crest)
+        excess = np.log(found / target)
+        low, high = np.where(excess < 0, y, low), np.where(excess < 0, high, y)
+        if before is not None:
+            step, rise = y - before[0], excess - before[1]
+            slope = np.where(np.abs(step) > 1e-9, rise / np.where(step == 0, 1.0, step), slope)
+        before, ahead = (y, excess), y - excess / np.maximum(slope, 0.1)
+        y = np.where((ahead > low) & (ahead < high), ahead, (low + high) / 2)
+        y = np.where(np.abs(excess) < _ROUND_OFF, before[0], y)
+        if np.all(np.abs(excess) < _ROUND_OFF):
+            break
+    return np.asarray(np.exp(y))

@@ -36,6 +36,7 @@ _FACTS: Final = (
 )
 _LOPSIDED: Final = 1.2
 """Ratio of the two sides of an interval from which on both ends are shown."""
+_NAMED_INPUTS: Final = 2
 _RELATIVE_METRICS: Final = ("relative", "validation", "within_uncertainty")
 
 
@@ -248,6 +249,13 @@ def _without_half_width(text: str) -> str:
     return f"{value.removeprefix('(')}{unit}"
 
 
+def _rests_on(case: Record) -> list[str]:
+    """The first inputs behind a claim that nobody gave, and how many more there are."""
+    every = [f"{input_name(one['path'])} ({one['origin']})" for one in case.get("rests_on") or []]
+    rest = len(every) - _NAMED_INPUTS
+    return every if rest <= 1 else [*every[:_NAMED_INPUTS], f"{rest} more"]
+
+
 def case_view(case: Record) -> Record:
     """Everything that the page shows of one case."""
     sequences = [{**item, "label": _sequence_label(item)} for item in case.get("convergence") or []]
@@ -262,7 +270,7 @@ def case_view(case: Record) -> Record:
         "brief": _in_brief(case),
         "consequence": case.get("consequence") or "",
         "cause": case.get("cause") or "",
-        "rests_on": [f"{input_name(one['path'])} ({one['origin']})" for one in case.get("rests_on") or []],
+        "rests_on": _rests_on(case),
         "facts": _facts(case),
         "equations": _equations(case),
         "rows": [

@@ -29,6 +29,13 @@ from ringbalance.verification.runner import paper_scene
 _OTHER_READING: Final = "liquid_ring_paper_calibrated"
 """The paper's disc with the bore that its Fig. 7 implies under the calibrated law."""
 _RETUNED: Final = "calibrated_retuned"
+_VALVE: Final = {
+    OPEN: "Choose the valve before anything else is built, and put its conductance, critical ratio and lag "
+    "into the scene: only a fast one can reach the limit.",
+    MISSED: "Choose a faster valve with less dead volume, or raise the limit: with a valve as assumed the "
+    "last corrections are larger than the limit, whatever the gain.",
+}
+"""What to do about a valve that may not, or cannot, reach the limit."""
 _DOMINANT: Final = 3
 _MAIN: Final = {
     "velocity": "flow velocity",
@@ -117,7 +124,11 @@ def loop_sentences(evidence: Record) -> list[str]:
     tuned = retuned(evidence)
     if tuned is not None:
         gain, own = (shown(r, "s/m", digits=2) for r in _gains(evidence, tuned))
-        told.append(f"Recommended gain: {gain} (the scene has {own}). With it this run {_ending(tuned)}.")
+        line = evidence["calibration"].get("gas_line") or {"given": True}
+        ideal = "" if line["given"] else " and a valve that acts at once"
+        told.append(
+            f"Recommended gain: {gain} (the scene has {own}). With it{ideal} this run {_ending(tuned)}."
+        )
     paper = evidence["closed_loop"].get("paper")
     if paper is not None:
         told.append(f"Under the paper’s law, with the scene’s gain, it {_ending(paper)}.")
@@ -221,11 +232,8 @@ def _actions(evidence: Record, rows: Sequence[Requirement]) -> list[str]:
     verdicts = {row.name.split(" with ")[0]: row.verdict for row in reversed(rows)}
     if tuned is not None and verdicts.get("Loop factor") == MISSED:
         told.append(f"Set the proportional gain to {shown(tuned['proportional_s_per_m'], 's/m', digits=2)}.")
-    if verdicts.get("Smallest correction that the valve can give") in {MISSED, OPEN}:
-        told.append(
-            "Choose the valve before anything else is built, and put its conductance, critical ratio and lag "
-            "into the scene: only a fast one can reach the limit."
-        )
+    if valve := _VALVE.get(verdicts.get("Smallest correction that the valve can give", "")):
+        told.append(valve)
     if verdicts.get("Correction capacity of one pair") in {MISSED, OPEN}:
         told.append("Balance the rotor better by hand, or take a larger disc: the capacity has no reserve.")
     if any("bore" in row.rests for row in rows):

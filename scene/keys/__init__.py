@@ -4,5 +4,6 @@ A new key is one field of a record in `scene.models`, `scene.loop_models`, `scen
 `scene.eccentric_control_models`: its annotation declares what it takes (a reader in `fields`, named in
 `quantities` where several keys share it), how it may be absent, what it means, how it is described, and
 whether it may be uncertain, see `declaration`. A default that follows from other keys names its
-rule. `schema` lists the tables; tools/scene_reference.py writes them into docs/scene-file.md.
+rule. `schema` and `eccentric_schema` list the tables; tools/scene_reference.py writes them into
+docs/scene-file.md.
 """

@@ -1,20 +1,19 @@
-"""The tables of a scene file of each kind, with the keys that the records declare."""
+"""The tables of a scene file as the records declare its keys; `eccentric_schema` has the other kind."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
-from ringbalance.scene import eccentric_control_models, eccentric_models, loop_models, models
+from ringbalance.scene import loop_models, models
 from ringbalance.scene.keys.declaration import (
     Entries,
     Key,
     Presence,
     derived,
     keys_of,
-    needed,
     standard,
     unused,
 )
@@ -45,6 +44,8 @@ class Schema:
     top: Mapping[str, Key]
     """Keys before the first table."""
     tables: Mapping[str, Table]
+    scene: Callable[..., Any]
+    """What is made of it all."""
 
     def key_at(self, place: Place) -> Key:
         """The key at a place: table, key and so on; entries of lists are passed over."""
@@ -64,7 +65,8 @@ class Schema:
         return keys
 
 
-def _of(record: type, text: str) -> Table:
+def table_of(record: type, text: str) -> Table:
+    """A table that becomes a record. Args: `text`: what it describes."""
     return Table(text=text, keys=keys_of(record), record=record)
 
 
@@ -84,7 +86,8 @@ def _rotor() -> Table:
     )
 
 
-def _top(balancer: Presence) -> dict[str, Key]:
+def top_keys(balancer: Presence) -> dict[str, Key]:
+    """Keys before the first table. Args: `balancer`: how that key may be absent."""
     return {
         "name": Key(takes=text(), presence=derived("the file's name", "title of the scene")),
         "balancer": Key(takes=choice(Balancer), presence=balancer),
@@ -110,7 +113,7 @@ def _uncertainty(tables: Mapping[str, Table]) -> Table:
     return Table(text="Expanded uncertainties (95 %) of the inputs", keys=keys)
 
 
-def _with_origins(tables: Mapping[str, Table]) -> Mapping[str, Table]:
+def with_origins(tables: Mapping[str, Table]) -> Mapping[str, Table]:
     """The tables, each with the key that says where its values come from."""
     return MappingProxyType(
         {name: replace(table, keys={**table.keys, ORIGIN: _origins(table)}) for name, table in tables.items()}
@@ -130,47 +133,26 @@ _TOLERANCE = Key(
     takes=share(Bounds(above=0, below=1), example=0.01),
     presence=standard("1 %", "relative bound on discretisation and left-out terms, against the top model"),
 )
-_RUN = {
-    "run": _of(loop_models.RunSettings, "a simulation's seed and end"),
+RUN = {
+    "run": table_of(loop_models.RunSettings, "a simulation's seed and end"),
     "accuracy": Table(text="what is asked of the result", keys={"tolerance": _TOLERANCE}),
 }
 _LIQUID_RING = {
-    "disc": _of(models.Disc, "the balancing disc"),
-    "liquid": _of(models.Liquid, "the balancing liquid"),
-    "tube": _of(models.Tube, "the tube that connects two opposite chambers"),
-    "gas": _of(models.Gas, "the gas that drives the liquid"),
-    "environment": _of(models.Environment, "gravity and how the shaft lies in it"),
+    "disc": table_of(models.Disc, "the balancing disc"),
+    "liquid": table_of(models.Liquid, "the balancing liquid"),
+    "tube": table_of(models.Tube, "the tube that connects two opposite chambers"),
+    "gas": table_of(models.Gas, "the gas that drives the liquid"),
+    "environment": table_of(models.Environment, "gravity and how the shaft lies in it"),
     "rotor": _rotor(),
-    "sensor": _of(loop_models.Sensor, "the vibration sensor; exact when left out"),
-    "controller": _of(loop_models.ControllerSettings, "the control algorithm"),
-    "requirement": _of(
+    "sensor": table_of(loop_models.Sensor, "the vibration sensor; exact when left out"),
+    "controller": table_of(loop_models.ControllerSettings, "the control algorithm"),
+    "requirement": table_of(
         loop_models.Requirement, "what is required of the balancer; reports compare it with what is reached"
     ),
 }
-_ECCENTRIC = {
-    "rotor": _of(eccentric_models.EccentricRotor, "the rotor on its bearing, and its speed"),
-    "imbalance": _of(eccentric_models.Imbalance, "the imbalance to be balanced"),
-    "masses": _of(eccentric_models.EccentricMasses, "the two eccentric masses on their track"),
-    "motor": _of(eccentric_models.Motor, "motor and gears of each mass"),
-    "sensor": _of(eccentric_models.EccentricSensor, "the sensors; exact when left out"),
-    "imbalance_filter": _of(
-        eccentric_control_models.ImbalanceFilter, "the Kalman filter that finds the imbalance"
-    ),
-    "friction_filter": _of(
-        eccentric_control_models.FrictionFilter, "the extended Kalman filter that finds the friction"
-    ),
-    "lqr": _of(eccentric_control_models.Lqr, "the regulator that moves the masses"),
-    "fine_tuning": _of(eccentric_control_models.FineTuning, "the search by trial for a smaller vibration"),
-    "supervisor": _of(eccentric_control_models.Supervisor, "the order of the stages, and when each ends"),
-}
-
 LIQUID_RING = Schema(
-    top=MappingProxyType(_top(standard("liquid_ring", "kind of balancer"))),
-    tables=_with_origins({**_LIQUID_RING, "uncertainty": _uncertainty(_LIQUID_RING), **_RUN}),
+    top=MappingProxyType(top_keys(standard("liquid_ring", "kind of balancer"))),
+    tables=with_origins({**_LIQUID_RING, "uncertainty": _uncertainty(_LIQUID_RING), **RUN}),
+    scene=models.Scene,
 )
 """A scene whose balancer is a liquid ring."""
-ECCENTRIC_MASS = Schema(
-    top=MappingProxyType(_top(needed('"eccentric_mass" for eccentric masses'))),
-    tables=_with_origins({**_ECCENTRIC, **_RUN}),
-)
-"""A scene whose balancer is two eccentric masses."""

@@ -26,6 +26,7 @@ from ringbalance.reduced_model.selection.loss_models import (
     CORRELATIONS,
     LOSSES,
     TABLES,
+    head_at,
     loss_at,
     velocity_under_head,
 )
@@ -218,3 +219,14 @@ def test_a_scene_without_gravity_has_no_number_for_it(table_1_scene: Scene) -> N
     assert found["omega^2 a/g"] is None
     pressure, moment = chamber_hierarchies(scene)
     assert choose(pressure, 1e-6).fidelity.name == choose(moment, 1e-6).fidelity.name == "closed form"
+
+
+@pytest.mark.parametrize("loss", LOSSES)
+@pytest.mark.parametrize("to_crest", [False, True])
+def test_the_velocity_under_a_head_has_that_head(table_1_scene: Scene, loss: str, to_crest: bool) -> None:
+    """From creeping to turbulent flow; limit: round-off of a logarithm."""
+    heads = np.geomspace(1e-4, 1e5, 301)
+    u = velocity_under_head(table_1_scene, loss=loss, head=heads, to_crest=to_crest)
+    assert np.all(np.diff(u) > 0)
+    found = head_at(table_1_scene, loss=loss, velocity=u, to_crest=to_crest)
+    np.testing.assert_allclose(found, heads, rtol=1e-13)

@@ -48,7 +48,9 @@ class Plate:
     """No key, kg."""
 
 
-SCHEMA = Schema(top={}, tables={"plate": Table(text="a plate", keys=keys_of(Plate), record=Plate)})
+SCHEMA = Schema(
+    top={}, tables={"plate": Table(text="a plate", keys=keys_of(Plate), record=Plate)}, scene=dict
+)
 
 
 def _read(**plate: Any) -> tuple[Reading, tuple[Fault, ...]]:

@@ -26,7 +26,8 @@ from ringbalance.scene import (
     load_scene,
     scene_from,
 )
-from ringbalance.scene.keys.schema import ECCENTRIC_MASS, ORIGIN
+from ringbalance.scene.keys.eccentric_schema import ECCENTRIC_MASS
+from ringbalance.scene.keys.schema import ORIGIN
 from ringbalance.scene.loop_models import RunSettings
 
 RPM = math.pi / 30

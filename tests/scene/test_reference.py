@@ -12,7 +12,8 @@ import pytest
 import scene_reference
 
 from ringbalance.scene import Scene, loop_models, models
-from ringbalance.scene.keys.schema import ECCENTRIC_MASS, LIQUID_RING, ORIGIN, Schema
+from ringbalance.scene.keys.eccentric_schema import ECCENTRIC_MASS
+from ringbalance.scene.keys.schema import LIQUID_RING, ORIGIN, Schema
 from ringbalance.scene.rules import eccentric, shape, working
 from ringbalance.scene.rules.check import Check
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES

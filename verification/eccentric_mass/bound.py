@@ -13,7 +13,7 @@ from typing import NamedTuple
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 
 
-class MotionBound(NamedTuple):
+class _MotionBound(NamedTuple):
     """Bounds on the rotor's motion in the fixed frame, for masses that move within given rates."""
 
     force: float
@@ -30,7 +30,7 @@ class MotionBound(NamedTuple):
 
 def motion_bound(
     parameters: PlantParameters, *, speed: float, rate: float, acceleration: float = 0.0
-) -> MotionBound:
+) -> _MotionBound:
     """Bound the rotor's motion for masses that move with at most a given rate and acceleration.
 
     M Z'' + C_B Z' + K_B Z = F with |F| <= Y = U W^2 + 2 b (W + w)^2 + 2 b w', so |Z| <= Y int |h| dt, where
@@ -50,7 +50,7 @@ def motion_bound(
     # |h| peaks where tan(w_d t) = root/ratio, and falls by the same factor from each extreme to the next.
     first = math.exp(-ratio / root * math.atan2(root, ratio)) / (parameters.mass * natural)
     fall = math.exp(-math.pi * ratio / root)
-    return MotionBound(
+    return _MotionBound(
         force,
         printed,
         force / parameters.damping,

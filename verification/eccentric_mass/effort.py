@@ -58,7 +58,7 @@ class FigureSix:
 
 
 @compiled
-def positioning_effort(
+def _positioning_effort(
     law: DriveLaw,
     arm: float,
     believed_arm: float,
@@ -145,6 +145,6 @@ def _over_speed(
     natural = math.sqrt(scene.rotor.stiffness / (scene.rotor.mass * (1 + 2 * mass_ratio)))
     arm = scene.masses.friction_arm[0]
     return [
-        positioning_effort(law, arm, share * arm, ratio * natural, *TRAVEL, step, DURATION, printed)
+        _positioning_effort(law, arm, share * arm, ratio * natural, *TRAVEL, step, DURATION, printed)
         for ratio in SPEED_RATIOS
     ]

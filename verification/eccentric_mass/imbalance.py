@@ -33,7 +33,7 @@ SCALES = (1.0, 10.0, 100.0, 1000.0, 1500.0, 2000.0, 2500.0, 1e4)
 
 
 @dataclass(frozen=True, kw_only=True)
-class ImbalanceRecord:
+class _ImbalanceRecord:
     """A locked rotor at constant speed, measured in its own frame."""
 
     time: FloatArray
@@ -67,11 +67,11 @@ class FigureFour:
     """The same time for the first phase, s, shape (scales,); infinite where it is never reached."""
 
 
-def imbalance_record(scene: EccentricScene, *, duration: float, seed: int | None = None) -> ImbalanceRecord:
+def imbalance_record(scene: EccentricScene, *, duration: float, seed: int | None = None) -> _ImbalanceRecord:
     """Measure a rotor that starts at its centre, the masses locked at their first angles.
 
     Args: `seed`: of the noise; default the scene's.
-    Returns: ImbalanceRecord, one sample for each step of the sensor, without the instant of the start.
+    Returns: _ImbalanceRecord, one sample for each step of the sensor, without the instant of the start.
     """
     level = at_constant_speed(scene, time_limit=duration)
     run = run_plant(level, locked=True)
@@ -79,7 +79,7 @@ def imbalance_record(scene: EccentricScene, *, duration: float, seed: int | None
     deviations = np.repeat([scene.sensor.position_noise, scene.sensor.velocity_noise], 2)
     clean = run.state[1:, :4]
     parameters = plant_parameters(scene)
-    return ImbalanceRecord(
+    return _ImbalanceRecord(
         time=run.time[1:],
         samples=clean + deviations * random.standard_normal(clean.shape),
         imbalance=complex(parameters.unbalance * np.exp(1j * parameters.phase)),
@@ -87,7 +87,7 @@ def imbalance_record(scene: EccentricScene, *, duration: float, seed: int | None
     )
 
 
-def scene_matrices(scene: EccentricScene, *, angular_velocity: float) -> FilterMatrices:
+def _scene_matrices(scene: EccentricScene, *, angular_velocity: float) -> FilterMatrices:
     """Matrices of the scene's imbalance filter for samples in the rotor's frame."""
     told = scene.imbalance_filter
     noise = ProcessNoise(told.velocity_walk**2, told.unbalance_walk**2)
@@ -96,7 +96,7 @@ def scene_matrices(scene: EccentricScene, *, angular_velocity: float) -> FilterM
 
 
 def estimate_imbalance(
-    scene: EccentricScene, record: ImbalanceRecord, *, scale: float = 1.0
+    scene: EccentricScene, record: _ImbalanceRecord, *, scale: float = 1.0
 ) -> tuple[FloatArray, FloatArray]:
     """Run the scene's imbalance filter over a record.
 
@@ -109,7 +109,7 @@ def estimate_imbalance(
     own = plant_parameters(scene).moment * (np.exp(1j * first) + np.exp(1j * second))
     return imbalance_history(
         start,
-        matrices=scene_matrices(scene, angular_velocity=record.speed),
+        matrices=_scene_matrices(scene, angular_velocity=record.speed),
         samples=record.samples,
         variance=variance,
         masses=locked_masses(complex(own)),
@@ -128,7 +128,7 @@ def convergence_time(time: FloatArray, error: FloatArray, *, limit: float) -> fl
     return math.inf if last == time.size - 1 else float(time[last + 1])
 
 
-def _time_of(scene: EccentricScene, record: ImbalanceRecord, scale: float) -> float:
+def _time_of(scene: EccentricScene, record: _ImbalanceRecord, scale: float) -> float:
     states, _ = estimate_imbalance(scene, record, scale=scale)
     error = np.abs(states[:, 4] + 1j * states[:, 5] - record.imbalance) / abs(record.imbalance)
     return convergence_time(record.time, error, limit=CONVERGED)

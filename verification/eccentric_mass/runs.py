@@ -167,15 +167,15 @@ def figure_nine(scene: EccentricScene) -> FigureNine:
     return FigureNine(
         balanced=balanced,
         locked=locked,
-        balanced_peak=run_up_peak(balanced, after=begins),
-        locked_peak=run_up_peak(locked, after=begins),
+        balanced_peak=_run_up_peak(balanced, after=begins),
+        locked_peak=_run_up_peak(locked, after=begins),
         critical_speed=math.sqrt(parameters.stiffness / parameters.mass),
         rotor_critical_speed=math.sqrt(parameters.stiffness / scene.rotor.mass),
         steady_peak_speed=steady_peak_speed(parameters),
     )
 
 
-def run_up_peak(run: EccentricRun, *, after: float) -> tuple[float, float]:
+def _run_up_peak(run: EccentricRun, *, after: float) -> tuple[float, float]:
     """Largest amplitude from a time on, and the speed at which it falls. Returns: m and rad/s."""
     first = int(np.searchsorted(run.time, after))
     at = first + int(np.argmax(run.amplitude[first:]))

@@ -51,7 +51,7 @@ SIZES: Final[Mapping[Level, Size]] = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Extremes:
+class _Extremes:
     """What was found."""
 
     points: tuple[Point, ...]
@@ -80,7 +80,7 @@ def find_extremes(
     workers: int = 1,
     progress: Progress | None = None,
     kept: Path | None = None,
-) -> Extremes:
+) -> _Extremes:
     """Look at a scene's extremes, with the same result for any number of workers.
 
     Args: `kept`: file from which an interrupted designed set resumes.
@@ -93,7 +93,7 @@ def find_extremes(
     points = design(count=size.points, seed=SEED)
     # First, so that a kept file that cannot be used is known at once.
     judgements = judged(base, points, workers=workers, progress=told("designed set"), kept=kept)
-    return Extremes(
+    return _Extremes(
         points=points,
         judgements=judgements,
         sweeps=(
@@ -104,7 +104,7 @@ def find_extremes(
     )
 
 
-def extremes_document(extremes: Extremes) -> Record:
+def extremes_document(extremes: _Extremes) -> Record:
     """The extremes as plain numbers, lists and texts."""
     everything = extremes.everything
     return {
@@ -120,7 +120,7 @@ def extremes_document(extremes: Extremes) -> Record:
     }
 
 
-def extremes_tables(extremes: Extremes) -> dict[str, dict[str, list[Any]]]:
+def extremes_tables(extremes: _Extremes) -> dict[str, dict[str, list[Any]]]:
     """Columns by table: "axes", the spans of each that end alike, and "map of x and y" for each map."""
     spans = [(sweep.axis, span) for sweep in extremes.sweeps for span in sweep.spans()]
     axes: dict[str, list[Any]] = {
@@ -152,12 +152,12 @@ def counted(judgements: Sequence[Judgement]) -> dict[str, int]:
     return {str(ending): numbers[ending] for ending in Ending}
 
 
-def broken(extremes: Extremes) -> int:
+def broken(extremes: _Extremes) -> int:
     """Number of points, of all looked at, at which anything was not as it should be."""
     return sum(bool(j.violations) for j in extremes.everything)
 
 
-def _violations(extremes: Extremes) -> list[Record]:
+def _violations(extremes: _Extremes) -> list[Record]:
     found = [
         {"point": dict(point), "violations": list(judgement.violations)}
         for point, judgement in zip(extremes.points, extremes.judgements, strict=True)

@@ -26,7 +26,7 @@ class StepRule:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class FlowPath:
+class _FlowPath:
     """Flows at the targets that were reached, in order."""
 
     solutions: tuple[FlowSolution, ...]
@@ -86,7 +86,7 @@ def follow(
     start_at: float,
     targets: Sequence[float],
     rule: StepRule | None = None,
-) -> FlowPath:
+) -> _FlowPath:
     """Flows at the targets, each reached from the one before in steps that recover from failure.
 
     A failed step is halved; after an easy one the step grows again.
@@ -107,4 +107,4 @@ def follow(
             status = Status(code=StatusCode.NOT_CONVERGED, text=f"{text}; {remedy}")
             break
         reached.append(walk.flow)
-    return FlowPath(solutions=tuple(reached), status=status, solves=walk.solves, failures=walk.failures)
+    return _FlowPath(solutions=tuple(reached), status=status, solves=walk.solves, failures=walk.failures)

@@ -103,7 +103,7 @@ def _followed(
     return path.solutions[0]
 
 
-def quarter_cells(*, space: FlowSpace, cells: IntArray | slice = slice(None)) -> IntArray:
+def _quarter_cells(*, space: FlowSpace, cells: IntArray | slice = slice(None)) -> IntArray:
     """Four straight quadrilaterals per nine-node cell, counter-clockwise.
 
     Args: `space`: on a plane mesh of quadrilaterals. `cells`: of the mesh; default all.
@@ -119,7 +119,7 @@ def quarter_cells(*, space: FlowSpace, cells: IntArray | slice = slice(None)) ->
 
 def _triangles(space: FlowSpace, cells: IntArray | slice = slice(None)) -> IntArray:
     """Eight straight triangles per nine-node cell, counter-clockwise, shape (m, 3)."""
-    quads = quarter_cells(space=space, cells=cells)
+    quads = _quarter_cells(space=space, cells=cells)
     return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
@@ -296,7 +296,7 @@ def _meridional_stream_function(system: FlowSystem, flow: FlowSolution) -> Float
     return _potential(fitted, np.stack([-r * v, r * u]), np.concatenate([axis, wall]), values)
 
 
-def nodal_pressure(*, space: FlowSpace, pressure: FloatArray) -> FloatArray:
+def _nodal_pressure(*, space: FlowSpace, pressure: FloatArray) -> FloatArray:
     """The linear pressure at all nodes of the velocity."""
     basis: Any = space.pressure
     at = np.asarray(space.velocity.elem.doflocs, dtype=np.float64).T
@@ -320,7 +320,7 @@ def _near_the_mouth(end: End, system: FlowSystem, flow: FlowSolution, re: float,
         velocity=flow.velocity[:, used],
         speed=np.asarray(np.hypot(*flow.velocity[:, used]), dtype=np.float64),
         stream_function=_meridional_stream_function(system, flow)[used],
-        pressure=2 / re * nodal_pressure(space=space, pressure=flow.pressure - reservoir)[used],
+        pressure=2 / re * _nodal_pressure(space=space, pressure=flow.pressure - reservoir)[used],
         reynolds=re,
         status=status,
     )

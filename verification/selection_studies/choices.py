@@ -25,7 +25,7 @@ _DEFECTS: Final = {"estimate_off": 1e-3, "estimate_large": 1e3}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Judged:
+class _Judged:
     """One choice, judged."""
 
     scene: str
@@ -73,7 +73,7 @@ def judge(
     tolerances: Sequence[float] = TOLERANCES,
     check: bool = True,
     worth: float = 1.0,
-) -> list[Judged]:
+) -> list[_Judged]:
     """Choose models for a scene at every tolerance, and judge each choice by the finest model.
 
     Args: `check`: whether choices are checked; without it the estimates alone decide. `worth`: factor on
@@ -98,7 +98,7 @@ def _spoiled(contributions: Mapping[str, Contribution], worth: float) -> Mapping
 
 def _judged(
     scene: Scene, hierarchy: ModelHierarchy, values: Values, tolerance: float, *, check: bool
-) -> Judged:
+) -> _Judged:
     costs, points = committed_costs(), tuple(range(len(hierarchy.points)))
     choice = choose(hierarchy, tolerance, check=check, costs=costs, values=values)
     cheapest = choice.cost
@@ -109,7 +109,7 @@ def _judged(
         if values.error(fidelity, hierarchy.top, points) <= tolerance:
             cheapest = cost
             break
-    return Judged(
+    return _Judged(
         scene=scene.name,
         quantity=hierarchy.quantity,
         tolerance=tolerance,
@@ -159,7 +159,7 @@ def choices_evidence(
     )
 
 
-def _table(judged: list[Judged]) -> Table:
+def _table(judged: list[_Judged]) -> Table:
     """Shares by quantity and tolerance."""
     rows = [(q, t) for q in dict.fromkeys(j.quantity for j in judged) for t in TOLERANCES]
     groups = [[j for j in judged if j.quantity == q and j.tolerance == t] for q, t in rows]

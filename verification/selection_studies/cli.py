@@ -64,11 +64,11 @@ def trade(
         write_whole(out / FILE, text + "\n")
         messages_console().print(f"written to {out / FILE}", highlight=False)
     if save_costs is not None:
-        write_whole(save_costs, costs_text(study))
+        write_whole(save_costs, _costs_text(study))
     return DONE
 
 
-def costs_text(study: TradeStudy) -> str:
+def _costs_text(study: TradeStudy) -> str:
     """The refitted cost model as the JSON file that the program reads."""
     costs = study.refit or study.costs
     record = {

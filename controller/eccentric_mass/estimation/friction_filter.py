@@ -51,7 +51,7 @@ class FrictionEstimate(NamedTuple):
     arm_variance: float
 
 
-class FrictionFlow(NamedTuple):
+class _FrictionFlow(NamedTuple):
     """The motion of a mass over one step and how it hangs on rate and arm."""
 
     rate: float
@@ -65,7 +65,7 @@ class FrictionFlow(NamedTuple):
 @compiled
 def friction_flow(
     model: TrackModel, rate: float, arm: float, speed: float, torque: float, step: float, euler: bool
-) -> FrictionFlow:
+) -> _FrictionFlow:
     """Carry a moving mass one step on, by the exponential Rosenbrock-Euler rule, which bears any step.
 
     Returns: The flow and its derivatives; the printed Jacobian carries the arm once too often in d/d mu, and
@@ -77,10 +77,10 @@ def friction_flow(
     slope = (model.damping + 2 * direction * arm * model.moment * (speed + rate)) / model.inertia
     acceleration = (torque - model.damping * rate - arm * load) / model.inertia
     if euler:
-        return FrictionFlow(rate + step * acceleration, 1 - slope * step, -step * load / model.inertia)
+        return _FrictionFlow(rate + step * acceleration, 1 - slope * step, -step * load / model.inertia)
     decay = math.exp(-slope * step)
     span = step if abs(slope * step) < 1e-9 else -math.expm1(-slope * step) / slope
-    return FrictionFlow(rate + span * acceleration, decay, -span * load / model.inertia)
+    return _FrictionFlow(rate + span * acceleration, decay, -span * load / model.inertia)
 
 
 @compiled

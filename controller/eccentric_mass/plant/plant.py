@@ -10,6 +10,15 @@ With M = m_r + 2 m_b, b = m_b r_b, J = m_b r_b^2, U = m_im r_im, W the rotor's s
                                      + b sum[(W + phi_i')^2 sin phi_i - (W' + phi_i'') cos phi_i]
     J (phi_i'' + W') + b (-a_x sin phi_i + a_y cos phi_i) = u_i - friction_i
 
+The motor shaft turns n = N_3 / N_1 times as fast as the mass along the track.  Without inductance and with
+i = (V - K_m n phi') / R_m the torque on the mass is
+
+    u = n K_i V / R_m - n^2 K_i K_m / R_m phi' - J_add phi'',
+
+positive voltage driving the mass with the rotation.  The signs follow from K_i i = J_1 theta_1'' + T_1 on the
+motor shaft, T_2 = J_2 theta_2'' + T_3 on gear B, equal power at each mesh, and theta_1 = n phi; the inertia
+and the back-emf both oppose the motion.
+
 The imbalance mass is a part of m_r.  The state is [x, y, x', y', phi_1, phi_2, phi_1', phi_2'], angles not
 wrapped; beside it each mass is SLIDING, STUCK or LOCKED (`friction`).  A locked mass is clamped to its track
 by a brake that no torque overcomes.
@@ -27,7 +36,6 @@ import numpy as np
 
 from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.controller.eccentric_mass.plant.friction import Torques, angular_accelerations
-from ringbalance.controller.eccentric_mass.plant.motor import limited
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.scene.arrays import FloatArray, IntArray
 
@@ -49,7 +57,7 @@ class Drive(NamedTuple):
     """W', rad/s^2, constant."""
 
 
-class Loads(NamedTuple):
+class _Loads(NamedTuple):
     """Forces on rotor and masses in one state."""
 
     force_x: float
@@ -61,20 +69,30 @@ class Loads(NamedTuple):
 
 
 @compiled
+def _limited(voltage: float, maximum: float) -> float:
+    """Cut a voltage to what the supply can give.
+
+    Args: `maximum`: V, positive; may be infinite.
+    Returns: V within [-maximum, maximum].
+    """
+    return min(max(voltage, -maximum), maximum)
+
+
+@compiled
 def drive_of(parameters: PlantParameters, command: FloatArray, rate: float) -> Drive:
     """Gather what acts on the plant from outside."""
     most = parameters.maximum_voltage
     return Drive(
         parameters.unbalance * math.cos(parameters.phase),
         parameters.unbalance * math.sin(parameters.phase),
-        parameters.drive_gain * limited(command[0], most),
-        parameters.drive_gain * limited(command[1], most),
+        parameters.drive_gain * _limited(command[0], most),
+        parameters.drive_gain * _limited(command[1], most),
         rate,
     )
 
 
 @compiled
-def loads(parameters: PlantParameters, state: FloatArray, speed: float, drive: Drive) -> Loads:
+def loads(parameters: PlantParameters, state: FloatArray, speed: float, drive: Drive) -> _Loads:
     """Forces on the rotor, and the masses' equations with the rotor's accelerations eliminated.
 
     A phi'' = g - friction, with A_ij = (J + J_add) delta_ij - b^2 / M cos(phi_i - phi_j) and
@@ -106,7 +124,7 @@ def loads(parameters: PlantParameters, state: FloatArray, speed: float, drive: D
         parameters.friction_arm_1 * b * square_1,
         parameters.friction_arm_2 * b * square_2,
     )
-    return Loads(force_x, force_y, torques)
+    return _Loads(force_x, force_y, torques)
 
 
 @compiled
@@ -147,3 +165,23 @@ def rest_state(angles: tuple[float, float]) -> FloatArray:
 def stuck_flags(flag: int) -> IntArray:
     """The same flag for both masses. Returns: Shape (2,)."""
     return np.full(2, flag, dtype=np.int64)
+
+
+@compiled
+def electrical_energy(
+    parameters: PlantParameters, before: FloatArray, after: FloatArray, command: FloatArray, step: float
+) -> float:
+    """Energy that both motors take from the supply while their voltages are held.
+
+    E = sum V (V h - K_m n (phi(t + h) - phi(t))) / R_m, the exact integral of V i; negative when a motor
+    feeds back.
+    Returns: J.
+    Source: Kirchhoff's law for the motor without inductance, Eqs. (A1) to (A3) of the paper on eccentric
+    masses.
+    """
+    total = 0.0
+    for mass in range(2):
+        voltage = _limited(command[mass], parameters.maximum_voltage)
+        turned = parameters.gear_ratio * (after[4 + mass] - before[4 + mass])
+        total += voltage * (voltage * step - parameters.back_emf_constant * turned) / parameters.resistance
+    return total

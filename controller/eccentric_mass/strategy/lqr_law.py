@@ -23,7 +23,7 @@ from ringbalance.controller.eccentric_mass.strategy.records import (
 from ringbalance.controller.eccentric_mass.strategy.supervisor import FRICTION, IMBALANCE
 from ringbalance.controller.eccentric_mass.strategy.targets import wrapped
 
-BREAKS_AWAY: Final = 3.0
+_BREAKS_AWAY: Final = 3.0
 """Standard deviations of a friction arm beyond its estimate with which a mass at rest is set going."""
 
 
@@ -90,7 +90,7 @@ def friction_torque(
     pressure = law.track.moment * (speed + rate) ** 2
     if abs(rate) > law.slow:
         return math.copysign(max(arm, 0.0) * pressure, rate)
-    largest = max(arm + BREAKS_AWAY * deviation, 0.0) * pressure
+    largest = max(arm + _BREAKS_AWAY * deviation, 0.0) * pressure
     return math.copysign(largest, distance) if abs(distance) > law.near else 0.0
 
 

@@ -20,21 +20,21 @@ from ringbalance.controller.eccentric_mass.strategy.records import (
 )
 from ringbalance.scene.eccentric_models import EccentricScene
 
-SMOOTHING_TIME = 0.05
+_SMOOTHING_TIME = 0.05
 """Of the angles and rates that arrival is judged by, s."""
-DWELL_TIME = 0.2
+_DWELL_TIME = 0.2
 """For which a mass must have arrived, s."""
-DECAYS = 2.0
+_DECAYS = 2.0
 """Decay times of the rotor that the imbalance is estimated for at least."""
-LONGEST_ESTIMATE = 0.5
+_LONGEST_ESTIMATE = 0.5
 """Share of the estimation's time limit that this may take at most."""
-LEAST_DRIVE_TIME = 1.0
+_LEAST_DRIVE_TIME = 1.0
 """Of the friction stage, s: long against the drive's own time constants."""
-LONGEST_TRIAL_MOVE = 10.0
+_LONGEST_TRIAL_MOVE = 10.0
 """s."""
-SLOWEST_RATE = 1e-3
+_SLOWEST_RATE = 1e-3
 """Below which a mass rests, however good the encoder, rad/s."""
-CERTAIN = 5.0
+_CERTAIN = 5.0
 """Standard deviations of a smoothed rate beyond which a mass moves."""
 FRICTION_ERROR = 0.1
 """Share of the arrival angle that unknown friction may hold a mass off."""
@@ -61,7 +61,7 @@ def strategy_settings(scene: EccentricScene) -> StrategySettings:
     return StrategySettings(
         step=step,
         laboratory=scene.sensor.frame == "laboratory",
-        smoothing=-math.expm1(-step / SMOOTHING_TIME),
+        smoothing=-math.expm1(-step / _SMOOTHING_TIME),
         voltage_every=max(round(scene.lqr.step / step), 1),
         law=drive_law(scene),
         gates=_gates(scene),
@@ -92,12 +92,12 @@ def _friction(scene: EccentricScene) -> FrictionSettings:
     inertia = track.inertia - given_way
     # The other mass's acceleration is a difference of two measured rates.
     noise = told.rate_noise**2 * (1 + 2 * (given_way / inertia) ** 2)
-    smooth = sensor.encoder_rate_noise * math.sqrt(sensor.step / (2 * SMOOTHING_TIME))
+    smooth = sensor.encoder_rate_noise * math.sqrt(sensor.step / (2 * _SMOOTHING_TIME))
     return FrictionSettings(
         start=FrictionEstimate(0.0, 0.0, told.initial_rate**2, 0.0, told.initial_friction**2),
         noise=FrictionNoise(noise, told.rate_walk**2, told.friction_walk**2),
         track=track._replace(inertia=inertia),
-        least_motion=max(CERTAIN * smooth, SLOWEST_RATE),
+        least_motion=max(_CERTAIN * smooth, _SLOWEST_RATE),
         euler=told.discretisation == "euler",
         every=max(round(told.step / sensor.step), 1),
         drive_speed=told.drive_speed,
@@ -135,7 +135,7 @@ def drive_law(scene: EccentricScene) -> DriveLaw:
         position_gain=position_gain,
         rate_gain=rate_gain,
         breaks_away=scene.lqr.friction_compensation == "break_away",
-        slow=max(3 * scene.sensor.encoder_rate_noise, SLOWEST_RATE),
+        slow=max(3 * scene.sensor.encoder_rate_noise, _SLOWEST_RATE),
         near=_near(scene),
     )
 
@@ -143,15 +143,15 @@ def drive_law(scene: EccentricScene) -> DriveLaw:
 def _near(scene: EccentricScene) -> float:
     """A quarter of the finest move asked for, but not finer than the smoothed encoder can tell."""
     finest = min(scene.fine_tuning.stop, scene.supervisor.arrival_angle)
-    smooth = scene.sensor.encoder_noise * math.sqrt(scene.sensor.step / (2 * SMOOTHING_TIME))
+    smooth = scene.sensor.encoder_noise * math.sqrt(scene.sensor.step / (2 * _SMOOTHING_TIME))
     return max(0.25 * finest, 3 * smooth)
 
 
 def _least_estimate(scene: EccentricScene) -> float:
     """Until the rotor's own transient, which hangs most on the assumed bearing, has died down."""
     whirl = believed_whirl(scene)
-    longest = LONGEST_ESTIMATE * scene.supervisor.imbalance_time
-    return min(DECAYS * 2 * whirl.mass / whirl.damping, longest) if whirl.damping > 0 else longest
+    longest = _LONGEST_ESTIMATE * scene.supervisor.imbalance_time
+    return min(_DECAYS * 2 * whirl.mass / whirl.damping, longest) if whirl.damping > 0 else longest
 
 
 def _gates(scene: EccentricScene) -> Gates:
@@ -164,7 +164,7 @@ def _gates(scene: EccentricScene) -> Gates:
         lowest_speed=told.lowest_speed,
         arrival_angle=told.arrival_angle,
         arrival_rate=told.arrival_rate,
-        dwell=DWELL_TIME,
+        dwell=_DWELL_TIME,
         imbalance_time=told.imbalance_time,
         friction_time=told.friction_time,
         positioning_time=told.positioning_time,
@@ -173,7 +173,7 @@ def _gates(scene: EccentricScene) -> Gates:
         friction_gate=scene.friction_filter.gate,
         friction_torque=FRICTION_ERROR * law.position_gain * told.arrival_angle,
         least_estimate=_least_estimate(scene),
-        least_drive=LEAST_DRIVE_TIME,
+        least_drive=_LEAST_DRIVE_TIME,
         stall_rate=scene.friction_filter.stall_share * scene.friction_filter.drive_speed,
         tuning_step=tuning.step,
         tuning_stop=tuning.stop,
@@ -181,7 +181,7 @@ def _gates(scene: EccentricScene) -> Gates:
         wait=tuning.wait,
         average=tuning.average,
         margin=2 * scene.sensor.position_noise / math.sqrt(averaged),
-        move_time=LONGEST_TRIAL_MOVE,
+        move_time=_LONGEST_TRIAL_MOVE,
         moment=plant.moment,
         gap=scene.masses.arc_length / scene.masses.guide_radius,
         target_error=told.target_error,

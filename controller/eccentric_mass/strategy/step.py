@@ -57,9 +57,9 @@ from ringbalance.controller.eccentric_mass.strategy.supervisor import (
 )
 from ringbalance.scene.arrays import FloatArray
 
-LARGEST_TURN: Final = 0.05
+_LARGEST_TURN: Final = 0.05
 """Of a mass within one step of the imbalance filter, rad, which takes its path as straight."""
-STEADY: Final = 1e-6
+_STEADY: Final = 1e-6
 """Speed rate that counts as none, rad/s^2."""
 
 
@@ -154,9 +154,9 @@ def _smoothed(new: float, old: Smoothed, motion: Motion) -> Smoothed:
 @compiled
 def _visible(settings: StrategySettings, motion: Motion, smoothed: Smoothed) -> bool:
     """Whether the imbalance filter's model holds: turning, at constant speed, with masses it can follow."""
-    turning = abs(motion.speed) >= settings.gates.lowest_speed and abs(motion.speed_rate) < STEADY
+    turning = abs(motion.speed) >= settings.gates.lowest_speed and abs(motion.speed_rate) < _STEADY
     fastest = max(abs(smoothed.rate[0]), abs(smoothed.rate[1]))
-    return turning and fastest * settings.step * settings.imbalance.every <= LARGEST_TURN
+    return turning and fastest * settings.step * settings.imbalance.every <= _LARGEST_TURN
 
 
 @compiled
@@ -268,7 +268,7 @@ def _facts(
     return Facts(
         time,
         w,
-        abs(motion.speed_rate) < STEADY,
+        abs(motion.speed_rate) < _STEADY,
         visible,
         motion.position,
         smoothed.angle,

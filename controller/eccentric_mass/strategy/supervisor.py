@@ -37,7 +37,7 @@ _CAUSES: Final = tuple(map(int, Cause))
 NONE, BALANCED, SATURATED, RESIDUAL, TUNING_TIME, SPEED_CHANGED, TOO_SLOW, SPEED_NOT_CONSTANT = _CAUSES[:8]
 IMBALANCE_UNCERTAIN, FRICTION_UNCERTAIN, STALLED, NOT_ARRIVED, LOCKED, MASSES_MOVE = _CAUSES[8:]
 
-HOLDS_FOR_SURE: Final = 0.7
+_HOLDS_FOR_SURE: Final = 0.7
 """Share of the friction known to be there that the drives may be switched off on."""
 STALLED_SHARE: Final = 0.5
 """Of the friction stage, beyond which its failure is blamed on the drive."""
@@ -205,7 +205,7 @@ def _rest(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     astray = False
     for i in range(2):
         astray = astray or abs(facts.angle[i] - now.goal[i]) > 2 * gates.arrival_angle
-    if hold == RELEASED and (astray or facts.load > HOLDS_FOR_SURE):
+    if hold == RELEASED and (astray or facts.load > _HOLDS_FOR_SURE):
         hold = HELD
     return _with_hold(now, hold)
 

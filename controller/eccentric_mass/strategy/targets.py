@@ -27,7 +27,7 @@ class Targets(NamedTuple):
     """Whether the imbalance is more than the masses can undo, which takes them side by side."""
 
 
-class Assignment(NamedTuple):
+class _Assignment(NamedTuple):
     """How far each mass goes."""
 
     first: float
@@ -67,17 +67,17 @@ def target_angles(imbalance: float, phase: float, moment: float, gap: float) -> 
 
 
 @compiled
-def assign(first: float, second: float, target_one: float, target_two: float) -> Assignment:
+def assign(first: float, second: float, target_one: float, target_two: float) -> _Assignment:
     """Send each mass to a target by the shortest pair of travels on which they do not meet.
 
     The sum of squared travels is least over both assignments and all whole turns that keep the order of the
     masses on the track.  Masses that share one law of motion then never come closer than they are at the
     start or at the end.
-    Returns: Assignment; of two equal ones the unswapped.
+    Returns: _Assignment; of two equal ones the unswapped.
     Source: Eqs. 27 and 28 of the paper on eccentric masses, with angles wrapped.
     """
     lead = (second - first) % (2 * math.pi)
-    best = Assignment(0.0, 0.0, False)
+    best = _Assignment(0.0, 0.0, False)
     least = math.inf
     for swapped in (False, True):
         goal = target_two if swapped else target_one
@@ -88,5 +88,5 @@ def assign(first: float, second: float, target_one: float, target_two: float) ->
             travel = wrapped(goal - first) + 2 * math.pi * turn
             cost = travel**2 + (travel + change) ** 2
             if cost < least - 1e-12:
-                least, best = cost, Assignment(travel, travel + change, swapped)
+                least, best = cost, _Assignment(travel, travel + change, swapped)
     return best

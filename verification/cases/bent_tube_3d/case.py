@@ -46,7 +46,7 @@ _DEVELOPED: Final = (5.0, 1.0)
 reference = dict.fromkeys(("straight", "explained"), Reference(value=1.0))
 
 
-def path(scene: Scene, refinement: float) -> tuple[Segment, ...]:
+def _path(scene: Scene, refinement: float) -> tuple[Segment, ...]:
     """Leg, bend to the right, over the crest, bend to the right, leg; lengths over the bore.
 
     Args: `refinement`: cells along the path over those of the coarsest mesh.
@@ -80,14 +80,14 @@ def _rotation(scene: Scene) -> float:
     )
 
 
-def solve(scene: Scene, *, mesh: tuple[int, int, float], coriolis_factor: float = 1.0) -> BentTubeFlow:
+def _solve(scene: Scene, *, mesh: tuple[int, int, float], coriolis_factor: float = 1.0) -> BentTubeFlow:
     """The flow on a mesh of cells around, cells across and refinement along the path.
 
     Raises: ArithmeticError: Newton's method failed.
     """
     around, across, along = mesh
     flow = bent_tube_flow(
-        segments=path(scene, along),
+        segments=_path(scene, along),
         cells=SectionMesh(around=around, across=across, wall_ratio=3.0),
         reynolds=REYNOLDS,
         rotation_reynolds=_rotation(scene),
@@ -144,7 +144,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     flows: list[BentTubeFlow] = []
     losses: list[float] = []
     for mesh in meshes:
-        flow = solve(scene, mesh=mesh, coriolis_factor=_FACTORS[defect])
+        flow = _solve(scene, mesh=mesh, coriolis_factor=_FACTORS[defect])
         losses.append(pressure_loss(flow=flow, start=0.0, end=float(flow.arc_length[-1])))
         # Only the last flow is needed whole; each holds hundreds of megabytes.
         flows = [flow]
@@ -201,7 +201,7 @@ def _sizes(scene: Scene, meshes: Sequence[tuple[int, int, float]]) -> list[float
     counts = []
     for around, across, along in meshes:
         section = 2 * around**2 + 4 * around * across
-        counts.append(section * sum(segment.cells for segment in path(scene, along)))
+        counts.append(section * sum(segment.cells for segment in _path(scene, along)))
     return [count ** (-1 / 3) for count in counts]
 
 

@@ -20,7 +20,7 @@ from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Evidence, Found, Level, Table
 from ringbalance.verification.reference.exact_chamber import exact_moment, exact_wall_pressure
 
-QUANTITIES: Final = ("liquid_volume", "wall_pressure", "moment", "moment_per_volume")
+_QUANTITIES: Final = ("liquid_volume", "wall_pressure", "moment", "moment_per_volume")
 _CHAMBERS: Final = (2, 4, 6, 8, 10)
 _ROUND_OFF: Final = 1e-13
 """Relative errors below this are the exact value's own rounding."""
@@ -31,7 +31,7 @@ _FACTORS: Final = {None: 1.0, "half_widths_quartered": 0.25, "half_widths_padded
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sample:
+class _Sample:
     """One random disc at one fill."""
 
     disc: Disc
@@ -43,7 +43,7 @@ class Sample:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Coverage:
+class _Coverage:
     """How one quantity fared over all samples."""
 
     share: float
@@ -56,13 +56,13 @@ class Coverage:
     """Largest |error| over half-width."""
 
 
-def random_samples(*, count: int, seed: int) -> tuple[Sample, ...]:
+def _random_samples(*, count: int, seed: int) -> tuple[_Sample, ...]:
     """Discs of all proportions that the program accepts, with fills from thin to the largest."""
     generator = np.random.default_rng(seed)
     return tuple(_sample(generator) for _ in range(count))
 
 
-def _sample(generator: np.random.Generator) -> Sample:
+def _sample(generator: np.random.Generator) -> _Sample:
     chambers = int(generator.choice(_CHAMBERS))
     angle = generator.uniform(0.7, 1.0) * 2 * math.pi / chambers
     outer = generator.uniform(15e-3, 200e-3)
@@ -79,7 +79,7 @@ def _sample(generator: np.random.Generator) -> Sample:
         max_fill_ratio=largest,
         initial_fill=largest / 2,
     )
-    return Sample(
+    return _Sample(
         disc=disc,
         density=generator.uniform(700, 6100),
         angular_velocity=float(generator.uniform(80, 6000)),
@@ -87,7 +87,7 @@ def _sample(generator: np.random.Generator) -> Sample:
     )
 
 
-def error_ratios(*, samples: tuple[Sample, ...]) -> FloatArray:
+def _error_ratios(*, samples: tuple[_Sample, ...]) -> FloatArray:
     """|error| over half-width, shape (samples, quantities); -1 where the error is at round-off.
 
     Raises: RuntimeError: a sample that could not be solved.
@@ -95,16 +95,16 @@ def error_ratios(*, samples: tuple[Sample, ...]) -> FloatArray:
     return np.array([_ratios_of(sample) for sample in samples])
 
 
-def coverage(*, ratios: FloatArray, width_factor: float = 1.0) -> Mapping[str, Coverage]:
-    """How often half-widths hold, and how tight they are, of each of `QUANTITIES`.
+def _coverage(*, ratios: FloatArray, width_factor: float = 1.0) -> Mapping[str, _Coverage]:
+    """How often half-widths hold, and how tight they are, of each of `_QUANTITIES`.
 
     Args: `width_factor`: multiplies every half-width; anything but 1 is a deliberate error.
     """
     scaled = np.where(ratios < 0, ratios, ratios / width_factor)
-    return {name: _judge(scaled[:, index]) for index, name in enumerate(QUANTITIES)}
+    return {name: _judge(scaled[:, index]) for index, name in enumerate(_QUANTITIES)}
 
 
-def _ratios_of(sample: Sample) -> list[float]:
+def _ratios_of(sample: _Sample) -> list[float]:
     ring = ring_quantities(
         disc=sample.disc,
         density=sample.density,
@@ -114,7 +114,7 @@ def _ratios_of(sample: Sample) -> list[float]:
     if not ring.status.ok:
         raise RuntimeError(ring.status.text)
     exact = _exact(sample)
-    return [_ratio(ring, name, exact[name]) for name in QUANTITIES]
+    return [_ratio(ring, name, exact[name]) for name in _QUANTITIES]
 
 
 def _ratio(ring: RingQuantities, name: str, exact: float) -> float:
@@ -125,7 +125,7 @@ def _ratio(ring: RingQuantities, name: str, exact: float) -> float:
     return error / float(estimate.uncertainty[0])
 
 
-def _exact(sample: Sample) -> Mapping[str, float]:
+def _exact(sample: _Sample) -> Mapping[str, float]:
     disc, x = sample.disc, sample.fill_ratio
     a = surface_radius(disc=disc, fill_ratio=x)
     alpha = half_angle(disc=disc, radius=a)
@@ -140,9 +140,9 @@ def _exact(sample: Sample) -> Mapping[str, float]:
     }
 
 
-def _judge(ratios: FloatArray) -> Coverage:
+def _judge(ratios: FloatArray) -> _Coverage:
     judged = ratios[ratios >= 0]
-    return Coverage(
+    return _Coverage(
         share=float(np.mean(ratios <= 1)),
         tightness=float(np.median(judged)) if judged.size else 1.0,
         judged=int(judged.size),
@@ -151,9 +151,9 @@ def _judge(ratios: FloatArray) -> Coverage:
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    results = coverage(ratios=_ratios(), width_factor=_FACTORS[defect])
+    results = _coverage(ratios=_ratios(), width_factor=_FACTORS[defect])
     found: dict[str, Found] = {}
-    for name, quantity in zip(_NAMES, QUANTITIES, strict=True):
+    for name, quantity in zip(_NAMES, _QUANTITIES, strict=True):
         found[f"{name}_share"] = Found(value=results[quantity].share)
         found[f"{name}_tightness"] = Found(value=results[quantity].tightness)
     return Evidence(
@@ -165,10 +165,10 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 
 @lru_cache(maxsize=1)
 def _ratios() -> FloatArray:
-    return error_ratios(samples=random_samples(count=_COUNT, seed=_SEED))
+    return _error_ratios(samples=_random_samples(count=_COUNT, seed=_SEED))
 
 
-def _table(results: Mapping[str, Coverage]) -> Table:
+def _table(results: Mapping[str, _Coverage]) -> Table:
     return Table(
         name=f"{_COUNT} random discs, seed {_SEED}",
         columns={

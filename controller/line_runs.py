@@ -1,0 +1,86 @@
+"""Whole runs at both ends of the default range of gas lines, where a scene does not give its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ringbalance.controller.loop import simulate
+from ringbalance.controller.simulation import Simulation
+from ringbalance.controller.terms import can_carry
+from ringbalance.reduced_model.gas_line import line_ends
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.paper_law import PaperLaw
+from ringbalance.reduced_model.selection.estimates import FILLING, INERTIA, LAG
+from ringbalance.scene.models import Scene
+
+
+@dataclass(frozen=True, kw_only=True)
+class LineRun:
+    """One run with one end of the range."""
+
+    end: str
+    """ "slow" or "fast"."""
+    conductance: float
+    """m^3/(s Pa)."""
+    valve_lag: float
+    """s."""
+    run: Simulation
+
+
+def line_runs(scene: Scene, model: BalancerModel) -> tuple[LineRun, ...]:
+    """Runs with gas filling, valve lag and inertia modelled; none where the scene gives its gas line, or the
+    law no forces."""
+    ends = line_ends(scene)
+    if len(ends) == 1 or not can_carry(scene, model):
+        return ()
+    found = []
+    for end in ends:
+        gas = replace(
+            scene.gas,
+            conductance=end.line.conductance,
+            critical_ratio=end.line.critical_ratio,
+            valve_lag=end.valve_lag,
+        )
+        # The paper's law has no mass in the tube.
+        terms = (FILLING, LAG) if isinstance(model.flow, PaperLaw) else (INERTIA, FILLING, LAG)
+        run = simulate(replace(scene, gas=gas), model, modelled=terms)
+        found.append(
+            LineRun(end=end.name, conductance=end.line.conductance, valve_lag=end.valve_lag, run=run)
+        )
+    return tuple(found)
+
+
+def line_runs_text(runs: Sequence[LineRun]) -> str:
+    """How the runs end, in one sentence; empty without any."""
+    if not runs:
+        return ""
+    each = "; ".join(f"{run.end} line: {_end(run.run)}" for run in runs)
+    return f"the scene gives no gas line; with both ends of its default range modelled, {each}"
+
+
+def _end(run: Simulation) -> str:
+    if run.settling_time is not None:
+        return f"settled in {run.settling_time:.3g} s"
+    return f"{run.verdict.value}, {1e6 * run.amplitude[-1]:.3g} um at the end"
+
+
+def line_runs_document(runs: Sequence[LineRun]) -> list[dict[str, Any]]:
+    """For JSON, in SI."""
+    return [
+        {
+            "end": found.end,
+            "conductance_m3_per_s_Pa": found.conductance,
+            "valve_lag_s": found.valve_lag,
+            "settled": found.run.settled,
+            "settling_time_s": found.run.settling_time,
+            "verdict": found.run.verdict.value,
+            "outcome": found.run.outcome.value,
+            "final_amplitude_m": float(found.run.amplitude[-1]),
+            "overshoots": found.run.overshoots,
+            "injections": len(found.run.injections),
+            "status": found.run.status,
+        }
+        for found in runs
+    ]

@@ -1,0 +1,24 @@
+"""What only a scene with eccentric masses needs, loaded when first used: others start faster without.
+
+`from ringbalance.scene import deferred`, then `deferred.ECCENTRIC_MASS`.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from types import MappingProxyType
+from typing import Any, Final
+
+_HOME: Final = MappingProxyType(
+    {
+        "CHECKS": "ringbalance.scene.rules.eccentric",
+        "ECCENTRIC_MASS": "ringbalance.scene.keys.eccentric_schema",
+        "EccentricScene": "ringbalance.scene.eccentric_models",
+    }
+)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_HOME[name]), name)

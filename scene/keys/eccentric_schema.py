@@ -1,0 +1,29 @@
+"""The tables of a scene file with eccentric masses; loaded for such a file only."""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+
+from ringbalance.scene import eccentric_control_models as control
+from ringbalance.scene import eccentric_models as machine
+from ringbalance.scene.keys.declaration import needed
+from ringbalance.scene.keys.schema import RUN, Schema, table_of, top_keys, with_origins
+
+_ECCENTRIC = {
+    "rotor": table_of(machine.EccentricRotor, "the rotor on its bearing, and its speed"),
+    "imbalance": table_of(machine.Imbalance, "the imbalance to be balanced"),
+    "masses": table_of(machine.EccentricMasses, "the two eccentric masses on their track"),
+    "motor": table_of(machine.Motor, "motor and gears of each mass"),
+    "sensor": table_of(machine.EccentricSensor, "the sensors; exact when left out"),
+    "imbalance_filter": table_of(control.ImbalanceFilter, "the Kalman filter that finds the imbalance"),
+    "friction_filter": table_of(control.FrictionFilter, "the extended Kalman filter that finds the friction"),
+    "lqr": table_of(control.Lqr, "the regulator that moves the masses"),
+    "fine_tuning": table_of(control.FineTuning, "the search by trial for a smaller vibration"),
+    "supervisor": table_of(control.Supervisor, "the order of the stages, and when each ends"),
+}
+ECCENTRIC_MASS = Schema(
+    top=MappingProxyType(top_keys(needed('"eccentric_mass" for eccentric masses'))),
+    tables=with_origins({**_ECCENTRIC, **RUN}),
+    scene=machine.EccentricScene,
+)
+"""A scene whose balancer is two eccentric masses."""

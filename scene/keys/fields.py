@@ -189,7 +189,8 @@ def each_of(reader: Reader, *, count: int, example: str) -> Reader:
         except FieldError as error:
             raise FieldError(f"entry {place}: {error.problem}", error.allowed) from error
 
-    return Reader(read=read, allowed=allowed, summary=f"a list of {count}, each {reader.summary}")
+    summary = f"a list of {count}, each {reader.summary}"
+    return Reader(read=read, allowed=allowed, summary=summary, dimension=reader.dimension)
 
 
 def choice(words: Any) -> Reader:

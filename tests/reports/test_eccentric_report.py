@@ -111,6 +111,8 @@ def test_every_value_has_its_origin(scene: EccentricScene) -> None:
     assert mass["value"] == f"{1e3 * scene.masses.guide_radius:.6g}\u202fmm"
     assert "from" in rows["Rotor", "speed profile"]["value"]
     assert all(row["note"] for row in rows.values())
+    for arm in rows["Masses", "friction arm"]["value"].split(", "):
+        assert arm.endswith("m")
 
 
 def test_unstable_loops_are_named() -> None:

@@ -182,7 +182,7 @@ def _topology(cells: tuple[int, ...]) -> tuple[IntArray, IntArray]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class MeshQuality:
+class _Quality:
     """Quality figures over all cells of a mesh; none depends on the unit of length."""
 
     minimum_scaled_jacobian: float
@@ -194,7 +194,7 @@ class MeshQuality:
     nodes: int
 
 
-def mesh_quality(chamber: ChamberMesh) -> MeshQuality:
+def mesh_quality(chamber: ChamberMesh) -> _Quality:
     """Quality of a mesh, judged at the nodes of every cell.
 
     scaled Jacobian = det(J) / prod_b |J_b| with J_b = dx/dX_b, aspect = max_b |J_b| / min_b |J_b|.
@@ -204,7 +204,7 @@ def mesh_quality(chamber: ChamberMesh) -> MeshQuality:
     _, gradients = cell_shapes([np.array([-1.0, 0.0, 1.0])] * chamber.dimension)
     jacobian = jacobians(chamber.nodes[:, chamber.cell_nodes], gradients)
     lengths = np.linalg.norm(jacobian, axis=-2)
-    return MeshQuality(
+    return _Quality(
         minimum_scaled_jacobian=float(np.linalg.det(jacobian / lengths[..., None, :]).min()),
         maximum_aspect=float((lengths.max(axis=-1) / lengths.min(axis=-1)).max()),
         cells=len(chamber.cell_nodes),

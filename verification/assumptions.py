@@ -45,7 +45,7 @@ def assumptions_of(rests_on: Sequence[RestsOn], scene: Any) -> tuple[Assumption,
     """
     found = []
     for one in rests_on:
-        origin, value = scene.origin_of(one.path), value_of(scene, one.path)
+        origin, value = scene.origin_of(one.path), _value_of(scene, one.path)
         if origin in KNOWN or value is None:
             continue
         low, high, why = _range(one, scene, value, origin)
@@ -56,7 +56,7 @@ def assumptions_of(rests_on: Sequence[RestsOn], scene: Any) -> tuple[Assumption,
     return tuple(found)
 
 
-def value_of(scene: Any, path: str) -> float | None:
+def _value_of(scene: Any, path: str) -> float | None:
     """A scene's value by "table.key", SI; None where the scene does not have the term."""
     table, _, key = path.partition(".")
     value: float | None = getattr(getattr(scene, table), key)

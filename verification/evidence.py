@@ -149,11 +149,6 @@ class Evidence:
     status: Status = field(default_factory=Status)
 
 
-def no_reference(_scene: Any) -> Mapping[str, Reference]:
-    """What a case's `reference` is where limits alone judge its quantities. Returns: Nothing."""
-    return {}
-
-
 class CaseCode(Protocol):
     """A case's `case.py`.
 

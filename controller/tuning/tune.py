@@ -14,7 +14,7 @@ from ringbalance.controller.checks import check_settings
 from ringbalance.controller.ensemble.monte_carlo import Probability, binomial_share, simulate_ensemble
 from ringbalance.controller.ensemble.samples import MemberUncertainty, drawn_members
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.terms import run_models
+from ringbalance.controller.terms import run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor, vibration_rates
 from ringbalance.controller.tuning.margins import Margins, loop_margins
 from ringbalance.controller.tuning.recommendation import (
@@ -34,6 +34,8 @@ Progress = Callable[[str], None]
 
 MEMBERS: Final = 2000
 """Compiled runs of the target-vector algorithm."""
+MOVING_MEMBERS: Final = 200
+"""The most of them where inertia, gas or valves are modelled, which takes a hundred times as long."""
 RUNS: Final = 20
 """Runs one by one, of an algorithm that is not compiled."""
 QUANTILES: Final = {"p50": 0.5, "p95": 0.95}
@@ -184,6 +186,8 @@ def _settling(
     scene: Scene, model: BalancerModel, widths: MemberUncertainty, *, members: int, runs: int, told: Progress
 ) -> SettlingTimes:
     if scene.controller.kind == "target_vector":
+        carried = terms_modelled(run_models(scene=scene, model=model))
+        members = min(members, MOVING_MEMBERS) if carried else members
         return _of_ensemble(scene, model, widths, members=members, told=told)
     times = np.array([_one_run(scene, model, widths, number=i, told=told) for i in range(runs)])
     return SettlingTimes(

@@ -33,13 +33,13 @@ from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
 from ringbalance.mesh.chamber import chamber_mesh
+from ringbalance.mesh.quadratic import line_shapes
 from ringbalance.physics.pressure.assembly import stiffness as stiffness_of
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.models import Disc
 
 _GAUSS, _WEIGHT = np.polynomial.legendre.leggauss(4)
-_SHAPE = np.stack([_GAUSS * (_GAUSS - 1) / 2, 1 - _GAUSS**2, _GAUSS * (_GAUSS + 1) / 2])
-_SLOPE = np.stack([_GAUSS - 0.5, -2 * _GAUSS, _GAUSS + 0.5])
+_SHAPE, _SLOPE = line_shapes(np.asarray(_GAUSS, dtype=np.float64))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -28,7 +28,7 @@ _LOOPS: Final = {
     "time_limit": ("T", "time is up", style.MUTED),
     "diverging": ("D", "diverges", style.PAPER),
     "drifting": ("D", "diverges", style.PAPER),
-    "gas_time_too_short": ("G", "below the shortest gas time", style.THIRD),
+    "gas_time_too_short": ("G", "below the shortest valve-open time", style.THIRD),
     "noise": ("N", "lost in noise", style.FOURTH),
     "stalled": ("B", "blocked", style.FIFTH),
     "capacity_exceeded": ("C", "beyond the capacity", style.FOURTH),

@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -190,6 +191,50 @@ def test_numbers_that_can_be_worked_by_hand(results: Mapping[str, CaseResult]) -
     # rho omega^2 V 0.5 / (B theta) = 0.381 MPa; rho omega^2 (R2^2 - r_m^2)/2 = 0.542 MPa.
     assert stall["by_eq_19"] == pytest.approx(0.3811e6, rel=1e-3)
     assert stall["by_priming"] == pytest.approx(0.5417e6, rel=1e-3)
+
+
+def test_moments_in_consequences_follow_from_the_integral(
+    results: Mapping[str, CaseResult], paper_scene: Scene
+) -> None:
+    """Worked by hand: with sin(pi/4 - asin(t/r)) the integral of r^2 sin(alpha) is elementary."""
+    disc, t = paper_scene.disc, paper_scene.disc.plate_thickness
+
+    def antiderivative(r: float) -> float:
+        return float((r**2 - t**2) ** 1.5 / 3 - t * r**2 / 2)
+
+    inner = results["claim_02_ring_radius"].numbers["ring_radius"]
+    depth = antiderivative(disc.outer_radius) - antiderivative(inner)
+    moment = math.sqrt(2) * 1000 * disc.axial_width * depth
+    exact = pytest.approx(moment, rel=1e-6)
+    assert results["claim_03_chamber_moment"].numbers["moment"] == exact
+    assert results["claim_03_chamber_moment"].numbers["shortfall"] == pytest.approx(1 - moment / 1.333e-3)
+    assert results["claim_04_disc_capacity"].numbers["guaranteed"] == exact
+    assert results["claim_05_density"].numbers["dense_capacity"] / math.sqrt(8) == exact
+    literal = 72e-3 * 1000 * 67.7e-6 * 0.5
+    ratio = results["claim_12_correction_mass"].numbers["literal_over_exact"]
+    assert ratio == pytest.approx(literal / moment, rel=2e-3)
+    whole = results["claim_20_rectangular_element"].numbers["whole_ring"]
+    outer = disc.outer_radius
+    by_force = (outer**3 - inner**3) / (3 * outer) / ((outer**2 - inner**2) / 2)
+    assert whole == pytest.approx(1 - by_force, abs=1e-6)
+
+
+def test_times_in_consequences_are_the_extremes_of_all_runs(results: Mapping[str, CaseResult]) -> None:
+    def table(case: str) -> Mapping[str, Any]:
+        evidence = results[case].evidence
+        assert evidence is not None
+        return evidence.tables[0].columns
+
+    trial = results["claim_14_trial_algorithm"].numbers
+    settled = [
+        time for time in table("claim_14_trial_algorithm")["settled after"] if not isinstance(time, str)
+    ]
+    assert (trial["fastest"], trial["slowest"]) == (min(settled), max(settled))
+    pair = table("claim_17_faster")
+    ratios = [slow / fast for slow, fast in zip(pair["trial"], pair["target vector"], strict=True)]
+    least = results["claim_17_faster"].numbers["speed_ratio_low"]
+    assert least == pytest.approx(min(ratios), rel=0.2)
+    assert least <= min(ratios) + 1e-9
 
 
 GEOMETRY_OR_LOOP = {1, 2, 3, 4, 5, 11, 12, 13, 14, 16, 17, 18, 20}

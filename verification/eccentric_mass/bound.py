@@ -1,4 +1,4 @@
-"""Appendix B: a bound on the rotor's motion while the masses go round, as printed, corrected and sharpened.
+"""Appendix B: a bound on the rotor's motion while the masses go round, as printed and corrected.
 
 The printed argument shows that the energy falls while the rotor's fixed-frame velocity exceeds Y/C_B, and
 concludes that the motion is bounded.  That does not follow: nothing is said of the displacement, and the
@@ -20,12 +20,8 @@ class _MotionBound(NamedTuple):
     """Y, largest force on the rotor, N."""
     printed_force: float
     """Y from the printed F_T, which drops b W^2 of each mass, N."""
-    velocity_threshold: float
-    """Y/C_B, beyond which the energy falls, m/s."""
     amplitude: float
     """Bound on |Z| once the start's transient is gone, m."""
-    velocity: float
-    """Bound on |Z'| once the start's transient is gone, m/s."""
 
 
 def motion_bound(
@@ -34,12 +30,10 @@ def motion_bound(
     """Bound the rotor's motion for masses that move with at most a given rate and acceleration.
 
     M Z'' + C_B Z' + K_B Z = F with |F| <= Y = U W^2 + 2 b (W + w)^2 + 2 b w', so |Z| <= Y int |h| dt, where
-    the impulse response h of an underdamped rotor has int |h| dt = coth(pi zeta/(2 sqrt(1 - zeta^2)))/K_B,
-    and |Z'| <= Y int |h'| dt, the sum of |h| at its extremes.
+    the impulse response h of an underdamped rotor has int |h| dt = coth(pi zeta/(2 sqrt(1 - zeta^2)))/K_B.
     Raises: ValueError: no damping, which bounds nothing, or so much that the rotor does not swing.
     Source: Appendix B of the paper on eccentric masses, corrected.
     """
-    natural = math.sqrt(parameters.stiffness / parameters.mass)
     ratio = parameters.damping / (2 * math.sqrt(parameters.stiffness * parameters.mass))
     if not 0 < ratio < 1:
         raise ValueError("the damping ratio of the rotor must lie between 0 and 1, both excluded")
@@ -47,13 +41,5 @@ def motion_bound(
     b, w = parameters.moment, abs(speed)
     force = parameters.unbalance * w**2 + 2 * b * ((w + rate) ** 2 + acceleration)
     printed = parameters.unbalance * w**2 + 2 * b * (rate**2 + acceleration + 2 * w * rate)
-    # |h| peaks where tan(w_d t) = root/ratio, and falls by the same factor from each extreme to the next.
-    first = math.exp(-ratio / root * math.atan2(root, ratio)) / (parameters.mass * natural)
-    fall = math.exp(-math.pi * ratio / root)
-    return _MotionBound(
-        force,
-        printed,
-        force / parameters.damping,
-        force / parameters.stiffness / math.tanh(math.pi * ratio / (2 * root)),
-        force * 2 * first / (1 - fall),
-    )
+    amplitude = force / parameters.stiffness / math.tanh(math.pi * ratio / (2 * root))
+    return _MotionBound(force, printed, amplitude)

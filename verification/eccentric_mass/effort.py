@@ -19,17 +19,17 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.verification.eccentric_mass.scenes import changed
 
-STEP = 1e-4
+_STEP = 1e-4
 """s, of the integration, which is of first order."""
-DURATION = 3.0
+_DURATION = 3.0
 """Of the move, s."""
-MASS_RATIOS = (0.035, 0.023)
+_MASS_RATIOS = (0.035, 0.023)
 """m_b/m_r of Fig. 6."""
-WEIGHT_RATIOS = (1.0, 2.0, 3.5, 5.0)
+_WEIGHT_RATIOS = (1.0, 2.0, 3.5, 5.0)
 """q/r."""
-SPEED_RATIOS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0)
+_SPEED_RATIOS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0)
 """W over sqrt(K_B/M)."""
-TRAVEL = (-1.0, 0.6)
+_TRAVEL = (-1.0, 0.6)
 """rad, of the two masses."""
 
 
@@ -112,7 +112,7 @@ def _later_rate(law: DriveLaw, arm: float, speed: float, rate: float, net: float
     return 0.0 if later * rate < 0 else later
 
 
-def figure_six(scene: EccentricScene, *, step: float = STEP) -> FigureSix:
+def figure_six(scene: EccentricScene, *, step: float = _STEP) -> FigureSix:
     """Effort over weights and speed for both mass ratios and four compensations.
 
     Source: Fig. 6 of the paper on eccentric masses.
@@ -120,9 +120,9 @@ def figure_six(scene: EccentricScene, *, step: float = STEP) -> FigureSix:
     share = {"exact": 1.0, "without": 0.0, "printed": 1.0, "short": 0.8}
     found = {name: _efforts(scene, name == "printed", part, step) for name, part in share.items()}
     return FigureSix(
-        mass_ratios=np.array(MASS_RATIOS),
-        weight_ratios=np.array(WEIGHT_RATIOS),
-        speed_ratios=np.array(SPEED_RATIOS),
+        mass_ratios=np.array(_MASS_RATIOS),
+        weight_ratios=np.array(_WEIGHT_RATIOS),
+        speed_ratios=np.array(_SPEED_RATIOS),
         **found,
     )
 
@@ -130,8 +130,8 @@ def figure_six(scene: EccentricScene, *, step: float = STEP) -> FigureSix:
 def _efforts(scene: EccentricScene, printed: bool, share: float, step: float) -> FloatArray:
     return np.array(
         [
-            [_over_speed(scene, mass, weight, printed, share, step) for weight in WEIGHT_RATIOS]
-            for mass in MASS_RATIOS
+            [_over_speed(scene, mass, weight, printed, share, step) for weight in _WEIGHT_RATIOS]
+            for mass in _MASS_RATIOS
         ]
     )
 
@@ -145,6 +145,6 @@ def _over_speed(
     natural = math.sqrt(scene.rotor.stiffness / (scene.rotor.mass * (1 + 2 * mass_ratio)))
     arm = scene.masses.friction_arm[0]
     return [
-        _positioning_effort(law, arm, share * arm, ratio * natural, *TRAVEL, step, DURATION, printed)
-        for ratio in SPEED_RATIOS
+        _positioning_effort(law, arm, share * arm, ratio * natural, *_TRAVEL, step, _DURATION, printed)
+        for ratio in _SPEED_RATIOS
     ]

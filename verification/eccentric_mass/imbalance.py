@@ -24,11 +24,11 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.verification.eccentric_mass.scenes import at_constant_speed, changed
 
-PAPER_PHASES = (30.0, 100.0, 210.0, 300.0)
+_PAPER_PHASES = (30.0, 100.0, 210.0, 300.0)
 """Of the imbalance in Fig. 4, deg."""
-CONVERGED = 0.02
+_CONVERGED = 0.02
 """Relative error of the imbalance within which its estimate has converged."""
-SCALES = (1.0, 10.0, 100.0, 1000.0, 1500.0, 2000.0, 2500.0, 1e4)
+_SCALES = (1.0, 10.0, 100.0, 1000.0, 1500.0, 2000.0, 2500.0, 1e4)
 """Sensor noise that the filter assumes, over the true one."""
 
 
@@ -71,7 +71,7 @@ def imbalance_record(scene: EccentricScene, *, duration: float, seed: int | None
     """Measure a rotor that starts at its centre, the masses locked at their first angles.
 
     Args: `seed`: of the noise; default the scene's.
-    Returns: _ImbalanceRecord, one sample for each step of the sensor, without the instant of the start.
+    Returns: One sample for each step of the sensor, without the instant of the start.
     """
     level = at_constant_speed(scene, time_limit=duration)
     run = run_plant(level, locked=True)
@@ -131,22 +131,22 @@ def convergence_time(time: FloatArray, error: FloatArray, *, limit: float) -> fl
 def _time_of(scene: EccentricScene, record: _ImbalanceRecord, scale: float) -> float:
     states, _ = estimate_imbalance(scene, record, scale=scale)
     error = np.abs(states[:, 4] + 1j * states[:, 5] - record.imbalance) / abs(record.imbalance)
-    return convergence_time(record.time, error, limit=CONVERGED)
+    return convergence_time(record.time, error, limit=_CONVERGED)
 
 
 def figure_four(
-    scene: EccentricScene, *, duration: float = 8.0, scales: tuple[float, ...] = SCALES
+    scene: EccentricScene, *, duration: float = 8.0, scales: tuple[float, ...] = _SCALES
 ) -> FigureFour:
     """Estimate the four imbalances of Fig. 4, and one of them under covariances ever less honest.
 
     Source: Fig. 4 of the paper on eccentric masses.
     """
-    turned = [changed(scene, "imbalance", phase=math.radians(phase)) for phase in PAPER_PHASES]
+    turned = [changed(scene, "imbalance", phase=math.radians(phase)) for phase in _PAPER_PHASES]
     records = [imbalance_record(one, duration=duration) for one in turned]
     found = [estimate_imbalance(one, record) for one, record in zip(turned, records, strict=True)]
     return FigureFour(
         time=records[0].time,
-        phases=PAPER_PHASES,
+        phases=_PAPER_PHASES,
         true=np.array([[record.imbalance.real, record.imbalance.imag] for record in records]),
         estimate=np.array([states[:, 4:] for states, _ in found]),
         covariance_norm=np.array([np.linalg.norm(covariances, 2, (1, 2)) for _, covariances in found]),

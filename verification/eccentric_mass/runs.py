@@ -8,24 +8,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.verification.eccentric_mass.imbalance import convergence_time
-from ringbalance.verification.eccentric_mass.scenes import RPM, at_constant_speed, changed, envelope, thinned
+from ringbalance.verification.eccentric_mass.scenes import at_constant_speed, changed, envelope, thinned
 from ringbalance.verification.evidence import Curve, Series, figure
 
-PAPER_ARMS = (0.01, 0.005)
+_PAPER_ARMS = (0.01, 0.005)
 """Of Fig. 5, m."""
-PAPER_PLACES = (45.0, 135.0)
+_PAPER_PLACES = (45.0, 135.0)
 """Phases of the imbalance in Figs. 7 and 8, deg."""
-PAPER_ERROR = math.radians(10.0)
+_PAPER_ERROR = math.radians(10.0)
 """Of the masses' places in Fig. 8, rad."""
-PAPER_CRITICAL_SPEED = 135 * RPM
-"""As printed, rad/s."""
-CONVERGED = 0.05
+_CONVERGED = 0.05
 """Relative error of the friction arm within which its estimate has converged."""
 
 
@@ -38,8 +36,6 @@ class FigureFive:
     runs: tuple[EccentricRun, ...]
     time_to_converge: tuple[float, ...]
     """From the beginning of the friction stage until both estimates keep within 5 %, s."""
-    relative_error: tuple[float, ...]
-    """Of the worse estimate at the end of the stage."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,8 +72,6 @@ class FigureNine:
     """sqrt(K_B/M) with the eccentric masses, rad/s."""
     rotor_critical_speed: float
     """sqrt(K_B/m_r), which the paper prints as 135 rpm, rad/s."""
-    steady_peak_speed: float
-    """Of the largest steady whirl, rad/s."""
 
 
 def amplitude_figure(
@@ -96,13 +90,12 @@ def amplitude_figure(
 def figure_five(scene: EccentricScene, *, time_limit: float = 12.0) -> FigureFive:
     """Find the friction arms of Fig. 5. Source: Fig. 5 of the paper on eccentric masses."""
     level = at_constant_speed(scene, time_limit=time_limit)
-    runs = tuple(simulate_eccentric(changed(level, "masses", friction_arm=(a, a))) for a in PAPER_ARMS)
-    pairs = list(zip(runs, PAPER_ARMS, strict=True))
+    runs = tuple(simulate_eccentric(changed(level, "masses", friction_arm=(a, a))) for a in _PAPER_ARMS)
+    pairs = list(zip(runs, _PAPER_ARMS, strict=True))
     return FigureFive(
-        arms=PAPER_ARMS,
+        arms=_PAPER_ARMS,
         runs=runs,
         time_to_converge=tuple(_friction_time(run, arm) for run, arm in pairs),
-        relative_error=tuple(float(_arm_error(run, arm)[-1]) for run, arm in pairs),
     )
 
 
@@ -114,7 +107,7 @@ def _friction_time(run: EccentricRun, arm: float) -> float:
     begun = [stage.start for stage in run.stages if stage.name == "friction estimation"]
     if not begun:
         return math.inf
-    return convergence_time(run.time, _arm_error(run, arm), limit=CONVERGED) - begun[0]
+    return convergence_time(run.time, _arm_error(run, arm), limit=_CONVERGED) - begun[0]
 
 
 def figure_seven(scene: EccentricScene, *, time_limit: float = 30.0) -> BalancingFigure:
@@ -131,14 +124,14 @@ def figure_eight(scene: EccentricScene, *, time_limit: float = 400.0) -> Balanci
     Source: Fig. 8 of the paper on eccentric masses.
     """
     level = at_constant_speed(scene, time_limit=time_limit)
-    return _balanced(changed(level, "supervisor", target_error=(PAPER_ERROR, PAPER_ERROR)))
+    return _balanced(changed(level, "supervisor", target_error=(_PAPER_ERROR, _PAPER_ERROR)))
 
 
 def _balanced(scene: EccentricScene) -> BalancingFigure:
-    turned = [changed(scene, "imbalance", phase=math.radians(phase)) for phase in PAPER_PLACES]
+    turned = [changed(scene, "imbalance", phase=math.radians(phase)) for phase in _PAPER_PLACES]
     runs = tuple(simulate_eccentric(one) for one in turned)
     return BalancingFigure(
-        phases=PAPER_PLACES,
+        phases=_PAPER_PLACES,
         runs=runs,
         before=tuple(run.unbalanced_amplitude for run in runs),
         positioned=tuple(_in_check(run) for run in runs),
@@ -171,7 +164,6 @@ def figure_nine(scene: EccentricScene) -> FigureNine:
         locked_peak=_run_up_peak(locked, after=begins),
         critical_speed=math.sqrt(parameters.stiffness / parameters.mass),
         rotor_critical_speed=math.sqrt(parameters.stiffness / scene.rotor.mass),
-        steady_peak_speed=steady_peak_speed(parameters),
     )
 
 
@@ -180,14 +172,3 @@ def _run_up_peak(run: EccentricRun, *, after: float) -> tuple[float, float]:
     first = int(np.searchsorted(run.time, after))
     at = first + int(np.argmax(run.amplitude[first:]))
     return float(run.amplitude[at]), float(run.speed[at])
-
-
-def steady_peak_speed(parameters: PlantParameters) -> float:
-    """Speed of the largest steady whirl.
-
-    W = w_n/sqrt(1 - 2 zeta^2) with w_n = sqrt(K_B/M), zeta = C_B/(2 sqrt(K_B M)).
-    Returns: rad/s; infinite when damping lets the amplitude only grow with speed.
-    """
-    natural = math.sqrt(parameters.stiffness / parameters.mass)
-    ratio = parameters.damping / (2 * math.sqrt(parameters.stiffness * parameters.mass))
-    return natural / math.sqrt(1 - 2 * ratio**2) if 2 * ratio**2 < 1 else math.inf

@@ -30,7 +30,6 @@ from ringbalance.verification.eccentric_mass.runs import (
     figure_five,
     figure_nine,
     figure_seven,
-    steady_peak_speed,
 )
 from ringbalance.verification.eccentric_mass.scenes import RPM, at_constant_speed, changed
 
@@ -53,7 +52,8 @@ def test_figure_four_honest_filters_need_no_seconds(scene: EccentricScene) -> No
 
 def test_figure_five_finds_both_friction_arms(scene: EccentricScene) -> None:
     found = figure_five(scene, time_limit=8.0)
-    assert max(found.relative_error) < 0.02
+    for run, arm in zip(found.runs, found.arms, strict=True):
+        assert run.estimates.friction_arm[-1] == pytest.approx((arm, arm), rel=0.02)
     assert max(found.time_to_converge) < 1.0
 
 
@@ -98,7 +98,10 @@ def test_figure_nine_passes_the_models_own_critical_speed(scene: EccentricScene)
     amplitude, speed = found.locked_peak
     assert amplitude == pytest.approx(expected, rel=1e-6)
     assert speed == pytest.approx(at, abs=1e-3)
-    assert found.steady_peak_speed < speed < found.steady_peak_speed + 4 * RPM
+    plant = plant_parameters(scene)
+    ratio = plant.damping / (2 * math.sqrt(plant.stiffness * plant.mass))
+    steady = found.critical_speed / math.sqrt(1 - 2 * ratio**2)
+    assert steady < speed < steady + 4 * RPM
     assert found.balanced_peak[0] < 2e-3 * amplitude
 
 
@@ -119,22 +122,12 @@ def fixed_frame_peak(plant: PlantParameters) -> tuple[float, float]:
     return float(np.max(size)), float(first + RPM * grid[np.argmax(size)])
 
 
-def test_steady_peak_speed_is_the_largest_whirl(scene: EccentricScene) -> None:
-    plant = plant_parameters(scene)
-    speeds = np.linspace(10, 20, 20001)
-    whirl = speeds**2 / np.abs(plant.stiffness - plant.mass * speeds**2 + 1j * plant.damping * speeds)
-    assert steady_peak_speed(plant) == pytest.approx(speeds[np.argmax(whirl)], abs=1e-3)
-    assert steady_peak_speed(plant._replace(damping=1000.0)) == math.inf
-
-
 def test_the_bound_holds_is_sharp_at_resonance_and_is_not_the_printed_one(scene: EccentricScene) -> None:
     plant = plant_parameters(scene)
     natural = math.sqrt(plant.stiffness / plant.mass)
     still = motion_bound(plant._replace(moment=0.0), speed=natural, rate=0.0)
     whirl = plant.unbalance * natural**2 / (plant.damping * natural)
     assert whirl <= still.amplitude <= 4 / math.pi * whirl * 1.1
-    # A whirl at the critical speed has just the velocity at which the printed argument begins to hold.
-    assert natural * whirl == pytest.approx(still.velocity_threshold)
     turning = motion_bound(plant, speed=10.47, rate=0.52)
     assert turning.printed_force < turning.force - 2 * plant.moment * 10.47**2 * 0.99
     half = plant.damping / (2 * plant.mass)
@@ -145,15 +138,6 @@ def test_the_bound_holds_is_sharp_at_resonance_and_is_not_the_printed_one(scene:
         for i in range(120)
     ]
     assert turning.amplitude == pytest.approx(turning.force * sum(h) / (plant.mass * damped), rel=1e-6)
-    slope = [
-        quad(
-            lambda t: math.exp(-half * t) * abs(math.cos(damped * t) - half / damped * math.sin(damped * t)),
-            i * period / 50,
-            (i + 1) * period / 50,
-        )[0]
-        for i in range(3000)
-    ]
-    assert turning.velocity == pytest.approx(turning.force * sum(slope) / plant.mass, rel=1e-4)
 
 
 @pytest.mark.parametrize("damping", [0.0, 1e4])

@@ -1,0 +1,75 @@
+"""Document data, symbols and tables beside the report are those of the evidence and of the glossary."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+from ringbalance.reports.pages.document import NOMENCLATURE, SECTION, evidence_text
+from ringbalance.reports.provenance import provenance
+from ringbalance.reports.tables import LONG, csv_tables, is_long, table_file
+
+Record = dict[str, Any]
+GLOSSARY = Path(__file__).resolve().parents[2] / "docs" / "glossary.md"
+
+
+def facts(evidence: Record) -> dict[str, str]:
+    view = SECTION.view(evidence)
+    assert view is not None
+    return dict(view["facts"])
+
+
+def test_symbols_are_those_of_the_glossary() -> None:
+    rows = [
+        tuple(cell.strip() for cell in line.split("|")[1:4])
+        for line in GLOSSARY.read_text(encoding="utf-8").splitlines()
+        if line.startswith("|")
+    ]
+    assert len(NOMENCLATURE) > 10
+    assert [entry for entry in NOMENCLATURE if (entry[2], entry[0], entry[1]) not in rows] == []
+
+
+def test_the_document_names_what_it_was_made_of(evidence: Record) -> None:
+    told = facts(evidence)
+    assert told["Commit"] == "0123456789abcdef"
+    assert told["Command"] == "ringbalance report sample.toml"
+    assert hashlib.sha256(evidence_text(evidence).encode()).hexdigest() in told["evidence.json"]
+    assert json.loads(evidence_text(evidence)) == evidence
+    evidence["provenance"]["dirty"] = True
+    assert facts(evidence)["Commit"].endswith("with local changes")
+
+
+def test_kept_evidence_is_named_with_its_date_and_scene(evidence: Record) -> None:
+    assert facts(evidence)["Kept evidence"].startswith("none")
+    evidence["verification"][-1].update(date="2029-02-03", scene_sha256="cd" * 32)
+    assert facts(evidence)["Kept evidence"] == "coverage of 2029-02-03, scene cdcdcdcdcdcd"
+
+
+def test_provenance_names_neither_folder_nor_machine() -> None:
+    found = provenance()
+    assert len(found["lock_sha256"]) == 64
+    assert "/" not in found["command"]
+    assert set(found) == {"commit", "dirty", "lock_sha256", "command", "machine"}
+
+
+def test_long_tables_become_files_with_every_row(evidence: Record) -> None:
+    table: Record = {
+        "name": "Settled after, by period",
+        "columns": {"period": [0.1 * i for i in range(LONG + 1)], "ending": ["settled"] * (LONG + 1)},
+        "units": {"period": "s"},
+    }
+    short = {"name": "short", "columns": {"a": [1.0]}, "units": {}}
+    case = evidence["verification"][0]
+    case["tables"] = [table, short]
+    assert (is_long(table), is_long(short)) == (True, False)
+    found = csv_tables(evidence)
+    assert table_file(case, table) == "claim_01_settled_after__by_period.csv"
+    rows = list(csv.reader(io.StringIO(found[table_file(case, table)])))
+    assert rows[0] == ["period [s]", "ending [1]"]
+    assert [float(row[0]) for row in rows[1:]] == table["columns"]["period"]
+    assert {"loop_calibrated.csv", "loop_paper.csv"} <= set(found)
+    assert not any("short" in name for name in found)

@@ -89,10 +89,10 @@ class Calibrated(Protocol):
 def rounded(value: float, total: float) -> str:
     """A value, or its uncertainty, to the place of the second digit of the total uncertainty.
 
-    Nine digits of the value at most, and that many without an uncertainty.
+    Nine digits of the value at most, and that many without an uncertainty; an exact zero has none.
     """
-    if not total > 0:
-        return f"{value:.{_DIGITS}g}"
+    if not total > 0 or value == 0:
+        return f"{value + 0.0:.{_DIGITS}g}"
     exact, width = Decimal(repr(float(value))), Decimal(repr(float(total)))
     # Twice, because 0.0996 becomes 0.10 and then its second digit is another one.
     place = width.quantize(Decimal(1).scaleb(width.adjusted() - 1)).adjusted() - 1

@@ -72,7 +72,7 @@ def _summary(simulation: Simulation) -> Table:
         ("gas line", line_text(simulation.gas_line)),
         ("overshoots", str(simulation.overshoots)),
         ("misadjustments", str(simulation.misadjustments)),
-        ("shortened injections", str(simulation.shortened)),
+        *([("shortened injections", str(simulation.shortened))] if simulation.shortened else []),
         ("fill ratios", "  ".join(f"{letter} {fill:.4f}" for letter, fill in last.items())),
     ):
         table.add_row(name, value)

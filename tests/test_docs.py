@@ -12,6 +12,7 @@ import pytest
 import ringbalance as rb
 from ringbalance.cli import COMMANDS
 from ringbalance.controller.document import simulation_document
+from ringbalance.controller.line_runs import line_runs_document
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
@@ -99,7 +100,9 @@ def test_the_promised_keys_of_simulate_are_there(paper_scene: Scene) -> None:
     run = rb.simulate(paper_scene, flow_law=rb.paper_law(paper_scene))
     keys = first_column("docs/commands.md", "`simulate --json`")
     assert len(keys) > 8
-    assert [key for key in keys if not has_path(simulation_document(run), key)] == []
+    # The command adds the runs at the ends of a gas line's range.
+    document = simulation_document(run) | {"gas_line_runs": line_runs_document(())}
+    assert [key for key in keys if not has_path(document, key)] == []
 
 
 def test_the_promised_keys_of_verify_are_there(paper_scene: Scene) -> None:

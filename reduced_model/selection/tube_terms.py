@@ -38,6 +38,8 @@ GRAVITY: Final = "gravity, in the level of a chamber"
 NO_PRESSURE: Final = 1.0
 """Gauge, Pa, at or below which the gas drives nothing."""
 HUMP: Final = "priming and separation over the siphon crest"
+_LEAST_HEAD: Final = 1e-16
+"""H without loss at 1e-8 m/s, the slowest flow that is looked for, m^2/s^2."""
 _RECALLED: Final = 0.3
 """Share of the rotation term that its correlations may be off by, from their distance to the tables."""
 _LAMINAR_ENDS: Final = 1.3
@@ -71,7 +73,8 @@ def flow_estimate(scene: Scene) -> FlowEstimate:
     rotation = rotation_reynolds_number(
         angular_velocity=scene.rotor.speed, bore=tube.bore, kinematic_viscosity=nu
     )
-    if scene.gas.pressure <= 0:
+    head = scene.gas.pressure / scene.liquid.density
+    if head < _LEAST_HEAD:
         return FlowEstimate(
             velocity=0.0,
             k=0.0,
@@ -80,7 +83,7 @@ def flow_estimate(scene: Scene) -> FlowEstimate:
             rotation_share=0.0,
             laminar_share=1.0,
         )
-    u = float(velocity_under_head(scene, loss=CORRELATIONS, head=scene.gas.pressure / scene.liquid.density))
+    u = float(velocity_under_head(scene, loss=CORRELATIONS, head=head))
     k = float(loss_at(scene, loss=CORRELATIONS, velocity=u).k)
     turning = float(loss_at(scene, loss=ROTATING, velocity=u).k)
     re = float(reynolds_number(velocity=u, bore=tube.bore, kinematic_viscosity=nu))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -47,10 +48,13 @@ def _solve(drive: Drive, t: FloatArray, tolerance: float) -> Transfer:
         event = boundary_event(drive, end) if drive.fill == end else Event.NONE
         return _unmoved(drive, t, regime, event)
 
-    solved = _march(drive, u0, end, float(t[-1]), tolerance)
+    primed = drive.primed or bool(before.primed)
+    solved = _march(drive, u0, end, float(t[-1]), tolerance, primed=primed)
     last = float(solved.t[-1])
-    event = _event(drive, end, [bool(times.size) for times in solved.t_events], finished_=solved.status >= 0)
     fill = np.asarray(solved.sol(np.minimum(t, last))[0], dtype=np.float64)
+    if solved.t_events[2].size:
+        return _once_primed(drive, t, fill, float(solved.y[0, -1]), last, tolerance)
+    event = _event(drive, end, [bool(times.size) for times in solved.t_events], finished_=solved.status >= 0)
     if event in {Event.EMPTY, Event.FULL}:
         fill = np.where(t >= last, end, fill)
     return finished(
@@ -60,20 +64,39 @@ def _solve(drive: Drive, t: FloatArray, tolerance: float) -> Transfer:
         regime_start=regime,
         event=event,
         event_time=None if event is Event.NONE else last,
+        primed=primed,
     )
 
 
-def _march(drive: Drive, u0: float, end: float, duration: float, tolerance: float) -> Any:
+def _once_primed(
+    drive: Drive, t: FloatArray, fill: FloatArray, reached: float, at: float, tolerance: float
+) -> Transfer:
+    """The rest of a transfer that spilled until it primed its tube."""
+    rest = np.concatenate([[0.0], np.maximum(t - at, 0.0)])
+    after = _solve(replace(drive, fill=reached, primed=True), rest, tolerance)
+    return replace(
+        after,
+        instants=t,
+        fill=np.where(t > at, after.fill[1:], fill),
+        regime_start=Regime(int(drive.flow(drive.fill, primed=False).regime)),
+        event_time=None if after.event_time is None else at + after.event_time,
+    )
+
+
+def _march(drive: Drive, u0: float, end: float, duration: float, tolerance: float, *, primed: bool) -> Any:
     def slope(_: float, x: FloatArray) -> FloatArray:
-        return np.asarray(-drive.exchange_rate * drive.flow(x).velocity, dtype=np.float64)
+        return np.asarray(-drive.exchange_rate * drive.flow(x, primed=primed).velocity, dtype=np.float64)
 
     def at_end(_: float, x: FloatArray) -> float:
         return float(x[0] - end)
 
     def at_stall(_: float, x: FloatArray) -> float:
-        return float(drive.flow(x[0]).velocity / u0 - tolerance**0.5)
+        return float(drive.flow(x[0], primed=primed).velocity / u0 - tolerance**0.5)
 
-    at_end.terminal = at_stall.terminal = True  # type: ignore[attr-defined]
+    def at_priming(_: float, x: FloatArray) -> float:
+        return 1.0 if not primed and bool(drive.flow(x[0], primed=False).primed) else -1.0
+
+    at_end.terminal = at_stall.terminal = at_priming.terminal = True  # type: ignore[attr-defined]
     return solve_ivp(
         slope,
         (0.0, duration),
@@ -82,7 +105,7 @@ def _march(drive: Drive, u0: float, end: float, duration: float, tolerance: floa
         rtol=max(tolerance, 1e-13),
         atol=tolerance * 1e-2,
         dense_output=True,
-        events=(at_end, at_stall),
+        events=(at_end, at_stall, at_priming),
     )
 
 

@@ -258,7 +258,7 @@ def test_a_wrong_coefficient_and_a_wrong_k_are_learnt_together(
 
 
 def test_an_empty_belief_does_not_stop_it(scene: Scene, model: BalancerModel) -> None:
-    # 9.5 um need nearly all that a pair can use; a flow believed 1.4 times too fast empties it on paper first.
+    # 9.5 um need nearly all that a pair can use; believing 1.4 times the flow empties it on paper first.
     heavy = replace(scene, rotor=replace(scene.rotor, initial_amplitude=9.5e-6))
     fast = paper_model(replace(scene, tube=replace(scene.tube, drag_coefficient=25.0)))
     asked = law_based(heavy)

@@ -304,16 +304,11 @@ def requirement_bars(rows: Iterable[Record]) -> Drawing | None:
             axes.barh(place, ratio, height=0.42, color=colour, alpha=0.75, linewidth=0)
             if width:
                 axes.errorbar(ratio, place, xerr=width, color=style.INK, linewidth=1.2, capsize=3)
-            sense = "at least" if row["at_least"] else "at most"
-            reached, wanted = (
-                shown(row["reached"], row["unit"], row["uncertainty"]),
-                given(row["required"], row["unit"], digits=3),
-            )
             axes.plot([1, 1], [place - 0.3, place + 0.3], color=style.INK, linewidth=1.8)
             axes.text(
                 0.0,
                 place - 0.32,
-                f"{row['label']}: {reached}, {sense} {wanted}; {verdict}",
+                f"{row['label']} ({'at least' if row['at_least'] else 'at most'} 1): {verdict}",
                 va="bottom",
                 color=style.INK,
             )
@@ -332,7 +327,8 @@ def requirement_bars(rows: Iterable[Record]) -> Drawing | None:
         wide=True,
         height=0.8 + 0.44 * len(kept),
         alt=f"Requirements against what is reached: {told}.",
-        caption="Reached over required, with 95 % intervals where known; the line is the requirement.",
+        caption="Reached over required, with the 95 % interval of the ratio where known: result and "
+        "requirement are both uncertain. The line is the requirement.",
     )
 
 

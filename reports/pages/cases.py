@@ -214,7 +214,7 @@ def _in_brief(case: Record) -> Record:
         return dict.fromkeys(("paper", "found", "half_width"), MISSING) | {"what": ""}
     unit, reference = quantity.get("unit") or "1", quantity.get("reference")
     path = f"{path}.{case['quantities'].index(quantity)}"
-    value_text = _without_half_width(_value(quantity, quantity.get("value_uncertainty")))
+    value_text = _brief_value(quantity)
     paper = MISSING if reference is None else traced(given(reference, unit, digits=4), f"{path}.reference")
     return {
         "paper": _criterion(quantity) if reference is None else paper,
@@ -222,6 +222,14 @@ def _in_brief(case: Record) -> Record:
         "half_width": _width(quantity),
         "what": quantity.get("title") or "",
     }
+
+
+def _brief_value(quantity: Record) -> str:
+    """A found number without its half-width: two digits where that leaves none standing."""
+    value, own = quantity.get("value"), quantity.get("value_uncertainty")
+    if value and own and own > abs(value) / 2:
+        return given(value, quantity.get("unit") or "1", digits=2)
+    return _without_half_width(_value(quantity, own))
 
 
 def _width(quantity: Record) -> str:

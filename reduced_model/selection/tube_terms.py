@@ -23,7 +23,7 @@ from ringbalance.reduced_model.selection.loss_models import (
     loss_at,
     velocity_under_head,
 )
-from ringbalance.reduced_model.tube.regime import SiphonCrest, TubeEnds, can_flow
+from ringbalance.reduced_model.tube.regime import SiphonCrest, TubeEnds, can_flow, column_flow
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Scene
 
@@ -106,7 +106,8 @@ class RangeFlow:
     siphon: FloatArray
     """Velocity of a full siphon, m/s; zero without a driving pressure."""
     separated: FloatArray
-    """Velocity of a column separated at the crest, m/s; infinite without a crest, zero where it blocks."""
+    """Velocity of a column separated at the crest, m/s, of one that spills where gas stays there; infinite
+    without a crest, zero where it blocks."""
     starts: BoolArray
     """Whether the gas starts a flow in an unprimed tube."""
 
@@ -126,7 +127,14 @@ def range_flow(scene: Scene) -> RangeFlow:
     driving = ends.driving_pressure()
     separated = np.full(driving.shape, np.inf)
     if crest is not None:
-        separated = _velocities(scene, crest.separation_margin(ends) / rho, to_crest=True)
+        separated = column_flow(
+            ends=ends,
+            crest=crest,
+            primed=False,
+            allowed=True,
+            siphon=lambda pressure, flows: _velocities(scene, flows * pressure / rho, to_crest=False),
+            separation=lambda pressure, flows: _velocities(scene, flows * pressure / rho, to_crest=True),
+        ).separation_velocity
     can = can_flow(ends=ends, crest=crest, primed=False)
     return RangeFlow(
         driving_pressure=driving,

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import tomllib
 from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.stats import binomtest
 
+from ringbalance.scene.models import Scene
+from ringbalance.verification.catalogue import case_code
 from ringbalance.verification.validation.measurements import measurements
 from ringbalance.verification.validation.model_bias import ModelStatistics, model_statistics
 from ringbalance.verification.validation.tube_friction import friction_points, predicted_friction
@@ -89,3 +92,19 @@ def test_points_come_in_ascending_order_with_their_walls() -> None:
     plain = predicted_friction(points.reynolds, np.zeros_like(points.reynolds))
     assert np.array_equal(rough[smooth], plain[smooth])
     assert np.all(rough[~smooth] > plain[~smooth])
+
+
+def test_the_readme_says_what_the_comparison_finds(paper_scene: Scene) -> None:
+    readme = " ".join((Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8").split())
+    smooth, rough, rotor = (
+        cases_code.compute(paper_scene, "light")
+        for cases_code in (case_code(f"measured_{name}") for name in ("smooth_tubes", "rough_tubes", "rotor"))
+    )
+    numbers, share = smooth.numbers, smooth.found["share_within"].value
+    assert (
+        f"({numbers['points']:.0f} points of {numbers['series']:.0f} tubes and rigs, "
+        f"bias {numbers['turbulent_bias']:.1%}, {share:.1%} within both intervals)"
+    ).replace("%", " %") in readme
+    assert rough.found["share_within"].value == 1.0
+    assert f"({rough.numbers['points']:.0f} points, all within)" in readme
+    assert f"({rotor.numbers['points']:.0f} points)" in readme

@@ -20,8 +20,8 @@ _NAMES: Final = {
     "moment": "Moment of one chamber at the largest fill",
     "usable_moment": "Usable moment of one pair",
     "chamber_volume": "Volume of one chamber",
-    "crest_pressure": "Pressure over the siphon crest",
-    "cavitation_margin": "Cavitation margin",
+    "crest_pressure": "Pressure over the siphon crest as the tube runs, gauge",
+    "cavitation_margin": "Cavitation margin of a tube that ran full; below zero the column separates",
 }
 _DRAWN: Final = {"velocity": "Velocity", "usable_moment": "Usable moment", "lambda": "Lever arm λ"}
 _REGIMES: Final = {

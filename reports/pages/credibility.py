@@ -78,19 +78,18 @@ def _credibility(evidence: Record) -> Table:
 def _development(evidence: Record) -> list[Cells]:
     checks = summary.checks(evidence)
     failed = [case for case in checks if case["verdict"] == "failed"]
+    known = {"given", "measured"} & set((evidence["scene"].get("origins") or {}).values())
+    pedigree = ("1", "Some of the device’s data come from a document.")
+    verified = (
+        "1" if failed else "3",
+        f"{_outcome(checks)}; numerical errors are estimated, and deliberate errors in the code must be "
+        "noticed.",
+    )
+    measured = ("1", "Parts only, see above; none of the device.")
     return [
-        (
-            "Data pedigree",
-            "1",
-            "Properties of liquids with source and uncertainty; the device’s data are printed.",
-        ),
-        (
-            "Verification",
-            "1" if failed else "3",
-            f"{_outcome(checks)}; numerical errors are estimated for every quantity, and deliberate errors "
-            "in the code must be noticed.",
-        ),
-        ("Validation", "1", "Parts only, see above; none of the device."),
+        ("Data pedigree", *(pedigree if known else ("0", "No value comes from a document of the device."))),
+        ("Verification", *(verified if checks else ("0", "No check was run for this report."))),
+        ("Validation", *(measured if _of(evidence, "validation") else ("0", "None was run."))),
     ]
 
 
@@ -108,9 +107,13 @@ def _use(evidence: Record) -> list[Cells]:
             "Uncertainty characterisation",
             "3" if budgets else "1",
             "Numerical, input and model parts of each main quantity; the closed loop over drawn inputs "
-            "and noise.",
+            "and noise."
+            if budgets
+            else "The filters’ covariances of one run with one seed.",
         ),
-        ("Robustness of results", "2", "Sensitivity to each stated input; not to combinations of them."),
+        ("Robustness of results", "2", "Sensitivity to each stated input; not to combinations of them.")
+        if budgets
+        else ("Robustness of results", "0", "Not studied."),
         ("Use history", "0", "No decision on a built device is known to rest on this program."),
         ("Management", "2", "Versioned, tested at each change, evidence kept with dates and hashes."),
     ]

@@ -180,12 +180,12 @@ def _loops(_own: Record, evidence: Record) -> Record:
 def _loop_table(loops: list[Record]) -> Table:
     return Table(
         caption="The drives’ loops as they run, sampled: stable when the largest pole is below 1. "
-        "Recommended is the largest value of the key that leaves a gain margin of two.",
+        "The largest value is a ceiling, not a setting: it leaves a gain margin of two.",
         heads=(
             "Loop",
             "Key",
             "Value",
-            "Recommended,\nat most",
+            "Largest\nvalue",
             "Largest\npole",
             "Gain\nmargin",
             "Hold of the\nvoltage",

@@ -32,8 +32,8 @@ _RETUNED: Final = "calibrated_retuned"
 _VALVE: Final = {
     OPEN: "Choose the valve before anything else is built, and put its conductance, critical ratio and lag "
     "into the scene: only a fast one can reach the limit.",
-    MISSED: "Choose a faster valve with less dead volume, or raise the limit: with a valve as assumed the "
-    "last corrections are larger than the limit, whatever the gain.",
+    MISSED: "Find a valve and gas line whose smallest correction is within the limit, or raise the limit: "
+    "with a valve as assumed the last corrections are larger than the limit, whatever the gain.",
 }
 """What to do about a valve that may not, or cannot, reach the limit."""
 _DOMINANT: Final = 3
@@ -42,7 +42,9 @@ _MAIN: Final = {
     "usable_moment": "usable moment",
     "lambda": "lever arm λ",
     "wall_pressure": "wall pressure",
+    "needed_moment": "capacity needed",
 }
+_NEEDED: Final = "needed_moment"
 """Results whose causes of uncertainty are compared; k and the margin follow from the velocity's."""
 _ENDINGS: Final = {
     "settled": "settles",
@@ -166,7 +168,7 @@ def _factor(run: Record) -> str:
         end = f"From {limit} times on the residual grows, so it grows here"
     elif factor > 1:
         end = (
-            "The residual turns to the opposite side each time and shrinks slowly; "
+            f"The residual turns to the opposite side, and {percent(factor - 1)} of it is left; "
             f"from {limit} times on it grows"
         )
     else:
@@ -183,8 +185,8 @@ def chance(evidence: Record) -> list[str]:
     members, until = ensembles[1]["members"], given(found["time_limit_s"], "s")
     own, tuned = (percent(1 - e["probability"]["not_settled"]["value"]) for e in ensembles[1:])
     return [
-        f"Of {members} runs over the stated uncertainties and the noise, {own} have settled by {until} with "
-        f"the scene’s gain and {tuned} with the recommended one. {_tuned(found['tuning'])}"
+        f"With the scene’s gain {own} of {members} runs over the stated uncertainties and the noise have "
+        f"settled by {until}, with the recommended gain {tuned}. {_tuned(found['tuning'])}"
     ]
 
 
@@ -194,8 +196,9 @@ def _tuned(tuning: Record) -> str:
         return f"{tuning['status'][0].upper()}{tuning['status'][1:]}."
     fraction, low, high = (percent(f) for f in (tuning["fraction_settled"], *tuning["fraction_settled_95"]))
     return (
-        f"With every term that the tolerance selects, {fraction} ({low} to {high}) of {tuning['runs']} runs "
-        f"settle with it, and {percent(0.95)} within {shown(reached, 's', digits=2)}."
+        f"With the fuller models that the tolerance selects, {fraction} (95 % confidence: {low} to {high}) "
+        f"of {tuning['runs']} runs settle with the recommended gain, {percent(0.95)} of all within "
+        f"{shown(reached, 's', digits=2)}."
     )
 
 
@@ -236,6 +239,8 @@ def _actions(evidence: Record, rows: Sequence[Requirement]) -> list[str]:
         told.append(valve)
     if verdicts.get("Correction capacity of one pair") in {MISSED, OPEN}:
         told.append("Balance the rotor better by hand, or take a larger disc: the capacity has no reserve.")
+    if any("hump radius" in row.rests for row in rows):
+        told.append("Measure the radius of the siphon crest: it sets the gas pressure that starts the flow.")
     if any("bore" in row.rests for row in rows):
         told.append(
             "Measure the flow through the tube at three gas pressures; every velocity and gain rests on the "
@@ -245,7 +250,7 @@ def _actions(evidence: Record, rows: Sequence[Requirement]) -> list[str]:
 
 
 def dominant(evidence: Record) -> list[str]:
-    """The three causes that change a main result most, relative to it."""
+    """The three effects of one cause on one main result that are largest, relative to it."""
     budgets = evidence["calibration"].get("budgets") or {}
     effects = []
     for name, budget in budgets.items():
@@ -253,10 +258,12 @@ def dominant(evidence: Record) -> list[str]:
             continue
         causes = {**budget["inputs"], "the model itself": budget["model"]}
         effects += [(width / abs(budget["value"]), cause, name) for cause, width in causes.items()]
-    largest: dict[str, tuple[float, str]] = {}
-    for effect, cause, name in sorted(effects, reverse=True):
-        largest.setdefault(cause, (effect, name))
-    return [_cause(evidence, cause, *largest[cause]) for cause in list(largest)[:_DOMINANT]]
+    own = evidence.get("summary") or {}
+    if own.get("needed_moment_kg_m") and own.get("needed_uncertainty_kg_m"):
+        share = own["needed_uncertainty_kg_m"] / own["needed_moment_kg_m"]
+        effects.append((share, "rotor.influence_coefficient", _NEEDED))
+    largest = sorted(effects, reverse=True)[:_DOMINANT]
+    return [_cause(evidence, cause, effect, name) for effect, cause, name in largest]
 
 
 def _cause(evidence: Record, cause: str, effect: float, name: str) -> str:

@@ -194,9 +194,10 @@ def _scene_gain(evidence: Record) -> Requirement | None:
     if run is None or run.get("loop_factor") is None:
         return None
     limit = _staying(run, "closed_loop.calibrated")
+    bound = traced(number(run["loop_factor_limit"], digits=3), "closed_loop.calibrated.loop_factor_limit")
     return Requirement(
         name="Loop factor with the scene’s gain",
-        wanted=f"at most {limit}",
+        wanted=f"at most {limit} for noise to stay within the limit; unstable from {bound}",
         result=read(evidence, "closed_loop.calibrated.loop_factor", "1"),
         verdict=MET if run["loop_factor"] <= _staying_value(run) else MISSED,
         rests=resting(evidence, "tube.bore", "rotor.influence_coefficient", "sensor.amplitude_noise"),
@@ -255,7 +256,8 @@ def _settling(evidence: Record) -> Requirement | None:
         wanted=UNASKED if wanted is None else f"at most {given(wanted, 's')} in {percent(_LIKELY)} of runs",
         result=f"median {middle}, {percent(_LIKELY)} of runs within {slow}; settled: "
         f"{traced(percent(tuning['fraction_settled']), 'summary.tuning.fraction_settled')} of "
-        f"{tuning['runs']} runs, with 95 % confidence {percent(low)} to {percent(high)}",
+        f"{tuning['runs']} runs, with 95 % confidence {percent(low)} to {percent(high)}"
+        f"{_ideal_valve(evidence)}",
         verdict=UNASKED if wanted is None else judged,
         rests=resting(evidence, "tube.bore", "rotor.influence_coefficient", "controller.period"),
         required=wanted,
@@ -275,11 +277,12 @@ def _residual_row(evidence: Record) -> Requirement | None:
         return None
     noise, limit = STAYING_DEVIATIONS * evidence_at(evidence, path), wanted["residual_m"]
     moment = read(evidence, "summary.requirement.residual_moment_kg_m", "kg m", digits=2)
+    gain = "the recommended gain" if tuning.get("stationary_deviation_m") else "the scene’s gain"
     return Requirement(
         name="Residual vibration, zero to peak",
         wanted=f"at most {given(limit, 'm')}, an unbalance of {moment}",
-        result=f"the sensor’s noise keeps up {shown(noise, 'm', digits=2)}, which is "
-        f"{STAYING_DEVIATIONS:g} standard deviations",
+        result=f"{shown(noise, 'm', digits=2)}: {STAYING_DEVIATIONS:g} standard deviations of what noise keeps "
+        f"up with {gain}{_ideal_valve(evidence)}",
         verdict=MET if noise <= limit else MISSED,
         rests=resting(evidence, "sensor.amplitude_noise", "rotor.influence_coefficient"),
         required=limit,
@@ -287,6 +290,11 @@ def _residual_row(evidence: Record) -> Requirement | None:
         unit="m",
         at_least=False,
     )
+
+
+def _ideal_valve(evidence: Record) -> str:
+    line = evidence["calibration"].get("gas_line") or {"given": True}
+    return "" if line["given"] else "; for a valve that acts at once"
 
 
 def _smallest(evidence: Record) -> Requirement | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -104,7 +105,8 @@ def test_the_recommended_gain_stands_beside_the_scene_s(evidence: Record) -> Non
     told = " ".join(found["loop_lead"])
     assert "Recommended gain: 0.024\u202fs/µm (the scene has 0.080\u202fs/µm)" in told
     loop = loop_view(with_consequences(evidence))
-    assert "56\u202f% have settled by 120\u202fs" in loop["chance"][0]
+    assert "With the scene’s gain 56\u202f% of 500 runs" in loop["chance"][0]
+    assert "have settled by 120\u202fs" in loop["chance"][0]
     assert "84\u202f% to 100\u202f%" in loop["chance"][0]
     assert next(row for row in loop["table"].rows if row[0].startswith("Loop factor"))[2] == "0.570"
 
@@ -241,12 +243,20 @@ def test_what_rests_on_assumptions_says_so(evidence: Record) -> None:
     assert row.rests == "inferred: plate thickness; assumed: bore"
 
 
-def test_the_largest_causes_come_first_and_once(evidence: Record) -> None:
+def test_the_largest_effects_come_first(evidence: Record) -> None:
     first, second, third = dominant(evidence)
     assert first.startswith("Bore of the tube (assumed)")
     assert "9.3\u202f% of the flow velocity" in first
     assert second.startswith("The model itself")
-    assert third.startswith("Speed of the rotor")
+    shares = [float(re.findall(r"([\d.]+)\u202f%", untraced(told))[0]) for told in (first, second, third)]
+    assert shares == sorted(shares, reverse=True)
+
+
+def test_the_capacity_needed_is_as_uncertain_as_the_influence_coefficient(evidence: Record) -> None:
+    evidence["summary"]["needed_uncertainty_kg_m"] = 0.5 * evidence["summary"]["needed_moment_kg_m"]
+    first = dominant(evidence)[0]
+    assert first.startswith("Influence coefficient of the rotor")
+    assert "50\u202f% of the capacity needed" in first
 
 
 def test_the_bore_and_the_other_reading_are_named(evidence: Record) -> None:

@@ -157,7 +157,7 @@ def test_a_requirement_is_judged_in_words(reached: float, at_least: bool, verdic
     row = {"label": "moment", "required": 1.0, "reached": reached, "uncertainty": 0.1, "unit": "kg m"}
     drawing = requirement_bars([{**row, "at_least": at_least}])
     assert drawing is not None
-    assert any(text.endswith(f"; {verdict}") for text in texts(drawing))
+    assert any(text.endswith(f": {verdict}") for text in texts(drawing))
 
 
 def test_text_is_no_smaller_than_eight_points_in_print(collected: Record) -> None:

@@ -281,8 +281,8 @@ def _residual_row(evidence: Record) -> Requirement | None:
     return Requirement(
         name="Residual vibration, zero to peak",
         wanted=f"at most {given(limit, 'm')}, an unbalance of {moment}",
-        result=f"{shown(noise, 'm', digits=2)}: {STAYING_DEVIATIONS:g} standard deviations of what noise keeps "
-        f"up with {gain}{_ideal_valve(evidence)}",
+        result=f"{shown(noise, 'm', digits=2)}: {STAYING_DEVIATIONS:g} standard deviations of what noise "
+        f"keeps up with {gain}{_ideal_valve(evidence)}",
         verdict=MET if noise <= limit else MISSED,
         rests=resting(evidence, "sensor.amplitude_noise", "rotor.influence_coefficient"),
         required=limit,

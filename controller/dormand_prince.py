@@ -1,4 +1,4 @@
-"""Coefficients of the embedded Runge-Kutta pair of Dormand and Prince, orders 5 and 4.
+"""Coefficients of the method of order 5 in the Runge-Kutta pair of Dormand and Prince.
 
 Source: Dormand and Prince, "A family of embedded Runge-Kutta formulae", J. Comp. Appl. Math. 6 (1980).
 """
@@ -24,5 +24,3 @@ TIMES: Final = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0])
 """Of the stages, as fractions of the step."""
 WEIGHTS: Final = np.array([35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84])
 """Of the stages in the result of order 5."""
-ESTIMATE: Final = np.array([-71 / 57600, 0, 71 / 16695, -71 / 1920, 17253 / 339200, -22 / 525, 1 / 40])
-"""Of the six stages and the rates at the end, in the result of order 4 less that of order 5."""

@@ -22,6 +22,8 @@ class Source:
     where: str
     doi: str
     """Empty where there is none."""
+    licence: str
+    """Of the numbers as they stand in the file."""
     read: Literal["tables", "transcription", "figure"]
     """Tables of the publication, somebody else's copy of them, or points read from a figure."""
     uncertainty: float

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 
 from ringbalance.physics.tube.friction import friction_factor, friction_uncertainty
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, StringArray
-from ringbalance.verification.validation.measurements import measurements
+from ringbalance.verification.validation.kinds import Kind, Prediction
+from ringbalance.verification.validation.measurements import Measurements, measurements
 from ringbalance.verification.validation.model_bias import ModelStatistics, model_statistics
 
 
@@ -76,11 +77,26 @@ def friction_points(*names: str) -> FrictionPoints:
             [each.columns.get("relative_roughness", np.zeros(len(each))) for each in sets]
         ),
         friction=np.concatenate([each.columns["friction_factor"] for each in sets]),
-        measurement_uncertainty=np.concatenate(
-            [np.full(len(each), each.source.uncertainty) for each in sets]
-        ),
+        measurement_uncertainty=np.concatenate([each.uncertainty for each in sets]),
         series=np.concatenate(
             [np.char.add(f"{name}: ", each.series) for name, each in zip(names, sets, strict=True)]
         ),
     )
     return joined.where(np.argsort(joined.reynolds, kind="stable"))
+
+
+def _predict(data: Measurements) -> Prediction:
+    reynolds = data.columns["reynolds"]
+    wall = data.columns.get("relative_roughness", np.zeros(len(data)))
+    return Prediction(
+        value=predicted_friction(reynolds, wall), stated=_each(friction_uncertainty, reynolds, wall)
+    )
+
+
+FRICTION: Final = Kind(
+    title="Darcy friction factor of a long straight tube at rest",
+    measured="friction_factor",
+    columns={"reynolds": "Reynolds number with the bore and the mean velocity"},
+    optional={"relative_roughness": "ks/d, grain of the wall over the bore; smooth without this column"},
+    predict=_predict,
+)

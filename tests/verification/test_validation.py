@@ -7,6 +7,7 @@ import tomllib
 from importlib.resources import files
 from pathlib import Path
 
+import measurement_reference
 import numpy as np
 import pytest
 from scipy.stats import binomtest
@@ -22,7 +23,7 @@ from ringbalance.verification.validation.measurements import (
 )
 from ringbalance.verification.validation.model_bias import ModelStatistics, model_statistics
 from ringbalance.verification.validation.tube_friction import friction_points, predicted_friction
-from ringbalance.verification.validation.wave_frequency import tank_frequency
+from ringbalance.verification.validation.wave_frequency import CALIBRATING, tank_frequency
 
 _DATA = files("ringbalance.verification.validation") / "data"
 _NAMES = sorted(path.name.removesuffix(".csv") for path in _DATA.iterdir() if path.name.endswith(".csv"))
@@ -173,7 +174,7 @@ def test_a_comparison_is_confirmed_by_its_own_predictions_and_refuted_by_others(
 
 def test_the_uncertainty_of_wave_frequencies_comes_from_tanks_that_are_not_judged() -> None:
     data = measurements("addington_1960")
-    taught = np.isin(data.series, case_code("measured_waves").CALIBRATING)
+    taught = np.isin(data.series, CALIBRATING)
     deviation = compare(data.where(taught))
     ratio = np.log(deviation.predicted / deviation.measured)
     width = math.hypot(float(ratio.mean()), 2 * float(ratio.std(ddof=1)))
@@ -206,3 +207,10 @@ def test_every_bundled_set_of_a_kind_that_is_predicted_has_its_columns() -> None
         data = measurements(name)
         if data.source.kind in KINDS:
             assert compare(data).predicted.size == len(data)
+
+
+def test_the_page_on_measurements_lists_the_kinds_and_its_example_can_be_read() -> None:
+    page = measurement_reference.PAGE.read_text(encoding="utf-8")
+    assert measurement_reference.fresh(page) == page
+    example = page.split("```")[1]
+    assert len(compare(parse_measurements(example, file="example")).measured) == 3

@@ -48,6 +48,17 @@ class Comparison:
         return Comparison(**{name: column[chosen] for name, column in vars(self).items()})
 
     @property
+    def within(self) -> BoolArray:
+        """Whether a point's deviation lies within both 95 % uncertainties."""
+        allowed = np.hypot(self.stated, self.uncertainty * self.measured)
+        return np.asarray(np.abs(self.predicted - self.measured) <= allowed)
+
+    @property
+    def bias(self) -> float:
+        """Geometric mean of predicted over measured, less one."""
+        return float(np.expm1(np.mean(np.log(self.predicted / self.measured))))
+
+    @property
     def statistics(self) -> ModelStatistics:
         """How the predictions stand to the measurements."""
         return model_statistics(
@@ -118,8 +129,16 @@ def _check(data: Measurements, kind: Kind) -> None:
     strange = [name for name in data.columns if name not in known]
     faults = [f'the column "{name}" is missing: {_meaning(kind, name)}' for name in missing]
     faults += [f'the column "{name}" is not known; allowed: {", ".join(sorted(known))}' for name in strange]
-    if not missing and not np.all(data.columns[kind.measured] > 0):
-        faults.append(f'the column "{kind.measured}" must be positive in every row')
+    faults += [
+        f'the column "{name}" must be positive in every row'
+        for name in wanted
+        if name in data.columns and not np.all(data.columns[name] > 0)
+    ]
+    faults += [
+        f'the column "{name}" must not be negative'
+        for name in known & data.columns.keys() - set(wanted)
+        if not np.all(data.columns[name] >= 0)
+    ]
     if faults:
         raise MeasurementsError("\n".join(faults))
 

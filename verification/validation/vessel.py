@@ -14,7 +14,7 @@ import numpy as np
 from ringbalance.physics.gas.supply import HEAT_CAPACITY_RATIO, GasLine
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.validation.kinds import Kind, Prediction
-from ringbalance.verification.validation.measurements import Measurements
+from ringbalance.verification.validation.measurements import Measurements, MeasurementsError
 
 CONDUCTANCE_UNCERTAINTY: Final = 0.1
 """U (95 %), relative, of a conductance computed from an opening's area: its discharge coefficient."""
@@ -25,6 +25,7 @@ _STEPS: Final = 2000
 
 def _predict(data: Measurements) -> Prediction:
     """Middle of both limits, stated as wide as the limits and the conductance leave it."""
+    _check(data)
     columns = {"critical_ratio": np.full(len(data), _CRITICAL_RATIO), **data.columns}
     names = ("pressure", "start_pressure", "far_pressure", "temperature", "volume", "conductance")
     rows = zip(*(columns[name] for name in (*names, "critical_ratio")), strict=True)
@@ -32,6 +33,14 @@ def _predict(data: Measurements) -> Prediction:
     middle = limits.mean(axis=1)
     half = np.abs(limits[:, 1] - limits[:, 0]) / 2
     return Prediction(value=middle, stated=np.hypot(half, CONDUCTANCE_UNCERTAINTY * middle))
+
+
+def _check(data: Measurements) -> None:
+    reached, start, far = (data.columns[name] for name in ("pressure", "start_pressure", "far_pressure"))
+    if not np.all((reached - start) * (far - reached) > 0):
+        raise MeasurementsError("pressure must lie between start_pressure and far_pressure in every row")
+    if "critical_ratio" in data.columns and not np.all(data.columns["critical_ratio"] < 1):
+        raise MeasurementsError("critical_ratio must be below 1 in every row")
 
 
 def _limits(

@@ -18,6 +18,8 @@ from ringbalance.scene.models import Disc
 from ringbalance.verification.validation.kinds import Kind, Prediction
 from ringbalance.verification.validation.measurements import Measurements
 
+CALIBRATING: Final = ("tank 1", "tank 3", "tank 5", "tank 7")
+"""Tanks of Addington whose points gave the uncertainty that the program states, and are not judged."""
 _RADIUS: Final = 1e4
 """Of the chamber, in widths of the tank."""
 _CELLS: Final = (8, 16)

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level
 from ringbalance.verification.validation.comparison import data_evidence
 from ringbalance.verification.validation.measurements import measurements
-
-CALIBRATING: Final = ("tank 1", "tank 3", "tank 5", "tank 7")
-"""Their points gave the uncertainty that the program states, and are not judged."""
+from ringbalance.verification.validation.wave_frequency import CALIBRATING
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.verification.navier_stokes.continuation import flow_at
 from ringbalance.verification.navier_stokes.meshes import (
     Patch,
     geometric_vertices,
@@ -39,6 +40,7 @@ from ringbalance.verification.navier_stokes.space import taylor_hood
 
 POISEUILLE_GRADIENT = 32.0
 """G of a tube at rest: -dp/dx d^2/(mu U)."""
+_KL_SCALE = 300.0
 CORIOLIS = ((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (-1.0, 0.0, 0.0))
 """e_z x velocity for components along (y, z, x)."""
 
@@ -121,6 +123,18 @@ def solve_section(
     c = Coefficients(inertia=1.0, viscosity=1.0, rotation=rotation)
     area = float(system.space.weights.sum())
     return solve_flow(system=system, coefficients=c, flow_rate=area, start=start, settings=settings)
+
+
+def developed_section(
+    *, system: FlowSystem, kl: float, s: float, settings: NewtonSettings | None = None
+) -> FlowSolution:
+    """The same for any Kl, followed from a small one. Raises: ArithmeticError: the flow was not found."""
+
+    def solve(a: float, start: FlowSolution | None) -> FlowSolution:
+        at = _KL_SCALE * float(np.expm1(a))
+        return solve_section(system=system, kl=at, s=s, start=start, settings=settings)
+
+    return flow_at(solve=solve, parameter=float(np.log1p(kl / _KL_SCALE)), first=2.0)
 
 
 def solve_section_without_inertia(*, system: FlowSystem, rotation_reynolds: float) -> FlowSolution:

@@ -48,6 +48,8 @@ class Source:
     where: str = ""
     doi: str = ""
     """Empty where there is none."""
+    licence: str = ""
+    """Of the numbers as they stand in the file."""
     read: str = ""
     """Tables of the publication, somebody else's copy of them (a transcription), or points read from a
     figure."""

@@ -7,6 +7,7 @@ from typing import Final
 
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.tuning.tune import tuning_document
+from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.chamber.inputs import half_widths
 from ringbalance.reports.numbers import THIN_SPACE, given, number, percent, shown
 from ringbalance.reports.pages.requirements import (
@@ -68,7 +69,7 @@ def _collect(work: Work) -> Record:
         "needed_uncertainty_kg_m": _needed_uncertainty(work.scene),
         "gas_pressure_uncertainty_Pa": half_widths(work.scene).get("pressure", 0.0),
         "requirement": requirement_record(work.scene),
-        "crest": _crest_range(work),
+        "crest": crest_range(work.scene, work.calibration),
         "bore_m": work.scene.tube.bore,
         "bore_uncertainty_stated": any(i.quantity == "bore" for i in work.scene.uncertainty),
         "time_limit_s": work.scene.run.time_limit,
@@ -83,13 +84,13 @@ def _needed_uncertainty(scene: Scene) -> float:
     return scene.rotor.initial_amplitude * width / scene.rotor.influence_coefficient**2
 
 
-def _crest_range(work: Work) -> Record | None:
+def crest_range(scene: Scene, calibration: Calibration) -> Record | None:
     """Where a siphon crest that nobody gave may lie, and the gas pressures that lift the liquid over it."""
-    scene, point = work.scene, work.calibration.operating_point
+    point = calibration.operating_point
     (crest,) = assumptions_of((_CREST,), scene) or (None,)
     if crest is None or point.priming_vented is None:
         return None
-    head = 0.5 * scene.liquid.density * scene.rotor.speed**2 / work.calibration.flow_law.gas_factor
+    head = 0.5 * scene.liquid.density * scene.rotor.speed**2 / calibration.flow_law.gas_factor
     pressures = [point.priming_vented + head * (crest.value**2 - r**2) for r in (crest.high, crest.low)]
     return {
         "radius_m": [crest.low, crest.high],

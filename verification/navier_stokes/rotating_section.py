@@ -1,7 +1,8 @@
 """Laminar fully developed flow in a straight tube that rotates about an axis at right angles to its own.
 
-Half of the circular section, lengths over the bore d, velocities over the mean velocity U.  With x along the
-tube, z along the rotation axis, w the axial and (u, v) the velocity along (y, z), and p the reduced pressure:
+Half of the section, circular or rectangular, lengths over the bore or hydraulic diameter d, velocities over
+the mean velocity U.  With x along the tube, z along the rotation axis, w the axial and (u, v) the velocity
+along (y, z), and p the reduced pressure:
 
     Re (u w_y + v w_z) - 2 R u = G + lap w
     Re (u u_y + v u_z) + 2 R w = -p_y + lap u
@@ -25,6 +26,7 @@ from ringbalance.verification.navier_stokes.meshes import (
     geometric_vertices,
     patch_mesh,
     ruled_patch,
+    tensor_patch,
     with_midpoints,
 )
 from ringbalance.verification.navier_stokes.newton import (
@@ -56,6 +58,20 @@ class SectionMesh:
     wall_ratio: float = 12.0
     """Innermost cell of the ring over the cell at the wall."""
     shape: str = "quad"
+
+
+@dataclass(frozen=True, kw_only=True)
+class DuctMesh:
+    """Cells of the half section of a rectangular duct, refined towards its walls."""
+
+    aspect_ratio: float = 1.0
+    """Across the axis of rotation over along it."""
+    across: int = 12
+    """Cells across the axis of rotation, an even number."""
+    along: int = 8
+    """Cells of the half along it."""
+    wall_ratio: float = 20.0
+    """Innermost cell over the cell at the wall."""
 
 
 def _lines(points: FloatArray, count: int) -> FloatArray:
@@ -95,9 +111,29 @@ def section_mesh(*, cells: SectionMesh) -> Any:
     return patch_mesh(patches=patches, shape=cells.shape)
 
 
-def section_system(*, cells: SectionMesh) -> FlowSystem:
+def duct_mesh(*, cells: DuctMesh) -> Any:
+    """Mesh of the half section (z >= 0) of a rectangular duct of unit hydraulic diameter.
+
+    Args: `cells`: numbers of cells and their grading.
+    Returns: Quadratic mesh with boundaries wall and symmetry.
+    """
+    width = (1 + cells.aspect_ratio) / 2
+    half = geometric_vertices(cells=cells.across // 2, ratio=cells.wall_ratio) / 2
+    y = width * (np.concatenate([half, 1 - half[-2::-1]]) - 0.5)
+    height = width / cells.aspect_ratio
+    z = height / 2 * (1 - geometric_vertices(cells=cells.along, ratio=cells.wall_ratio)[::-1])
+    patch = tensor_patch(
+        x=with_midpoints(vertices=y),
+        y=with_midpoints(vertices=z),
+        sides={"west": "wall", "east": "wall", "north": "wall", "south": "symmetry"},
+    )
+    return patch_mesh(patches=[patch])
+
+
+def section_system(*, cells: SectionMesh | DuctMesh) -> FlowSystem:
     """Discrete equations of the half section: no slip at the wall, mirror symmetry about z = 0."""
-    space = taylor_hood(mesh=section_mesh(cells=cells), components=3)
+    mesh = duct_mesh(cells=cells) if isinstance(cells, DuctMesh) else section_mesh(cells=cells)
+    space = taylor_hood(mesh=mesh, components=3)
     conditions = [Dirichlet(boundary="symmetry", component=1)]
     conditions += [Dirichlet(boundary="wall", component=c) for c in range(3)]
     return flow_system(space=space, conditions=conditions, enclosed=True, flow_component=2, coriolis=CORIOLIS)

@@ -228,7 +228,7 @@ def test_jacobian_is_the_exact_derivative() -> None:
     linear = linear_entries(system, c)
 
     def residual(x: np.ndarray) -> np.ndarray:
-        return full_matrix(system, linear) @ x + c.inertia * convection_vector(system, x)
+        return np.asarray(full_matrix(system, linear) @ x + c.inertia * convection_vector(system, x))
 
     # The residual is quadratic, so its central difference is exact.
     difference = (residual(vector + change) - residual(vector - change))[system.free] / 2

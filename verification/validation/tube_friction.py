@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 
@@ -15,7 +15,8 @@ from ringbalance.verification.navier_stokes.rotating_section import (
     section_system,
     solve_section_without_inertia,
 )
-from ringbalance.verification.validation.measurements import measurements
+from ringbalance.verification.validation.kinds import Kind, Prediction
+from ringbalance.verification.validation.measurements import Measurements, measurements
 from ringbalance.verification.validation.model_bias import ModelStatistics, model_statistics
 
 
@@ -78,23 +79,23 @@ class FrictionPoints:
 
 def friction_points(*names: str) -> FrictionPoints:
     """The points of data sets, in ascending order of the Reynolds number."""
-    sets = [measurements(name) for name in names]
-    aspects = [each.columns.get("aspect_ratio", np.zeros(len(each))) for each in sets]
+    sets = [_points_of(measurements(name), prefix=f"{name}: ") for name in names]
     joined = FrictionPoints(
-        reynolds=np.concatenate([each.columns["reynolds"] for each in sets]),
-        relative_roughness=np.concatenate(
-            [each.columns.get("relative_roughness", np.zeros(len(each))) for each in sets]
-        ),
-        laminar_ratio=_laminar_ratio(np.concatenate(aspects)),
-        friction=np.concatenate([each.columns["friction_factor"] for each in sets]),
-        measurement_uncertainty=np.concatenate(
-            [each.columns.get("uncertainty", np.full(len(each), each.source.uncertainty)) for each in sets]
-        ),
-        series=np.concatenate(
-            [np.char.add(f"{name}: ", each.series) for name, each in zip(names, sets, strict=True)]
-        ),
+        **{key: np.concatenate([getattr(each, key) for each in sets]) for key in vars(sets[0])}
     )
     return joined.where(np.argsort(joined.reynolds, kind="stable"))
+
+
+def _points_of(data: Measurements, *, prefix: str = "") -> FrictionPoints:
+    none = np.zeros(len(data))
+    return FrictionPoints(
+        reynolds=data.columns["reynolds"],
+        relative_roughness=data.columns.get("relative_roughness", none),
+        laminar_ratio=_laminar_ratio(data.columns.get("aspect_ratio", none)),
+        friction=data.columns["friction_factor"],
+        measurement_uncertainty=data.uncertainty,
+        series=np.char.add(prefix, data.series),
+    )
 
 
 def _laminar_ratio(aspect_ratio: FloatArray) -> FloatArray:
@@ -105,3 +106,20 @@ def _laminar_ratio(aspect_ratio: FloatArray) -> FloatArray:
         flow = solve_section_without_inertia(system=system, rotation_reynolds=0.0)
         ratio[aspect_ratio == aspect] = friction_ratio(flow)
     return ratio
+
+
+def _predict(data: Measurements) -> Prediction:
+    points = _points_of(data)
+    return Prediction(value=points.predicted(), stated=points.stated())
+
+
+FRICTION: Final = Kind(
+    title="Darcy friction factor of a long straight tube or duct at rest",
+    measured="friction_factor",
+    columns={"reynolds": "Reynolds number with the hydraulic diameter and the mean velocity"},
+    optional={
+        "relative_roughness": "ks/d, grain of the wall over the bore; smooth without this column",
+        "aspect_ratio": "long over short side of a rectangular duct; 0, or no such column, for a tube",
+    },
+    predict=_predict,
+)

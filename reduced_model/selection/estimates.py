@@ -39,6 +39,7 @@ from ringbalance.reduced_model.selection.tube_terms import (
     RangeFlow,
     flow_contributions,
     flow_estimate,
+    flows,
     loss_effect,
     range_flow,
     range_velocities,
@@ -195,9 +196,9 @@ def _tube(scene: Scene) -> dict[str, TermEstimate]:
 
 
 def _loss(scene: Scene, term: str, models: TubeModels) -> Row:
+    if scene.tube.drag_coefficient is not None or not flows(scene):
+        return term, None, "the scene prescribes k" if flows(scene) else "nothing flows", None
     u = range_velocities(scene)
-    if scene.tube.drag_coefficient is not None or not u.size:
-        return term, None, "nothing flows" if not u.size else "the scene prescribes k", None
     simpler = "k = 50" if models.constant else "leaving it out"
     return (
         term,

@@ -47,7 +47,7 @@ NO_PRESSURE: Final = 1.0
 HUMP: Final = "priming and separation over the siphon crest"
 _LEAST_HEAD: Final = 1e-16
 """H without loss at 1e-8 m/s, the slowest flow that is looked for, m^2/s^2."""
-_VELOCITIES: Final = 13
+_VELOCITIES: Final = 25
 PARTS: Final[Mapping[str, tuple[Fidelity, ...]]] = {
     "roughness": (LEFT_OUT,),
     "rotation": (LEFT_OUT, CORRELATION),
@@ -161,37 +161,43 @@ def steady(scene: Scene) -> Scene:
 
 
 @dataclass(frozen=True, kw_only=True)
-class LossEffect:
+class _LossEffect:
     """What simpler models of the tube's loss change at worst over the scene's velocities, relative."""
 
     k: float
-    """Of k, or of the head up to the siphon crest."""
+    """Of k under the same pressure, or of the head up to the siphon crest."""
     velocity: float
-    """Under one of these heads."""
+    """Under the same pressure."""
+
+
+def flows(scene: Scene) -> bool:
+    """Whether anything flows at some fill of the range."""
+    return bool(np.any(range_flow(scene).velocity > 0))
 
 
 def range_velocities(scene: Scene) -> FloatArray:
     """Velocities at which the loss is judged, m/s: from a quarter of the slowest flow, full or separated,
-    over the range of fills to twice the fastest; none where nothing flows."""
+    over the range of fills to twice the fastest; about that under the gas alone where nothing flows."""
     flow = range_flow(scene)
-    if not np.any(flow.velocity > 0):
-        return np.zeros(0)
     found = np.concatenate([flow.siphon, flow.separated])
+    if not flows(scene):
+        found = np.array([flow_estimate(scene).velocity or 1.0])
     found = np.log(found[(found > 0) & np.isfinite(found)])
     return np.exp(np.linspace(np.min(found) - np.log(4), np.max(found) + np.log(2), _VELOCITIES))
 
 
-def loss_effect(scene: Scene, models: TubeModels) -> LossEffect:
+def loss_effect(scene: Scene, models: TubeModels) -> _LossEffect:
     """Compare simpler models of the loss with the finest; without an effect where the scene prescribes k."""
     if scene.tube.drag_coefficient is not None:
-        return LossEffect(k=0.0, velocity=0.0)
+        return _LossEffect(k=0.0, velocity=0.0)
     (k, *heads), (finest_k, *finest_heads) = _heads(scene, models), _heads(scene, FINEST_MODELS)
-    ratios = np.array([own / finest for own, finest in zip(heads, finest_heads, strict=True)])
-    changed = np.abs(np.array([k / finest_k, *ratios[1:]]) - 1)
-    return LossEffect(
-        k=float(np.max(changed, initial=0.0)),
-        velocity=float(np.max(np.abs(ratios**-0.5 - 1), initial=0.0)),
-    )
+    log_u = np.log(range_velocities(scene))
+    ratios = np.array(heads) / np.array(finest_heads)
+    # The same head drives another velocity, at which k is another: fully so in laminar flow.
+    slopes = np.array([np.gradient(np.log(head), log_u) for head in finest_heads])
+    velocity = np.abs(ratios ** (-1 / slopes) - 1)
+    own = np.abs(k / finest_k - 1) + np.abs(np.gradient(np.log(finest_k), log_u)) * velocity[0]
+    return _LossEffect(k=float(np.max([own, *np.abs(ratios[1:] - 1)])), velocity=float(np.max(velocity)))
 
 
 @lru_cache(maxsize=64)
@@ -214,7 +220,7 @@ def tube_models(scene: Scene) -> TubeModels:
     """
     scene = steady(scene)
     prescribed = scene.tube.drag_coefficient is not None
-    if scene.tolerance == FINEST or prescribed or not range_velocities(scene).size:
+    if scene.tolerance == FINEST or prescribed or not flows(scene):
         return FINEST_MODELS
     if loss_effect(scene, CONSTANT_MODELS).k <= scene.tolerance:
         return CONSTANT_MODELS

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+from ringbalance.reduced_model.budget import last_place
 from ringbalance.reports.equations import equation_svg
 from ringbalance.reports.figures.cases import order_plot, series_plots
 from ringbalance.reports.numbers import (
@@ -11,6 +12,7 @@ from ringbalance.reports.numbers import (
     PLUS_MINUS,
     THIN_SPACE,
     display_unit,
+    fixed,
     given,
     number,
     percent,
@@ -241,7 +243,9 @@ def _width(quantity: Record) -> str:
     if value is not None and low is not None and high is not None:
         sides = sorted((value - low, high - value))
         if sides[1] > _LOPSIDED * sides[0] and sides[1] > 0.1 * abs(value):
-            ends = [number(end * display.factor, digits=2) for end in (low, high)]
+            low, high = low * display.factor, high * display.factor
+            place = last_place(high - low)
+            ends = [fixed(round(end, -place), max(-place, 0)) for end in (low, high)]
             return with_unit(" to ".join(ends), display.symbol)
     return with_unit(
         number(None if not half_width else half_width * display.factor, digits=2), display.symbol

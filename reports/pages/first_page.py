@@ -7,6 +7,7 @@ from typing import Final
 
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.tuning.tune import tuning_document
+from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.chamber.inputs import half_widths
 from ringbalance.reports.numbers import THIN_SPACE, given, number, percent, shown
 from ringbalance.reports.pages.requirements import (
@@ -23,6 +24,8 @@ from ringbalance.reports.pages.requirements import (
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.reports.traces import traced
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
+from ringbalance.verification.assumptions import assumptions_of
+from ringbalance.verification.case import RestsOn
 from ringbalance.verification.loops import calibration_of
 from ringbalance.verification.runner import paper_scene
 
@@ -46,6 +49,11 @@ _MAIN: Final = {
 }
 _NEEDED: Final = "needed_moment"
 """Results whose causes of uncertainty are compared; k and the margin follow from the velocity's."""
+_CREST: Final = RestsOn(
+    path="tube.hump_radius",
+    documented=True,
+    why="any place between the chamber’s inner wall and the fullest ring fits",
+)
 _ENDINGS: Final = {
     "settled": "settles",
     "hovering": "hovers about its limit",
@@ -61,6 +69,7 @@ def _collect(work: Work) -> Record:
         "needed_uncertainty_kg_m": _needed_uncertainty(work.scene),
         "gas_pressure_uncertainty_Pa": half_widths(work.scene).get("pressure", 0.0),
         "requirement": requirement_record(work.scene),
+        "crest": crest_range(work.scene, work.calibration),
         "bore_m": work.scene.tube.bore,
         "bore_uncertainty_stated": any(i.quantity == "bore" for i in work.scene.uncertainty),
         "time_limit_s": work.scene.run.time_limit,
@@ -73,6 +82,21 @@ def _needed_uncertainty(scene: Scene) -> float:
     """Of the initial unbalance, kg m at 95 %, by that of the influence coefficient."""
     width = half_widths(scene).get("influence_coefficient", 0.0)
     return scene.rotor.initial_amplitude * width / scene.rotor.influence_coefficient**2
+
+
+def crest_range(scene: Scene, calibration: Calibration) -> Record | None:
+    """Where a siphon crest that nobody gave may lie, and the gas pressures that lift the liquid over it."""
+    point = calibration.operating_point
+    (crest,) = assumptions_of((_CREST,), scene) or (None,)
+    if crest is None or point.priming_vented is None:
+        return None
+    head = 0.5 * scene.liquid.density * scene.rotor.speed**2 / calibration.flow_law.gas_factor
+    pressures = [point.priming_vented + head * (crest.value**2 - r**2) for r in (crest.high, crest.low)]
+    return {
+        "radius_m": [crest.low, crest.high],
+        "priming_pressure_Pa": pressures,
+        "why": crest.why,
+    }
 
 
 def _other_reading(work: Work) -> Record | None:
@@ -240,7 +264,12 @@ def _actions(evidence: Record, rows: Sequence[Requirement]) -> list[str]:
     if verdicts.get("Correction capacity of one pair") in {MISSED, OPEN}:
         told.append("Balance the rotor better by hand, or take a larger disc: the capacity has no reserve.")
     if any("hump radius" in row.rests for row in rows):
-        told.append("Measure the radius of the siphon crest: it sets the gas pressure that starts the flow.")
+        crest = (evidence.get("summary") or {}).get("crest")
+        most = shown(crest["priming_pressure_Pa"][-1], "Pa", digits=2) if crest else ""
+        told.append(
+            "Measure the radius of the siphon crest: it sets the gas pressure that starts the flow"
+            f"{f'; {most} would do wherever it may lie' if most else ''}."
+        )
     if any("bore" in row.rests for row in rows):
         told.append(
             "Measure the flow through the tube at three gas pressures; every velocity and gain rests on the "

@@ -38,6 +38,9 @@ class Requirement:
     """As a number of `unit`; None where there is none to draw."""
     reached: float | None = None
     uncertainty: float = 0.0
+    low: float | None = None
+    high: float | None = None
+    """Ends of what is reached, where they are others than plus and minus the uncertainty."""
     unit: str = "1"
     at_least: bool = True
     """Whether more than required is better."""
@@ -94,8 +97,8 @@ def requirement_figure(rows: Iterable[Requirement]) -> Drawing | None:
             "label": untraced(row.name),
             "required": row.required,
             "reached": row.reached,
-            "low": row.reached - row.uncertainty,
-            "high": row.reached + row.uncertainty,
+            "low": row.reached - row.uncertainty if row.low is None else row.low,
+            "high": row.reached + row.uncertainty if row.high is None else row.high,
             "at_least": row.at_least,
             "verdict": row.verdict,
         }
@@ -177,16 +180,27 @@ def _gas_pressure(evidence: Record) -> Requirement | None:
     starts = point.get("priming_pressure_vented_Pa") is not None
     key = "priming_pressure_vented_Pa" if starts else "stall_pressure_Pa"
     width = point["priming_uncertainty" if starts else "stall_uncertainty"]
-    own = (evidence.get("summary") or {}).get("gas_pressure_uncertainty_Pa") or 0.0
+    summary, gas = evidence.get("summary") or {}, point["gas_pressure_Pa"]
+    own = summary.get("gas_pressure_uncertainty_Pa") or 0.0
+    both, crest = math.hypot(width, own), summary.get("crest") if starts else None
+    # A crest that nobody gave may lie elsewhere, which moves the pressure by more than any tolerance.
+    least, most = crest["priming_pressure_Pa"] if crest else (point[key], point[key])
+    ends = (
+        read(evidence, f"summary.crest.priming_pressure_Pa.{end}", "Pa", digits=2) for end in (0, 1) if crest
+    )
+    anywhere = f"; {' to '.join(ends)} wherever the crest may lie" if crest else ""
+    verdicts = {_above(gas, bound, both) for bound in (least, most)}
     return Requirement(
         name="Gas pressure " + ("that lifts the liquid over the siphon crest" if starts else "above stall"),
-        wanted=f"at least {read(evidence, f'operating_point.{key}', 'Pa', width=width)}",
+        wanted=f"at least {read(evidence, f'operating_point.{key}', 'Pa', width=width)}{anywhere}",
         result=read(evidence, "operating_point.gas_pressure_Pa", "Pa", width=own),
-        verdict=_above(point["gas_pressure_Pa"], point[key], math.hypot(width, own)),
+        verdict=verdicts.pop() if len(verdicts) == 1 else OPEN,
         rests=resting(evidence, "tube.hump_radius", "tube.port_radius", "tube.hump_gas"),
         required=point[key],
-        reached=point["gas_pressure_Pa"],
-        uncertainty=math.hypot(width, own),
+        reached=gas,
+        uncertainty=both,
+        low=gas * point[key] / most - both if most > 0 else None,
+        high=gas * point[key] / least + both if least > 0 else None,
         unit="Pa",
     )
 

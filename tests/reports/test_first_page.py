@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from ringbalance.reports.pages.first_page import SECTION, dominant, loop_sentences
+from ringbalance.reports.pages.first_page import SECTION, crest_range, dominant, loop_sentences
 from ringbalance.reports.pages.loop import SECTION as LOOP
 from ringbalance.reports.pages.requirements import (
     OPEN,
@@ -19,6 +19,7 @@ from ringbalance.reports.pages.requirements import (
 )
 from ringbalance.reports.traces import untraced
 from ringbalance.scene import Scene
+from ringbalance.verification.loops import calibration_of
 
 Record = dict[str, Any]
 
@@ -156,6 +157,35 @@ def test_a_stated_moment_takes_the_place_of_the_initial_vibration(evidence: Reco
     row = row_of(evidence, "Correction capacity")
     assert row.verdict == "not met"
     assert "1100\u202fg\u202fmm" in untraced(row.wanted)
+
+
+@pytest.mark.parametrize(
+    ("pressures", "verdict"),
+    [
+        (None, "met"),
+        ([0.2e6, 0.6e6], "met"),
+        # Somewhere within its range the crest asks for more than the supply gives.
+        ([0.2e6, 0.9e6], "cannot be told"),
+        ([0.8e6, 0.9e6], "not met"),
+    ],
+)
+def test_a_crest_that_nobody_gave_widens_what_the_gas_must_do(
+    evidence: Record, pressures: list[float] | None, verdict: str
+) -> None:
+    evidence["operating_point"].update(gas_pressure_Pa=0.7e6, priming_pressure_vented_Pa=0.54e6)
+    evidence["summary"]["crest"] = pressures and {"priming_pressure_Pa": pressures, "why": "inferred"}
+    row = row_of(evidence, "Gas pressure")
+    assert row.verdict == verdict
+    assert ("wherever the crest may lie" in row.wanted) == (pressures is not None)
+
+
+def test_the_crest_may_lie_wherever_the_tube_is_empty_at_rest(paper_scene: Scene) -> None:
+    """Both ends by hydrostatics, rho omega^2 (R2^2 - r^2)/2; none where its radius is given."""
+    crest, rotor = crest_range(paper_scene, calibration_of(paper_scene)), paper_scene.rotor
+    assert crest is not None
+    for r, pressure in zip(reversed(crest["radius_m"]), crest["priming_pressure_Pa"], strict=True):
+        head = 0.5 * paper_scene.liquid.density * rotor.speed**2 * (paper_scene.disc.outer_radius**2 - r**2)
+        assert pressure == pytest.approx(head, rel=5e-3)
 
 
 def tuned(evidence: Record, **changes: Any) -> Record:

@@ -143,9 +143,9 @@ def _measured(case: Mapping[str, Any]) -> str:
     """Such as "smooth tubes: 536 points, 96.8 % within, bias -1.5 %, scatter 1.6 %"."""
     name = case["id"].removeprefix("measured_").replace("_", " ")
     if case["verdict"] == "not run":
-        return f"{name}: not run"
+        return f"{name}: not run" + (" (a heavy case)" if case["cost"] == "heavy" else "")
     numbers = case["numbers"]
-    parts = [f"{numbers['points']:.0f} points"]
+    parts = [f"{numbers['points']:.0f} points" if "points" in numbers else "a correlation of them"]
     if "share_within" in numbers:
         parts += [
             f"{100 * numbers['share_within']:.1f} % within",

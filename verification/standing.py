@@ -51,6 +51,7 @@ SUBJECTS: Final[Mapping[str, Subject]] = MappingProxyType(
         ),
         "crest": Subject(
             title="Flow over the siphon crest, separation",
+            calibrated="the cavity's pressure, with two thresholds of one siphon in view",
             assumed="cavity between vapour and gas pressure; air leaves at Froude numbers 0.6 to 1.1",
             budgets=(
                 "velocity",

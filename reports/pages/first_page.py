@@ -146,15 +146,13 @@ def loop_sentences(evidence: Record) -> list[str]:
     run = evidence["closed_loop"].get("calibrated")
     if run is None:
         return ["The closed loop was not run."]
-    told = [f"Under the calibrated law the loop {_ending(run)}{_factor(run)}."]
+    line = evidence["calibration"].get("gas_line") or {"given": True}
+    ideal = "" if line["given"] else ", with a valve that acts at once,"
+    told = [f"Under the calibrated law{ideal} the loop {_ending(run)}{_factor(run)}."]
     tuned = retuned(evidence)
     if tuned is not None:
         gain, own = (shown(r, "s/m", digits=2) for r in _gains(evidence, tuned))
-        line = evidence["calibration"].get("gas_line") or {"given": True}
-        ideal = "" if line["given"] else " and a valve that acts at once"
-        told.append(
-            f"Recommended gain: {gain} (the scene has {own}). With it{ideal} this run {_ending(tuned)}."
-        )
+        told.append(f"Recommended gain: {gain} (the scene has {own}). With it this run {_ending(tuned)}.")
     paper = evidence["closed_loop"].get("paper")
     if paper is not None:
         told.append(f"Under the paper’s law, with the scene’s gain, it {_ending(paper)}.")
@@ -189,15 +187,15 @@ def _factor(run: Record) -> str:
         for key in ("loop_factor", "loop_factor_limit")
     )
     if factor > run["loop_factor_limit"]:
-        end = f"From {limit} times on the residual grows, so it grows here"
+        end = f"more than {limit} times, so that it grows"
     elif factor > 1:
         end = (
-            f"The residual turns to the opposite side, and {percent(factor - 1)} of it is left; "
-            f"from {limit} times on it grows"
+            f"so that {percent(factor - 1)} of it is left on the opposite side; "
+            f"from {limit} times on it would grow"
         )
     else:
-        end = f"The rest is left to the next injection; from {limit} times on the residual would grow"
-    return f". One injection moves {value} times the liquid that would just cancel a small residual. {end}"
+        end = f"and leaves the rest to the next; from {limit} times on it would grow"
+    return f". One injection removes {value} times a small residual, {end}"
 
 
 def chance(evidence: Record) -> list[str]:
@@ -263,7 +261,7 @@ def _actions(evidence: Record, rows: Sequence[Requirement]) -> list[str]:
         told.append(valve)
     if verdicts.get("Correction capacity of one pair") in {MISSED, OPEN}:
         told.append("Balance the rotor better by hand, or take a larger disc: the capacity has no reserve.")
-    if any("hump radius" in row.rests for row in rows):
+    if any("siphon crest radius" in row.rests for row in rows):
         crest = (evidence.get("summary") or {}).get("crest")
         most = shown(crest["priming_pressure_Pa"][-1], "Pa", digits=2) if crest else ""
         told.append(

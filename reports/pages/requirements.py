@@ -11,6 +11,7 @@ from ringbalance.controller.tuning.loop_factor import STAYING_DEVIATIONS
 from ringbalance.reports.figures.operation import requirement_bars
 from ringbalance.reports.figures.style import Drawing
 from ringbalance.reports.numbers import given, number, percent, shown
+from ringbalance.reports.prose import key_words
 from ringbalance.reports.section import Record, Table
 from ringbalance.reports.traces import evidence_at, read, traced, untraced
 from ringbalance.scene import Scene
@@ -19,6 +20,7 @@ MET: Final = "met"
 MISSED: Final = "not met"
 OPEN: Final = "cannot be told"
 UNASKED: Final = "none stated"
+_NONE: Final = "nothing in the scene"
 _CERTAIN: Final = ("given", "measured")
 _LIKELY: Final = 0.95
 """Fraction of runs that must settle in time, the confidence of every interval in the report."""
@@ -122,7 +124,7 @@ def resting(evidence: Record, *paths: str) -> str:
     by_origin: dict[str, list[str]] = {}
     for path in paths:
         if (origin := origins.get(path, "given")) not in _CERTAIN:
-            by_origin.setdefault(origin, []).append(path.partition(".")[2].replace("_", " "))
+            by_origin.setdefault(origin, []).append(key_words(path))
     return "; ".join(f"{origin}: {', '.join(names)}" for origin, names in by_origin.items())
 
 
@@ -135,7 +137,7 @@ def named_with_origin(evidence: Record, path: str) -> str:
 def input_name(path: str) -> str:
     """The name of an input that a path in the scene file stands for, such as "bore of the tube"."""
     table, _, key = path.partition(".")
-    return f"{key.replace('_', ' ')} of the {table}" if key else path
+    return f"{key_words(path)} of the {table.replace('_', ' ')}" if key else path
 
 
 def _capacity(evidence: Record) -> Requirement | None:
@@ -269,7 +271,7 @@ def _settling(evidence: Record) -> Requirement | None:
     slow = read(evidence, "summary.tuning.settling_time_s.p95", "s", digits=2)
     return Requirement(
         name="Settling time with the recommended gain",
-        wanted=UNASKED if wanted is None else f"at most {given(wanted, 's')} in {percent(_LIKELY)} of runs",
+        wanted=_NONE if wanted is None else f"at most {given(wanted, 's')} in {percent(_LIKELY)} of runs",
         result=f"median {middle}, {percent(_LIKELY)} of runs within {slow}; settled: "
         f"{traced(percent(tuning['fraction_settled']), 'summary.tuning.fraction_settled')} of "
         f"{tuning['runs']} runs, with 95 % confidence {percent(low)} to {percent(high)}"
@@ -340,7 +342,7 @@ def _grade_row(evidence: Record) -> Requirement | None:
     path = "summary.requirement.grade_at_residual_m_s"
     return Requirement(
         name="Balance quality grade at the residual, ISO 21940-11",
-        wanted=UNASKED if bound is None else f"at most G {number(1e3 * bound, digits=3)}",
+        wanted=_NONE if bound is None else f"at most G {number(1e3 * bound, digits=3)}",
         result=f"G {traced(number(1e3 * reached, digits=2), path)}, in mm/s",
         verdict=UNASKED if bound is None else (MET if reached <= bound else MISSED),
         rests=resting(evidence, "rotor.mass", "rotor.influence_coefficient"),

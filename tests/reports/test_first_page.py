@@ -81,8 +81,8 @@ def test_the_verdict_is_named_with_the_loop_factor(evidence: Record, verdict: st
     run.update(verdict=verdict, loop_factor=1.93, settled=verdict == "settled")
     lead = untraced(loop_sentences(evidence)[0])
     assert said in lead
-    assert "One injection moves 1.93 times the liquid that would just cancel a small residual" in lead
-    assert "from 2.00 times on it grows" in lead
+    assert "One injection removes 1.93 times a small residual, so that 93\u202f% of it is left" in lead
+    assert "from 2.00 times on it would grow" in lead
 
 
 def test_a_loop_factor_is_explained_on_either_side_of_one(evidence: Record) -> None:
@@ -91,14 +91,14 @@ def test_a_loop_factor_is_explained_on_either_side_of_one(evidence: Record) -> N
     for factor in (0.8, 1.5, 2.3):
         run["loop_factor"] = factor
         ends[factor] = untraced(loop_sentences(evidence)[0]).split(". ")[-1]
-    assert ends[0.8].startswith("The rest is left to the next injection")
-    assert ends[1.5].startswith("The residual turns to the opposite side")
-    assert ends[2.3].endswith("so it grows here.")
+    assert "and leaves the rest to the next;" in ends[0.8]
+    assert "50\u202f% of it is left on the opposite side" in ends[1.5]
+    assert ends[2.3].endswith("so that it grows.")
 
 
 def test_no_run_is_compared_with_another_by_a_ratio(evidence: Record) -> None:
     told = " ".join(view(with_consequences(evidence))["loop_lead"])
-    assert told.count("times the") == told.count("times the liquid")
+    assert told.count("times the") == 0
 
 
 def test_the_recommended_gain_stands_beside_the_scene_s(evidence: Record) -> None:

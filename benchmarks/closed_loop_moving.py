@@ -119,6 +119,8 @@ def compare(repeats: int, members: int, largest: int) -> dict[str, object]:
     by_time = sorted(carried.asked, key=lambda one: one[1])
     judged = [by_time[round(i)] for i in np.linspace(0, len(by_time) - 1, JUDGED)]
     carried.method, carried.tolerance, error = fastest(carried.rival, dynamics, judged)
+    if error > FILL_ERROR:
+        raise RuntimeError(f"an ensemble's fills are off by {error:.1e}")
     carried.asked.clear()
     theirs = least(partial(rival_run, scene, model, carried), repeats) / RIVAL_RUNS
     injections = len(carried.asked) / (repeats * RIVAL_RUNS)

@@ -96,12 +96,12 @@ def opening(shared: Record, run: Record, pair: int, first: bool, duration: float
 
 
 @compiled
-def kept(shared: Record, run: Record, found: float, duration: float) -> float:
-    """Count a valve-open time, s, that was shortened; zero where it is below the minimum."""
+def kept(shared: Record, run: Record, found: float, duration: float, chamber: int) -> float:
+    """Count a valve-open time, s, that was shortened; zero where it is below the chamber's least."""
     if found == duration:
         return duration
     run.shortened += 1
-    return found if found >= shared.minimum_gas_time else 0.0
+    return found if found >= shared.minimum_gas_time + shared.offset[chamber] else 0.0
 
 
 @compiled

@@ -106,7 +106,7 @@ def _permitted(
     if _driven(shared, run, other) > run.residual_fill:
         chamber, spare = 0 if first else 1, shared.chambers // 2 * 2
         found = opening_within(plant, motions, pair, spare, chamber, duration, w)
-    return kept(shared, run, found, duration)
+    return kept(shared, run, found, duration, pair if first else pair + shared.chambers // 2)
 
 
 @compiled

@@ -293,7 +293,7 @@ def _permitted(shared: Record, run: Record, pair: int, first: bool, duration: fl
     """A valve-open time, s, that leaves the residual fill; zero where it would be below the minimum."""
     driven = run.fill[pair] if first else shared.total - run.fill[pair]
     found = opening(shared, run, pair, first, duration) if driven > run.residual_fill else 0.0
-    return kept(shared, run, found, duration)
+    return kept(shared, run, found, duration, pair if first else pair + shared.chambers // 2)
 
 
 @compiled
@@ -348,7 +348,7 @@ def _decide(shared: Record, run: Record) -> None:
 @compiled
 def _open(shared: Record, run: Record, chamber: int, share: float) -> None:
     """Open the next valve, unless its share is below the minimum."""
-    time = _valve_time(share, shared.minimum_gas_time, shared.maximum_gas_time)
+    time = _valve_time(share, shared.offset[chamber], shared.minimum_gas_time, shared.maximum_gas_time)
     if time == 0.0:
         return
     half, left = shared.chambers // 2, shared.time_limit - run.time

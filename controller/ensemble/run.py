@@ -111,6 +111,7 @@ def ensemble_plan(*, scene: Scene, model: BalancerModel, transfer: PairTransfer)
     for name, value in (_loop(scene) | _controller(scene)).items():
         shared[name] = value
     loop = loop_factor(scene, model, target_vector_of(scene))
+    shared["offset"][0, :chambers] = scene.controller.offsets(chambers)
     return EnsemblePlan(
         shared=shared,
         plant=transfer.plant,

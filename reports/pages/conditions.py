@@ -82,7 +82,7 @@ def _part(part: float, total: float, path: str) -> str:
     """A part to the place of the total's second digit, or that it is smaller than that."""
     place = math.floor(math.log10(total)) - 1 if total else 0
     if round(part, -place) == 0:
-        return f"< {number(10.0**place, digits=1)}"
+        return f"< {fixed(10.0**place, max(-place, 0))}"
     return traced(fixed(round(part, -place), max(-place, 0)), path)
 
 

@@ -24,13 +24,7 @@ VELOCITIES: Final = (0.1, 20.0)
 
 
 def range_notes(*, tube: Tube, state: TubeState, velocity: FloatArray) -> dict[str, BoolArray]:
-    """Say in a sentence each why, and mark where, a correlation is stretched.
-
-    Args: `tube`: the tube; nothing is stretched when its k is prescribed. `state`: its terms.
-        `velocity`: u, m/s, the shape of the state's arrays.
-    Returns: For each sentence that holds anywhere, where it holds.
-    Source: the ranges stand with the correlations.
-    """
+    """For each sentence that holds anywhere on why a correlation is stretched, where it holds."""
     re, rotation = state.reynolds, state.rotation_reynolds
     laminar = re < state.critical_ratio * STRAIGHT_CRITICAL_REYNOLDS
     unsteady = ~laminar & (re < state.critical_ratio * FULLY_TURBULENT_REYNOLDS)

@@ -39,10 +39,7 @@ _EQUAL_FORCE: Final = (1.0, 0.25)
 
 
 def rotation_in_range(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike) -> BoolArray:
-    """Whether the laminar rotation ratio rests on finite-element solutions: Kl <= 1e7 and R_Om <= 1e5.
-
-    Source: the table of `rotating_section_table`.
-    """
+    """Whether the laminar rotation ratio rests on finite-element solutions: Kl <= 1e7 and R_Om <= 1e5."""
     return rotation_table_covers(reynolds=reynolds, rotation_reynolds=rotation_reynolds)
 
 

@@ -51,11 +51,7 @@ def uncertainty_parts(
 
 
 def model_parts(*, tube: Tube, state: TubeState) -> dict[str, FloatArray]:
-    """Expanded uncertainties (95 %) of k by the correlations and tables themselves.
-
-    Returns: Half-width of k by cause, each the shape of the state's arrays.
-    Source: the spreads stand with the correlations.
-    """
+    """Expanded uncertainties (95 %) of k by cause, of the correlations and tables themselves."""
     re, rough, ratio = state.reynolds, tube.roughness / tube.bore, state.critical_ratio
     straight = straight_length(tube=tube) / tube.bore
     lam = rotating_friction_ratio(reynolds=re, rotation_reynolds=state.rotation_reynolds)

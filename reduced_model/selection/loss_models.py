@@ -19,7 +19,7 @@ from ringbalance.physics.tube.rotation import (
     turbulent_friction_ratio,
 )
 from ringbalance.physics.tube.rotation_table import ito_nanbu_laminar
-from ringbalance.physics.tube.state import tube_state, upstream_loss
+from ringbalance.physics.tube.state import tube_state
 from ringbalance.reduced_model.paper.formulas import PAPER_DRAG_COEFFICIENT
 from ringbalance.reduced_model.tube.path import crest_span, head_behind_crest, loss_along, to_crest_end
 from ringbalance.scene.arrays import FloatArray
@@ -121,7 +121,7 @@ def _tables(scene: Scene, tube: Tube, velocity: FloatArray) -> Loss:
     state = tube_state(tube=tube, liquid=scene.liquid, angular_velocity=scene.rotor.speed, velocity=velocity)
     return Loss(
         k=state.k,
-        upstream_k=upstream_loss(tube=to_crest_end(tube), state=state),
+        upstream_k=state.upstream_loss(tube=to_crest_end(tube)),
         kinetic_factor=np.asarray(state.kinetic_factor),
         along=loss_along(state.terms),
     )

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.physics.tube.state import TubeState, tube_state, upstream_loss
+from ringbalance.physics.tube.state import TubeState, tube_state
 from ringbalance.physics.tube.uncertainty import model_parts, uncertainty_parts
 from ringbalance.reduced_model.chamber.inputs import half_widths
 from ringbalance.reduced_model.tables.fit import level_table, refined_table
@@ -109,7 +109,7 @@ def _widths(
             state=state,
             inputs=scene.uncertainty,
         )
-    k, upstream = state.k, upstream_loss(tube=tube, state=state)
+    k, upstream = state.k, state.upstream_loss(tube=tube)
     width = np.sqrt(sum((part**2 for part in parts.values()), start=np.zeros_like(k)))
     share = np.where(k > 0, upstream / np.where(k > 0, k, 1.0), 1.0)
     moved = np.hypot(width * share, loss_along(state.terms) * place)
@@ -127,7 +127,7 @@ def _fraction_uncertainty(
 ) -> FloatArray:
     """(s_j - R)/(k + 1) of each part of k with a fraction s_j before the crest's end, and of its place."""
     total = state.k + 1
-    fraction = (state.kinetic_factor + upstream_loss(tube=tube, state=state)) / total
+    fraction = (state.kinetic_factor + state.upstream_loss(tube=tube)) / total
     squares = (loss_along(state.terms) * place / total) ** 2
     for name, part in parts.items():
         # Which end or bend is wrong is not known: then the worse of before and behind the crest.
@@ -161,7 +161,7 @@ def log_heads(scene: Scene) -> list[LogHead]:
         def head(log_velocity: FloatArray) -> FloatArray:
             there = state(log_velocity.tobytes())
             there = replace(there, bends=there.bends[::order])
-            factor = there.kinetic_factor + upstream_loss(tube=to_crest_end(seen), state=there)
+            factor = there.kinetic_factor + there.upstream_loss(tube=to_crest_end(seen))
             kinetic = np.exp(2 * log_velocity) / 2
             fall = factor * kinetic
             if lowest:

@@ -24,9 +24,6 @@ from ringbalance.verification.extremes.axes import places_of
 from ringbalance.verification.extremes.study import (
     SIZES,
     Record,
-    broken,
-    extremes_document,
-    extremes_tables,
     find_extremes,
     scene_base,
 )
@@ -76,7 +73,7 @@ def extremes(
                 ),
                 kept=None if out is None else out / KEPT,
             )
-        told, tables = extremes_document(found), extremes_tables(found)
+        told, tables = found.document(), found.tables()
         if stage is not None:
             write_whole(stage / FILE, json_format.dumps(told, allow_nan=False) + "\n")
             for drawing in map_drawings(tables, places_of(base.scene)):
@@ -87,7 +84,7 @@ def extremes(
         print(json_format.dumps(told, allow_nan=False))
     else:
         _show(told, axis_rows(tables["axes"]))
-    return BROKEN if broken(found) else DONE
+    return BROKEN if found.broken() else DONE
 
 
 def _show(told: Record, rows: list[Cells]) -> None:

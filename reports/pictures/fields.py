@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ringbalance.mesh.chamber import chamber_mesh, default_cells, mesh_quality
+from ringbalance.mesh.chamber import chamber_mesh, default_cells
 from ringbalance.mesh.export import write_vtu
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, places, solve_pressure
@@ -94,7 +94,7 @@ def pressure_profile(*, scene: Scene, field: ChamberField) -> Record:
 def mesh_record(field: ChamberField) -> Record:
     """Sizes and quality of the mesh, and how the solve ended."""
     chamber, solution = field.solution.chamber, field.solution
-    quality = mesh_quality(chamber)
+    quality = chamber.quality()
     return {
         "cells": list(chamber.cells),
         "unknowns": quality.nodes,

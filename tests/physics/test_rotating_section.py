@@ -28,7 +28,6 @@ from ringbalance.verification.navier_stokes.newton import FlowSolution, FlowSyst
 from ringbalance.verification.navier_stokes.rotating_section import (
     SectionMesh,
     friction_ratio,
-    section_system,
     solve_section,
     solve_section_without_inertia,
 )
@@ -36,7 +35,7 @@ from ringbalance.verification.navier_stokes.rotating_section import (
 
 @cache
 def _system(around: int = 8, wall_ratio: float = 15.0) -> FlowSystem:
-    return section_system(cells=SectionMesh(around=around, across=3 * around // 2, wall_ratio=wall_ratio))
+    return SectionMesh(around=around, across=3 * around // 2, wall_ratio=wall_ratio).system()
 
 
 def _still(system: FlowSystem) -> float:
@@ -78,7 +77,7 @@ def test_fast_rotation_without_inertia_tends_to_the_exact_limit() -> None:
 
 @pytest.mark.heavy
 def test_fast_rotation_up_to_a_million() -> None:
-    system = section_system(cells=SectionMesh(around=28, across=44, wall_ratio=60.0))
+    system = SectionMesh(around=28, across=44, wall_ratio=60.0).system()
     for rotation, gap in ((1e2, 0.7754), (1e4, 0.0753), (1e6, 0.0075)):
         flow = solve_section_without_inertia(system=system, rotation_reynolds=rotation)
         found = friction_ratio(flow) / (0.07863 * np.sqrt(rotation)) - 1

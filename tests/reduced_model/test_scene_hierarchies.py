@@ -42,7 +42,6 @@ from ringbalance.verification.selection_studies.law_models import (
     SIPHON,
     LawModels,
     base_law,
-    law_of,
 )
 from ringbalance.verification.selection_studies.scene_numbers import scene_numbers
 from ringbalance.verification.selection_studies.tube_models import LawBook, k_hierarchy, velocity_hierarchy
@@ -171,12 +170,12 @@ def test_the_highest_law_against_the_calibrated_one_and_a_root_of_its_own(
     table_1_scene: Scene, table_1_calibration: Calibration
 ) -> None:
     base = base_law(table_1_scene)
-    law = law_of(table_1_scene, LawModels(level=QUADRATURE, loss=TABLES, regimes=REGIMES), base=base)
+    law = LawModels(level=QUADRATURE, loss=TABLES, regimes=REGIMES).law(table_1_scene, base=base)
     fills = np.array([0.1, 0.25, 0.4])
     found = law.evaluate(fill_ratio=fills, gas_pressure=7e5)
     wanted = table_1_calibration.flow_law.evaluate(fill_ratio=fills, gas_pressure=7e5)
     assert found.velocity == pytest.approx(wanted.velocity, rel=1e-6)
-    siphon = law_of(table_1_scene, LawModels(level=CLOSED, loss=CORRELATIONS, regimes=SIPHON), base=base)
+    siphon = LawModels(level=CLOSED, loss=CORRELATIONS, regimes=SIPHON).law(table_1_scene, base=base)
     head = (
         700.0
         + (

@@ -111,18 +111,12 @@ def _friction_time(run: EccentricRun, arm: float) -> float:
 
 
 def figure_seven(scene: EccentricScene, *, time_limit: float = 30.0) -> BalancingFigure:
-    """Balance the two imbalances of Fig. 7 at constant speed.
-
-    Source: Fig. 7 of the paper on eccentric masses.
-    """
+    """Balance the two imbalances of the paper's Fig. 7 at constant speed."""
     return _balanced(at_constant_speed(scene, time_limit=time_limit))
 
 
 def figure_eight(scene: EccentricScene, *, time_limit: float = 400.0) -> BalancingFigure:
-    """The same with masses that stop 10 degrees beside their targets, and fine tuning.
-
-    Source: Fig. 8 of the paper on eccentric masses.
-    """
+    """The same with masses that stop 10 degrees beside their targets, and fine tuning: the paper's Fig. 8."""
     level = at_constant_speed(scene, time_limit=time_limit)
     return _balanced(changed(level, "supervisor", target_error=(_PAPER_ERROR, _PAPER_ERROR)))
 

@@ -74,10 +74,7 @@ class _LayeredFactors:
 
 
 def _factored(block: FloatArray) -> Any:
-    """LU factors of a dense block.
-
-    A singular block leaves infinities, which the residual of the solve shows.
-    """
+    """LU factors of a dense block; a singular one leaves infinities, which the solve's residual shows."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", LinAlgWarning)
         return lu_factor(block, overwrite_a=True, check_finite=False)

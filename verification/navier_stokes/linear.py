@@ -29,10 +29,7 @@ class Factors:
     pivoted: bool
 
     def solve(self, right: FloatArray) -> FloatArray:
-        """Solution of A x = b, refined; factors with partial pivoting replace the sparse ones if they must.
-
-        Raises: RuntimeError: the matrix is singular.
-        """
+        """Solution of A x = b, refined, with pivots if need be. Raises: RuntimeError: A is singular."""
         x, gap = _refined(self.matrix, self.factors, right)
         if gap > _USABLE and not self.pivoted:
             self.factors, self.pivoted = _with_pivoting(self.matrix), True

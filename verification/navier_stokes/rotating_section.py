@@ -57,6 +57,31 @@ class SectionMesh:
     """Innermost cell of the ring over the cell at the wall."""
     shape: str = "quad"
 
+    def mesh(self) -> Any:
+        """Quadratic mesh of the half section (y, z >= 0) of a tube of unit bore: wall and symmetry."""
+        n = self.around
+        core, edges = _core(n, 0.26, 0.2)
+        vertices = geometric_vertices(cells=self.across, ratio=self.wall_ratio)
+        blend = 1 - with_midpoints(vertices=vertices)[::-1]
+        patches = [Patch(nodes=core, sides={"south": "symmetry"})]
+        ranges = ((0.0, 0.25, n), (0.25, 0.75, 2 * n), (0.75, 1.0, n))
+        for edge, (first, last, count), flat in zip(edges, ranges, ("west", "", "east"), strict=True):
+            angles = np.pi * np.linspace(first, last, 2 * count + 1)
+            wall = 0.5 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+            wall[np.abs(wall) < 1e-15] = 0.0
+            sides = {"north": "wall"} | ({flat: "symmetry"} if flat else {})
+            patches.append(ruled_patch(inner=edge, outer=wall, blend=blend, sides=sides))
+        return patch_mesh(patches=patches, shape=self.shape)
+
+    def system(self) -> FlowSystem:
+        """Discrete equations of the half section: no slip at the wall, mirror symmetry about z = 0."""
+        space = taylor_hood(mesh=self.mesh(), components=3)
+        conditions = [Dirichlet(boundary="symmetry", component=1)]
+        conditions += [Dirichlet(boundary="wall", component=c) for c in range(3)]
+        return flow_system(
+            space=space, conditions=conditions, enclosed=True, flow_component=2, coriolis=CORIOLIS
+        )
+
 
 def _lines(points: FloatArray, count: int) -> FloatArray:
     """Nodes on a straight line between two points, shape (2 count + 1, 2)."""
@@ -73,34 +98,6 @@ def _core(n: int, half_width: float, corner: float) -> tuple[FloatArray, list[Fl
     top = (straight + bulge) / 2
     nodes = ruled_patch(inner=bottom, outer=top, blend=np.linspace(0.0, 1.0, 2 * n + 1)).nodes
     return nodes, [nodes[-1], nodes[::-1, -1], nodes[0, ::-1]]
-
-
-def section_mesh(*, cells: SectionMesh) -> Any:
-    """Curved mesh of the half section (y, z >= 0) of a tube of unit bore, refined towards the wall.
-
-    Args: `cells`: numbers of cells and their grading.
-    Returns: Quadratic mesh with boundaries wall and symmetry.
-    """
-    n = cells.around
-    core, edges = _core(n, 0.26, 0.2)
-    blend = 1 - with_midpoints(vertices=geometric_vertices(cells=cells.across, ratio=cells.wall_ratio))[::-1]
-    patches = [Patch(nodes=core, sides={"south": "symmetry"})]
-    ranges = ((0.0, 0.25, n), (0.25, 0.75, 2 * n), (0.75, 1.0, n))
-    for edge, (first, last, count), flat in zip(edges, ranges, ("west", "", "east"), strict=True):
-        angles = np.pi * np.linspace(first, last, 2 * count + 1)
-        wall = 0.5 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-        wall[np.abs(wall) < 1e-15] = 0.0
-        sides = {"north": "wall"} | ({flat: "symmetry"} if flat else {})
-        patches.append(ruled_patch(inner=edge, outer=wall, blend=blend, sides=sides))
-    return patch_mesh(patches=patches, shape=cells.shape)
-
-
-def section_system(*, cells: SectionMesh) -> FlowSystem:
-    """Discrete equations of the half section: no slip at the wall, mirror symmetry about z = 0."""
-    space = taylor_hood(mesh=section_mesh(cells=cells), components=3)
-    conditions = [Dirichlet(boundary="symmetry", component=1)]
-    conditions += [Dirichlet(boundary="wall", component=c) for c in range(3)]
-    return flow_system(space=space, conditions=conditions, enclosed=True, flow_component=2, coriolis=CORIOLIS)
 
 
 def solve_section(

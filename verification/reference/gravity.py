@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from types import MappingProxyType
 from typing import Final
 
@@ -24,7 +23,7 @@ from ringbalance.physics.pressure.surface import solve_with_gravity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene, Shaft
 from ringbalance.verification.evidence import Evidence, Found
-from ringbalance.verification.orders import field_error, order_figure, order_study, order_table, orders_found
+from ringbalance.verification.orders import field_error, order_figure, order_study, orders_found
 from ringbalance.verification.reference.mutated_pressure import mutated_pressure
 
 _GAUSS: Final = 60
@@ -171,7 +170,6 @@ def gravity_evidence(
     volume = max(abs(s.statistics.extra["volume_error"]) for s in solutions)
     middle = float(surface_radius(disc=disc, fill_ratio=fill))
     note = "cells " + ", ".join(" x ".join(map(str, count)) for count in cells)
-    table = partial(order_table, formal_order=3.0, geometry="quadratic", note=note)
     return Evidence(
         found={
             **orders_found({"surface": surface, "field": field}),
@@ -180,8 +178,8 @@ def gravity_evidence(
         numbers={"tilt": _GRAVITY / (true.angular_velocity**2 * middle), "direction": _DIRECTION},
         series=(order_figure({"free surface": surface, "pressure field": field}),),
         convergence=(
-            table("place of the free surface, over the depth", surface),
-            table("pressure field, relative error", field),
+            surface.table("place of the free surface, over the depth", 3.0, geometry="quadratic", note=note),
+            field.table("pressure field, relative error", 3.0, geometry="quadratic", note=note),
         ),
     )
 

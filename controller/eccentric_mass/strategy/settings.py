@@ -41,10 +41,7 @@ FRICTION_ERROR = 0.1
 
 
 def believed_whirl(scene: EccentricScene) -> WhirlModel:
-    """The rotor as configured in filter and controller.
-
-    Returns: WhirlModel; its mass includes the eccentric masses.
-    """
+    """The rotor as configured in filter and controller; its mass includes the eccentric masses."""
     told = scene.imbalance_filter
     return WhirlModel(told.assumed_mass + 2 * scene.masses.mass, told.assumed_damping, told.assumed_stiffness)
 

@@ -22,9 +22,6 @@ from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
 from ringbalance.verification.reference.sloshing_exact import (
     CosineWaves,
-    cosine_amplification,
-    cosine_frequencies,
-    cosine_pressure_amplification,
     cosine_waves,
 )
 
@@ -107,7 +104,7 @@ def _frequency_deviation(disc: Disc, factor: float) -> float:
 
 @lru_cache(maxsize=1)
 def _exact_frequencies(disc: Disc) -> FloatArray:
-    return np.array([cosine_frequencies(waves, modes=_MODES) for waves in _waves(disc)])
+    return np.array([waves.frequencies(modes=_MODES) for waves in _waves(disc)])
 
 
 def _forced_deviations(disc: Disc, defect: str | None) -> dict[str, float]:
@@ -119,8 +116,8 @@ def _forced_deviations(disc: Disc, defect: str | None) -> dict[str, float]:
     moments, pressures = [], []
     for waves, depth in zip(_waves(disc), _depths(disc), strict=True):
         turned = replace(waves, mixed=-waves.mixed) if defect == "forcing_backwards" else waves
-        moments.append(cosine_amplification(turned, frequency_ratio=1.0))
-        pressures.append(cosine_pressure_amplification(turned, frequency_ratio=1.0, depth=float(depth)))
+        moments.append(turned.amplification(frequency_ratio=1.0))
+        pressures.append(turned.pressure_amplification(frequency_ratio=1.0, depth=float(depth)))
     taken = found.amplification if defect == "pressure_swings_as_the_moment" else found.pressure_amplification
     return {
         "forced": float(np.abs(found.amplification.value / np.array(moments) - 1).max()),

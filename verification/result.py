@@ -69,10 +69,9 @@ class CaseResult:
     def numbers(self) -> Mapping[str, float]:
         """All numbers that the case's text may ask for.
 
-        For each quantity q: q, q_low and q_high (as far as assumed inputs move it) (as
-        far as the assumed input of key k does), q_reference, q_error,
-        q_relative (error over reference), q_uncertainty (95 % half-width of the comparison), q_limit; and the
-        evidence's own.
+        For each quantity q: q, q_low and q_high (as far as assumed inputs move it), q_reference, q_error,
+        q_relative (error over reference), q_uncertainty (95 % half-width of the comparison), q_limit; and
+        the evidence's own.
         """
         named: dict[str, float] = {}
         for result in self.quantities:

@@ -361,7 +361,7 @@ class InputUncertainty:
     """Expanded uncertainty (95 %) of one scene quantity."""
 
     quantity: str
-    """Key, such as "bore" or "lag_angle"."""
+    """Key, such as "bore" or "lag_angle"; of eccentric masses its path, such as "rotor.mass"."""
     half_width: float
     """Relative when `relative`, else SI."""
     relative: bool

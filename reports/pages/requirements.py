@@ -94,11 +94,13 @@ def requirement_figure(rows: Iterable[Requirement]) -> Drawing | None:
             "label": untraced(row.name),
             "required": row.required,
             "reached": row.reached,
-            "uncertainty": row.uncertainty,
-            "unit": row.unit,
+            "low": row.reached - row.uncertainty,
+            "high": row.reached + row.uncertainty,
             "at_least": row.at_least,
+            "verdict": row.verdict,
         }
         for row in rows
+        if row.reached is not None
     )
 
 

@@ -1,7 +1,8 @@
 """Laminar fully developed flow in a straight tube that rotates about an axis at right angles to its own.
 
-Half of the circular section, lengths over the bore d, velocities over the mean velocity U.  With x along the
-tube, z along the rotation axis, w the axial and (u, v) the velocity along (y, z), and p the reduced pressure:
+Half of the section, circular or rectangular, lengths over the bore or hydraulic diameter d, velocities over
+the mean velocity U.  With x along the tube, z along the rotation axis, w the axial and (u, v) the velocity
+along (y, z), and p the reduced pressure:
 
     Re (u w_y + v w_z) - 2 R u = G + lap w
     Re (u u_y + v u_z) + 2 R w = -p_y + lap u
@@ -13,6 +14,7 @@ Kl = R Re and S = R/Re; at Re = 0 (S infinite) the problem is linear.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,6 +27,7 @@ from ringbalance.verification.navier_stokes.meshes import (
     geometric_vertices,
     patch_mesh,
     ruled_patch,
+    tensor_patch,
     with_midpoints,
 )
 from ringbalance.verification.navier_stokes.newton import (
@@ -45,8 +48,25 @@ CORIOLIS = ((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (-1.0, 0.0, 0.0))
 """e_z x velocity for components along (y, z, x)."""
 
 
+class _HalfSection(ABC):
+    """Half of a section, with the boundaries wall and symmetry."""
+
+    @abstractmethod
+    def mesh(self) -> Any:
+        """Its mesh."""
+
+    def system(self) -> FlowSystem:
+        """Discrete equations of the half section: no slip at the wall, mirror symmetry about z = 0."""
+        space = taylor_hood(mesh=self.mesh(), components=3)
+        conditions = [Dirichlet(boundary="symmetry", component=1)]
+        conditions += [Dirichlet(boundary="wall", component=c) for c in range(3)]
+        return flow_system(
+            space=space, conditions=conditions, enclosed=True, flow_component=2, coriolis=CORIOLIS
+        )
+
+
 @dataclass(frozen=True, kw_only=True)
-class SectionMesh:
+class SectionMesh(_HalfSection):
     """Cells of the half section: a core of 2 n x n cells inside a ring of 4 n cells around."""
 
     around: int = 6
@@ -58,7 +78,7 @@ class SectionMesh:
     shape: str = "quad"
 
     def mesh(self) -> Any:
-        """Quadratic mesh of the half section (y, z >= 0) of a tube of unit bore: wall and symmetry."""
+        """Quadratic mesh of the half section (y, z >= 0) of a tube of unit bore, refined at its wall."""
         n = self.around
         core, edges = _core(n, 0.26, 0.2)
         vertices = geometric_vertices(cells=self.across, ratio=self.wall_ratio)
@@ -73,14 +93,33 @@ class SectionMesh:
             patches.append(ruled_patch(inner=edge, outer=wall, blend=blend, sides=sides))
         return patch_mesh(patches=patches, shape=self.shape)
 
-    def system(self) -> FlowSystem:
-        """Discrete equations of the half section: no slip at the wall, mirror symmetry about z = 0."""
-        space = taylor_hood(mesh=self.mesh(), components=3)
-        conditions = [Dirichlet(boundary="symmetry", component=1)]
-        conditions += [Dirichlet(boundary="wall", component=c) for c in range(3)]
-        return flow_system(
-            space=space, conditions=conditions, enclosed=True, flow_component=2, coriolis=CORIOLIS
+
+@dataclass(frozen=True, kw_only=True)
+class DuctMesh(_HalfSection):
+    """Cells of the half section of a rectangular duct, refined towards its walls."""
+
+    aspect_ratio: float = 1.0
+    """Across the axis of rotation over along it."""
+    across: int = 12
+    """Cells across the axis of rotation, an even number."""
+    along: int = 8
+    """Cells of the half along it."""
+    wall_ratio: float = 20.0
+    """Innermost cell over the cell at the wall."""
+
+    def mesh(self) -> Any:
+        """Quadratic mesh of the half section (z >= 0) of a duct of unit hydraulic diameter."""
+        width = (1 + self.aspect_ratio) / 2
+        half = geometric_vertices(cells=self.across // 2, ratio=self.wall_ratio) / 2
+        y = width * (np.concatenate([half, 1 - half[-2::-1]]) - 0.5)
+        height = width / self.aspect_ratio
+        z = height / 2 * (1 - geometric_vertices(cells=self.along, ratio=self.wall_ratio)[::-1])
+        patch = tensor_patch(
+            x=with_midpoints(vertices=y),
+            y=with_midpoints(vertices=z),
+            sides={"west": "wall", "east": "wall", "north": "wall", "south": "symmetry"},
         )
+        return patch_mesh(patches=[patch])
 
 
 def _lines(points: FloatArray, count: int) -> FloatArray:

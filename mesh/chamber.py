@@ -86,6 +86,11 @@ class ChamberMesh:
             nodes=self.nodes.shape[1],
         )
 
+    @property
+    def places(self) -> FloatArray:
+        """Places of the nodes, m, shape (dimension, nodes)."""
+        return np.asarray(self.length_scale * self.nodes)
+
 
 def default_cells(*, disc: Disc, dimension: int = 2) -> tuple[int, ...]:
     """Numbers of cells that keep pressure and moment within 1e-6: 8 x 24 (x 4) for a chamber of 90 degrees.

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.verification.case import CAUSES, NEEDS_REFERENCE, CaseDefinition
+from ringbalance.verification.case import CAUSES, CaseDefinition
 from ringbalance.verification.comparison import COVERAGE_FACTOR
 from ringbalance.verification.evidence import Convergence, Curve, Evidence, Found, Reference, Series, Table
 from ringbalance.verification.result import CaseResult, MutationResult, QuantityResult
@@ -57,20 +57,6 @@ def definition_document(definition: CaseDefinition) -> Document:
     return listed | {"mutations": [mutation.id for mutation in definition.must_fail]}
 
 
-def comparison_half_width(result: QuantityResult) -> float | None:
-    """Half-width of the comparison that decided a quantity: 2 u_val, and as far as assumed inputs move it.
-
-    Returns: Zero where nothing uncertain entered; None where the case was not run.
-    """
-    found, comparison = result.found, result.comparison
-    if found is None or comparison is None:
-        return None
-    reach = max(map(abs, found.reach))
-    certain = found.numerical == 0 and found.input == 0
-    judged_alone = result.quantity.metric not in NEEDS_REFERENCE
-    return reach if certain and judged_alone else comparison.half_width + reach
-
-
 def _consequence(result: CaseResult) -> str:
     if result.verdict is Verdict.NOT_RUN:
         return ""
@@ -83,7 +69,7 @@ def _quantity(result: QuantityResult) -> Document:
         **quantity.model_dump(),
         "value": None if found is None else found.value,
         "reference": None if reference is None else reference.value,
-        "uncertainty": comparison_half_width(result),
+        "uncertainty": result.half_width,
         "reference_uncertainty": None if reference is None else COVERAGE_FACTOR * reference.uncertainty,
         **_found(found, reference),
         "verdict": result.verdict.value,
@@ -91,8 +77,7 @@ def _quantity(result: QuantityResult) -> Document:
 
 
 def _found(found: Found | None, reference: Reference | None) -> Document:
-    """Uncertainties of a found number: expanded ones, and the standard ones of V&V 20 by their symbols
-    there."""
+    """Expanded uncertainties of a found number, and the standard ones of V&V 20 by their symbols there."""
     if found is None:
         names = ("error", "value_uncertainty", "value_low", "value_high", "numerical_uncertainty")
         return dict.fromkeys((*names, "input_uncertainty", "corrected", "validation"))

@@ -136,7 +136,7 @@ def solve_pressure(
     discrete = problem.discretise(chamber=chamber)
     surface = chamber.grid[0].ravel()
     pressure = np.zeros(discrete.load.size)
-    pressure[surface] = problem.surface_pressure(places(chamber)[:, surface])
+    pressure[surface] = problem.surface_pressure(chamber.places[:, surface])
     free = chamber.grid[1:].ravel()
     rows = discrete.matrix[free]
     linear = solve_linear(
@@ -148,11 +148,6 @@ def solve_pressure(
     )
     pressure[free] = linear.values
     return _solution(chamber, discrete, pressure, linear)
-
-
-def places(chamber: ChamberMesh) -> FloatArray:
-    """Places of the nodes. Returns: m, shape (dimension, nodes)."""
-    return np.asarray(chamber.length_scale * chamber.nodes)
 
 
 def _solution(

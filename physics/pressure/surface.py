@@ -20,7 +20,6 @@ from ringbalance.physics.pressure.solve import (
     FREE_SURFACE,
     PressureSolution,
     RotatingLiquid,
-    places,
     solve_pressure,
 )
 from ringbalance.physics.results import Statistics, Status, StatusCode
@@ -258,7 +257,7 @@ def _wanted_move(chamber: ChamberMesh, liquid: RotatingLiquid, target: float) ->
     here = facets.at_points(pressure)
     shortage = unit * (target - _measure(chamber))
     level = (shortage + np.sum(compliance * here)) / np.sum(compliance)
-    nodes = places(chamber)[:, chamber.grid[0]]
+    nodes = chamber.places[:, chamber.grid[0]]
     radial = np.zeros_like(nodes)
     radial[:2] = nodes[:2] / np.hypot(nodes[0], nodes[1])
     return np.asarray((level - pressure[chamber.grid[0]]) / _normal_force(liquid, nodes, radial))

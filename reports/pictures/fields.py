@@ -12,7 +12,7 @@ import numpy as np
 from ringbalance.mesh.chamber import chamber_mesh, default_cells
 from ringbalance.mesh.export import write_vtu
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
-from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, places, solve_pressure
+from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, solve_pressure
 from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.scene.models import Scene
 
@@ -58,7 +58,7 @@ def write_field(*, field: ChamberField, path: Path) -> Path:
     Raises: OSError: the file cannot be written.
     """
     chamber = field.solution.chamber
-    radius = np.hypot(*places(chamber)[:2])
+    radius = np.hypot(*chamber.places[:2])
     fields = {
         "pressure_Pa": field.solution.pressure,
         "depth_m": np.maximum(radius - field.surface_radius, 0.0),
@@ -84,7 +84,7 @@ def pressure_profile(*, scene: Scene, field: ChamberField) -> Record:
     )
     return {
         "fill_ratio": field.fill_ratio,
-        "radius_m": np.hypot(*places(chamber)[:2, line]).tolist(),
+        "radius_m": np.hypot(*chamber.places[:2, line]).tolist(),
         "pressure_Pa": field.solution.pressure[line].tolist(),
         "paper_radius_m": drawn.tolist(),
         "paper_pressure_Pa": [*(factor * (drawn[:-1] ** 2 - implied**2)).tolist(), float(wall)],

@@ -20,7 +20,7 @@ from ringbalance.physics.pressure.assembly import (
     volume_points,
 )
 from ringbalance.physics.pressure.linear import solve_linear
-from ringbalance.physics.pressure.solve import PressureProblem, RotatingLiquid, places, solve_pressure
+from ringbalance.physics.pressure.solve import PressureProblem, RotatingLiquid, solve_pressure
 from ringbalance.physics.pressure.sparse import linear_prolongation
 from ringbalance.physics.results import StatusCode
 from ringbalance.scene.arrays import FloatArray
@@ -73,7 +73,7 @@ def test_polynomials_of_the_space_are_exact(
     problem = polynomial(len(cells), degree)
     chamber = chamber_mesh(disc=disc, surface_radius=wavy, cells=cells, geometry=geometry)
     solution = solve_pressure(chamber=chamber, problem=problem)
-    exact = problem.surface_pressure(places(chamber))
+    exact = problem.surface_pressure(chamber.places)
     np.testing.assert_allclose(solution.pressure, exact, atol=1e-11 * np.abs(exact).max())
 
 

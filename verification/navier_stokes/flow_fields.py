@@ -137,13 +137,11 @@ def _in_plane_stream_function(system: FlowSystem, flow: FlowSolution) -> FloatAr
 
 
 def section_flow(*, reynolds: float, rotation_reynolds: float) -> SectionFlow:
-    """Developed laminar flow in the section of a tube that turns about an axis across it.
+    """Developed laminar flow over the section of a tube that turns about an axis across it.
 
-    Returns: The flow over the whole disc; beyond R Re = 1e6 or R = 1e4 the nearest flow of the same R/Re, its
-        status OUT_OF_RANGE.
+    Beyond R Re = 1e6 or R = 1e4 it is the nearest flow of the same R/Re, its status OUT_OF_RANGE.
     Raises: ValueError: an argument that is not finite or out of its bounds.
     Raises: ArithmeticError: the flow was not found.
-    Source: `rotating_section`.
     """
     _check(reynolds, "reynolds", above=True)
     _check(rotation_reynolds, "rotation_reynolds", above=False)
@@ -193,12 +191,11 @@ def _check(value: float, name: str, *, above: bool) -> None:
 
 
 def entrance_flow(*, reynolds: float) -> EndFlow:
-    """Laminar flow from a large reservoir into a sharp-edged tube.
+    """Laminar flow near the mouth from a large reservoir into a sharp-edged tube, see `end_losses`.
 
-    Returns: The flow near the mouth; beyond Re = 2000 the one there, its status OUT_OF_RANGE.
+    Beyond Re = 2000 it is the one there, its status OUT_OF_RANGE.
     Raises: ValueError: an argument that is not finite or not above zero.
     Raises: ArithmeticError: the flow was not found.
-    Source: `end_losses`.
     """
     _check(reynolds, "reynolds", above=True)
     length = 10.0 + 0.1 * min(reynolds, LARGEST_END_REYNOLDS)
@@ -207,13 +204,7 @@ def entrance_flow(*, reynolds: float) -> EndFlow:
 
 
 def exit_flow(*, reynolds: float) -> EndFlow:
-    """Laminar developed flow from a sharp-edged tube into a large reservoir.
-
-    Returns: The flow near the mouth; beyond Re = 2000 the one there, its status OUT_OF_RANGE.
-    Raises: ValueError: an argument that is not finite or not above zero.
-    Raises: ArithmeticError: the flow was not found.
-    Source: `end_losses`.
-    """
+    """Laminar developed flow from a sharp-edged tube into a large reservoir; otherwise as `entrance_flow`."""
     _check(reynolds, "reynolds", above=True)
     cells = EndMesh(cells_per_fold=1.3, edge_cell=1e-2, reservoir=15.0, tube=2.0, jet_cell=1.0)
     return _end_flow("exit", cells.system(end="exit"), reynolds, 1.2)

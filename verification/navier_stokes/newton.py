@@ -202,16 +202,10 @@ def solve_flow(
     settings: NewtonSettings | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> FlowSolution:
-    """Steady flow of a system for given coefficients.
+    """Steady flow of a system by Newton's method with the exact derivative, at first from the Stokes flow.
 
-    Newton's method on F(u, p, G) = 0 with F's exact derivative; without a start, from the Stokes flow.
-    Args:
-        system: made by `flow_system`.
-        coefficients: inertia, viscosity and rotation factors of the momentum equation.
-        flow_rate: integral of the system's flow component over the domain; unused without one.
-        start: a flow of the same system to start from.
-        settings: of Newton's method.
-        progress: called with a short text on each iteration; None for silence.
+    Args: `flow_rate`: integral of the system's flow component over the domain; unused without one. `start`: a
+        flow of the same system. `progress`: called with a short text on each iteration.
     Returns: The flow; its status says NOT_CONVERGED, with a remedy, when Newton's method failed.
     Raises: ValueError: viscosity not above zero, or a start of another system.
     """

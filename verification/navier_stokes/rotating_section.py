@@ -147,12 +147,10 @@ def solve_section(
     start: FlowSolution | None = None,
     settings: NewtonSettings | None = None,
 ) -> FlowSolution:
-    """Fully developed flow in the rotating tube at given Kl = R Re and S = R/Re.
-
-    The in-plane velocity is measured in nu/d: Re and R then enter through Kl and S alone, and S may be zero.
+    """Fully developed flow in the rotating tube at given Kl = R Re and S = R/Re, which may be zero.
 
         u w_y + v w_z - 2 S u = G + lap w,    u u_y + v u_z + 2 Kl w = -p_y + lap u,    ...
-    Args: `start`: a neighbouring flow; needed once Kl exceeds a few thousand. `settings`: of Newton's method.
+    Args: `start`: a neighbouring flow; needed once Kl exceeds a few thousand.
     Returns: The flow; nodal velocity components along (y, z) over nu/d, and along x over U.
     """
     rotation = ((0.0, 0.0, 2 * kl), (0.0, 0.0, 0.0), (2 * s, 0.0, 0.0))
@@ -174,18 +172,12 @@ def developed_section(
 
 
 def solve_section_without_inertia(*, system: FlowSystem, rotation_reynolds: float) -> FlowSolution:
-    """Fully developed flow in the rotating tube in the limit Re = 0, where it is linear.
-
-    Returns: The flow; nodal velocity components along (y, z, x) over U.
-    """
+    """Fully developed flow in the limit Re = 0, where it is linear; components along (y, z, x) over U."""
     c = Coefficients(inertia=0.0, viscosity=1.0, rotation=2 * rotation_reynolds)
     area = float(system.space.weights.sum())
     return solve_flow(system=system, coefficients=c, flow_rate=area)
 
 
 def friction_ratio(solution: FlowSolution) -> float:
-    """F = G/32, the pressure gradient over that of the tube at rest at the same flow rate.
-
-    Args: `solution`: of the section, made dimensionless with bore and mean velocity.
-    """
+    """F = G/32, the pressure gradient over that of the tube at rest at the same flow rate."""
     return solution.driving_gradient / POISEUILLE_GRADIENT

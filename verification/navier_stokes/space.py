@@ -160,9 +160,8 @@ class FlowSpace:
         return _scattered(self.pressure.element_dofs.T.ravel(), local, self.pressure_nodes)
 
     def at_points(self, velocity: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Velocity and its gradient at the quadrature points.
+        """Velocity and its gradient at the quadrature points, from nodal values (components, velocity nodes).
 
-        Args: `velocity`: nodal values, shape (components, velocity nodes).
         Returns: u of shape (components, elements, points), and du_c/dx_d of shape (c, d, elements, points).
         """
         local = velocity[:, self.velocity.element_dofs.T]

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from scipy.optimize import brentq
 
 from ringbalance.mesh.geometry import half_angle, liquid_area, surface_radius
-from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, places
+from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid
 from ringbalance.physics.pressure.surface import solve_with_gravity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene, Shaft
@@ -142,10 +142,9 @@ def _mean_area_along(disc: Disc, ring: _ExactRing) -> float:
 def gravity_evidence(
     scene: Scene, *, cells: Sequence[tuple[int, ...]], shaft: Shaft, defect: str | None
 ) -> Evidence:
-    """Find the free surface on a sequence of meshes, and compare it with the exact one.
+    """Find the free surface on meshes that halve h each time, coarse to fine; compare it with the exact one.
 
-    Args: `cells`: of each level, coarse to fine, halving h each time. `shaft`: "horizontal" for gravity
-        across the chamber, "vertical" for gravity along the shaft.
+    Gravity points across the chamber of a horizontal shaft, along a vertical one.
     Raises: ValueError: a search or solve that failed on some level.
     """
     disc, fill = scene.disc, _FILL_SHARE * scene.disc.max_fill_ratio
@@ -208,7 +207,7 @@ def _across() -> tuple[float, float]:
 
 
 def _surface_error(disc: Disc, solution: PressureSolution, exact: _ExactRing) -> float:
-    nodes = places(solution.chamber)[:, solution.chamber.grid[0]]
+    nodes = solution.chamber.places[:, solution.chamber.grid[0]]
     angle = np.arctan2(nodes[1], nodes[0])
     axial = nodes[2] if len(nodes) == 3 else np.zeros_like(angle)
     away = np.hypot(nodes[0], nodes[1]) - exact.radius(angle, axial)

@@ -11,7 +11,6 @@ import numpy as np
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.sloshing.modes import (
     default_sloshing_cells,
-    natural_frequencies,
     resonant_fills,
     sloshing_modes,
 )
@@ -88,7 +87,7 @@ def _still_deviation(disc: Disc) -> float:
 def _frequencies(disc: Disc, factor: float) -> FloatArray:
     """With a factor on the Coriolis force: zero for a chamber that does not turn, or a mutation."""
     turned = [replace(system, coriolis=factor * system.coriolis) for system in _systems(disc)]
-    return np.array([natural_frequencies(system)[:_MODES] for system in turned])
+    return np.array([system.natural_frequencies()[:_MODES] for system in turned])
 
 
 @lru_cache(maxsize=1)

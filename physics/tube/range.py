@@ -39,15 +39,10 @@ def range_notes(*, tube: Tube, state: TubeState, velocity: FloatArray) -> dict[s
             "friction: relative roughness above 0.05": np.full(
                 re.shape, tube.roughness > LARGEST_ROUGHNESS * tube.bore
             ),
-            "rotation: laminar factor beyond Kl = 1e7 or R_Om = 1e5": ~_turbulent(laminar, unsteady)
-            & untested,
+            "rotation: laminar factor beyond Kl = 1e7 or R_Om = 1e5": (laminar | unsteady) & untested,
             "rotation: critical Re extrapolated beyond R_Om = 2000": unsteady & (rotation > 2000),
             "bends: scaled from one computed shape in laminar flow": (laminar | unsteady) & bool(tube.bends),
             "bends: angle above 180 deg or radius below d/2": np.full(re.shape, not shapes),
             "ends: tube too short for a developed laminar profile": laminar & developing,
         }
     return {text: where for text, where in notes.items() if np.any(where)}
-
-
-def _turbulent(laminar: BoolArray, unsteady: BoolArray) -> BoolArray:
-    return np.asarray(~laminar & ~unsteady)

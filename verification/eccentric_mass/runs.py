@@ -11,7 +11,6 @@ import numpy as np
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
-from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.verification.eccentric_mass.imbalance import convergence_time
 from ringbalance.verification.eccentric_mass.scenes import at_constant_speed, changed, envelope, thinned
@@ -99,15 +98,12 @@ def figure_five(scene: EccentricScene, *, time_limit: float = 12.0) -> FigureFiv
     )
 
 
-def _arm_error(run: EccentricRun, arm: float) -> FloatArray:
-    return np.asarray(np.max(np.abs(run.estimates.friction_arm - arm), axis=1) / arm, dtype=np.float64)
-
-
 def _friction_time(run: EccentricRun, arm: float) -> float:
     begun = [stage.start for stage in run.stages if stage.name == "friction estimation"]
     if not begun:
         return math.inf
-    return convergence_time(run.time, _arm_error(run, arm), limit=_CONVERGED) - begun[0]
+    error = np.max(np.abs(run.estimates.friction_arm - arm), axis=1) / arm
+    return convergence_time(run.time, error, limit=_CONVERGED) - begun[0]
 
 
 def figure_seven(scene: EccentricScene, *, time_limit: float = 30.0) -> BalancingFigure:

@@ -190,7 +190,8 @@ def tilted_liquid(*, disc: Disc, density: float, fill_ratio: float, shaft: Shaft
     """
     middle = float(surface_radius(disc=disc, fill_ratio=fill_ratio))
     speed = float(np.sqrt(_GRAVITY / _offset(disc, middle, shaft)))
-    gravity = (0.0, 0.0, -_GRAVITY) if shaft == "vertical" else _across()
+    across = (_GRAVITY * float(np.cos(_DIRECTION)), _GRAVITY * float(np.sin(_DIRECTION)))
+    gravity = (0.0, 0.0, -_GRAVITY) if shaft == "vertical" else across
     return RotatingLiquid(density=density, angular_velocity=speed, gravity=gravity)
 
 
@@ -200,10 +201,6 @@ def _offset(disc: Disc, middle: float, shaft: Shaft) -> float:
     if shaft == "horizontal":
         return min(_TILT * inner, _ROOM * min(middle - inner, outer - middle))
     return _ROOM * min(middle**2 - inner**2, outer**2 - middle**2) / disc.axial_width
-
-
-def _across() -> tuple[float, float]:
-    return _GRAVITY * float(np.cos(_DIRECTION)), _GRAVITY * float(np.sin(_DIRECTION))
 
 
 def _surface_error(disc: Disc, solution: PressureSolution, exact: _ExactRing) -> float:

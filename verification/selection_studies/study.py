@@ -89,7 +89,8 @@ def trade_study(
     """
     costs = committed_costs()
     trades, chosen = [], {}
-    clock = _clock(level) if timed else None
+    every = Clock(repeats=3) if level == "heavy" else Clock(repeats=1, memory=False)
+    clock = every if timed else None
     for hierarchy in hierarchies_of(scene, level=level):
         if progress is not None:
             progress(hierarchy.title)
@@ -116,10 +117,6 @@ def thinned(hierarchy: ModelHierarchy) -> ModelHierarchy:
         )
 
     return replace(hierarchy, fidelities=tuple(filter(kept, hierarchy.fidelities)))
-
-
-def _clock(level: Level) -> Clock:
-    return Clock(repeats=3) if level == "heavy" else Clock(repeats=1, memory=False)
 
 
 def _no_longer(clock: Clock | None, hierarchy: ModelHierarchy) -> Clock | None:

@@ -25,7 +25,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         capacity = capacity.with_correction()
     below, above = (found_of(ring, "moment", 0) for ring in (light, dense))
     ratio = 1.0 if defect == "density_without_effect" else above.value / below.value
-    oil = _oil_density()
+    oil = liquid_at(name="perfluorinated oil GPL 101", temperature=293.15).density
     return Evidence(
         found={
             "ratio": Found(value=ratio, numerical=ratio * below.numerical / below.value),
@@ -34,7 +34,3 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         numbers={"oil_density": oil, "oil_capacity": capacity.value * oil / _DENSE},
         status=dense.status,
     )
-
-
-def _oil_density() -> float:
-    return float(liquid_at(name="perfluorinated oil GPL 101", temperature=293.15).density)

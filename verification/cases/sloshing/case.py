@@ -34,9 +34,10 @@ _CORIOLIS: Final = {"coriolis_off_by_a_percent": 1.01}
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     bare = replace(scene.disc, plate_thickness=0.0)
+    ratios = _frequencies(bare, _CORIOLIS.get(defect or "", 1.0)) / _exact_frequencies(bare)
     judged = {
         "still": _still_deviation(bare),
-        "frequencies": _frequency_deviation(bare, _CORIOLIS.get(defect or "", 1.0)),
+        "frequencies": float(np.abs(ratios - 1).max()),
         **_forced_deviations(bare, defect),
     }
     return replace(
@@ -95,10 +96,6 @@ def _systems(disc: Disc) -> tuple[SloshingSystem, ...]:
     cells = default_sloshing_cells(disc=disc, modes=_MODES)[0]
     radii = surface_radius(disc=disc, fill_ratio=_FILLS)
     return tuple(sloshing_system(disc=disc, surface_radius=float(a), cells=cells) for a in radii)
-
-
-def _frequency_deviation(disc: Disc, factor: float) -> float:
-    return float(np.abs(_frequencies(disc, factor) / _exact_frequencies(disc) - 1).max())
 
 
 @lru_cache(maxsize=1)

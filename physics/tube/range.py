@@ -8,7 +8,8 @@ import numpy as np
 
 from ringbalance.physics.tube.bends import bend_in_range
 from ringbalance.physics.tube.ends import LAMINAR_ENTRY_LENGTH
-from ringbalance.physics.tube.rotation import STRAIGHT_CRITICAL_REYNOLDS, rotation_in_range
+from ringbalance.physics.tube.rotation import STRAIGHT_CRITICAL_REYNOLDS
+from ringbalance.physics.tube.rotation_table import rotation_table_covers
 from ringbalance.physics.tube.state import TubeState
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Tube
@@ -32,7 +33,7 @@ def range_notes(*, tube: Tube, state: TubeState, velocity: FloatArray) -> dict[s
     notes = {"velocity outside 0.1 to 20 m/s": (velocity < low * (1 - 1e-9)) | (velocity > high * (1 + 1e-9))}
     if tube.drag_coefficient is None:
         shapes = all(bend_in_range(bend=b, bore=tube.bore) for b in tube.bends)
-        untested = ~rotation_in_range(reynolds=re, rotation_reynolds=rotation)
+        untested = ~rotation_table_covers(reynolds=re, rotation_reynolds=rotation)
         developing = LAMINAR_ENTRY_LENGTH * re * tube.bore > tube.length
         notes |= {
             "friction: Re above 1e6": re > LARGEST_REYNOLDS,

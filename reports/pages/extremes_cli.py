@@ -12,7 +12,6 @@ from rich.markup import escape
 from rich.padding import Padding
 from rich.table import Table
 
-from ringbalance.reports.figures.style import standalone
 from ringbalance.reports.numbers import number
 from ringbalance.reports.pages.extremes import axis_rows, map_drawings
 from ringbalance.reports.section import Cells
@@ -77,7 +76,7 @@ def extremes(
         if stage is not None:
             write_whole(stage / FILE, json_format.dumps(told, allow_nan=False) + "\n")
             for drawing in map_drawings(tables, places_of(base.scene)):
-                write_whole(stage / f"{drawing.name}.svg", standalone(drawing))
+                write_whole(stage / f"{drawing.name}.svg", drawing.standalone())
     if out is not None:
         console.print(f"written to {out}", highlight=False)
     if json:

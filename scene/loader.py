@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import fields
+from dataclasses import MISSING, fields
 from importlib import resources
 from os import PathLike
 from pathlib import Path, PurePath
@@ -75,7 +75,7 @@ def scene_from(*, content: bytes, file: str) -> AnyScene:
 
 
 def _records(reading: Reading) -> dict[str, Any]:
-    """A record of each table; its fields are named after keys, and an absent key is None."""
+    """A record of each table; its fields are named after keys, and an absent key is the default or None."""
     values: dict[str, Any] = dict(reading.values)
     vibration = values.get("rotor.initial_vibration")
     if vibration is not None:
@@ -83,7 +83,11 @@ def _records(reading: Reading) -> dict[str, Any]:
         values["rotor.initial_phase"] = vibration.phase
     return {
         name: table.record(
-            **{field.name: values.get(f"{name}.{field.name}") for field in fields(table.record)}
+            **{
+                field.name: values.get(f"{name}.{field.name}")
+                for field in fields(table.record)
+                if field.default is MISSING or f"{name}.{field.name}" in values
+            }
         )
         for name, table in reading.schema.tables.items()
         if table.record is not None

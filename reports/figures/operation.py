@@ -16,6 +16,7 @@ from scipy.spatial import ConvexHull
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import given, number, percent, shown
+from ringbalance.reports.prose import key_words
 from ringbalance.reports.section import Record
 from ringbalance.scene.arrays import FloatArray
 
@@ -134,7 +135,7 @@ def tornado(budgets: dict[str, Record], titles: dict[str, str]) -> Drawing | Non
 
 def _causes(budget: Record) -> list[tuple[str, float]]:
     """Names and relative contributions, the largest first."""
-    own = [(path.split(".")[-1].replace("_", " "), width) for path, width in budget["inputs"].items()]
+    own = [(key_words(path), width) for path, width in budget["inputs"].items()]
     own += [("the model", budget["model"]), ("numerics", budget["numerical"])]
     return sorted(((name, abs(width / budget["value"])) for name, width in own), key=lambda c: -c[1])
 

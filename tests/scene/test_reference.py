@@ -51,7 +51,7 @@ def test_example_in_the_document_loads(load: Callable[[Mapping[str, Any]], Scene
     [
         ("disc", models.Disc, set()),
         ("liquid", models.Liquid, {"density_uncertainty", "viscosity_uncertainty", "source"}),
-        ("tube", models.Tube, set()),
+        ("tube", models.Tube, {"models"}),
         ("gas", models.Gas, set()),
         ("environment", models.Environment, set()),
         ("rotor", loop_models.Rotor, {"initial_vibration", "initial_amplitude", "initial_phase"}),

@@ -14,6 +14,7 @@ import pytest
 from scipy.stats import binomtest
 
 from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY
+from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.scene.models import Scene
 from ringbalance.verification.catalogue import case_code
 from ringbalance.verification.validation.comparison import KINDS, compare
@@ -103,6 +104,15 @@ def test_points_come_in_ascending_order_with_their_walls() -> None:
     plain = replace(points, relative_roughness=np.zeros_like(points.reynolds)).predicted()
     assert np.array_equal(rough[smooth], plain[smooth])
     assert np.all(rough[~smooth] > plain[~smooth])
+
+
+def test_the_budget_of_k_holds_bias_and_scatter_of_turbulent_friction(paper_scene: Scene) -> None:
+    numbers = case_code("measured_smooth_tubes").compute(paper_scene, "light").numbers
+    spread = math.hypot(numbers["turbulent_bias"], 2 * numbers["turbulent_standard_deviation"])
+    smooth = replace(paper_scene.tube, roughness=0.0)
+    loss = tube_loss(tube=smooth, liquid=paper_scene.liquid, angular_velocity=0.0, velocity=np.array([15.0]))
+    assert loss.uncertainty_parts["friction correlation"] >= spread * loss.terms["friction"]
+    assert loss.k.uncertainty >= loss.uncertainty_parts["friction correlation"]
 
 
 def test_the_readme_says_what_the_comparison_finds(paper_scene: Scene) -> None:

@@ -40,6 +40,7 @@ from ringbalance.verification.navier_stokes.newton import (
     solve_flow,
 )
 from ringbalance.verification.navier_stokes.space import taylor_hood
+from ringbalance.verification.navier_stokes.time_march import March, march_flow
 
 POISEUILLE_GRADIENT = 32.0
 """G of a tube at rest: -dp/dx d^2/(mu U)."""
@@ -153,10 +154,39 @@ def solve_section(
     Args: `start`: a neighbouring flow; needed once Kl exceeds a few thousand.
     Returns: The flow; nodal velocity components along (y, z) over nu/d, and along x over U.
     """
-    rotation = ((0.0, 0.0, 2 * kl), (0.0, 0.0, 0.0), (2 * s, 0.0, 0.0))
-    c = Coefficients(inertia=1.0, viscosity=1.0, rotation=rotation)
+    c = _coefficients(kl=kl, s=s, inertia=1.0)
     area = float(system.space.weights.sum())
     return solve_flow(system=system, coefficients=c, flow_rate=area, start=start, settings=settings)
+
+
+def _coefficients(*, kl: float, s: float, inertia: float) -> Coefficients:
+    rotation = ((0.0, 0.0, 2 * kl), (0.0, 0.0, 0.0), (2 * s, 0.0, 0.0))
+    return Coefficients(inertia=inertia, viscosity=1.0, rotation=rotation)
+
+
+def march_section(*, system: FlowSystem, kl: float, s: float, step: float, steps: int) -> March:
+    """The same in time, from the flow without inertia and a disturbance of one per cent.
+
+    It finds what a steady solution leaves out where that is unstable; flow is alike along the tube.
+    Args: `step`: dt over d^2/nu.
+    Raises: ArithmeticError: the step is too long.
+    """
+    area = float(system.space.weights.sum())
+    linear = _coefficients(kl=kl, s=s, inertia=0.0)
+    start = solve_flow(system=system, coefficients=linear, flow_rate=area).vector.copy()
+    velocity = system.space.split(start)[0]
+    noise = np.random.default_rng(0).standard_normal(velocity.shape)
+    noise *= 0.01 * np.abs(velocity).max(axis=1, keepdims=True)
+    moving = system.free[system.free < velocity.size]
+    start[moving] += noise.ravel()[moving]
+    return march_flow(
+        system=system,
+        coefficients=_coefficients(kl=kl, s=s, inertia=1.0),
+        flow_rate=area,
+        start=start,
+        step=step,
+        steps=steps,
+    )
 
 
 def developed_section(

@@ -19,6 +19,7 @@ from ringbalance.reduced_model.selection.loss_models import FORMULAS, head_at
 from ringbalance.reduced_model.tables.fit import refined_table, table_from_samples
 from ringbalance.reduced_model.tables.hermite import HermiteTable
 from ringbalance.reduced_model.tube.heads import TABLE_ERROR, TABLE_VELOCITIES, TubeHeads
+from ringbalance.scene.accuracy import with_tolerance
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene, Tube
 from ringbalance.verification.selection_studies.hierarchy import Work
@@ -82,9 +83,9 @@ class LawModels:
 
 
 def base_law(scene: Scene) -> CalibratedLaw:
-    """The scene's calibrated law without gravity, whose parts the models exchange; a ring must exist."""
+    """The scene's law by the finest models but without gravity, whose parts are exchanged; a ring exists."""
     still = replace(scene, environment=replace(scene.environment, gravity=0.0))
-    return calibrate(still).flow_law
+    return calibrate(with_tolerance(still, models="finest")).flow_law
 
 
 def levels_available(scene: Scene) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from ringbalance.verification.result import CaseResult, MutationResult, Quantity
 from ringbalance.verification.verdicts import Verdict
 
 Document = dict[str, Any]
-_LISTED: Final = {"id", "kind", "paper", "number", "title", "claim", "cost"}
+_LISTED: Final = {"id", "kind", "about", "paper", "number", "title", "claim", "cost"}
 _AS_DEFINED: Final = _LISTED | {
     *("protects", "assumes", "does_not_cover", "equations", "headline", "judged_on"),
 }
@@ -173,4 +173,5 @@ def _merged(case: Document, earlier: Document | None) -> Document:
     keep = case["cost"] == "heavy" and case["verdict"] == Verdict.NOT_RUN.value
     if not keep or earlier is None or earlier["verdict"] == Verdict.NOT_RUN.value:
         return case
-    return earlier | {"status": f"kept from an earlier run of {earlier.get('date', 'an unknown date')}"}
+    status = f"kept from an earlier run of {earlier.get('date', 'an unknown date')}"
+    return earlier | {"about": case["about"], "status": status}

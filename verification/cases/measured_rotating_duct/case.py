@@ -15,7 +15,6 @@ from ringbalance.verification.navier_stokes.rotating_section import (
     DuctMesh,
     SectionMesh,
     march_section,
-    section_system,
 )
 from ringbalance.verification.navier_stokes.system import FlowSystem
 
@@ -28,7 +27,7 @@ _FACTORS: Final = {None: 1.0, "rotation_ten_per_cent_slow": 0.9}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    square = section_system(cells=_CELLS[level])
+    square = _CELLS[level].system()
     points = (*_SQUARE, _FAST)
     s, re = (np.array([point[i] for point in points]) for i in (0, 1))
     gradients = [_mean_gradient(square, point, _FACTORS[defect]) for point in points]
@@ -67,7 +66,7 @@ def _correlated(s: FloatArray, re: FloatArray) -> FloatArray:
 
 def _tube() -> dict[str, float]:
     """Friction of the circular tube, solved in time as well, over the table's steady one, less one."""
-    tube = section_system(cells=SectionMesh(around=7, across=11, wall_ratio=15.0))
+    tube = SectionMesh(around=7, across=11, wall_ratio=15.0).system()
     s, re, _, _ = _TUBE
     steady = float(laminar_ratio(reynolds=re, rotation_reynolds=s * re))
     return {"tube": _mean_gradient(tube, _TUBE) / POISEUILLE_GRADIENT / steady - 1}

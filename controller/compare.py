@@ -14,6 +14,8 @@ from ringbalance.controller.compare_rotor import OneRotor, own_scene, rotor_of, 
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.sampled_loops import recommended_gains
 from ringbalance.controller.loop import simulate
+from ringbalance.controller.rotor import chamber_letters
+from ringbalance.controller.tuning.dead_time import compensated
 from ringbalance.controller.tuning.loop_factor import loop_factor
 from ringbalance.controller.tuning.recommendation import recommended_gain
 from ringbalance.reduced_model.law.model import BalancerModel
@@ -146,6 +148,15 @@ def _liquid_side(scene: Scene, model: BalancerModel, *, span: float, runs: int, 
         if gain > 0:
             changes = {"controller.proportional": gain}
             ready = replace(ready, controller=replace(ready.controller, proportional=gain))
+    if tuned:
+        ready = compensated(ready, model)
+        if ready.controller.gas_time_offset != scene.controller.gas_time_offset:
+            offsets = ready.controller.offsets(ready.disc.chambers)
+            letters = chamber_letters(ready.disc.chambers)
+            changes |= {
+                f"controller.gas_time_offset.{letter}": offset
+                for letter, offset in zip(letters, offsets, strict=True)
+            }
     done = [
         simulate(replace(ready, run=replace(ready.run, seed=ready.run.seed + i)), model, to_time_limit=True)
         for i in range(runs)

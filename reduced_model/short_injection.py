@@ -43,6 +43,8 @@ _SLOWEST_RISE: Final = 100.0
 """Times longer than without liquid that a pressure may take to rise."""
 _STEPS: Final = 33
 """Of filling or venting."""
+_SLOWEST: Final = 1e-9
+"""m/s."""
 _ROUNDS: Final = 3
 """After which the dead time, which hardly depends on the opening, is known to 0.1 ms."""
 
@@ -236,7 +238,7 @@ class ShortInjection:
         """Gauge pressures, Pa, the steady velocities u of a primed column under them, m/s, and c(u), 1/m."""
         highest = self.line.supply_pressure - self.line.ambient_pressure
         p = np.linspace(self.edges.stops, highest, _STEPS)[1:]
-        u = np.maximum.accumulate(self.fills.flow(p, primed=True).velocity)
+        u = np.maximum.accumulate(np.maximum(self.fills.flow(p, primed=True).velocity, _SLOWEST))
         return p, u, self._push(p, p) / u**2
 
     def _moved(self, before: Moved, steady: float, push: float, time: float) -> Moved:

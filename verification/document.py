@@ -24,6 +24,7 @@ def case_document(result: CaseResult) -> Document:
     return {
         "id": definition.id,
         "kind": definition.kind,
+        "about": list(definition.about),
         "verdict": result.verdict.value,
         "quantities": [_quantity(quantity) for quantity in result.quantities],
         "paper": definition.paper,
@@ -68,6 +69,7 @@ def definition_document(definition: CaseDefinition) -> Document:
     return {
         "id": definition.id,
         "kind": definition.kind,
+        "about": list(definition.about),
         "paper": definition.paper,
         "number": definition.number,
         "title": definition.title,
@@ -216,4 +218,5 @@ def _merged(case: Document, earlier: Document | None) -> Document:
     keep = case["cost"] == "heavy" and case["verdict"] == Verdict.NOT_RUN.value
     if not keep or earlier is None or earlier["verdict"] == Verdict.NOT_RUN.value:
         return case
-    return earlier | {"status": f"kept from an earlier run of {earlier.get('date', 'an unknown date')}"}
+    status = f"kept from an earlier run of {earlier.get('date', 'an unknown date')}"
+    return earlier | {"about": case["about"], "status": status}

@@ -60,8 +60,6 @@ class HumpProfile:
     it is that of a primed tube."""
     cavitation_margin_uncertainty: float | None
     """Expanded uncertainty (95 %), Pa."""
-    lowest_pressure: float | None
-    """Of the liquid inside the tube, gauge, Pa; None when there is none."""
 
 
 def hump_profile(
@@ -133,7 +131,6 @@ def _profile(
     start, end = crest_span(tube)
     crest = start if state.reverse else end
     place = int(np.argmin(np.abs(line.share - crest)))
-    inside = line.pressure[1:-1][line.full[1:-1]]
     return HumpProfile(
         path=line.share * tube.length,
         radius=path_radius(tube=tube, share=line.share),
@@ -146,7 +143,6 @@ def _profile(
         cavity_pressure=_cavity_pressure(law, state),
         cavitation_margin=margin[0],
         cavitation_margin_uncertainty=margin[1],
-        lowest_pressure=float(np.min(inside)) if inside.size else None,
     )
 
 

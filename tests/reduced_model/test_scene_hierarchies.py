@@ -18,7 +18,6 @@ from ringbalance.reduced_model.calibration import calibrated_model
 from ringbalance.reduced_model.chamber import terms as chamber_terms
 from ringbalance.reduced_model.chamber.values import (
     by_closed_form,
-    by_elements,
     by_paper,
     by_quadrature,
 )
@@ -35,6 +34,7 @@ from ringbalance.reduced_model.tube.path import to_crest_end
 from ringbalance.scene import models
 from ringbalance.scene.accuracy import with_tolerance
 from ringbalance.scene.models import Scene
+from ringbalance.verification.selection_studies.chamber_elements import by_elements
 from ringbalance.verification.selection_studies.chamber_models import chamber_hierarchies
 from ringbalance.verification.selection_studies.choice import choose
 from ringbalance.verification.selection_studies.law_models import (

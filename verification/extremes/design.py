@@ -22,7 +22,16 @@ from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.platform.files import write_whole
 from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification.extremes.axes import AXES, fitted, toml_bytes, varied
-from ringbalance.verification.extremes.point import SOUND, Defect, Ending, Judgement, judge_point, refusal
+from ringbalance.verification.extremes.point import (
+    GAS_TIME,
+    PERIODS,
+    SOUND,
+    Defect,
+    Ending,
+    Judgement,
+    judge_point,
+    refusal,
+)
 
 Point = Mapping[str, float]
 Progress = Callable[[int, int], None]
@@ -30,10 +39,6 @@ Progress = Callable[[int, int], None]
 
 USUAL_SHARE: Final = 0.75
 """Of the coordinates, drawn from where most discs are; else all but a few points would be refused."""
-PERIODS: Final = 20
-"""Of the controller that a point's closed loop may take."""
-GAS_TIME: Final = 0.2
-"""s, beyond those: a short period with long valve-open times is no reason for hundreds of operations."""
 CHUNK: Final = 20
 _LOG: Final = logging.getLogger("ringbalance")
 

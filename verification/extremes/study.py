@@ -14,6 +14,7 @@ import numpy as np
 from ringbalance.scene.loader import read_scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.verification.evidence import Level
+from ringbalance.verification.extremes.axes import MAP_PREFIX
 from ringbalance.verification.extremes.design import Base, Point, design, judged
 from ringbalance.verification.extremes.maps import StabilityMap, Sweep, stability_maps, sweeps
 from ringbalance.verification.extremes.numerics import numerical_sweeps
@@ -24,8 +25,6 @@ Progress = Callable[[str, int, int], None]
 Record = dict[str, Any]
 
 SEED: Final = 1
-MAP_PREFIX: Final = "map of "
-"""Of the name of a map's table."""
 MOST_SHOWN: Final = 20
 """Violations reported in full."""
 

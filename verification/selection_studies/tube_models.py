@@ -21,16 +21,15 @@ from ringbalance.reduced_model.selection.loss_models import (
     TABLES,
     loss_at,
 )
+from ringbalance.reduced_model.selection.range_flow import SHARES, equal_velocity
 from ringbalance.reduced_model.selection.tube_terms import (
     GRAVITY,
     HUMP,
     LEVEL,
     LOSS,
     ROTATION,
-    SHARES,
     TABLE,
     flow_contributions,
-    flow_estimate,
     loss_contributions,
 )
 from ringbalance.scene.arrays import FloatArray
@@ -86,7 +85,7 @@ class LawBook:
 
 def k_hierarchy(scene: Scene) -> ModelHierarchy:
     """The model hierarchy of the tube's loss, as k + 1, which is what heads know."""
-    centre = flow_estimate(scene).velocity or 1.0
+    centre = equal_velocity(scene) or 1.0
     velocities = centre * np.array(VELOCITY_FACTORS)
 
     def solve(point: int, *, loss: str) -> FloatArray:

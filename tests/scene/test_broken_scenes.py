@@ -196,16 +196,6 @@ SINGLE: dict[str, Broken] = {
     "letter unknown": _one(
         "controller.sequence", ["a", "C", "B", "D"], "capital letter", "each once", '["a", "C", "B", "D"]'
     ),
-    "offsets of too few chambers": _one(
-        "controller.gas_time_offset",
-        ["30 ms"] * 3,
-        "3 times for 4 chambers",
-        "a list of 4",
-        '["30 ms", "30 ms", "30 ms"]',
-    ),
-    "offset below zero": _one(
-        "controller.gas_time_offset", ["-1 ms"], "entry 1", "a time of at least 0", '["-1 ms"]'
-    ),
     "trial step never executed": Broken(
         {"controller.kind": "trial", "controller.short_step": "0.5 ms"},
         (Expected("controller", "short_step", '"0.5 ms"', "never executed", "minimum_gas_time (0.001 s)"),),

@@ -227,7 +227,7 @@ def test_outside_the_table_the_answer_is_wide_and_says_so() -> None:
     assert np.all(np.isfinite(found.value))
     covered = rotation_table_covers(reynolds=[100.0, 1e5, 10.0], rotation_reynolds=[100.0, 1e3, 1e6])
     np.testing.assert_array_equal(covered, [True, False, False])
-    assert np.all(found.uncertainty[~covered] > 0.24 * found.value[~covered])
+    assert np.all(found.uncertainty[~covered] > 0.25 * found.value[~covered])
     assert found.uncertainty[0] < 0.01 * found.value[0]
 
 
@@ -248,24 +248,6 @@ def test_ito_and_nanbus_formula_holds_for_slow_rotation_only() -> None:
     assert gap(0.05) < 0.03
     assert gap(0.5) < 0.08
     assert gap(2.0) > 0.13
-
-
-@pytest.mark.parametrize(
-    ("kl", "s", "added"),
-    [
-        (1e6, 1.0, 0.0),
-        (2e6, 0.5, 0.0),
-        (3.7e6, 0.3, 0.10),
-        (4.1e6, 0.2, 0.05),
-        (9e6, 1.0, 0.06),
-        (1.3e7, 0.3, 0.19),
-    ],
-)
-def test_the_interval_holds_what_fluctuating_flow_adds(kl: float, s: float, added: float) -> None:
-    """The numbers are those of `march_section` over long times."""
-    found = rotating_friction_ratio(reynolds=np.sqrt(kl / s), rotation_reynolds=np.sqrt(kl * s))
-    assert found.uncertainty >= added * found.value
-    assert added > 0 or found.uncertainty < 0.002 * found.value
 
 
 def test_a_flow_that_changes_in_time_settles_at_the_steady_one() -> None:

@@ -45,12 +45,17 @@ def _outcome(cases: Sequence[Record]) -> str:
 
 def _origins(evidence: Record) -> list[str]:
     """Inputs that nobody gave, by origin."""
-    origins = evidence["scene"].get("origins") or {}
     found = {
-        origin: sorted(input_name(path) for path, own in origins.items() if own == origin)
+        origin: sorted(input_name(path) for path, own in _inputs(evidence).items() if own == origin)
         for origin in _UNSURE[:2]
     }
     return [f"{origin.capitalize()}: {', '.join(names)}." for origin, names in found.items() if names]
+
+
+def _inputs(evidence: Record) -> dict[str, str]:
+    """Origins by path, but those of stated uncertainties."""
+    origins: dict[str, str] = evidence["scene"].get("origins") or {}
+    return {path: origin for path, origin in origins.items() if not path.startswith("uncertainty.")}
 
 
 def _credibility(evidence: Record) -> Table:
@@ -84,8 +89,7 @@ def _development(evidence: Record) -> list[Cells]:
 def _use(evidence: Record) -> list[Cells]:
     budgets = (evidence.get("calibration") or {}).get("budgets")
     moved = any(row["achieved_interval"] for row in evidence.get("requirements", ()))
-    origins = (evidence["scene"].get("origins") or {}).values()
-    assumed = sum(origin == "assumed" for origin in origins)
+    assumed = sum(origin == "assumed" for origin in _inputs(evidence).values())
     return [
         (
             "Input pedigree",

@@ -20,7 +20,7 @@ MET: Final = "met"
 MISSED: Final = "not met"
 OPEN: Final = "cannot be told"
 UNASKED: Final = "none stated"
-_NONE: Final = "nothing in the scene"
+_NONE: Final = "the scene asks for none"
 _CERTAIN: Final = ("given", "measured")
 _LIKELY: Final = 0.95
 """Fraction of runs that must settle in time, the confidence of every interval in the report."""

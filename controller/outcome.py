@@ -104,11 +104,11 @@ def outcome_of(facts: Facts) -> Outcome:
     limit = facts.scene.controller.limit
     if facts.settling_time is not None:
         return Outcome.SETTLED
+    if facts.unreachable_amplitude > limit and not facts.loop.unstable:
+        return Outcome.CAPACITY_EXCEEDED
     higher = facts.final_amplitude > facts.initial_amplitude + facts.noise_floor
     if has_grown(facts.cause, higher):
         return Outcome.DRIFTING if facts.drift > NOTICEABLE else Outcome.DIVERGING
-    if facts.unreachable_amplitude > limit:
-        return Outcome.CAPACITY_EXCEEDED
     if facts.loop.unstable:
         return Outcome.UNSTABLE
     if min(facts.since, facts.held_since) < math.inf:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import date
 from typing import Any
 
-from ringbalance.controller.eccentric_mass.study import eccentric_study, study_document
+from ringbalance.controller.eccentric_mass.study import eccentric_study
 from ringbalance.reports.evidence import FORMAT, Progress, finished_cases, scene_record, versions
 from ringbalance.reports.numbers import given, short, with_unit
 from ringbalance.reports.provenance import provenance
@@ -38,7 +38,7 @@ def collect_eccentric(
         cases, scene=paper_scene(), level=level, mutations=level == "heavy", workers=workers
     ) as under_way:
         tell("balanced and locked run")
-        study = study_document(eccentric_study(scene))
+        study = eccentric_study(scene).document()
         verification = finished_cases(under_way, tell)
     run = study.pop("run")
     return {

@@ -25,7 +25,6 @@ from ringbalance.controller.ensemble.transfer import PairTransfer, pair_transfer
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw, balancer_model
-from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.scene.arrays import IntArray
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.faults import SceneError
@@ -79,6 +78,33 @@ class Ensemble:
     """Members by number of overshoots, the last entry is that many or more."""
     misadjustment_counts: IntArray
     """Members by number of misadjustments, likewise."""
+
+    def document(self) -> dict[str, Any]:
+        """All as a JSON document of SI numbers, with arrays of at most 41 entries."""
+        shares = ("settled", "not_settled", "overshoot", "misadjustment", "diverged", "drifted")
+        last = int(np.max(np.flatnonzero(self.time_counts), initial=0)) + 1
+        per_bin = -(-last // SHOWN_BINS)
+        padded = np.zeros(per_bin * SHOWN_BINS, dtype=np.int64)
+        padded[:last] = self.time_counts[:last]
+        counts = padded.reshape(SHOWN_BINS, per_bin).sum(axis=1)
+        edges = self.bin_width * per_bin * np.arange(SHOWN_BINS + 1)
+        return {
+            "law": self.law,
+            "members": self.members,
+            "seed": self.seed,
+            "spread_95": asdict(self.uncertainty_95),
+            "left_out": [],
+            "probability": {name: asdict(getattr(self, name)) for name in shares},
+            "settling_time_s": {
+                "quantiles": dict(zip(map(str, QUANTILES), self.settling_quantiles, strict=True)),
+                "resolution": self.bin_width,
+                "edges": edges.tolist(),
+                "counts": counts.tolist(),
+                "settled_fraction": (np.cumsum(counts) / self.members).tolist(),
+            },
+            "overshoots": self.overshoot_counts.tolist(),
+            "misadjustments": self.misadjustment_counts.tolist(),
+        }
 
 
 def simulate_ensemble(
@@ -161,12 +187,7 @@ def ensemble_transfer(scene: Scene, model: BalancerModel) -> PairTransfer:
         model=model,
         total=2 * scene.disc.initial_fill,
         gas_pressure=scene.gas.pressure,
-        dynamics=dynamics_of(
-            scene=scene,
-            model=model,
-            modelled=modelled,
-            residual_fill=residual_fill_ratio(scene, law=model.flow),
-        ),
+        dynamics=dynamics_of(scene=scene, model=model, modelled=modelled),
     )
 
 
@@ -256,31 +277,3 @@ def binomial_share(*, count: int, of: int) -> Probability:
     centre = (p + z2 / 2) / (1 + z2)
     half = math.sqrt(p * (1 - p) * z2 + z2**2 / 4) / (1 + z2)
     return Probability(value=p, low=max(centre - half, 0.0), high=min(centre + half, 1.0))
-
-
-def ensemble_document(ensemble: Ensemble) -> dict[str, Any]:
-    """An ensemble as a JSON document of SI numbers, with arrays of at most 41 entries."""
-    shares = ("settled", "not_settled", "overshoot", "misadjustment", "diverged", "drifted")
-    last = int(np.max(np.flatnonzero(ensemble.time_counts), initial=0)) + 1
-    per_bin = -(-last // SHOWN_BINS)
-    padded = np.zeros(per_bin * SHOWN_BINS, dtype=np.int64)
-    padded[:last] = ensemble.time_counts[:last]
-    counts = padded.reshape(SHOWN_BINS, per_bin).sum(axis=1)
-    edges = ensemble.bin_width * per_bin * np.arange(SHOWN_BINS + 1)
-    return {
-        "law": ensemble.law,
-        "members": ensemble.members,
-        "seed": ensemble.seed,
-        "spread_95": asdict(ensemble.uncertainty_95),
-        "left_out": [],
-        "probability": {name: asdict(getattr(ensemble, name)) for name in shares},
-        "settling_time_s": {
-            "quantiles": dict(zip(map(str, QUANTILES), ensemble.settling_quantiles, strict=True)),
-            "resolution": ensemble.bin_width,
-            "edges": edges.tolist(),
-            "counts": counts.tolist(),
-            "settled_fraction": (np.cumsum(counts) / ensemble.members).tolist(),
-        },
-        "overshoots": ensemble.overshoot_counts.tolist(),
-        "misadjustments": ensemble.misadjustment_counts.tolist(),
-    }

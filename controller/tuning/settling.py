@@ -24,7 +24,7 @@ MEMBERS: Final = 2000
 MOVING_MEMBERS: Final = 200
 """The most of them where inertia, gas or valves are modelled, which takes a hundred times as long."""
 FIRST_MEMBERS: Final = 16
-"""Of these come first; where half of them settle or fewer, 95 % of more will not."""
+"""Of these come first; more only where their 95 % interval leaves it open that 95 % of them settle."""
 RUNS: Final = 20
 """Runs one by one, of an algorithm that is not compiled."""
 FIRST_RUNS: Final = 4
@@ -47,7 +47,7 @@ class SettlingTimes:
 def settling_times(
     scene: Scene, model: BalancerModel, widths: MemberUncertainty, *, members: int, runs: int, told: Progress
 ) -> SettlingTimes:
-    """Few runs first, and more where half of them settle.
+    """Few runs first, and more where these leave it open that 95 % settle.
 
     Args: `members`: the most of compiled runs. `runs`: the most of others.
     """
@@ -56,7 +56,7 @@ def settling_times(
     most = min(members, MOVING_MEMBERS if moving else members) if compiled else runs
     first = (FIRST_MEMBERS if moving else most) if compiled else FIRST_RUNS
     found = _runs(scene, model, widths, number=min(first, most), told=told)
-    if first >= most or found.settled.value <= 0.5:
+    if first >= most or found.settled.high < QUANTILES["p95"]:
         return found
     return _runs(scene, model, widths, number=most, told=told)
 

@@ -8,8 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ringbalance.controller.algorithms.by_name import controller_of, target_vector_of
+from ringbalance.controller.algorithms.by_name import controller_of, law_based_of, target_vector_of
 from ringbalance.controller.checks import check_settings
+from ringbalance.controller.liquid_ring.plant import initial_state
+from ringbalance.controller.liquid_ring.reach import unreachable_moment
+from ringbalance.controller.rotor import influence, initial_vibration
 from ringbalance.controller.terms import run_models
 from ringbalance.controller.tuning.dead_time import dead_times, dead_zone
 from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor, vibration_rates
@@ -58,6 +61,8 @@ class Tuning:
     """Keys and values that are recommended beside the gain; empty: none."""
     search: Search | None
     """What was tried because the runs under the first recommendation do not settle; None: they do."""
+    beyond_capacity: float
+    """Vibration that remains with the liquid at its best, m."""
     reachable: bool | None
     """Whether valves and gas line can bring the amplitude below the limit; None: the line is not known."""
     gas_line: tuple[LineAnswer, ...]
@@ -99,7 +104,7 @@ def tune(
     if wanted > 0:
         told("settling times ...")
         settling = settling_times(best.scene, model, known.widths, members=members, runs=runs, told=told)
-        if settling.quantiles["p95"] is None:
+        if settling.quantiles["p95"] is None and _beyond_capacity(scene, model) <= scene.controller.limit:
             found = search(scene, model, known, base=best, told=told)
             if found.best is not best:
                 best = found.best
@@ -127,7 +132,8 @@ def _judged(
     dead = dead_times(tuned, model)
     zone = dead_zone(tuned, model, dead)
     lines = line_answers(tuned, model)
-    within = flows and loop.stays and max(zone, smallest / 2) <= settings.limit
+    beyond = _beyond_capacity(scene, model)
+    within = flows and loop.stays and max(zone, smallest / 2, beyond) <= settings.limit
     # The law-based algorithm asks for the time in which the law moves the whole residual.
     gain = (1.0 / loop.rate if settings.kind == "law_based" else settings.proportional) if flows else None
     return Tuning(
@@ -147,12 +153,23 @@ def _judged(
         dead_zone=zone,
         change=best.change,
         search=found,
+        beyond_capacity=beyond,
         reachable=within and _line_reaches(lines),
         gas_line=lines,
         settling=settling,
         models_used=run_models(scene=tuned, model=model),
-        status=_status(tuned, loop, zone=zone, smallest=smallest, settling=settling, best=best, found=found),
+        status=_over_capacity(scene, beyond)
+        or _status(tuned, loop, zone=zone, smallest=smallest, settling=settling, best=best, found=found),
     )
+
+
+def _beyond_capacity(scene: Scene, model: BalancerModel) -> float:
+    """Vibration that remains with the liquid at its best, m; zero within capacity."""
+    rotor, plant = scene.rotor, law_based_of(scene, model).ring
+    k = influence(coefficient=rotor.influence_coefficient, lag_angle=rotor.lag_angle)
+    wanted = -initial_vibration(rotor=rotor) / k
+    missing = unreachable_moment(plant=plant, state=initial_state(disc=scene.disc), wanted=wanted)
+    return missing * rotor.influence_coefficient
 
 
 def _line_reaches(lines: tuple[LineAnswer, ...]) -> bool | None:
@@ -177,6 +194,18 @@ def _margins(scene: Scene, loop: LoopFactor, known: FactorUncertainty) -> Margin
         phase_uncertainty=known.widths.lag_angle + error,
         integral=settings.period / (settings.integral_time or math.inf) if fixed else 0.0,
         derivative=settings.derivative_time / settings.period if fixed else 0.0,
+    )
+
+
+def _over_capacity(scene: Scene, beyond: float) -> str:
+    """Empty within capacity."""
+    limit, start, um = scene.controller.limit, scene.rotor.initial_amplitude, 1e6
+    if beyond <= limit:
+        return ""
+    return (
+        f"capacity exceeded: with the liquid at its best {beyond * um:.4g} um remain of {start * um:.4g} um, "
+        f"limit {limit * um:.4g} um: balance the rotor first, use a denser liquid, or a larger or "
+        "differently clocked disc"
     )
 
 
@@ -261,6 +290,7 @@ def tuning_document(tuning: Tuning) -> dict[str, Any]:
         "tried": [] if tuning.search is None else [asdict(row) for row in tuning.search.tried],
         "reachable_limit_m": None if tuning.search is None else tuning.search.limit,
         "limit_m": scene.controller.limit,
+        "beyond_capacity_m": tuning.beyond_capacity,
         "reachable": tuning.reachable,
         "gas_line": line_document(tuning.gas_line),
         "settling_time_s": None if settling is None else settling.quantiles,

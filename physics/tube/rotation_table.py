@@ -35,16 +35,8 @@ KL_LIMIT, ROTATION_LIMIT = 1e7, 1e5
 FAST_S, FAST_KL = 2.0, 1.05e7
 _JOIN = (2.5, 4.5)
 _OUTSIDE = 0.3
-"""Relative expanded uncertainty (95 %) beyond R = 1e5, where nothing was solved."""
-_FLUCTUATION = 0.25
-"""What flow that fluctuates may add, relative, as a half-width (95 %).
-
-Solutions in time (`march_section`) add nothing at (Kl, S) = (1e6, 1) and (2e6, 0.5), 0.10 at (3.7e6, 0.3),
-0.05 at (4.1e6, 0.2), 0.06 at (9e6, 1) and 0.19 at (1.3e7, 0.3); in a square duct such solutions are within 5
-% of what was measured (case `measured_rotating_duct`).
-"""
-_CALM_KL, _LIVELY_KL, _STEADYING_S = 2e6, 5e6, 0.5
-"""Kl up to which flow is steady, and from which on that half-width holds; S from which on it falls as 1/S."""
+"""Relative expanded uncertainty (95 %) outside the table: no source holds there, and flow is likely to be
+unsteady."""
 
 
 def slow_first(kl: npt.ArrayLike) -> FloatArray:
@@ -257,8 +249,8 @@ def rotating_friction_ratio(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.A
 
     F depends on Kl = R Re and S = R/Re alone; its exact slow limit is 1 + R^2/9216 + Kl^2/16515072, its
     fast one (Re = 0) tends to 0.07863 sqrt(R).
-    Returns: Estimate of F, of the broadcast shape; the uncertainty adds discretisation, interpolation and
-        what fluctuating flow may add. Its status says OUT_OF_RANGE when any point lies outside the table.
+    Returns: Estimate of F, of the broadcast shape; the uncertainty adds discretisation and interpolation. Its
+        status says OUT_OF_RANGE when any point lies outside the table, where 30 % is added.
     Raises: ValueError: a negative or undefined argument.
     Range: steady, symmetric, developed laminar flow, Kl <= 1e7, R <= 1e5, any S.
     Source: finite elements, `rotating_section`; the limits are exact.
@@ -272,16 +264,8 @@ def rotating_friction_ratio(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.A
         + _interpolation_uncertainty(table, at.kl, rotation)
     )
     # Both vanish with the excess: without rotation F is 1 exactly.
-    relative = uncertainty_95 * np.minimum((ratio - 1) / 0.05, 1.0) + _fluctuation(at.kl, re, rotation)
-    relative += np.where(rotation <= ROTATION_LIMIT, 0.0, _OUTSIDE)
+    relative = uncertainty_95 * np.minimum((ratio - 1) / 0.05, 1.0) + np.where(inside, 0.0, _OUTSIDE)
     return Estimate(value=ratio, uncertainty=np.asarray(ratio * relative), status=_status(inside))
-
-
-def _fluctuation(kl: FloatArray, re: FloatArray, rotation: FloatArray) -> FloatArray:
-    """Relative half-width for flow that fluctuates: rises from Kl = 2e6 to 5e6, falls as 1/S above 0.5."""
-    lively = _smooth_step(np.log(np.maximum(kl, 1e-300) / _CALM_KL) / np.log(_LIVELY_KL / _CALM_KL))
-    steadying = np.maximum(rotation / (_STEADYING_S * np.maximum(re, 1e-300)), 1.0)
-    return np.asarray(_FLUCTUATION * lively / steadying, dtype=np.float64)
 
 
 def _interpolation_uncertainty(table: FrictionTable, kl: FloatArray, rotation: FloatArray) -> FloatArray:

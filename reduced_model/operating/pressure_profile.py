@@ -12,7 +12,7 @@ from ringbalance.physics.tube.state import TubeState, tube_state
 from ringbalance.reduced_model.law.building import column_pressure
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Flow, Regime
-from ringbalance.reduced_model.operating.crest_margin import DirectedState, directed_state, margin_of
+from ringbalance.reduced_model.operating.crest_margin import DirectedState, directed_state
 from ringbalance.reduced_model.operating.rest import rest
 from ringbalance.reduced_model.tube.path import (
     Places,
@@ -99,7 +99,7 @@ def hump_profile(
     )
     state = backward if forward.ends.driving_pressure() < 0 else forward
     tube = reversed_tube(scene.tube) if state.reverse else scene.tube
-    margin = margin_of(law=law, state=state)
+    margin = state.margin(law=law)
     if Regime(int(flow.regime)) is Regime.BLOCKED and not bool(flow.primed):
         line = _blocked(scene, law, forward, primed, points)
     else:

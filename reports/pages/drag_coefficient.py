@@ -19,10 +19,8 @@ from ringbalance.reports.studies.drag_map import (
     BORES,
     DragMap,
     LiquidVerdicts,
-    drag_contour,
     drag_map,
     liquid_verdicts,
-    velocity_errors,
 )
 from ringbalance.reports.studies.drag_point import DragPoint
 
@@ -41,7 +39,7 @@ def _collect(work: Work) -> Record:
         "contours": {
             name: _contour(found, apparent=apparent) for name, apparent in (("k", False), ("apparent", True))
         },
-        "liquids": _liquid_records(verdicts),
+        "liquids": _with_budget(_liquid_records(verdicts), work.calibration),
         "apparent": _apparent(work.calibration),
     }
 
@@ -73,7 +71,7 @@ def _map_record(found: DragMap) -> Record:
 
 
 def _contour(found: DragMap, *, apparent: bool) -> Record:
-    viscosity, bore = drag_contour(drag_map=found, apparent=apparent)
+    viscosity, bore = found.contour(apparent=apparent)
     return {"kinematic_viscosity_m2_s": _rounded(viscosity), "bore_m": _rounded(bore)}
 
 
@@ -82,7 +80,7 @@ def _liquid_records(verdicts: LiquidVerdicts) -> list[Record]:
 
     Returns: One record a liquid: under the scene's gas where that starts the flow, else at equal heads.
     """
-    errors = velocity_errors(verdicts=verdicts)
+    errors = verdicts.velocity_errors()
     found = []
     for i, liquid in enumerate(verdicts.liquids):
         starts = bool(verdicts.at_scene.regime[i] != Regime.BLOCKED)
@@ -105,6 +103,16 @@ def _liquid_records(verdicts: LiquidVerdicts) -> list[Record]:
             }
         )
     return found
+
+
+def _with_budget(liquids: list[Record], calibration: Calibration) -> list[Record]:
+    """The scene's own liquid, the first, with the uncertainties that every other table gives its point."""
+    first, *others = liquids
+    if first["starts_at_scene_pressure"] and calibration.scene.tube.drag_coefficient is None:
+        budgets = calibration.budgets
+        names = {"velocity_uncertainty": "velocity", "k_uncertainty": "drag_coefficient"}
+        first = first | {key: budgets[name].total for key, name in names.items() if name in budgets}
+    return [first, *others]
 
 
 def _point_record(point: DragPoint, i: int) -> Record:

@@ -188,3 +188,12 @@ def test_too_little_time_is_told_from_settings_that_fail(slow: Scene, calibrated
     assert found.search is not None
     assert found.search.settles
     assert "raise run.time_limit" in found.status
+
+
+def test_an_unbalance_beyond_the_capacity_is_said_first(slow: Scene, calibrated: BalancerModel) -> None:
+    heavy = replace(slow, rotor=replace(slow.rotor, initial_amplitude=100 * slow.rotor.initial_amplitude))
+    found = tuned(heavy, calibrated)
+    assert found.status.startswith("capacity exceeded")
+    assert found.search is None
+    assert found.reachable is False
+    assert 0 < found.beyond_capacity < heavy.rotor.initial_amplitude

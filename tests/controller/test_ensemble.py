@@ -20,7 +20,6 @@ from ringbalance.controller.ensemble.moment import moment_table
 from ringbalance.controller.ensemble.monte_carlo import (
     QUANTILES,
     binomial_share,
-    ensemble_document,
     simulate_ensemble,
     simulate_members,
 )
@@ -41,7 +40,7 @@ from ringbalance.controller.simulation import Outcome
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw, PaperMoment, paper_model
-from ringbalance.reduced_model.operating.residual import residual_fill_ratio
+from ringbalance.reduced_model.operating.residual import residual_by_velocity, residual_fill_ratio
 from ringbalance.scene.models import Scene
 
 EXACT = MemberUncertainty(velocity=0.0, moment=0.0, influence_coefficient=0.0, lag_angle=0.0)
@@ -119,14 +118,16 @@ def test_every_member_is_the_scalar_run(scene: Scene, chambers: int, noise: bool
         asked = replace(asked, sensor=scene.sensor)
     model = paper_model(asked)
     members = various(asked, size=size)
-    # An ensemble keeps to the residual fill of the scene's own values.
-    residual = residual_fill_ratio(asked, law=model.flow)
+    residuals = np.interp(members.velocity_factor, *residual_by_velocity(asked, law=model.flow))
     found = simulate_members(asked, model, members=members, seed=4)
     outcomes = []
     for member in range(size):
         own_scene, own_model = alone(asked, model, members, member)
         sensor = sensor_of(asked, seed=4, member=member) if noise else None
+        residual = float(residuals[member])
+        assert residual == pytest.approx(residual_fill_ratio(own_scene, law=own_model.flow), abs=1e-6)
         run = simulate(own_scene, own_model, sensor=sensor, residual_fill=residual)
+        assert found.shortened[member] == run.shortened
         outcomes.append(run.outcome)
         assert found.settled[member] == run.settled
         assert found.overshoots[member] == run.overshoots
@@ -233,10 +234,10 @@ def test_the_same_seed_gives_the_same_numbers_for_any_threads(scene: Scene, mode
     asked = noisy(scene, time_limit=5.0)
     one = simulate_ensemble(asked, model, 2 * BLOCK + 5, 3, workers=1)
     two = simulate_ensemble(asked, model, 2 * BLOCK + 5, 3, workers=2)
-    assert ensemble_document(one) == ensemble_document(two)
+    assert one.document() == two.document()
     assert one.members == 2 * BLOCK + 5
     other = simulate_ensemble(asked, model, 2 * BLOCK + 5, 4, workers=2)
-    assert ensemble_document(other) != ensemble_document(one)
+    assert other.document() != one.document()
 
 
 def test_a_larger_ensemble_begins_with_the_smaller(scene: Scene, model: BalancerModel) -> None:
@@ -365,9 +366,9 @@ def test_a_share_has_its_interval() -> None:
 def test_the_document_is_small_clean_json(scene: Scene, model: BalancerModel) -> None:
     seen: list[tuple[int, int]] = []
     asked = noisy(scene, time_limit=5.0)
-    found = ensemble_document(
-        simulate_ensemble(asked, model, 300, 0, progress=lambda done, of: seen.append((done, of)))
-    )
+    found = simulate_ensemble(
+        asked, model, 300, 0, progress=lambda done, of: seen.append((done, of))
+    ).document()
     text = json.dumps(found, allow_nan=False)
     assert len(text) < 6500
     assert seen == [(300, 300)]

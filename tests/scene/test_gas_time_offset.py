@@ -29,7 +29,7 @@ def test_one_for_all_or_one_for_each(
     [
         (["30 ms"] * 3, "3 times for 4 chambers", "a list of 4"),
         (["-1 ms"] * 4, "entry 1", "a time of at least 0"),
-        ("-1 ms", "at least 0", "a list of one for each chamber"),
+        ("-1 ms", "at least 0", "a time of at least 0"),
     ],
 )
 def test_other_offsets_are_one_error(

@@ -57,6 +57,44 @@ class Base:
         """The scene itself, before anything is varied; read once for all points."""
         return _made(self.document, self.file)
 
+    def judge(self, point: Point) -> Judgement:
+        """Judge the scene at one point."""
+        scene = self.scene
+        document = varied(self.document, scene=scene, values=point)
+        period = point.get("period", scene.controller.period)
+        longest = PERIODS * period + GAS_TIME
+        document["run"]["time_limit"] = f"{longest!r} s"
+        try:
+            document = fitted(document, scene=scene, made=_made(document, self.file), values=point)
+        except SceneError as error:
+            return refusal(error)
+        return judge_point(document, file=self.file, defect=self.defect)
+
+    def judged(
+        self,
+        points: Sequence[Point],
+        *,
+        workers: int = 1,
+        progress: Progress | None = None,
+        kept: Path | None = None,
+    ) -> tuple[Judgement, ...]:
+        """Judge many points on several processes, in their order.
+
+        Args: `progress`: called after each chunk. `kept`: file of judgements done, from which an interrupted
+            run resumes; a damaged one is written again, with a note on standard error.
+        Raises: OSError: the kept file cannot be read or written.
+        """
+        done = _done(kept, self, points)
+        rest = [points[start : start + CHUNK] for start in range(len(done), len(points), CHUNK)]
+        with closing(_chunks(self, rest, workers)) as chunks:
+            for chunk in chunks:
+                done += chunk
+                if kept is not None:
+                    _keep(kept, self, points, done)
+                if progress is not None:
+                    progress(len(done), len(points))
+        return tuple(done)
+
 
 def design(*, count: int, seed: int) -> tuple[Point, ...]:
     """A designed set over all axes; a longer one begins with a shorter one.
@@ -77,48 +115,8 @@ def _point(shares: Sequence[float], kinds: Sequence[float]) -> Point:
     return values
 
 
-def judge(base: Base, point: Point) -> Judgement:
-    """Judge the scene at one point."""
-    scene = base.scene
-    document = varied(base.document, scene=scene, values=point)
-    period = point.get("period", scene.controller.period)
-    longest = PERIODS * period + GAS_TIME
-    document["run"]["time_limit"] = f"{longest!r} s"
-    try:
-        document = fitted(document, scene=scene, made=_made(document, base.file), values=point)
-    except SceneError as error:
-        return refusal(error)
-    return judge_point(document, file=base.file, defect=base.defect)
-
-
 def _made(document: Mapping[str, Any], file: str) -> Scene:
     return liquid_ring_scene(scene_from(content=toml_bytes(document), file=file))
-
-
-def judged(
-    base: Base,
-    points: Sequence[Point],
-    *,
-    workers: int = 1,
-    progress: Progress | None = None,
-    kept: Path | None = None,
-) -> tuple[Judgement, ...]:
-    """Judge many points on several processes, in their order.
-
-    Args: `progress`: called after each chunk. `kept`: file of judgements done, from which an interrupted run
-        resumes; a damaged one is written again, with a note on standard error.
-    Raises: OSError: the kept file cannot be read or written.
-    """
-    done = _done(kept, base, points)
-    rest = [points[start : start + CHUNK] for start in range(len(done), len(points), CHUNK)]
-    with closing(_chunks(base, rest, workers)) as chunks:
-        for chunk in chunks:
-            done += chunk
-            if kept is not None:
-                _keep(kept, base, points, done)
-            if progress is not None:
-                progress(len(done), len(points))
-    return tuple(done)
 
 
 def _chunks(
@@ -135,7 +133,7 @@ def _chunks(
 
 
 def _judge_all(base: Base, points: Sequence[Point]) -> list[Judgement]:
-    return [judge(base, point) for point in points]
+    return [base.judge(point) for point in points]
 
 
 def _key(base: Base, points: Sequence[Point]) -> str:

@@ -41,7 +41,6 @@ from ringbalance.verification.selection_studies.law_models import (
     EQ_12,
     SIPHON,
     LawModels,
-    law_work,
 )
 from ringbalance.verification.selection_studies.tube_models import (
     LawBook,
@@ -281,7 +280,7 @@ def _hierarchy(
                 models={**law.named(), "operation in time": time.name},
                 leaves_out=lacks(law, hump=hump) | frozenset(time.lacks),
                 work={kind: count * operations for kind, count in time.work.items()} | {"step": operations},
-                fixed_work={} if time.name == CLOSED_FORM else law_work(scene, law),
+                fixed_work={} if time.name == CLOSED_FORM else law.work(scene),
                 solve=partial(solve, law=law, time=time),
                 prepare=None if time.name == CLOSED_FORM else partial(book.make, law),
             )

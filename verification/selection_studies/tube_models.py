@@ -42,8 +42,6 @@ from ringbalance.verification.selection_studies.law_models import (
     REGIMES,
     SIPHON,
     LawModels,
-    law_of,
-    law_work,
     levels_available,
 )
 
@@ -74,7 +72,7 @@ class LawBook:
     def law(self, models: LawModels) -> CalibratedLaw:
         """The law of some models."""
         if models not in self._made:
-            self._made[models] = law_of(self.scene, models, base=self.base)
+            self._made[models] = models.law(self.scene, base=self.base)
         return self._made[models]
 
     def make(self, models: LawModels) -> CalibratedLaw:
@@ -169,7 +167,7 @@ def velocity_hierarchy(scene: Scene, *, book: LawBook) -> ModelHierarchy:
                 models=models.named(),
                 leaves_out=lacks(models, hump=hump),
                 work={"law": 1.0},
-                fixed_work=law_work(scene, models),
+                fixed_work=models.work(scene),
                 solve=partial(solve, models=models),
                 prepare=partial(book.make, models),
             )

@@ -12,12 +12,14 @@ from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, StringArra
 from ringbalance.verification.navier_stokes.rotating_section import (
     DuctMesh,
     friction_ratio,
-    section_system,
     solve_section_without_inertia,
 )
 from ringbalance.verification.validation.kinds import Kind, Prediction
-from ringbalance.verification.validation.measurements import Measurements, measurements
+from ringbalance.verification.validation.measurements import Measurements, MeasurementsError, measurements
 from ringbalance.verification.validation.model_bias import ModelStatistics, model_statistics
+
+_WIDEST: Final = 20
+"""Long over short side of a duct whose section is meshed."""
 
 
 class Formula(Protocol):
@@ -102,13 +104,16 @@ def _laminar_ratio(aspect_ratio: FloatArray) -> FloatArray:
     """Laminar friction of rectangular ducts over that of a tube of their hydraulic diameter; 0 for tubes."""
     ratio = np.ones_like(aspect_ratio)
     for aspect in np.unique(aspect_ratio[aspect_ratio > 0]):
-        system = section_system(cells=DuctMesh(aspect_ratio=float(aspect)))
+        system = DuctMesh(aspect_ratio=float(aspect)).system()
         flow = solve_section_without_inertia(system=system, rotation_reynolds=0.0)
         ratio[aspect_ratio == aspect] = friction_ratio(flow)
     return ratio
 
 
 def _predict(data: Measurements) -> Prediction:
+    aspect = data.columns.get("aspect_ratio", np.zeros(len(data)))
+    if not np.all((aspect == 0) | ((aspect >= 1) & (aspect <= _WIDEST))):
+        raise MeasurementsError(f"aspect_ratio must be 0 or from 1 to {_WIDEST} in every row")
     points = _points_of(data)
     return Prediction(value=points.predicted(), stated=points.stated())
 

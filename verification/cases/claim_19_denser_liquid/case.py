@@ -85,10 +85,6 @@ def _stall_by_elements(scene: Scene, density: float) -> Found:
     return found_of(ring_of(scene, (scene.disc.max_fill_ratio,), density=density), "wall_pressure", 0)
 
 
-def _wall(scene: Scene, density: float, fill: float) -> float:
-    return float(wall_pressure_of(scene, fill, density=density))
-
-
 def _law(scene: Scene, density: float) -> FlowLaw:
     liquid = dataclasses.replace(scene.liquid, density=density)
     return flow_law_of(dataclasses.replace(scene, liquid=liquid))
@@ -129,7 +125,7 @@ def _priming(scene: Scene, density: float) -> float:
 
 
 def _figure(scene: Scene, laws: Sequence[FlowLaw]) -> Series:
-    pressure = np.linspace(0.02, 2.5, 60) * _wall(scene, scene.liquid.density, scene.disc.max_fill_ratio)
+    pressure = np.linspace(0.02, 2.5, 60) * wall_pressure_of(scene, scene.disc.max_fill_ratio)
 
     def ability(law: FlowLaw, density: float) -> np.ndarray:
         fills = [_reach(law, float(p), refinements=_REFINEMENTS - 1) for p in pressure]

@@ -46,8 +46,9 @@ def test_the_document_names_what_it_was_made_of(evidence: Record) -> None:
 
 def test_kept_evidence_is_named_with_its_date_and_scene(evidence: Record) -> None:
     assert facts(evidence)["Kept evidence"].startswith("none")
-    evidence["verification"][-1].update(date="2029-02-03", scene_sha256="cd" * 32)
-    assert facts(evidence)["Kept evidence"] == "coverage of 2029-02-03, scene cdcdcdcdcdcd"
+    case = evidence["verification"][-1]
+    case.update(date="2029-02-03", scene_sha256="cd" * 32)
+    assert facts(evidence)["Kept evidence"] == f"{case['id']} of 2029-02-03, scene cdcdcdcdcdcd"
 
 
 def test_provenance_names_neither_folder_nor_machine() -> None:

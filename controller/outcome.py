@@ -176,16 +176,19 @@ def _um(length: float) -> str:
 
 def _settled(facts: Facts) -> str:
     many = facts.overshoots > MANY_OVERSHOOTS
-    cure = (
-        f"{facts.overshoots} overshoots: lower controller.proportional{_to_gain(facts)}"
-        if many
-        else "no further correction needed"
-    )
+    cure = f"{facts.overshoots} overshoots: {_lower(facts)}" if many else "no further correction needed"
     return (
         f"settled: within the limit of {_um(facts.scene.controller.limit)} from "
         f"{facts.settling_time:.4g} s on, for the hold time of {facts.scene.controller.hold_time:.4g} s, "
         f"{_um(facts.final_amplitude)} at the end; {cure}"
     )
+
+
+def _lower(facts: Facts) -> str:
+    """What to change in a loop that overshoots; the law-based algorithm has no gain to lower."""
+    if facts.scene.controller.kind == "law_based":
+        return _standing(facts) or "check controller.assumed_influence_coefficient and assumed_lag_angle"
+    return f"lower controller.proportional{_to_gain(facts)}"
 
 
 def _to_gain(facts: Facts) -> str:
@@ -208,7 +211,7 @@ def _hovering(facts: Facts) -> str:
     if NOISE_DEVIATIONS * sigma > settings.limit:
         cure = f"the sensor's own is {_um(sigma)}: raise controller.limit or average the sensor"
     else:
-        cure = f"lower controller.proportional{_to_gain(facts)}, raise controller.limit or average the sensor"
+        cure = f"{_lower(facts)}, raise controller.limit or average the sensor"
     left = "" if loop.deviation is None else f" of {_um(loop.deviation)}"
     return head + (
         f"it is not expected to stay: noise keeps up a standard deviation{left}, and the limit must hold "
@@ -245,10 +248,7 @@ def _not_settled(facts: Facts) -> str:
 
 def _time_limit(facts: Facts) -> str:
     if facts.overshoots > MANY_OVERSHOOTS:
-        cure = (
-            f"{facts.overshoots} overshoots: lower controller.proportional{_to_gain(facts)}, or shorten the "
-            "trial steps"
-        )
+        cure = f"{facts.overshoots} overshoots: {_lower(facts)}, or shorten the trial steps"
     else:
         cure = _standing(facts) or "raise controller.proportional or run.time_limit"
     return f"{_not_settled(facts)}; time is up ({facts.scene.run.time_limit:.4g} s): {cure}"
@@ -301,18 +301,20 @@ def _empty(facts: Facts) -> str:
 def _diverging(facts: Facts) -> str:
     if facts.overshoots >= 2:
         cure = (
-            f"the residual turned round {facts.overshoots} times: lower controller.proportional"
-            f"{_to_gain(facts)}; if it still grows, check influence coefficient, lag angle and sense of "
-            "rotation"
+            f"the residual turned round {facts.overshoots} times: {_lower(facts)}; if it still grows, "
+            "check influence coefficient, lag angle and sense of rotation"
         )
     else:
         cure = (
             "check the influence coefficient, the lag angle that the controller assumes (more than 90 "
             "degrees off drives the liquid the wrong way) and the sense of rotation"
         )
+    # The rises that end a run need not take it above its start.
+    higher = facts.final_amplitude > facts.initial_amplitude
+    since = f"from {_um(facts.initial_amplitude)} " if higher else "several times in a row, "
     return (
-        f"unstable: diverging, stopped at {facts.time:.4g} s: the amplitude rose from "
-        f"{_um(facts.initial_amplitude)} to {_um(facts.final_amplitude)}: {cure}"
+        f"unstable: diverging, stopped at {facts.time:.4g} s: the amplitude rose {since}to "
+        f"{_um(facts.final_amplitude)}: {cure}"
     )
 
 

@@ -87,7 +87,8 @@ def standing_remedy(scene: Scene, model: BalancerModel) -> str:
     if not mended or mended == scene.controller.gas_time_offset:
         return ""
     still = dead_zone(scene, model, mended)
+    by = "law" if scene.controller.kind == "law_based" else "gain alone"
     return (
-        f"by its gain alone an injection moves no liquid up to {1e6 * still:.3g} um, it only fills gas: set "
+        f"a command by the {by} moves no liquid up to {1e6 * still:.3g} um, it only fills gas: set "
         f"{offset_text(mended)}"
     )

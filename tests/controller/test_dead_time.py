@@ -197,3 +197,13 @@ def test_an_unbalance_beyond_the_capacity_is_said_first(slow: Scene, calibrated:
     assert found.search is None
     assert found.reachable is False
     assert 0 < found.beyond_capacity < heavy.rotor.initial_amplitude
+
+
+def test_the_law_based_algorithm_is_told_of_no_gain(slow: Scene, calibrated: BalancerModel) -> None:
+    """Its overshoots come from the dead time, which a lower gain would not shorten."""
+    line = replace(slow, gas=replace(slow.gas, conductance=0.3e-8))
+    turned = replace(line, rotor=replace(line.rotor, initial_phase=1.6))
+    run = simulate(with_settings(turned, kind="law_based"), calibrated)
+    assert run.overshoots > 2
+    assert "gas_time_offset" in run.status
+    assert "controller.proportional" not in run.status

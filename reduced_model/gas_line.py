@@ -161,10 +161,12 @@ def _answer(scene: Scene, end: LineEnd, fills: Fills, *, inertia: bool) -> LineA
     if injection is not None:
         shortest = injection.shortest(end.valve_lag)
         opening, correction = shortest.time, _vibration(scene, fills, shortest.metres)
-        metres = limit * shortest.metres / correction
-        dead = float(injection.dead_time(metres, least=end.valve_lag))
-        rate = limit / metres * fills.steady_velocity(scene.gas.pressure)
-        standing = _standing_amplitude(scene, dead, rate=rate)
+        # Under extreme laws the shortest injection may move nothing: then no vibration belongs to a way.
+        if correction > 0:
+            metres = limit * shortest.metres / correction
+            dead = float(injection.dead_time(metres, least=end.valve_lag))
+            rate = limit / metres * fills.steady_velocity(scene.gas.pressure)
+            standing = _standing_amplitude(scene, dead, rate=rate)
     return LineAnswer(
         end=end.name,
         conductance=line.conductance,

@@ -45,6 +45,8 @@ _STEPS: Final = 33
 """Of filling or venting."""
 _SLOWEST: Final = 1e-9
 """m/s."""
+_LEAST_PUSH: Final = 1e-9
+"""m/s^2."""
 _ROUNDS: Final = 3
 """After which the dead time, which hardly depends on the opening, is known to 0.1 ms."""
 
@@ -239,7 +241,8 @@ class ShortInjection:
         highest = self.line.supply_pressure - self.line.ambient_pressure
         p = np.linspace(self.edges.stops, highest, _STEPS)[1:]
         u = np.maximum.accumulate(np.maximum(self.fills.flow(p, primed=True).velocity, _SLOWEST))
-        return p, u, self._push(p, p) / u**2
+        # Where supply and stop coincide, round-off would leave no push, or one below zero.
+        return p, u, np.maximum(self._push(p, p), _LEAST_PUSH) / u**2
 
     def _moved(self, before: Moved, steady: float, push: float, time: float) -> Moved:
         velocity, metres = steady, steady * time

@@ -22,7 +22,7 @@ Record = dict[str, Any]
 def waves(*, resonant: list[Record], top: float, code: str = "ok", text: str = "solved") -> Record:
     return {
         "fill_ratio": [0.1, 0.3, 0.5],
-        "frequency_ratio": [[0.3, 0.5, top], [0.8, 1.2, 1.5]],
+        "frequency_ratio": [[0.3, 0.5, top], [0.8, 1.2, 1.5], [0.9, 1.1, 1.6]],
         "amplification": [0.2, 1.0, 4.0],
         "pressure_amplification": [3.1, 3.5, 6.0],
         "surface_amplitude_m": [1e-6, 1e-6, 2e-6],
@@ -46,9 +46,10 @@ def findings(record: Record) -> str:
 
 
 def test_fills_that_gravity_drives_are_named_and_others_are_not() -> None:
-    met = [{"mode": 2, "fill_ratio": 0.2}, {"mode": 3, "fill_ratio": 0.06}]
+    met = [{"mode": 2, "fill_ratio": 0.2}, {"mode": 3, "fill_ratio": 0.2}]
     told = findings(waves(resonant=met, top=0.6))
-    assert "0.06 (mode 3)" in told
+    # A frequency known to 7 % meets the speed anywhere from 0.93 to 1.07 of it.
+    assert "0.13 to 0.27 (mode 3)" in told
     assert "mode 2" not in told
 
 

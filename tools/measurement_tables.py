@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from ringbalance.reports.saved import saved_cases
 from ringbalance.scene import write_whole
 from ringbalance.verification.catalogue import load_cases
 from ringbalance.verification.document import case_document, definition_document
@@ -43,8 +44,9 @@ def kind_table() -> str:
 
 
 def standing_table(cases: Sequence[Mapping[str, Any]]) -> str:
-    """What stands behind each quantity. Args: `cases`: their documents."""
-    return _markdown(HEADS, standing_rows(cases))
+    """What stands behind each quantity, by the documents of the cases; heavy ones count as kept."""
+    kept = {case["id"]: {"verdict": case["verdict"], "numbers": case["numbers"]} for case in saved_cases()}
+    return _markdown(HEADS, standing_rows([{**case, **kept.get(case["id"], {})} for case in cases]))
 
 
 def _markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

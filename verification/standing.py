@@ -146,7 +146,7 @@ def _measured(case: Mapping[str, Any]) -> str:
     if case["verdict"] == "not run":
         return f"{name}: not run" + (" (a heavy case)" if case["cost"] == "heavy" else "")
     numbers = case["numbers"]
-    parts = [f"{numbers['points']:.0f} points" if "points" in numbers else "a correlation of them"]
+    parts = [f"{numbers['points']:.0f} points" if "points" in numbers else "a correlation of measurements"]
     if "share_within" in numbers:
         parts += [
             f"{100 * numbers['share_within']:.1f} % within",

@@ -126,7 +126,7 @@ def bend(scene: Scene, out: Path) -> Iterator[Row]:
         for n in around
     ]  # fmt: skip
     yield row(
-        quantity=f"loss coefficient of {end - start:g} bores and two bends, Re {REYNOLDS:g}, R {rotation:.0f}",
+        quantity=f"loss coefficient, {end - start:g} bores and two bends, Re {REYNOLDS:g}, R {rotation:.0f}",
         values=[found.loss(start, end) for found in runs], cells=around,
         ours=_kept_loss(start, end), seconds=runs[-1].seconds,
     )  # fmt: skip

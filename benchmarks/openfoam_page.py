@@ -12,24 +12,28 @@ _TITLES = {
     "waves": "Waves on the ring in a chamber without plates",
 }
 _NOTES = {
-    "tube": """SRFSimpleFoam on one slab of cells with cyclic ends. Here: the table of friction ratios that the
-tube law reads.""",
-    "bend": """SRFSimpleFoam, with developed inflow from its own straight tube. Here: the kept solution of the case
+    "tube": """\
+SRFSimpleFoam on one slab of cells with cyclic ends. Here: the table of friction ratios that the tube
+law reads.""",
+    "bend": """\
+SRFSimpleFoam, with developed inflow from its own straight tube. Here: the kept solution of the case
 `bent_tube_3d`.""",
-    "turbulent": """The k-omega SST model with cells down to the wall. It was made for a frame at rest: of the turning it
-knows the secondary flow that the Coriolis force drives, not what rotation does to turbulence. It is a second
-opinion, not a measurement. Here: the tube law's friction with its uncertainty.""",
-    "waves": """pimpleFoam on a mesh that moves with the surface; kinematic viscosity 1e-5 of omega R2^2, gravity
-0.005 of omega^2 R2. Here: linear theory without viscosity, with the uncertainty of its cells alone. With plates
-the surface meets the wall at an angle and its tracking fails after a few turns: waves in chambers with plates
-are verified by a second calculation only.""",
+    "turbulent": """\
+The k-omega SST model with cells down to the wall. It was made for a frame at rest: of the turning it
+knows the secondary flow that the Coriolis force drives, not what rotation does to turbulence. It is a
+second opinion, not a measurement. Here: the tube law's friction with its uncertainty.""",
+    "waves": """\
+pimpleFoam on a mesh that moves with the surface; kinematic viscosity 1e-5 of omega R2^2, gravity 0.005
+of omega^2 R2. Here: linear theory without viscosity, with the uncertainty of its cells alone. With
+plates the surface meets the wall at an angle and its tracking fails after a few turns: waves in
+chambers with plates are verified by a second calculation only.""",
 }
 _HEAD = """# Beside OpenFOAM
 
-What the program computes, beside an independent code that shares nothing with it but the cells of the tube's
-section. OpenFOAM {openfoam} of Debian, run on {date} by `make bench-cfd`. The uncertainty of OpenFOAM is that of
-its cells (grid convergence index on three meshes, 95 %), that of the program is what it states for the quantity.
-The two agree when their difference is within both.
+What the program computes, beside an independent code that shares nothing with it but the cells of the
+tube's section. OpenFOAM {openfoam} of Debian, run on {date} by `make bench-cfd`. The uncertainty of
+OpenFOAM is that of its cells (grid convergence index on three meshes, 95 %), that of the program is
+what it states for the quantity. The two agree when their difference is within both.
 """
 
 

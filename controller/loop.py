@@ -263,9 +263,14 @@ class _Run:
 
     def _permitted(self, asked: Mapping[int, float]) -> dict[int, float]:
         """The valve-open times that leave each driven chamber its residual fill."""
-        least = self.scene.controller.minimum_gas_time
+        settings = self.scene.controller
+        offsets = settings.offsets(self.plant.chambers)
         found = self.plant.permitted(self.state, gas_times=asked)
-        kept = {i: time for i, time in found.items() if time == asked[i] or time >= least}
+        kept = {
+            i: time
+            for i, time in found.items()
+            if time == asked[i] or time >= settings.minimum_gas_time + offsets[i]
+        }
         letters = chamber_letters(self.plant.chambers)
         self.refused = tuple(letters[i] for i, time in asked.items() if kept.get(i) != time)
         self.shortened += len(self.refused)

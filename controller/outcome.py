@@ -181,7 +181,7 @@ def _settled(facts: Facts) -> str:
         else "no further correction needed"
     )
     return (
-        f"settled: not above the limit of {_um(facts.scene.controller.limit)} from "
+        f"settled: within the limit of {_um(facts.scene.controller.limit)} from "
         f"{facts.settling_time:.4g} s on, for the hold time of {facts.scene.controller.hold_time:.4g} s, "
         f"{_um(facts.final_amplitude)} at the end; {cure}"
     )

@@ -86,6 +86,19 @@ class Calibrated(Protocol):
         """Under that law."""
 
 
+def last_place(total: float) -> int:
+    """Decimal exponent of the second digit of a total uncertainty: that to which a value with it is printed.
+
+    Source: at most two digits, as the GUM (JCGM 100:2008, 7.2.6) asks.
+    Raises: ValueError: an uncertainty that is not positive.
+    """
+    if not total > 0:
+        raise ValueError("an uncertainty must be positive")
+    width = Decimal(repr(float(total)))
+    # Twice, because 0.0996 becomes 0.10 and then its second digit is another one.
+    return width.quantize(Decimal(1).scaleb(width.adjusted() - 1)).adjusted() - 1
+
+
 def rounded(value: float, total: float) -> str:
     """A value, or its uncertainty, to the place of the second digit of the total uncertainty.
 
@@ -93,10 +106,8 @@ def rounded(value: float, total: float) -> str:
     """
     if not total > 0 or value == 0:
         return f"{value + 0.0:.{_DIGITS}g}"
-    exact, width = Decimal(repr(float(value))), Decimal(repr(float(total)))
-    # Twice, because 0.0996 becomes 0.10 and then its second digit is another one.
-    place = width.quantize(Decimal(1).scaleb(width.adjusted() - 1)).adjusted() - 1
-    place = max(place, exact.adjusted() - _DIGITS + 1)
+    exact = Decimal(repr(float(value)))
+    place = max(last_place(total), exact.adjusted() - _DIGITS + 1)
     shown = exact.quantize(Decimal(1).scaleb(place), rounding=ROUND_HALF_EVEN)
     plain = shown if shown else abs(shown)
     return f"{plain:f}" if place > -_DIGITS else f"{plain:e}"

@@ -22,7 +22,9 @@ from ringbalance.reduced_model.law.model import BalancerModel, balancer_model
 from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_law
 from ringbalance.reduced_model.operating.point import OperatingPoint, operating_point
 from ringbalance.reduced_model.operating.residual import ResidualLiquid, residual_liquid
+from ringbalance.reduced_model.operating.tube_liquid import TubeLiquid, tube_liquid
 from ringbalance.reduced_model.selection.registry import ModelUsed, models_used
+from ringbalance.reduced_model.selection.tube_terms import with_tube_models
 from ringbalance.reduced_model.tube.heads import tube_heads
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
@@ -40,6 +42,7 @@ class Calibration:
     """Everything that `calibrate` finds out about a scene's balancer."""
 
     scene: Scene
+    """With the models of the tube's loss that its tolerance asks for."""
     chamber: ChamberCalibration
     """Wall pressure, moment and lambda."""
     tube: TubeLoss
@@ -52,6 +55,8 @@ class Calibration:
     """At equal fills under the scene's gas pressure."""
     residual: ResidualLiquid
     """Of a chamber emptied under the scene's gas pressure, and what a pair can use."""
+    tube_liquid: TubeLiquid
+    """In the tube of a pair around its first injection, and what it does to the vibration."""
     gas_line: tuple[LineAnswer, ...]
     """What the gas line can deliver, or both ends of a default range of lines."""
     instability: AsynchronousInstability | None
@@ -82,7 +87,7 @@ def calibrate(scene: AnyScene) -> Calibration:
     Source: closed forms for the chamber, checked by finite elements; tables of finite elements for the
         laminar tube, correlations beyond; see the parts.
     """
-    scene = liquid_ring_scene(scene)
+    scene = with_tube_models(liquid_ring_scene(scene))
     chamber, law = _chamber_and_law(scene)
     heads, point = law.heads, operating_point(scene=scene, law=law)
     return Calibration(
@@ -93,6 +98,7 @@ def calibrate(scene: AnyScene) -> Calibration:
         paper_law=paper_law(scene),
         operating_point=point,
         residual=residual_liquid(scene, law=law),
+        tube_liquid=tube_liquid(scene, law=law),
         gas_line=line_answers(scene, balancer_model(law)),
         instability=asynchronous_instability(scene),
         models_used=models_used(scene),
@@ -115,7 +121,7 @@ def calibrated_model(scene: Scene) -> BalancerModel:
 
     Raises: SceneError, ValueError: as `calibrate`.
     """
-    return balancer_model(_chamber_and_law(scene)[1])
+    return balancer_model(_chamber_and_law(with_tube_models(scene))[1])
 
 
 def _chamber_and_law(scene: Scene) -> tuple[ChamberCalibration, CalibratedLaw]:

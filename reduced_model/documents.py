@@ -48,6 +48,7 @@ def calibration_document(calibration: Calibration) -> dict[str, Any]:
         "budgets": {name: _budget(budget) for name, budget in calibration.budgets.items()},
         "operating_point": _operating_point(calibration),
         "residual_liquid": _residual(calibration),
+        "tube_liquid": _tube_liquid(calibration),
         "asynchronous_instability": _instability(calibration),
         "identifiability": calibration.identifiability,
         "tolerance": scene.tolerance,
@@ -249,6 +250,25 @@ def _residual(calibration: Calibration) -> dict[str, float]:
         "pair_moment_kg_m": rest.pair_moment,
         "usable_pair_moment_kg_m": rest.usable_pair_moment,
         "usable_pair_moment_uncertainty": calibration.budgets["usable_moment"].total,
+    }
+
+
+def _tube_liquid(calibration: Calibration) -> dict[str, Any]:
+    found = calibration.tube_liquid
+    states = {"before": found.before, "flowing": found.flowing, "after": found.after}
+    return {
+        name: {
+            "state": held.state,
+            "mass_kg": held.mass,
+            "moment_along_kg_m": held.along,
+            "moment_across_kg_m": held.across,
+        }
+        for name, held in states.items()
+    } | {
+        "flowing_vibration_m": found.flowing_vibration,
+        "lasting_vibration_m": found.lasting_vibration,
+        "limit_m": found.limit,
+        "returned_volume_m3": found.returned_volume,
     }
 
 

@@ -18,6 +18,7 @@ from ringbalance.reduced_model.chamber.row_status import REMEDIES, row_status
 from ringbalance.reduced_model.documents import PRESSURE_FACTORS, paper_columns, velocity_status
 from ringbalance.reduced_model.gas_line import line_text, line_warning
 from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.operating.tube_liquid import TubeLiquid
 
 _MARKS: Final = MappingProxyType(
     {
@@ -103,6 +104,7 @@ def _summary_rows(calibration: Calibration) -> Iterator[tuple[str, str]]:
         )
     if point.cavitation_margin is not None:
         yield "cavitation margin", _margin_text(calibration)
+    yield "liquid in the tube", _tube_liquid_text(calibration.tube_liquid)
     yield "gas line", line_text(calibration.gas_line)
     if line_warning(calibration.gas_line):
         yield "note", line_warning(calibration.gas_line)
@@ -129,6 +131,18 @@ def _usable_text(calibration: Calibration) -> str:
         f"{_measured(rest.depth, rest.depth_uncertainty, 'mm', scale=1e3)} of liquid over the port, gas "
         "passes through"
     )
+
+
+def _tube_liquid_text(found: TubeLiquid) -> str:
+    moments = [f"{1e6 * abs(held.moment):.2g} g mm" for held in (found.flowing, found.after)]
+    changes = [f"{1e6 * value:.2g}" for value in (found.flowing_vibration, found.lasting_vibration)]
+    text = (
+        f"{moments[0]} while it flows, {moments[1]} at rest afterwards: the vibration changes by "
+        f"{changes[0]} um and lastingly by {changes[1]} um, of a limit of {1e6 * found.limit:.2g} um"
+    )
+    if not found.returned_volume:
+        return text
+    return f"{text}; up to {1e6 * found.returned_volume:.2g} ml fall back from the crest after each injection"
 
 
 def _point_text(calibration: Calibration) -> str:

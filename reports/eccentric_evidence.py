@@ -7,7 +7,7 @@ from typing import Any
 
 from ringbalance.controller.eccentric_mass.study import eccentric_study, study_document
 from ringbalance.reports.evidence import FORMAT, Progress, finished_cases, scene_record, versions
-from ringbalance.reports.numbers import given, short
+from ringbalance.reports.numbers import given, percent, short
 from ringbalance.reports.provenance import provenance
 from ringbalance.reports.section import Level, Record
 from ringbalance.scene.dimensions import DIMENSIONS
@@ -15,6 +15,7 @@ from ringbalance.scene.eccentric_models import EccentricScene, SpeedPoint
 from ringbalance.scene.keys.declaration import keys_of
 from ringbalance.scene.keys.eccentric_schema import ECCENTRIC_MASS
 from ringbalance.scene.keys.fields import Reader
+from ringbalance.scene.models import InputUncertainty
 from ringbalance.verification.catalogue import load_cases
 from ringbalance.verification.runner import DRIVEN, cases_under_way, paper_scene
 
@@ -62,13 +63,14 @@ def collect_eccentric(
 
 
 def parameters(scene: EccentricScene) -> list[Record]:
-    """Every value of a scene with its meaning and its origin, as rows of a table."""
+    """Every value of a scene with its uncertainty, meaning and origin, as rows of a table."""
+    widths = {each.quantity: _width(each) for each in scene.uncertainty}
     return [
         {
             "group": name.replace("_", " ").capitalize(),
             "quantity": key.replace("_", " "),
             "value": _written(value, entry.takes),
-            "uncertainty": "",
+            "uncertainty": widths.get(f"{name}.{key}", ""),
             "note": entry.presence.meaning,
             "origin": scene.origin_of(f"{name}.{key}"),
             "path": f"{name}.{key}",
@@ -78,6 +80,14 @@ def parameters(scene: EccentricScene) -> list[Record]:
         for key, entry in keys_of(table.record).items()
         if (value := getattr(getattr(scene, name, None), key, None)) is not None
     ]
+
+
+def _width(uncertain: InputUncertainty) -> str:
+    if uncertain.relative:
+        return percent(uncertain.half_width, digits=3)
+    table, key = uncertain.quantity.split(".")
+    record = ECCENTRIC_MASS.tables[table].record
+    return _written(uncertain.half_width, keys_of(record)[key].takes) if record else ""
 
 
 def _written(value: Any, takes: object) -> str:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from decimal import ROUND_HALF_EVEN, Decimal
 from typing import Final
 
+from ringbalance.reduced_model.budget import last_place
+
 THIN_SPACE: Final = "\u202f"
 MINUS: Final = "\u2212"
 PLUS_MINUS: Final = "\u00a0±\u00a0"
@@ -83,25 +85,8 @@ def fixed(value: float, decimals: int) -> str:
     return _plain(_exact(value), decimals)
 
 
-def half_width_exponent(half_width: float) -> int:
-    """Decimal place to which a half-width is shown: two digits when it begins with 1 or 2, else one.
-
-    Raises: ValueError: a half-width that is not positive and finite.
-    Source: at most two digits, as the GUM (JCGM 100:2008, 7.2.6) asks.
-    """
-    if not half_width > 0:
-        raise ValueError("a half-width must be positive")
-    rounded = _exact(half_width)
-    # Twice: 0.0297 becomes 0.030 and 0.96 becomes 1.0, and the rounded half-width decides.
-    for _ in range(2):
-        leading = _leading_exponent(rounded)
-        place = leading - 1 if rounded.scaleb(-leading) < 3 else leading
-        rounded = _rounded(rounded, place)
-    return place
-
-
 def measured(value: float | None, half_width: float | None, *, digits: int = 4) -> str:
-    """Value ± half-width without unit, such as 72.04 ± 0.03 or (1.20 ± 0.05) × 10⁻⁶.
+    """Value ± half-width without unit, such as 72.043 ± 0.032 or (1.200 ± 0.050) × 10⁻⁶.
 
     Both have the digits that the half-width leaves standing; without one the value has `digits`.
     Args: `half_width`: at 95 %, in the value's unit; None or zero where there is none.
@@ -112,7 +97,7 @@ def measured(value: float | None, half_width: float | None, *, digits: int = 4) 
     exact, width = _exact(value), _exact(half_width)
     if width < 0:
         raise ValueError("a half-width must not be negative")
-    place = half_width_exponent(half_width)
+    place = last_place(half_width)
     top = max(_leading_exponent(exact), place)
     if top - place + 1 > _MOST_DIGITS:
         return f"{number(value, digits=_MOST_DIGITS)}{PLUS_MINUS}{number(half_width, digits=1)}"
@@ -184,7 +169,7 @@ def display_unit(unit: str, *values: float | None) -> DisplayUnit:
 
 
 def shown(value: float | None, unit: str, half_width: float | None = None, *, digits: int = 4) -> str:
-    """An SI quantity in the unit that suits its size, with its half-width, such as (72.04 ± 0.03) mm.
+    """An SI quantity in the unit that suits its size, with its half-width, such as (72.043 ± 0.032) mm.
 
     Args: `half_width`: 95 %, in `unit`; without one the value has `digits` significant digits.
     Raises: ValueError: a value that is not finite.

@@ -57,5 +57,10 @@ def typeset(text: str) -> str:
     return raised
 
 
+def key_words(path: str) -> str:
+    """The key of a path in the scene file as a reader knows it, such as "siphon crest radius"."""
+    return path.rpartition(".")[2].replace("_", " ").replace("hump", "siphon crest")
+
+
 def _index(match: re.Match[str]) -> str:
     return (match[1] or match[2]) + match[3].translate(_SUBSCRIPTS) + ("′" if match[4] else "")

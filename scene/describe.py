@@ -135,7 +135,8 @@ def _value(scene: Scene, path: str) -> Any:
 
 def _written(line: _Line, value: Any) -> str:
     if line.dimension:
-        return format_quantity(value, line.dimension, line.shown.unit)
+        values = value if isinstance(value, tuple) else (value,)
+        return ", ".join(format_quantity(each, line.dimension, line.shown.unit) for each in values)
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, tuple):

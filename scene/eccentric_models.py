@@ -15,7 +15,7 @@ from ringbalance.scene.eccentric_control_models import (
     Lqr,
     Supervisor,
 )
-from ringbalance.scene.keys.declaration import listed, needed, standard, unused
+from ringbalance.scene.keys.declaration import UNCERTAIN, listed, needed, standard, unused
 from ringbalance.scene.keys.fields import NOT_NEGATIVE, POSITIVE, quantity
 from ringbalance.scene.keys.quantities import (
     Angle,
@@ -34,6 +34,7 @@ from ringbalance.scene.keys.quantities import (
     Turn,
     Velocity,
 )
+from ringbalance.scene.models import InputUncertainty
 from ringbalance.scene.origins import SceneFile
 
 Frame = Literal["rotor", "laboratory"]
@@ -54,10 +55,12 @@ class EccentricRotor:
     """A rigid planar rotor on an isotropic linear bearing."""
 
     mass: Annotated[
-        PositiveMass, needed("m_r of the rotor with its imbalance, without the two eccentric masses")
+        PositiveMass,
+        needed("m_r of the rotor with its imbalance, without the two eccentric masses"),
+        UNCERTAIN,
     ]
-    stiffness: Annotated[Stiffness, needed("K_B of the isotropic bearing")]
-    damping: Annotated[Damping, needed("C_B of the isotropic bearing")]
+    stiffness: Annotated[Stiffness, needed("K_B of the isotropic bearing"), UNCERTAIN]
+    damping: Annotated[Damping, needed("C_B of the isotropic bearing"), UNCERTAIN]
     speed_profile: Annotated[
         tuple[SpeedPoint, ...],
         needed("list of { time, speed }; the speed is linear in between, and constant before and after"),
@@ -69,17 +72,17 @@ class EccentricRotor:
 class Imbalance:
     """The imbalance of the rotor."""
 
-    mass: Annotated[Mass, needed("m_im; a part of the rotor's mass")]
-    radius: Annotated[PositiveLength, needed("r_im, of the imbalance")]
-    phase: Annotated[Turn, needed("phi_m, of the imbalance in the rotor's frame")]
+    mass: Annotated[Mass, needed("m_im; a part of the rotor's mass"), UNCERTAIN]
+    radius: Annotated[PositiveLength, needed("r_im, of the imbalance"), UNCERTAIN]
+    phase: Annotated[Turn, needed("phi_m, of the imbalance in the rotor's frame"), UNCERTAIN]
 
 
 @dataclass(frozen=True, kw_only=True)
 class EccentricMasses:
     """Two equal masses on one circular track."""
 
-    mass: Annotated[PositiveMass, needed("m_b of each")]
-    guide_radius: Annotated[PositiveLength, needed("r_b of the circular track")]
+    mass: Annotated[PositiveMass, needed("m_b of each"), UNCERTAIN]
+    guide_radius: Annotated[PositiveLength, needed("r_b of the circular track"), UNCERTAIN]
     arc_length: Annotated[PositiveLength, needed("l of each along the track: the masses cannot come closer")]
     initial_angle: Annotated[
         Angles, standard(["0 deg", "180 deg"], "phi of each at the start, in the rotor's frame")
@@ -90,6 +93,7 @@ class EccentricMasses:
             ["0 mm", "0 mm"],
             "mu_f of each, a length: friction torque = mu_f m_b r_b (rotor speed + mass's own speed)^2",
         ),
+        UNCERTAIN,
     ]
 
 
@@ -98,14 +102,17 @@ class Motor:
     """Motor and gears of one eccentric mass."""
 
     torque_constant: Annotated[
-        float, quantity("torque_constant", POSITIVE), needed("K_i, motor torque per current")
+        float, quantity("torque_constant", POSITIVE), needed("K_i, motor torque per current"), UNCERTAIN
     ]
     back_emf_constant: Annotated[
-        float, quantity("voltage_per_speed", NOT_NEGATIVE), needed("K_m, voltage per speed of the motor")
+        float,
+        quantity("voltage_per_speed", NOT_NEGATIVE),
+        needed("K_m, voltage per speed of the motor"),
+        UNCERTAIN,
     ]
-    resistance: Annotated[float, quantity("resistance", POSITIVE), needed("R_m of the winding")]
-    motor_inertia: Annotated[Inertia, needed("J_1 of motor and gear A")]
-    gear_inertia: Annotated[Inertia, needed("J_2 of gear B")]
+    resistance: Annotated[float, quantity("resistance", POSITIVE), needed("R_m of the winding"), UNCERTAIN]
+    motor_inertia: Annotated[Inertia, needed("J_1 of motor and gear A"), UNCERTAIN]
+    gear_inertia: Annotated[Inertia, needed("J_2 of gear B"), UNCERTAIN]
     teeth: Annotated[Teeth, needed("N_1 of gear A on the motor, N_2 of gear B, N_3 of the fixed gear C")]
     maximum_voltage: Annotated[
         float | None, quantity("voltage", POSITIVE), unused("no limit", "a larger command is cut to this")
@@ -142,6 +149,7 @@ class EccentricScene(SceneFile):
     lqr: Lqr
     fine_tuning: FineTuning
     supervisor: Supervisor
+    uncertainty: tuple[InputUncertainty, ...] = ()
 
     @property
     def balancer(self) -> Literal["eccentric_mass"]:

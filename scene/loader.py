@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import fields
+from dataclasses import MISSING, fields
 from importlib import resources
 from os import PathLike
 from pathlib import Path, PurePath
@@ -21,7 +21,6 @@ from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.origins import Origin
 from ringbalance.scene.rules import shape, working
 from ringbalance.scene.rules.check import failed_checks
-from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 from ringbalance.scene.working_liquid import with_liquid
 
 _LARGEST_FILE = 2**20
@@ -73,15 +72,14 @@ def scene_from(*, content: bytes, file: str) -> AnyScene:
         "values_sha256": _values_hash(reading),
         "defaulted": _defaulted(reading),
         "origins": tuple(_origins(reading)),
+        "uncertainty": tuple(_uncertainty(reading)),
     }
-    if reading.schema is LIQUID_RING:
-        parts["uncertainty"] = _uncertainty(reading)
     scene: AnyScene = reading.schema.scene(**parts)
     return scene
 
 
 def _records(reading: Reading) -> dict[str, Any]:
-    """A record of each table; its fields are named after keys, and an absent key is None."""
+    """A record of each table; its fields are named after keys, and an absent key is the default or None."""
     values: dict[str, Any] = dict(reading.values)
     vibration = values.get("rotor.initial_vibration")
     if vibration is not None:
@@ -89,20 +87,28 @@ def _records(reading: Reading) -> dict[str, Any]:
         values["rotor.initial_phase"] = vibration.phase
     return {
         name: table.record(
-            **{field.name: values.get(f"{name}.{field.name}") for field in fields(table.record)}
+            **{
+                field.name: values.get(f"{name}.{field.name}")
+                for field in fields(table.record)
+                if field.default is MISSING or f"{name}.{field.name}" in values
+            }
         )
         for name, table in reading.schema.tables.items()
         if table.record is not None
     }
 
 
-def _uncertainty(reading: Reading) -> tuple[InputUncertainty, ...]:
-    given = ((key, reading.values.get(f"uncertainty.{key}")) for key in UNCERTAIN_QUANTITIES)
-    return tuple(
-        InputUncertainty(quantity=key, half_width=spread[0], relative=spread[1])
-        for key, spread in given
-        if spread is not None
-    )
+def _uncertainty(reading: Reading) -> Iterator[InputUncertainty]:
+    """By key, or by "table.key" where [uncertainty] has a table for each table."""
+    for key in reading.schema.tables["uncertainty"].keys:
+        stated = reading.values.get(f"uncertainty.{key}")
+        if stated is None or key == ORIGIN:
+            continue
+        inside = (
+            {f"{key}.{name}": each for name, each in stated.items()} if isinstance(stated, dict) else None
+        )
+        for quantity, (width, relative) in (inside or {key: stated}).items():
+            yield InputUncertainty(quantity=quantity, half_width=width, relative=relative)
 
 
 def _defaulted(reading: Reading) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from ringbalance.scene.keys.quantities import (
     PositiveUnbalance,
     PositiveVelocity,
     Time,
+    TimePerChamber,
     Turn,
 )
 
@@ -167,6 +168,15 @@ class ControllerSettings:
         ),
         shown("order of trials", only_for="trial"),
     ]
+    gas_time_offset: Annotated[
+        TimePerChamber | None,
+        unused(
+            "nothing is added",
+            "target_vector and law_based: added to every valve-open time, such as the dead time in which gas "
+            "only fills the chamber; `ringbalance tune` recommends it",
+        ),
+        shown("added to valve-open times", "ms", absent="nothing"),
+    ] = None
     first_trial: Annotated[
         PositiveTime,
         standard("50 ms", "trial algorithm: valve-open time of a chamber's first trial"),
@@ -187,6 +197,11 @@ class ControllerSettings:
         standard("0.8 um", "trial algorithm: amplitude below which short steps are used"),
         shown("short steps below", "um", only_for="trial"),
     ]
+
+    def offsets(self, chambers: int) -> tuple[float, ...]:
+        """`gas_time_offset` of every chamber, s."""
+        given = self.gas_time_offset or (0.0,)
+        return given * chambers if len(given) == 1 else given
 
 
 @dataclass(frozen=True, kw_only=True)

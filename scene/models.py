@@ -31,6 +31,7 @@ from ringbalance.scene.keys.quantities import (
 )
 from ringbalance.scene.loop_models import ControllerSettings, Requirement, Rotor, Sensor
 from ringbalance.scene.origins import SceneFile
+from ringbalance.scene.tube_models import FINEST_MODELS, TubeModels
 
 HumpGas = Literal["vented", "trapped"]
 HumpShape = Literal["arc", "point"]
@@ -264,6 +265,8 @@ class Tube:
         UNCERTAIN,
         shown("drag coefficient k", absent="calculated"),
     ]
+    models: TubeModels = FINEST_MODELS
+    """Of its loss; no key."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -361,7 +364,7 @@ class InputUncertainty:
     """Expanded uncertainty (95 %) of one scene quantity."""
 
     quantity: str
-    """Key, such as "bore" or "lag_angle"."""
+    """Key, such as "bore" or "lag_angle"; of eccentric masses its path, such as "rotor.mass"."""
     half_width: float
     """Relative when `relative`, else SI."""
     relative: bool

@@ -30,7 +30,6 @@ PAGES = (
     "docs/how-to-choose.md",
     "docs/commands.md",
     "docs/eccentric-masses.md",
-    "docs/eccentric-strategy.md",
     "docs/scene-file.md",
 )
 LINK = re.compile(r"\]\(([^)#:]+)(?:#[^)]*)?\)")

@@ -22,6 +22,8 @@ from ringbalance.verification.document import comparison_half_width, definition_
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.result import CaseResult, QuantityResult
 from ringbalance.verification.runner import paper_scene, run_cases
+from ringbalance.verification.validation.blind import data_document
+from ringbalance.verification.validation.measurements import MeasurementsError
 from ringbalance.verification.verdicts import Verdict
 
 DONE: Final = 0
@@ -46,6 +48,7 @@ def verify(
     level: Level = "light",
     json: bool = False,
     workers: int = 1,
+    data: Path | None = None,
 ) -> int:
     """Run verification cases and judge the paper's claims.
 
@@ -57,15 +60,18 @@ def verify(
         level: "heavy" runs the cases that take long too.
         json: print one JSON document instead of a table.
         workers: processes to spread the cases over.
+        data: a file of measurements (docs/measurements.md), predicted and judged instead of the cases.
 
     Returns:
         Exit code: 0; 1 when a code-verification case failed, or a mutation was not caught; 2 for an unknown
-        case.
+        case or a file of measurements that cannot be used.
 
     Raises:
         SceneError: the scene file is not a scene.
     """
     progress = messages_console()
+    if data is not None:
+        return _judge_data(data, json=json)
     try:
         definitions = [load_case(case) for case in cases] if cases else list(load_cases())
     except UnknownCaseError as error:
@@ -90,6 +96,30 @@ def verify(
     else:
         _print_results(results)
     return exit_code(results)
+
+
+def _judge_data(path: Path, *, json: bool) -> int:
+    try:
+        document = data_document(path)
+    except MeasurementsError as error:
+        messages_console().print(f"ringbalance: {error}", markup=False, highlight=False, soft_wrap=True)
+        return BAD_INPUT
+    if json:
+        print(dumps(document, allow_nan=False))
+        return DONE
+    console, verdict = results_console(), Verdict(document["verdict"])
+    heading = Text.assemble(
+        (document["title"], "bold"), "  ", Text(verdict, style=_STYLES[verdict]), f"  ({document['source']})"
+    )
+    console.print(heading, soft_wrap=True)
+    table = Table(box=None, header_style="dim", padding=(0, 1, 0, 2))
+    for header in ("series", "points", "bias", "within"):
+        table.add_column(header, justify="left" if header == "series" else "right")
+    for name, one in {**document["series"], "all": document["statistics"]}.items():
+        table.add_row(name, f"{one['points']:.0f}", f"{one['bias']:+.1%}", f"{one['share_within']:.0%}")
+    console.print(table)
+    console.print(_indented(f"Confirmed where at least {document['limit']:.0%} lie within both intervals."))
+    return DONE
 
 
 def exit_code(results: Sequence[CaseResult]) -> int:

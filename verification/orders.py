@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ringbalance.verification.evidence import Convergence, Curve, Series, figure
+from ringbalance.physics.pressure.assembly import at_points, volume_points
+from ringbalance.physics.pressure.solve import PressureSolution
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.verification.evidence import Convergence, Curve, Found, Series, figure
 
 ROUND_OFF = 1e-13
 """Relative errors below this say nothing about the order."""
@@ -51,6 +54,21 @@ def order_study(*, size: Sequence[float], error: Sequence[float]) -> OrderStudy:
         raise ValueError("errors must be finite and above round-off for an order to be seen")
     order = np.log(e[:-1] / e[1:]) / np.log(h[:-1] / h[1:])
     return OrderStudy(size=tuple(h.tolist()), error=tuple(e.tolist()), order=tuple(order.tolist()))
+
+
+def orders_found(studies: Mapping[str, OrderStudy]) -> dict[str, Found]:
+    """The settled order and the finest error of each study as judged quantities, by its name."""
+    orders = {f"{name}_order": Found(value=study.settled_order) for name, study in studies.items()}
+    return orders | {f"{name}_error": Found(value=study.finest_error) for name, study in studies.items()}
+
+
+def field_error(solution: PressureSolution, exact: Callable[[FloatArray], FloatArray]) -> float:
+    """Root mean square over the liquid of a pressure's error, relative to that of the exact one at places."""
+    volume = volume_points(solution.chamber)
+    true = exact(solution.chamber.length_scale * volume.points)
+    difference = at_points(volume, solution.pressure) - true
+    squares = [np.sum(volume.weights * field**2) for field in (difference, true)]
+    return float(np.sqrt(squares[0] / squares[1]))
 
 
 def order_table(

@@ -17,7 +17,7 @@ from ringbalance.verification.assumptions import assumptions_of, overridden
 from ringbalance.verification.case import CaseDefinition, Mutation
 from ringbalance.verification.catalogue import case_code, load_case, load_cases
 from ringbalance.verification.eccentric_mass.scenes import driven_scene
-from ringbalance.verification.evidence import CaseCode, Level, NotRunError
+from ringbalance.verification.evidence import CaseCode, Evidence, Level, NotRunError
 from ringbalance.verification.judging import judge, references, widened
 from ringbalance.verification.result import CaseResult, MutationResult, QuantityResult
 from ringbalance.verification.verdicts import Verdict, combine
@@ -74,7 +74,7 @@ def run_definition(
         prescribed = {} if mutation is None else mutation.scene
         rests = [one for one in definition.rests_on if one.path not in prescribed]
         assumptions = assumptions_of(rests, mutated)
-        values = partial(_values, code, level, built_in)
+        values = partial(_values, code, level, built_in, (mutated, evidence))
         by_corners = [one for one in assumptions if not one.covered]
         evidence = widened(evidence, code, mutated, by_corners, values=values)
         quantities = judge(definition, evidence, references(code, mutated))
@@ -100,16 +100,21 @@ def run_definition(
     )
 
 
-def _values(code: CaseCode, level: Level, defect: str | None, scene: Any) -> Mapping[str, float]:
-    """Judged numbers on a scene, by the case's shorter way to them where it has one."""
+def _values(
+    code: CaseCode, level: Level, defect: str | None, known: tuple[Any, Evidence], scene: Any
+) -> Mapping[str, float]:
+    """Judged numbers on a scene, by the case's shorter way to them where it has one.
+
+    Args: `known`: a scene with its evidence.
+    """
     shorter = getattr(code, "values", None)
     if shorter is not None and defect is None:
         return dict(shorter(scene))
     try:
-        found = code.compute(scene, level, defect).found
+        evidence = known[1] if scene == known[0] else code.compute(scene, level, defect)
     except NotRunError as error:
         raise ValueError(f"not at every value of an assumed input: {error}") from error
-    return {name: one.value for name, one in found.items()}
+    return {name: one.value for name, one in evidence.found.items()}
 
 
 def _broken_down(definition: CaseDefinition) -> Verdict:

@@ -72,11 +72,21 @@ def usable(measurement: Measurement | None, *, needs_phase: bool) -> bool:
 
 
 def valve_commands(
-    times: tuple[tuple[int, float], ...], *, minimum_gas_time: float, maximum_gas_time: float
+    times: tuple[tuple[int, float], ...],
+    *,
+    minimum_gas_time: float,
+    maximum_gas_time: float,
+    offsets: tuple[float, ...] = (),
 ) -> tuple[ValveCommand, ...]:
-    """Valves that open for (chamber, time): a shorter time is not executed, a longer one is cut, s."""
+    """Valves that open for (chamber, time) and the chamber's offset: a shorter time is not executed, a longer
+    one is cut, s."""
     valves = (
-        ValveCommand(chamber=chamber, duration=valve_time(share, minimum_gas_time, maximum_gas_time))
+        ValveCommand(
+            chamber=chamber,
+            duration=valve_time(
+                share, offsets[chamber] if offsets else 0.0, minimum_gas_time, maximum_gas_time
+            ),
+        )
         for chamber, share in times
     )
     return tuple(valve for valve in valves if valve.duration > 0)

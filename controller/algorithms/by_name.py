@@ -56,6 +56,7 @@ def target_vector_of(scene: Scene) -> TargetVector:
         derivative_time=settings.derivative_time,
         minimum_gas_time=settings.minimum_gas_time,
         maximum_gas_time=settings.maximum_gas_time,
+        offsets=settings.offsets(scene.disc.chambers),
     )
 
 
@@ -95,4 +96,5 @@ def law_based_of(scene: Scene, model: BalancerModel) -> LawBased:
         probe=settings.period,
         minimum_gas_time=settings.minimum_gas_time,
         maximum_gas_time=settings.maximum_gas_time,
+        offsets=settings.offsets(scene.disc.chambers),
     )

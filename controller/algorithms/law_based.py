@@ -89,6 +89,8 @@ class LawBased:
     """s."""
     maximum_gas_time: float
     """s."""
+    offsets: tuple[float, ...] = ()
+    """Added to a valve's time, one for each chamber, s: what the law does not know; empty: none."""
 
     @property
     def rises_tolerated(self) -> int:
@@ -119,7 +121,10 @@ class LawBased:
             return seen, Command(resting=True)
         asked = self._gas_times(seen, _vector(measurement))
         valves = valve_commands(
-            asked, minimum_gas_time=self.minimum_gas_time, maximum_gas_time=self.maximum_gas_time
+            asked,
+            minimum_gas_time=self.minimum_gas_time,
+            maximum_gas_time=self.maximum_gas_time,
+            offsets=self.offsets,
         )
         reason = "" if valves else "the valve-open time is below the minimum"
         return replace(seen, valves=valves), Command(valves=valves, reason=reason)
@@ -143,7 +148,7 @@ class LawBased:
         return _LawBasedState(disc=disc, influence=influence, previous=now)
 
     def _advanced(self, state: _LawBasedState, interval: float) -> DiscState:
-        times = {valve.chamber: min(valve.duration, interval) for valve in state.valves}
+        times = {valve.chamber: min(self._acting(valve), interval) for valve in state.valves}
         disc, rest = state.disc, interval
         if times:
             disc = self.ring.advance(disc, gas_times=times, duration=max(times.values()), points=1).state
@@ -151,6 +156,11 @@ class LawBased:
         if rest > 0 and any(pair.primed for pair in disc.pairs):
             disc = self.ring.advance(disc, gas_times={}, duration=rest, points=1).state
         return disc
+
+    def _acting(self, valve: ValveCommand) -> float:
+        """Of a valve-open time, s, what moves liquid by the law."""
+        offset = self.offsets[valve.chamber] if self.offsets else 0.0
+        return max(valve.duration - offset, 0.0)
 
     def _noise(self, sample: Measurement) -> float:
         return self.amplitude_noise**2 + (sample.amplitude * self.phase_noise) ** 2

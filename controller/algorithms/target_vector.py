@@ -36,7 +36,8 @@ class TargetVector:
     chambers on either side, each by its component, with both valves open together.
 
     Limits: T is held within [0, maximum_gas_time], which keeps the vector's direction; while it is cut the
-    integral stands still (anti-windup).  A valve whose share is below minimum_gas_time does not open.
+    integral stands still (anti-windup).  A valve whose share is below minimum_gas_time does not open;
+    another stays open for its offset, too, in which gas fills the chamber and moves nothing.
     At or below `limit` the algorithm rests and forgets its integral.  A dropped sample or a NaN changes
     nothing: no valve opens, the state is held, and the next usable sample sees the whole interval.
 
@@ -64,6 +65,8 @@ class TargetVector:
     """s."""
     maximum_gas_time: float
     """s."""
+    offsets: tuple[float, ...] = ()
+    """Added to a valve's share, one for each chamber, s; empty: none."""
     on_reversal: OnReversal = "reset"
     """What becomes of the integral when the residual turns round."""
 
@@ -89,7 +92,10 @@ class TargetVector:
             length=min(max(wanted, 0.0), self.maximum_gas_time),
         )
         valves = valve_commands(
-            shares, minimum_gas_time=self.minimum_gas_time, maximum_gas_time=self.maximum_gas_time
+            shares,
+            minimum_gas_time=self.minimum_gas_time,
+            maximum_gas_time=self.maximum_gas_time,
+            offsets=self.offsets,
         )
         reason = "" if valves else "the valve-open time is below the minimum"
         return replace(state, integral=integral, previous=measurement), Command(valves=valves, reason=reason)

@@ -84,7 +84,7 @@ def _warnings(facts: RunFacts) -> list[tuple[bool, str]]:
         ),
         (
             facts.hold == HELD,
-            "the drives hold the masses at the end: friction is not known to do it",
+            "the drives still hold the masses at the end, as friction alone is not certain to",
         ),
         (
             facts.least_gap < gap,
@@ -120,7 +120,7 @@ def _not_settled(facts: RunFacts) -> str:
 
 def _settled(facts: RunFacts) -> str:
     return (
-        f"settled: not above {_limit(facts)} from {facts.settling_time:.4g} s on, {_end(facts)}; no further "
+        f"settled: within {_limit(facts)} from {facts.settling_time:.4g} s on, {_end(facts)}; no further "
         "correction needed"
     )
 

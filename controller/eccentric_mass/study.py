@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
@@ -20,16 +22,22 @@ from ringbalance.controller.eccentric_mass.sampled_loops import (
 )
 from ringbalance.controller.eccentric_mass.strategy.plan import STAGE_NAMES, Stage
 from ringbalance.controller.eccentric_mass.strategy.targets import target_angles
+from ringbalance.controller.eccentric_mass.uncertainty import Judged, effects, lost, moved_runs
 from ringbalance.controller.tuning.eccentric import eccentric_tuning_document
 from ringbalance.scene.eccentric_models import EccentricScene
 
 _AT_LEAST: Final = "at least"
 _AT_MOST: Final = "at most"
+_LIMIT: Final = "supervisor.limit"
+_ROUNDING: Final = 1e-12
+
+
+Interval = tuple[float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Requirement:
-    """What is asked of the balancer, beside what it comes to."""
+    """What is asked of the balancer and what it comes to; intervals are 95 %, from stated uncertainties."""
 
     quantity: str
     unit: str
@@ -37,16 +45,41 @@ class Requirement:
     sense: str
     """ "at least" or "at most"."""
     required: float
+    set_by: str
+    """Where the requirement comes from."""
     achieved: float | None
     """None: the run did not come to it."""
+    required_interval: Interval | None = None
+    achieved_interval: Interval | None = None
+    """None: no uncertainty is stated, or it does not move the number."""
+    effects: Mapping[str, Interval] = field(default_factory=dict)
+    """By how much each cause alone lowers and raises `excess`, by the input's path."""
+    lost: tuple[str, ...] = ()
+    """Causes with which a run does not come to it at all."""
+    least_excess: float = 0.0
+    """At the worst end of the interval, by which the requirement is more than met, less the excess itself."""
+    most_excess: float = 0.0
+
+    @property
+    def excess(self) -> float:
+        """By which the requirement is more than met; minus infinity where the run does not come to it."""
+        if self.achieved is None:
+            return -math.inf
+        more = self.achieved - self.required
+        return more if self.sense == _AT_LEAST else -more
 
     @property
     def met(self) -> bool:
-        """Whether it is."""
-        if self.achieved is None:
-            return False
-        more = self.achieved - self.required
-        return more >= 0 if self.sense == _AT_LEAST else more <= 0
+        """Whether it is, as the scene says."""
+        return self.excess >= 0
+
+    @property
+    def verdict(self) -> str:
+        """Whether it is wherever the inputs lie within their intervals: met, not met, cannot be told."""
+        if self.excess + self.most_excess < 0:
+            return "not met"
+        certain = self.excess + self.least_excess >= 0 and not self.lost
+        return "met" if certain else "cannot be told"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,15 +98,19 @@ class EccentricStudy:
 def eccentric_study(
     scene: EccentricScene, *, seed: int | None = None, progress: Progress | None = None
 ) -> EccentricStudy:
-    """Run a scene balanced and locked, and judge its loops and requirements; seed as in the run."""
+    """Run a scene balanced and locked, and judge its loops and requirements; seed as in the run.
+
+    A scene that states uncertainties is run again with each input at both ends of its interval.
+    """
     gains = recommended_gains(scene)
     run = simulate_eccentric(scene, seed=seed, progress=progress)
     locked = locked_run(scene, progress=progress)
-    requirements = tuple(_requirements(scene, run, gains))
+    moved = moved_runs(scene, _judged, seed=scene.run.seed if seed is None else seed)
+    requirements = (*(_with_intervals(row, moved) for row in _of_run(scene, run)), *_of_loops(gains))
     return EccentricStudy(scene=scene, run=run, locked=locked, gains=gains, requirements=requirements)
 
 
-def _requirements(scene: EccentricScene, run: EccentricRun, gains: RecommendedGains) -> Sequence[Requirement]:
+def _of_run(scene: EccentricScene, run: EccentricRun) -> Sequence[Requirement]:
     plant = plant_parameters(scene)
     gap = scene.masses.arc_length / scene.masses.guide_radius
     # Of an imbalance beyond all reach, what the masses side by side leave is what they lack.
@@ -81,25 +118,91 @@ def _requirements(scene: EccentricScene, run: EccentricRun, gains: RecommendedGa
     capacity = beyond - target_angles(beyond, 0.0, plant.moment, gap).residual
     deviation = float(np.sqrt(np.max(np.linalg.eigvalsh(run.estimates.imbalance_covariance[-1]))))
     estimate = float(np.hypot(*run.estimates.imbalance[-1]))
-    limit, margin = scene.supervisor.limit, "gain margin of the "
+    limit, gate = scene.supervisor.limit, scene.imbalance_filter.gate
+    until, why = _deadline(scene)
     return [
-        _row("balancing moment", "kg m", _AT_LEAST, plant.unbalance, capacity),
-        _row("amplitude at the end", "m", _AT_MOST, limit, run.final_amplitude),
-        _row("largest amplitude after balancing", "m", _AT_MOST, limit, _largest_balanced(run)),
-        _row("settling time", "s", _AT_MOST, scene.run.time_limit, run.settling_time),
+        _row("balancing moment", "kg m", _AT_LEAST, plant.unbalance, "the imbalance to cancel", capacity),
+        _row("amplitude at the end", "m", _AT_MOST, limit, _LIMIT, run.final_amplitude),
+        _row("largest amplitude after balancing", "m", _AT_MOST, limit, _LIMIT, _largest_balanced(run)),
+        _row("settling time", "s", _AT_MOST, until, why, run.settling_time),
         _row(
             "standard deviation of the imbalance",
             "kg m",
             _AT_MOST,
-            scene.imbalance_filter.gate * plant.unbalance,
+            gate * plant.unbalance,
+            f"imbalance_filter.gate, {100 * gate:g} % of the imbalance",
             deviation if estimate > 0 else None,
         ),
-        *(_row(margin + loop.name, "", _AT_LEAST, GAIN_MARGIN, loop.gain_margin) for loop in gains.loops),
     ]
 
 
-def _row(quantity: str, unit: str, sense: str, required: float, achieved: float | None) -> Requirement:
-    return Requirement(quantity=quantity, unit=unit, sense=sense, required=required, achieved=achieved)
+def _deadline(scene: EccentricScene) -> tuple[float, str]:
+    """Time by which the rotor must be balanced, s, and what sets it."""
+    profile, end = scene.rotor.speed_profile, scene.run.time_limit
+    changes = [here.time for here, after in pairwise(profile) if here.speed != after.speed]
+    if changes and 0 < changes[0] < end:
+        return changes[0], "the speed begins to change"
+    return end, "run.time_limit, the end of the run"
+
+
+def _of_loops(gains: RecommendedGains) -> Sequence[Requirement]:
+    why = "half the gain at which the loop is unstable"
+    return [
+        _row(f"gain margin of the {loop.name}", "", _AT_LEAST, GAIN_MARGIN, why, loop.gain_margin)
+        for loop in gains.loops
+    ]
+
+
+def _row(
+    quantity: str, unit: str, sense: str, required: float, set_by: str, achieved: float | None
+) -> Requirement:
+    return Requirement(
+        quantity=quantity, unit=unit, sense=sense, required=required, set_by=set_by, achieved=achieved
+    )
+
+
+def _judged(scene: EccentricScene, run: EccentricRun) -> Judged:
+    """Both sides of each row, and its excess, by the row's name and the side's."""
+    return {
+        f"{row.quantity}.{side}": value if row.achieved is not None or side == "required" else None
+        for row in _of_run(scene, run)
+        for side, value in (
+            ("achieved", row.achieved),
+            ("required", row.required),
+            ("excess", row.excess),
+        )
+    }
+
+
+def _with_intervals(row: Requirement, moved: Mapping[str, list[Judged]]) -> Requirement:
+    if not moved or row.achieved is None:
+        return row
+    achieved, required, excess = (
+        effects(value, moved, f"{row.quantity}.{side}")
+        for side, value in (("achieved", row.achieved), ("required", row.required), ("excess", row.excess))
+    )
+    worse, better = _together(excess)
+    return replace(
+        row,
+        required_interval=_interval(row.required, required),
+        achieved_interval=_interval(row.achieved, achieved),
+        effects=excess,
+        lost=lost(moved, f"{row.quantity}.achieved"),
+        least_excess=-worse,
+        most_excess=better,
+    )
+
+
+def _together(changes: Mapping[str, Interval]) -> Interval:
+    """Of independent causes: roots of the sums of squares."""
+    return math.hypot(*(down for down, _ in changes.values())), math.hypot(
+        *(up for _, up in changes.values())
+    )
+
+
+def _interval(value: float, changes: Mapping[str, Interval]) -> Interval | None:
+    down, up = _together(changes)
+    return (max(value - down, 0.0), value + up) if max(down, up) > _ROUNDING * abs(value) else None
 
 
 def _largest_balanced(run: EccentricRun) -> float | None:
@@ -116,5 +219,7 @@ def study_document(study: EccentricStudy) -> dict[str, Any]:
         "run": eccentric_document(study.run),
         "locked": eccentric_document(study.locked),
         "tuning": eccentric_tuning_document(study.scene, study.gains),
-        "requirements": [{**asdict(row), "met": row.met} for row in study.requirements],
+        "requirements": [
+            {**asdict(row), "met": row.met, "verdict": row.verdict} for row in study.requirements
+        ],
     }

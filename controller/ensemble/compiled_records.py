@@ -79,6 +79,7 @@ SHARED: Final = np.dtype(
         ("node", np.float64, (PATH_NODES, 4)),  # time, x, leaving and arriving dx/dt
         ("moment", np.float64, (MOMENT_NODES, 2)),  # of a pair: value, and slope per step
         ("axis", np.float64, (MAX_CHAMBERS // 2, 2)),  # directions of the pairs
+        ("offset", np.float64, (MAX_CHAMBERS,)),  # added to a valve's share, s
     ]
 )
 """What all members of an ensemble share."""

@@ -294,7 +294,8 @@ def _permitted(
     if found == duration:
         return duration
     run.shortened += 1
-    return found if found >= shared.minimum_gas_time else 0.0
+    least = shared.minimum_gas_time + shared.offset[pair + (0 if first else shared.chambers // 2)]
+    return found if found >= least else 0.0
 
 
 @compiled
@@ -349,7 +350,7 @@ def _decide(shared: Record, run: Record) -> None:
 @compiled
 def _open(shared: Record, run: Record, chamber: int, share: float) -> None:
     """Open the next valve, unless its share is below the minimum."""
-    time = _valve_time(share, shared.minimum_gas_time, shared.maximum_gas_time)
+    time = _valve_time(share, shared.offset[chamber], shared.minimum_gas_time, shared.maximum_gas_time)
     if time == 0.0:
         return
     half, left = shared.chambers // 2, shared.time_limit - run.time

@@ -105,6 +105,7 @@ def ensemble_plan(*, scene: Scene, model: BalancerModel, transfer: PairTransfer)
     for name, value in (_loop(scene) | _controller(scene)).items():
         shared[name] = value
     loop = loop_factor(scene, model, target_vector_of(scene))
+    shared["offset"][0, :chambers] = scene.controller.offsets(chambers)
     shared["residual_fill"] = residual_fill_ratio(scene, law=model.flow)
     return EnsemblePlan(shared=shared, plant=transfer.plant, loop=loop, rotor=scene.rotor)
 

@@ -57,6 +57,8 @@ def vector_shares(chambers: int, angle: float, length: float) -> tuple[int, floa
     )
 
 
-def valve_time(share: float, minimum_gas_time: float, maximum_gas_time: float) -> float:
-    """Time for which a valve opens: none below the minimum, no longer than the maximum, s."""
-    return min(share, maximum_gas_time) if share > 0.0 and share >= minimum_gas_time else 0.0
+def valve_time(share: float, offset: float, minimum_gas_time: float, maximum_gas_time: float) -> float:
+    """Time for which a valve opens, s: the share and its offset, at most the maximum; none for a share below
+    the minimum.
+    """
+    return min(share + offset, maximum_gas_time) if share > 0.0 and share >= minimum_gas_time else 0.0

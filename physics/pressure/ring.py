@@ -1,4 +1,4 @@
-"""What the liquid ring in one chamber does to its disc: volume, wall pressure, moment and wall forces.
+"""What the liquid ring in one chamber does to its disc: volume, wall pressure, moment and force.
 
 Every number comes from finite elements on three meshes or more and carries the half-width that the grid
 convergence of exactly this number gives it.  With gravity across the shaft each number is the mean over a
@@ -18,10 +18,7 @@ from ringbalance.mesh.geometry import half_angle, surface_radius
 from ringbalance.physics.convergence.grid import GridConvergence, gci
 from ringbalance.physics.pressure.ring_bounds import Case, rounding_bound, stated_widths
 from ringbalance.physics.pressure.ring_samples import (
-    COLUMNS,
-    SCALARS,
-    WALLS,
-    WIDTH,
+    QUANTITIES,
     Sample,
     Turn,
     empty_sample,
@@ -34,8 +31,6 @@ from ringbalance.scene.models import Disc, Shaft
 
 FORMAL_ORDER = 4.0
 """Of integrals on quadratic geometry: twice the order of the elements, and that of an arc's drawing."""
-PLATE_ORDER = 3.0
-"""Of what a plate alone feels: its edge on the free surface, where the conditions change, costs one order."""
 
 _SHALLOWEST = 1e-10
 """Depth over outer radius at which coordinates still resolve the nodes of a film."""
@@ -62,20 +57,14 @@ class RingQuantities:
     """U = rho times the integral of x over the liquid, kg m, shape (n,)."""
     moment_per_volume: Estimate
     """dU/dV' as liquid is added, kg/m^2, shape (n,)."""
-    wall_force: Mapping[str, Estimate]
-    """Force of the liquid on each wall, N, shape (n, 3)."""
     resultant_force: Estimate
-    """Sum over the walls, N, shape (n, 3)."""
-    wall_torque: Mapping[str, Estimate]
-    """Torque of the liquid on each wall about the shaft, with the rotation, N m, shape (n,)."""
-    resultant_torque: Estimate
-    """Sum over the walls, N m, shape (n,)."""
+    """Force of the liquid on all walls along x, N, shape (n,)."""
     ripple: Mapping[str, FloatArray]
     """First harmonic over a turn of "wall_pressure" (Pa) and "moment" (kg m), zero-to-peak, shape (n,)."""
     convergence: Mapping[str, tuple[GridConvergence, ...]]
-    """Judgement on each scalar quantity by its name, one per fill ratio."""
+    """Judgement on each quantity by its name, one per fill ratio."""
     mesh_values: Mapping[str, FloatArray]
-    """Each scalar quantity on every mesh, finest first, shape (meshes, n)."""
+    """Each quantity on every mesh, finest first, shape (meshes, n)."""
     cells: tuple[tuple[int, ...], ...]
     """Cells of the meshes, finest first."""
     closed: BoolArray
@@ -84,14 +73,6 @@ class RingQuantities:
     """Whether there are values at all, shape (n,); where not, zeros stand for them, which are no result."""
     status: Status
     statistics: Statistics
-
-    @property
-    def observed_order(self) -> Mapping[str, FloatArray]:
-        """Observed order of each scalar quantity, shape (n,); zero where round-off hides it."""
-        return {
-            name: np.array([record.observed_order for record in records])
-            for name, records in self.convergence.items()
-        }
 
 
 def ring_quantities(
@@ -110,7 +91,7 @@ def ring_quantities(
 
     laplace(p) = 2 rho omega^2, n.grad p = rho (omega^2 r e_r + g).n on walls, p = 0 on the free surface; then
     volume, mean p on the outer wall, U = int rho x, dU/dV' = rho int x/|n.grad p| / int 1/|n.grad p|, and
-    the forces int p n.
+    the force int p n.
     Args:
         fill_ratio: x, any shape, flattened to (n,), within [0, 1]; an empty chamber is exact.
         gravity: g, m/s^2; zero leaves it out.
@@ -136,10 +117,7 @@ def ring_quantities(
     meshes = _meshes(disc, cells, dimension or (3 if axial else 2))
     if axial and len(meshes[0]) == 2:
         raise ValueError("gravity along the shaft needs dimension 3")
-    liquid = RotatingLiquid(
-        density=density,
-        angular_velocity=angular_velocity,
-    )
+    liquid = RotatingLiquid(density=density, angular_velocity=angular_velocity)
     turn = Turn(gravity=gravity, shaft=shaft, samples=_turn_samples(disc, liquid, gravity, turn_samples))
     case = Case(disc=disc, liquid=liquid, fills=fills, meshes=meshes, turn=turn)
     return _collect(case, [_on_meshes(case, float(x), turn) for x in fills])
@@ -222,21 +200,17 @@ def _collect(case: Case, samples: Sequence[tuple[Sample, ...]]) -> RingQuantitie
     widths = np.array([[record.uncertainty for record in row] for row in records])
     widths = stated_widths(case=case, samples=kept, widths=widths, closed=closed)
     status = _status(case, failed) if all(s.ok for s in missing) else _status(case, missing, solved=False)
-    parts = {
-        name: Estimate(value=_part(values[:, 0], name), uncertainty=_part(widths, name), status=status)
-        for name in COLUMNS
+    estimates = {
+        name: Estimate(value=values[:, 0, k].copy(), uncertainty=widths[:, k].copy(), status=status)
+        for k, name in enumerate(QUANTITIES)
     }
     return RingQuantities(
         fill_ratio=case.fills,
         surface_radius=surface_radius(disc=case.disc, fill_ratio=case.fills),
-        **{name: parts[name] for name in SCALARS},
-        wall_force={name: parts[f"force {name}"] for name in WALLS},
-        resultant_force=parts["force resultant"],
-        wall_torque={name: parts[f"torque {name}"] for name in WALLS},
-        resultant_torque=parts["torque resultant"],
+        **estimates,
         ripple=_ripple(kept),
-        convergence={name: tuple(row[k] for row in records) for k, name in enumerate(SCALARS)},
-        mesh_values={name: values[:, :, k].T.copy() for k, name in enumerate(SCALARS)},
+        convergence={name: tuple(row[k] for row in records) for k, name in enumerate(QUANTITIES)},
+        mesh_values={name: values[:, :, k].T.copy() for k, name in enumerate(QUANTITIES)},
         cells=case.meshes,
         closed=closed,
         solved=np.array([status.ok for status in missing]),
@@ -259,32 +233,16 @@ def _statistics(samples: Sequence[tuple[Sample, ...]]) -> Statistics:
     )
 
 
-def _part(table: FloatArray, name: str) -> FloatArray:
-    columns = table[:, COLUMNS[name]]
-    return np.array(columns if columns.shape[1] > 1 else columns[:, 0])
-
-
 def _judge(
     case: Case, samples: Sequence[tuple[Sample, ...]], values: FloatArray
 ) -> list[list[GridConvergence]]:
     sizes = [float(np.prod(cells)) ** (-1 / len(cells)) for cells in case.meshes]
-    orders = np.full(WIDTH, FORMAL_ORDER)
-    for name, columns in COLUMNS.items():
-        if "plate" in name:
-            orders[columns] = PLATE_ORDER
     rows = []
     for x, levels, found in zip(case.fills, samples, values, strict=True):
         noise = rounding_bound(case=case, fill_ratio=float(x), samples=levels)
+        row = zip(found.T, noise, strict=True)
         rows.append(
-            [
-                gci(
-                    values=found[:, k],
-                    sizes=sizes,
-                    formal_order=float(orders[k]),
-                    round_off=float(noise[k]),
-                )
-                for k in range(WIDTH)
-            ]
+            [gci(values=v, sizes=sizes, formal_order=FORMAL_ORDER, round_off=float(n)) for v, n in row]
         )
     return rows
 

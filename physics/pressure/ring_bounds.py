@@ -10,7 +10,7 @@ import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, half_angle, surface_radius
 from ringbalance.physics.pressure.hydrostatics import displaced_by_gravity, hydrostatic_pressure
-from ringbalance.physics.pressure.ring_samples import COLUMNS, WIDTH, Sample, Turn
+from ringbalance.physics.pressure.ring_samples import QUANTITIES, WIDTH, Sample, Turn
 from ringbalance.physics.pressure.solve import RotatingLiquid
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Disc
@@ -38,7 +38,7 @@ def rounding_bound(*, case: Case, fill_ratio: float, samples: Sequence[Sample]) 
     eps [4 R2/depth + 0.2 max(nodes along the depth, depth over the nodes' distance along the arc)^2], plus
     the rounding of a found surface, times the natural size of the column.
     Args: `case`: disc, liquid and meshes. `fill_ratio`: x. `samples`: on the meshes.
-    Returns: Bound in the unit of each column, shape (28,); zero for an empty chamber, which is exact.
+    Returns: Bound in the unit of each column, shape (5,); zero for an empty chamber, which is exact.
     Source: coordinates of a film cancel, and narrow cells make the matrix stiff; the factors are five to ten
     times what was seen against closed forms between 1 and 180 degrees and depths down to 10 nm.
     """
@@ -56,7 +56,7 @@ def rounding_bound(*, case: Case, fill_ratio: float, samples: Sequence[Sample]) 
 def _natural_size(*, case: Case, fill_ratio: float) -> FloatArray:
     """Size that every column of `Sample.values` would have without symmetry.
 
-    Returns: Sizes in the unit of each column, shape (28,).
+    Returns: Sizes in the unit of each column, shape (5,).
     """
     disc, density = case.disc, case.liquid.density
     a, outer = float(surface_radius(disc=disc, fill_ratio=fill_ratio)), disc.outer_radius
@@ -64,34 +64,25 @@ def _natural_size(*, case: Case, fill_ratio: float) -> FloatArray:
     pressure = hydrostatic_pressure(
         density=density, angular_velocity=case.liquid.angular_velocity, inner=a, outer=outer
     )
-    return _columns(
-        disc,
-        volume=volume,
-        pressure=pressure,
-        moment=density * volume * outer,
-        moment_per_volume=density * outer,
-    )
+    moment = density * volume * outer
+    return _columns(disc, volume=volume, pressure=pressure, moment=moment, moment_per_volume=density * outer)
 
 
 def stated_widths(
-    *,
-    case: Case,
-    samples: Sequence[tuple[Sample, ...]],
-    widths: FloatArray,
-    closed: BoolArray,
+    *, case: Case, samples: Sequence[tuple[Sample, ...]], widths: FloatArray, closed: BoolArray
 ) -> FloatArray:
     """Half-widths of grid convergence, corrected where it does not cover the whole.
 
     Args: `case`: what was asked for. `samples`: that the values come from, by fill ratio and mesh. `widths`:
-        of grid convergence, shape (n, 28). `closed`: whether gravity leaves a closed ring, shape (n,).
-    Returns: Half-widths, shape (n, 28): zero for an empty chamber but for where its first drop goes; wider by
+        of grid convergence, shape (n, 5). `closed`: whether gravity leaves a closed ring, shape (n,).
+    Returns: Half-widths, shape (n, 5): zero for an empty chamber but for where its first drop goes; wider by
         all that gravity could do where it breaks the ring; the whole natural size where a solve failed.
     """
     stated = widths.copy()
     for k, x in enumerate(case.fills):
         displaced = _displaced(case, float(x))
         if x == 0:
-            first_drop = COLUMNS["moment_per_volume"]
+            first_drop = QUANTITIES.index("moment_per_volume")
             stated[k] = 0.0
             stated[k, first_drop] = displaced[first_drop]
         elif not all(sample.status.ok for sample in samples[k]):
@@ -106,26 +97,15 @@ def _displaced(case: Case, x: float) -> FloatArray:
         return np.zeros(WIDTH)
     pressure, moment, moment_per_volume = displaced_by_gravity(
         disc=case.disc, density=case.liquid.density, gravity=case.turn.gravity, fill_ratio=np.array([x])
-    )[:, 0]
+    )[:, 0].tolist()
     return _columns(
-        case.disc,
-        volume=0.0,
-        pressure=float(pressure),
-        moment=float(moment),
-        moment_per_volume=float(moment_per_volume),
+        case.disc, volume=0.0, pressure=pressure, moment=moment, moment_per_volume=moment_per_volume
     )
 
 
 def _columns(
     disc: Disc, *, volume: float, pressure: float, moment: float, moment_per_volume: float
 ) -> FloatArray:
-    """The scalars in their columns; forces as the pressure on the largest wall, torques at the outer
-
-    radius.
-    """
+    """These in their columns, and as force the pressure on the largest wall."""
     force = pressure * disc.central_angle * disc.outer_radius * (disc.axial_width + disc.outer_radius)
-    sizes = np.empty(WIDTH)
-    for name, columns in COLUMNS.items():
-        sizes[columns] = force if name.startswith("force") else force * disc.outer_radius
-    sizes[:4] = volume, pressure, moment, moment_per_volume
-    return sizes
+    return np.array([volume, pressure, moment, moment_per_volume, force])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,15 +15,9 @@ from ringbalance.physics.results import Status
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Shaft
 
-WALLS = ("outer_wall", "plate_left", "plate_right", "end_front", "end_back")
-SCALARS = ("liquid_volume", "wall_pressure", "moment", "moment_per_volume")
-COLUMNS: Mapping[str, slice] = {
-    **{name: slice(k, k + 1) for k, name in enumerate(SCALARS)},
-    **{f"force {name}": slice(4 + 3 * k, 7 + 3 * k) for k, name in enumerate((*WALLS, "resultant"))},
-    **{f"torque {name}": slice(22 + k, 23 + k) for k, name in enumerate((*WALLS, "resultant"))},
-}
-"""Where each quantity stands in `Sample.values`."""
-WIDTH = 28
+QUANTITIES = ("liquid_volume", "wall_pressure", "moment", "moment_per_volume", "resultant_force")
+"""In the order of `Sample.values`."""
+WIDTH = len(QUANTITIES)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +36,7 @@ class Sample:
     """Means over a turn on one mesh."""
 
     values: FloatArray
-    """In the order of `COLUMNS`, SI totals, shape (28,)."""
+    """In the order of `QUANTITIES`, SI totals, shape (5,)."""
     ripple: FloatArray
     """First harmonic of wall pressure (Pa) and moment (kg m), zero-to-peak, shape (2,)."""
     surfaces: tuple[FloatArray, ...]
@@ -87,7 +80,7 @@ def turn_mean(
     totals = (
         liquid_integrals(solution=s, density=liquid.density, axial_width=disc.axial_width) for s in solutions
     )
-    rows = np.array([_both_sides(total) for total in totals])
+    rows = np.array([_row(total) for total in totals])
     ripple = 2 * (weights * np.cos(angles)) @ rows[:, 1:3] if len(angles) > 1 else np.zeros(2)
     return Sample(
         values=weights @ rows,
@@ -107,7 +100,7 @@ def empty_sample(*, moment_per_volume: float) -> Sample:
     Args: `moment_per_volume`: limit of dU/dV', kg/m^2.
     """
     values = np.zeros(WIDTH)
-    values[COLUMNS["moment_per_volume"]] = moment_per_volume
+    values[QUANTITIES.index("moment_per_volume")] = moment_per_volume
     return replace(_failed(Status()), values=values)
 
 
@@ -142,27 +135,15 @@ def _solve(
     return solve_pressure(chamber=chamber, problem=liquid.problem())
 
 
-def _both_sides(totals: LiquidIntegrals) -> FloatArray:
-    """Mean of a state and its mirror image, which gravity at the opposite angle makes."""
-    return np.asarray((_row(totals) + _row(_mirrored(totals))) / 2)
-
-
-def _mirrored(totals: LiquidIntegrals) -> LiquidIntegrals:
-    other = {"plate_left": "plate_right", "plate_right": "plate_left"}
-    flip = np.array([1.0, -1.0, 1.0])
-    return replace(
-        totals,
-        first_moment=totals.first_moment * flip,
-        force={name: totals.force[other.get(name, name)] * flip for name in WALLS},
-        torque={name: -totals.torque[other.get(name, name)] for name in WALLS},
-    )
-
-
-def _row(totals: LiquidIntegrals) -> FloatArray:
-    forces = np.array([totals.force[name] for name in WALLS])
-    torques = np.array([totals.torque[name] for name in WALLS])
-    scalars = [totals.volume, totals.wall_pressure, totals.first_moment[0], totals.moment_per_volume]
-    return np.concatenate([scalars, forces.ravel(), forces.sum(axis=0), torques, [torques.sum()]])
+def _row(totals: LiquidIntegrals) -> list[float]:
+    """None of these changes in the mirror image, which gravity at the opposite angle makes."""
+    return [
+        totals.volume,
+        totals.wall_pressure,
+        float(totals.first_moment[0]),
+        totals.moment_per_volume,
+        sum(float(force[0]) for force in totals.force.values()),
+    ]
 
 
 def _failed(status: Status) -> Sample:

@@ -17,6 +17,8 @@ LAMINAR_ENTRY_LENGTH: Final = 0.056
 """Entry length of laminar flow in diameters per Re."""
 ROTATING_PROFILE_UNCERTAINTY: Final = 0.15
 """Expanded uncertainty (95 %) of the kinetic-energy factor of laminar flow in rotation."""
+TURBULENT_KINETIC_FACTOR: Final = 1.06
+"""alpha of the 1/7-power profile."""
 _CREEPING: Final = 6 * np.pi
 _OTHER_ENTRANCE: Final = 0.15
 """Spread of the laminar loss of an entrance that is not sharp: published excesses run from 0.2 to 0.33."""
@@ -37,7 +39,7 @@ def kinetic_factor(
     """
     turned = turbulent_share(reynolds=reynolds, critical_ratio=critical_ratio)
     laminar = 1.2 + 0.8 * np.asarray(friction_ratio, dtype=np.float64) ** -1.5
-    return np.asarray((1 - turned) * laminar + 1.06 * turned, dtype=np.float64)
+    return np.asarray((1 - turned) * laminar + TURBULENT_KINETIC_FACTOR * turned, dtype=np.float64)
 
 
 def turbulent_entrance_loss(*, tube: Tube) -> tuple[float, float]:

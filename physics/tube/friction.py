@@ -55,10 +55,10 @@ def friction_uncertainty(
 ) -> FloatArray:
     """Expanded uncertainty (95 %) of f by the friction correlation itself.
 
-    The root of the sum of squares of: 1 % (laminar) to 4.5 % (turbulent) of f; around the critical Re the gap
-    between the two branches, since flow may stay laminar or turn early; on a rough wall, while its grains lie
-    near the viscous layer (eps+ below about 35), the gap to a smooth wall, because sand-like walls still act
-    smooth there.
+    The root of the sum of squares of: 1 % (laminar) to 4.5 % (turbulent) of f; around the critical Re how far
+    the turbulent branch lies above the laminar one, since flow may stay laminar or turn early; on a rough
+    wall, while its grains lie near the viscous layer (eps+ below about 35), the gap to a smooth wall, because
+    sand-like walls still act smooth there.
     Args: `relative_roughness`: eps/d.
     Range: as for `friction_factor`.
     Source: spread against McKeon et al., J. Fluid Mech. 511 (2004) 41, and Nikuradse, VDI Forschungsheft 361
@@ -88,7 +88,9 @@ def _branch_gap(
     # The turbulent branch without its onset term; below Re = 1000 its logarithm changes sign.
     bounded = np.clip(re, 1000.0, 1e12)
     turbulent = 8 * np.asarray(turbulent_ratio) * _log_power(bounded, relative_roughness) ** -0.125
-    return np.asarray(np.abs(64 * np.asarray(laminar_ratio) / re - turbulent), dtype=np.float64)
+    # Where rotation has raised the laminar branch above the turbulent one there is no jump to be early or
+    # late for: friction follows the laminar branch, as measured in rotating ducts.
+    return np.maximum(turbulent - 64 * np.asarray(laminar_ratio, dtype=np.float64) / re, 0.0)
 
 
 def turbulent_share(

@@ -13,12 +13,14 @@ from ringbalance.physics.tube.development import developing_length, development_
 from ringbalance.physics.tube.ends import entrance_loss, exit_loss
 from ringbalance.physics.tube.friction import friction_factor, friction_uncertainty, turbulent_share
 from ringbalance.physics.tube.rotation import rotating_friction_ratio, turbulent_friction_ratio
-from ringbalance.physics.tube.state import TubeState, tube_state
+from ringbalance.physics.tube.state import TubeState, finest_state, tube_state
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import InputUncertainty, Liquid, Tube
 
 ASSUMED_ROUGHNESS_UNCERTAINTY: Final = 0.5
 """Relative expanded uncertainty (95 %) of a roughness for which the scene states none."""
+SIMPLER: Final = "left out"
+"""Part by what models simpler than the finest neglect."""
 INPUT_PART: Final = "input: "
 """What the names of parts by inputs begin with."""
 TUBE_INPUTS: Final = ("bore", "length", "roughness", "extra_loss", "drag_coefficient")
@@ -40,22 +42,24 @@ def uncertainty_parts(
     Returns: Half-width of k by cause, each the shape of `velocity`; parts that vanish everywhere are kept.
     Source: ASME V&V 20-2009, input uncertainty by sensitivity; model spreads stand with the correlations.
     """
-    model = {} if tube.drag_coefficient is not None else model_parts(tube=tube, state=state)
 
     def k_of(t: Tube, q: Liquid, w: float) -> FloatArray:
         return tube_state(tube=t, liquid=q, angular_velocity=w, velocity=velocity).k
 
-    return model | input_parts(
+    return model_parts(tube=tube, state=state) | input_parts(
         tube=tube, liquid=liquid, angular_velocity=angular_velocity, inputs=inputs, k_of=k_of, k=state.k
     )
 
 
 def model_parts(*, tube: Tube, state: TubeState) -> dict[str, FloatArray]:
-    """Expanded uncertainties (95 %) of k by the correlations and tables themselves.
+    """Expanded uncertainties (95 %) of k by the correlations and tables themselves, and by simpler models.
 
-    Returns: Half-width of k by cause, each the shape of the state's arrays.
-    Source: the spreads stand with the correlations.
+    Returns: Half-width of k by cause, each the shape of the state's arrays; none of a prescribed k.
+    Source: the spreads stand with the correlations; a simpler model is off by what it differs by.
     """
+    if tube.drag_coefficient is not None:
+        return {}
+    chosen, state = state, finest_state(tube=tube, state=state)
     re, rough, ratio = state.reynolds, tube.roughness / tube.bore, state.critical_ratio
     straight = straight_length(tube=tube) / tube.bore
     lam = rotating_friction_ratio(reynolds=re, rotation_reynolds=state.rotation_reynolds)
@@ -78,13 +82,14 @@ def model_parts(*, tube: Tube, state: TubeState) -> dict[str, FloatArray]:
         entrance_loss(tube=tube, reynolds=re, critical_ratio=ratio)[1],
         exit_loss(tube=tube, reynolds=re, critical_ratio=ratio, friction_ratio=lam.value)[1],
     )
-    return {
+    parts = {
         "friction correlation": straight * friction,
         "rotation model": tube.length / tube.bore * (higher - state.rotating_friction),
         "rotation entry": _development_part(tube, state, lam.value),
         "ends": np.sqrt(sum(e**2 for e in ends)),
         "bends": state.bend_half_width,
     }
+    return parts if chosen is state else parts | {SIMPLER: np.abs(state.k - chosen.k)}
 
 
 def _development_part(tube: Tube, state: TubeState, friction_ratio: FloatArray) -> FloatArray:

@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.mesh.geometry import chamber_volume
+from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.reduced_model.chamber.range import (
     chamber_fills,
     mean_gravity,
@@ -31,14 +31,19 @@ from ringbalance.reduced_model.chamber.terms import (
 )
 from ringbalance.reduced_model.chamber.values import by_closed_form
 from ringbalance.reduced_model.gas_line import LineEnd, line_ends
+from ringbalance.reduced_model.selection.loss_models import CONSTANT_MODELS
 from ringbalance.reduced_model.selection.tube_terms import (
     HUMP,
-    LOSS,
-    ROTATION,
+    PART_TERMS,
+    SHARES,
     RangeFlow,
     flow_contributions,
     flow_estimate,
+    loss_effect,
     range_flow,
+    range_velocities,
+    steady,
+    without,
 )
 from ringbalance.reduced_model.time_scales import (
     deciding_gas_time,
@@ -46,8 +51,10 @@ from ringbalance.reduced_model.time_scales import (
     start_up_loss,
     start_up_time,
 )
+from ringbalance.reduced_model.tube.path import crest_span, share_at_radius
 from ringbalance.scene.accuracy import FINEST
 from ringbalance.scene.models import Scene
+from ringbalance.scene.tube_models import TubeModels
 
 GRAVITY: Final = "gravity, mean over a turn"
 RIPPLE_AND_SLOSHING: Final = "gravity ripple at 1x and sloshing"
@@ -114,22 +121,12 @@ def percent(fraction: float) -> str:
 @lru_cache(maxsize=8)
 def term_estimates(scene: Scene) -> Mapping[str, TermEstimate]:
     """Estimates of all terms of a scene, by term."""
-    return MappingProxyType({**_steady(_without_loop(scene)), **injection_estimates(scene)})
+    return MappingProxyType({**_steady(steady(scene)), **injection_estimates(scene)})
 
 
 @lru_cache(maxsize=8)
 def _steady(scene: Scene) -> Mapping[str, TermEstimate]:
     return {**_chamber(scene), **_tube(scene)}
-
-
-def _without_loop(scene: Scene) -> Scene:
-    """The scene with fixed values of what tunes a loop or draws its runs: no steady flow depends on them."""
-    return replace(
-        scene,
-        rotor=replace(scene.rotor, influence_coefficient=1.0, lag_angle=0.0),
-        controller=replace(scene.controller, proportional=1.0),
-        run=replace(scene.run, seed=0, time_limit=1.0),
-    )
 
 
 def _by_term(scene: Scene, *rows: Row) -> dict[str, TermEstimate]:
@@ -183,21 +180,30 @@ def _sloshing_formula(scene: Scene, fills: np.ndarray) -> str:
 
 
 def _tube(scene: Scene) -> dict[str, TermEstimate]:
-    found, blocked = flow_contributions(scene), not np.any(range_flow(scene).velocity > 0)
-    rotation, reason = found[ROTATION].value, found[ROTATION].formula
-    if scene.tube.drag_coefficient is not None or blocked:
-        rotation, reason = None, "nothing flows" if blocked else "the scene prescribes k"
-    straight = scene.tube.hump_radius is None
+    crest = None if scene.tube.hump_radius is None else flow_contributions(scene)[HUMP]
     return _by_term(
         scene,
         (
             CREST,
-            None if straight else found[HUMP].value,
-            "the scene gives no hump_radius" if straight else found[HUMP].formula,
+            None if crest is None else crest.value,
+            "the scene gives no hump_radius" if crest is None else crest.formula,
             None,
         ),
-        (TUBE_LOSS, None if blocked else found[LOSS].value, found[LOSS].formula, None),
-        (ROTATION, rotation, reason, None),
+        _loss(scene, TUBE_LOSS, CONSTANT_MODELS),
+        *(_loss(scene, term, without(part)) for term, part in PART_TERMS.items()),
+    )
+
+
+def _loss(scene: Scene, term: str, models: TubeModels) -> Row:
+    u = range_velocities(scene)
+    if scene.tube.drag_coefficient is not None or not u.size:
+        return term, None, "nothing flows" if not u.size else "the scene prescribes k", None
+    simpler = "k = 50" if models.constant else "leaving it out"
+    return (
+        term,
+        loss_effect(scene, models).k,
+        f"{simpler} changes k, or the head up to the siphon crest, over {u[0]:.2g} to {u[-1]:.2g} m/s",
+        None,
     )
 
 
@@ -208,25 +214,15 @@ def injection_estimates(scene: Scene) -> Mapping[str, TermEstimate]:
         that the deciding injection moves, at most 1.
     Source: `time_scales`.
     """
-    flow, deciding = range_flow(_without_loop(scene)), injection_time(scene)
+    flow, deciding = range_flow(steady(scene)), injection_time(scene)
     within = f"in the shortest injection that matters, {1e3 * deciding:.3g} ms"
-    slowest = float(np.min(flow.velocity[flow.starts], initial=np.inf))
-    held = None if not np.isfinite(slowest) else min(scene.tube.length / max(slowest * deciding, 1e-300), 1.0)
     slow, fast = line_ends(scene)[0], line_ends(scene)[-1]
-    moment = arc_moment(scene)
     found = _by_term(
         scene,
         _inertia(scene, flow, deciding, within),
         _gas_filling(scene, slow, fast, deciding, within),
         _lag(slow, fast, deciding, within),
-        (
-            HELD,
-            held,
-            f"at most S L over the liquid moved {within}, at the worst fill, L/(u T); a full tube along half "
-            f"a turn has a moment of 2 rho S (L/pi)^2 = {1e6 * moment:.2g} g mm, "
-            f"{1e6 * moment * scene.rotor.influence_coefficient:.2g} um of vibration",
-            None,
-        ),
+        _held(scene, flow, deciding, within),
     )
     times = {FILLING: (_slower(scene, fast), _slower(scene, slow)), LAG: (fast.valve_lag, slow.valve_lag)}
     given = {FILLING: scene.gas.conductance, LAG: scene.gas.valve_lag}
@@ -243,13 +239,21 @@ def injection_estimates(scene: Scene) -> Mapping[str, TermEstimate]:
     }
 
 
-def arc_moment(scene: Scene) -> float:
-    """First moment of a full tube that follows an arc of half a turn, 2 rho S (L/pi)^2, kg m.
-
-    Source: int r sin(q) r dq over half a turn, with pi r = L; legs along a radius make it smaller.
-    """
-    area = np.pi / 4 * scene.tube.bore**2
-    return float(2 * scene.liquid.density * area * (scene.tube.length / np.pi) ** 2)
+def _held(scene: Scene, flow: RangeFlow, deciding: float, within: str) -> Row:
+    """What is lifted to the crest and falls back, as in `tube_liquid`, at the lowest level of the range."""
+    tube, slowest = scene.tube, float(np.min(flow.velocity[flow.starts], initial=np.inf))
+    if tube.hump_radius is None:
+        return HELD, 0.0, "a tube without a crest stays full", None
+    if not np.isfinite(slowest):
+        return HELD, None, "nothing flows", None
+    level = float(surface_radius(disc=scene.disc, fill_ratio=SHARES[0] * scene.disc.max_fill_ratio))
+    near = share_at_radius(tube=tube, radius=level, far_leg=False)
+    length = tube.length * (crest_span(tube)[1] - near)
+    formula = (
+        f"at most what fills {1e3 * length:.3g} mm of tube, from the level to the crest's end, falls back "
+        f"after venting, over the liquid moved {within}, at the worst fill"
+    )
+    return HELD, min(length / max(slowest * deciding, 1e-300), 1.0), formula, None
 
 
 def _chamber_gas(scene: Scene) -> float:
@@ -277,7 +281,7 @@ def injection_time(scene: Scene) -> float:
     """
     equal = by_closed_form(scene, scene.disc.max_fill_ratio / 2)
     area = np.pi / 4 * scene.tube.bore**2
-    flow = scene.liquid.density * area * flow_estimate(_without_loop(scene)).velocity
+    flow = scene.liquid.density * area * flow_estimate(steady(scene)).velocity
     return deciding_gas_time(scene, rate=scene.rotor.influence_coefficient * equal.moment_per_mass * flow)
 
 

@@ -7,7 +7,7 @@ new term is entered in `TERMS`, its estimate in `estimates`; its model lives wit
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Final, Literal
 
@@ -32,11 +32,20 @@ from ringbalance.reduced_model.selection.estimates import (
     percent,
     term_estimates,
 )
-from ringbalance.reduced_model.selection.tube_terms import ROTATION
+from ringbalance.reduced_model.selection.tube_terms import (
+    BENDS,
+    ENDS,
+    PART_TERMS,
+    ROTATION,
+    ROUGHNESS,
+    loss_effect,
+    steady,
+    tube_models,
+)
 from ringbalance.scene.models import Scene
+from ringbalance.scene.tube_models import CORRELATION, FINEST, FINEST_MODELS, LEFT_OUT
 
 Part = Literal["chamber", "tube", "injection"]
-LEFT_OUT: Final = "left out"
 NOT_MODELLED: Final = "not modelled in this version"
 CALIBRATED: Final = "calibrated"
 """Name of the law that is made of the models selected here."""
@@ -204,13 +213,22 @@ def _crest(term: Term, scene: Scene, _: TermEstimate) -> Selection:
 
 
 def _tube_loss(term: Term, scene: Scene, _: TermEstimate) -> Selection:
+    prescribed = scene.tube.drag_coefficient is not None
+    return term.models[not (prescribed or tube_models(scene).constant)], ""
+
+
+def _tube_part(term: Term, scene: Scene, estimate: TermEstimate) -> Selection:
+    """The model that keeps the tolerance together with what is left out beside it."""
     if scene.tube.drag_coefficient is not None:
-        return term.models[0], "the scene fixes drag_coefficient"
-    return term.models[-1], "against the liquid-ring paper's constant k = 50"
-
-
-def _rotation(term: Term, _: Scene, estimate: TermEstimate) -> Selection:
-    return (LEFT_OUT if estimate.contribution is None else term.models[-1]), ""
+        return LEFT_OUT, ""
+    part = PART_TERMS[term.name]
+    model = getattr(tube_models(scene), part)
+    if model == CORRELATION:
+        off = loss_effect(steady(scene), replace(FINEST_MODELS, **{part: model})).k
+        return term.models[1], f"the finest model would change it by {percent(off)}"
+    if model == FINEST and estimate.contribution is not None and not estimate.above and scene.tolerance:
+        return term.models[-1], "with what else is left out it would exceed the tolerance"
+    return term.models[0 if model == LEFT_OUT else -1], ""
 
 
 def _filling(term: Term, scene: Scene, estimate: TermEstimate) -> Selection:
@@ -249,14 +267,31 @@ TERMS: Final = (
     Term(
         name=TUBE_LOSS,
         part="tube",
-        models=("k prescribed", "k(u): finite elements laminar, correlations turbulent"),
+        models=("constant k", "k(u), friction by Churchill's formula and what follows"),
         select=_tube_loss,
     ),
+    Term(name=ROUGHNESS, part="tube", models=(LEFT_OUT, "in Churchill's formula"), select=_tube_part),
     Term(
         name=ROTATION,
         part="tube",
-        models=(LEFT_OUT, "finite-element table laminar, correlation turbulent"),
-        select=_rotation,
+        models=(LEFT_OUT, "correlations", "finite-element table laminar, correlation turbulent"),
+        select=_tube_part,
+    ),
+    Term(
+        name=BENDS,
+        part="tube",
+        models=(LEFT_OUT, "correlation of turbulent flow", "finite elements laminar, correlation turbulent"),
+        select=_tube_part,
+    ),
+    Term(
+        name=ENDS,
+        part="tube",
+        models=(
+            LEFT_OUT,
+            "constants of turbulent flow",
+            "finite elements laminar, constants turbulent",
+        ),
+        select=_tube_part,
     ),
     Term(
         name=INERTIA,

@@ -11,27 +11,34 @@ import numpy as np
 
 from ringbalance.physics.tube.friction import turbulent_share
 from ringbalance.physics.tube.numbers import reynolds_number, rotation_reynolds_number
+from ringbalance.physics.tube.state import tube_state
 from ringbalance.reduced_model.chamber.gravity import closed_ring
 from ringbalance.reduced_model.chamber.terms import MEAN, PLATES, chamber_contributions
 from ringbalance.reduced_model.chamber.values import by_closed_form
 from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.reduced_model.law.building import tube_path
-from ringbalance.reduced_model.paper.formulas import PAPER_DRAG_COEFFICIENT
 from ringbalance.reduced_model.selection.loss_models import (
+    CONSTANT_MODELS,
     CORRELATIONS,
+    MODELS,
     ROTATING,
-    loss_at,
     velocity_under_head,
 )
+from ringbalance.reduced_model.tube.heads import crest_head
 from ringbalance.reduced_model.tube.regime import SiphonCrest, TubeEnds, can_flow, column_flow
+from ringbalance.scene.accuracy import FINEST
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Scene
+from ringbalance.scene.tube_models import CORRELATION, FINEST_MODELS, LEFT_OUT, Fidelity, TubeModels
 
 SHARES: Final = (0.15, 0.3, 0.5, 0.7, 0.85)
 """Fills of the driven chamber at which the flow is judged, as shares of max_fill_ratio."""
 
 LOSS: Final = "k as a function of velocity"
 ROTATION: Final = "friction by rotation"
+ROUGHNESS: Final = "roughness of the tube's wall"
+BENDS: Final = "bends of the tube"
+ENDS: Final = "entrance and exit of the tube"
 TABLE: Final = "finite elements for rotation and ends"
 LEVEL: Final = "plates, in the level of a chamber"
 GRAVITY: Final = "gravity, in the level of a chamber"
@@ -40,12 +47,16 @@ NO_PRESSURE: Final = 1.0
 HUMP: Final = "priming and separation over the siphon crest"
 _LEAST_HEAD: Final = 1e-16
 """H without loss at 1e-8 m/s, the slowest flow that is looked for, m^2/s^2."""
-_RECALLED: Final = 0.3
-"""Share of the rotation term that its correlations may be off by, from their distance to the tables."""
-_LAMINAR_ENDS: Final = 1.3
-"""What laminar ends add to k."""
-_CREEPING_ENDS: Final = 12 * np.pi
-"""The same times Re where the flow creeps."""
+_VELOCITIES: Final = 13
+PARTS: Final[Mapping[str, tuple[Fidelity, ...]]] = {
+    "roughness": (LEFT_OUT,),
+    "rotation": (LEFT_OUT, CORRELATION),
+    "bends": (LEFT_OUT, CORRELATION),
+    "ends": (LEFT_OUT, CORRELATION),
+}
+"""Parts of the loss, with the models simpler than the finest in order of cost."""
+PART_TERMS: Final = {ROUGHNESS: "roughness", ROTATION: "rotation", BENDS: "bends", ENDS: "ends"}
+"""Part of the loss by the term's name."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,11 +65,8 @@ class FlowEstimate:
 
     velocity: float
     """m/s; zero without gas pressure."""
-    k: float
     reynolds: float
     rotation_reynolds: float
-    rotation_share: float
-    """Of k + 1, by the correlations."""
     laminar_share: float
     """1 laminar, 0 turbulent."""
 
@@ -70,30 +78,18 @@ def flow_estimate(scene: Scene) -> FlowEstimate:
     Source: (k + 1) u^2/2 = p/rho with the correlations' k.
     """
     tube, nu = scene.tube, scene.liquid.kinematic_viscosity
-    rotation = rotation_reynolds_number(
-        angular_velocity=scene.rotor.speed, bore=tube.bore, kinematic_viscosity=nu
-    )
-    head = scene.gas.pressure / scene.liquid.density
-    if head < _LEAST_HEAD:
-        return FlowEstimate(
-            velocity=0.0,
-            k=0.0,
-            reynolds=0.0,
-            rotation_reynolds=rotation,
-            rotation_share=0.0,
-            laminar_share=1.0,
-        )
-    u = float(velocity_under_head(scene, loss=CORRELATIONS, head=head))
-    k = float(loss_at(scene, loss=CORRELATIONS, velocity=u).k)
-    turning = float(loss_at(scene, loss=ROTATING, velocity=u).k)
-    re = float(reynolds_number(velocity=u, bore=tube.bore, kinematic_viscosity=nu))
+    head, u, re, laminar = scene.gas.pressure / scene.liquid.density, 0.0, 0.0, 1.0
+    if head >= _LEAST_HEAD:
+        u = float(velocity_under_head(scene, loss=CORRELATIONS, head=head))
+        re = float(reynolds_number(velocity=u, bore=tube.bore, kinematic_viscosity=nu))
+        laminar = float(1 - turbulent_share(reynolds=re))
     return FlowEstimate(
         velocity=u,
-        k=k,
         reynolds=re,
-        rotation_reynolds=rotation,
-        rotation_share=abs(turning - k) / (turning + 1),
-        laminar_share=float(1 - turbulent_share(reynolds=re)),
+        rotation_reynolds=rotation_reynolds_number(
+            angular_velocity=scene.rotor.speed, bore=tube.bore, kinematic_viscosity=nu
+        ),
+        laminar_share=laminar,
     )
 
 
@@ -152,57 +148,117 @@ def _velocities(scene: Scene, head: FloatArray, *, to_crest: bool) -> FloatArray
     return found
 
 
-def loss_contributions(scene: Scene) -> Mapping[str, Contribution]:
-    """What the models of the loss leave out, relative to k + 1.
-
-    Returns: Contributions by name; zero where the scene prescribes k, which all models then share.
-    """
-    flow = flow_estimate(scene)
-    constant = abs((PAPER_DRAG_COEFFICIENT + 1) / (flow.k + 1) - 1)
-    ends = _LAMINAR_ENDS + _CREEPING_ENDS / max(flow.reynolds, 1e-6)
-    tables = _RECALLED * flow.rotation_share + flow.laminar_share * ends / (flow.k + 1)
-    # Where the other branch rules, part of the rotation term still differs.
-    tables += 0.02 * flow.rotation_share
-    given = scene.tube.drag_coefficient is not None
-    found = (
-        (LOSS, constant, "|51/(k + 1) - 1| with k by correlations at equal fills", "definition of k"),
-        (
-            ROTATION,
-            flow.rotation_share,
-            "(k_rot - k)/(k_rot + 1), both by correlations",
-            "Ito and Nanbu (1971)",
-        ),
-        (
-            TABLE,
-            tables,
-            "0.3 of the rotation term, and (1.3 + 12 pi/Re)/(k + 1) while laminar",
-            "spread of the correlations",
-        ),
+def steady(scene: Scene) -> Scene:
+    """The scene with fixed values of what no steady flow depends on, tuning and draws of a loop, and without
+    a choice of models."""
+    return replace(
+        scene,
+        tube=replace(scene.tube, models=FINEST_MODELS),
+        rotor=replace(scene.rotor, influence_coefficient=1.0, lag_angle=0.0),
+        controller=replace(scene.controller, proportional=1.0),
+        run=replace(scene.run, seed=0, time_limit=1.0),
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class LossEffect:
+    """What simpler models of the tube's loss change at worst over the scene's velocities, relative."""
+
+    k: float
+    """Of k, or of the head up to the siphon crest."""
+    velocity: float
+    """Under one of these heads."""
+
+
+def range_velocities(scene: Scene) -> FloatArray:
+    """Velocities at which the loss is judged, m/s: from a quarter of the slowest flow, full or separated,
+    over the range of fills to twice the fastest; none where nothing flows."""
+    flow = range_flow(scene)
+    if not np.any(flow.velocity > 0):
+        return np.zeros(0)
+    found = np.concatenate([flow.siphon, flow.separated])
+    found = np.log(found[(found > 0) & np.isfinite(found)])
+    return np.exp(np.linspace(np.min(found) - np.log(4), np.max(found) + np.log(2), _VELOCITIES))
+
+
+def loss_effect(scene: Scene, models: TubeModels) -> LossEffect:
+    """Compare simpler models of the loss with the finest; without an effect where the scene prescribes k."""
+    if scene.tube.drag_coefficient is not None:
+        return LossEffect(k=0.0, velocity=0.0)
+    (k, *heads), (finest_k, *finest_heads) = _heads(scene, models), _heads(scene, FINEST_MODELS)
+    ratios = np.array([own / finest for own, finest in zip(heads, finest_heads, strict=True)])
+    changed = np.abs(np.array([k / finest_k, *ratios[1:]]) - 1)
+    return LossEffect(
+        k=float(np.max(changed, initial=0.0)),
+        velocity=float(np.max(np.abs(ratios**-0.5 - 1), initial=0.0)),
+    )
+
+
+@lru_cache(maxsize=64)
+def _heads(scene: Scene, models: TubeModels) -> tuple[FloatArray, ...]:
+    """k, and the heads of the full tube and, where it has a crest, up to there."""
+    tube, u = replace(scene.tube, models=models), range_velocities(scene)
+    state = tube_state(tube=tube, liquid=scene.liquid, angular_velocity=scene.rotor.speed, velocity=u)
+    full = state.k, (state.k + 1) * u**2 / 2
+    if tube.hump_radius is None:
+        return full
+    return (*full, crest_head(scene=scene, tube=tube, state=state, velocity=u))
+
+
+@lru_cache(maxsize=8)
+def tube_models(scene: Scene) -> TubeModels:
+    """Models of the tube's loss that the scene's tolerance asks for.
+
+    One part after the other, the least first, takes the cheapest model with which all that is left out
+    together keeps the tolerance; nothing is left out at tolerance zero, or where nothing flows.
+    """
+    scene = steady(scene)
+    prescribed = scene.tube.drag_coefficient is not None
+    if scene.tolerance == FINEST or prescribed or not range_velocities(scene).size:
+        return FINEST_MODELS
+    if loss_effect(scene, CONSTANT_MODELS).k <= scene.tolerance:
+        return CONSTANT_MODELS
+    chosen = FINEST_MODELS
+    for part in sorted(PARTS, key=lambda part: loss_effect(scene, without(part)).k):
+        trials = (replace(chosen, **{part: model}) for model in PARTS[part])  # type: ignore[arg-type]
+        chosen = next((t for t in trials if loss_effect(scene, t).k <= scene.tolerance), chosen)
+    return chosen
+
+
+def without(part: str) -> TubeModels:
+    """The finest models but for one part, which is left out."""
+    return replace(FINEST_MODELS, **{part: LEFT_OUT})  # type: ignore[arg-type]
+
+
+def with_tube_models(scene: Scene) -> Scene:
+    """The scene with those models of its tube's loss that its tolerance asks for."""
+    return replace(scene, tube=replace(scene.tube, models=tube_models(scene)))
+
+
+_LACKING: Final = (
+    (LOSS, CONSTANT_MODELS, "k = 50 against k by finite elements and correlations"),
+    (ROTATION, without("rotation"), "k without rotation against that"),
+    (TABLE, MODELS[ROTATING], "correlations alone against that"),
+)
+"""What the models of the loss may lack, and models that lack it."""
+
+
+def loss_contributions(scene: Scene) -> Mapping[str, Contribution]:
+    """What the models of the loss leave out, relative to k, by name; zero where the scene prescribes k."""
     return {
-        term: Contribution(
-            term=term,
-            value=0.0 if given else value,
-            formula=formula,
-            source=source,
-            rough=term != LOSS,
-        )
-        for term, value, formula, source in found
+        term: _contribution(term, loss_effect(scene, models).k, formula) for term, models, formula in _LACKING
     }
 
 
 def flow_contributions(scene: Scene) -> Mapping[str, Contribution]:
-    """What the models of the flow leave out, relative to the velocity.
+    """What the models of the flow leave out, relative to the velocity, by name.
 
-    Returns: Contributions by name; all rough, because none counts where the tube is blocked.
     Source: stands with each; u^2 is proportional to the head over k + 1.
     """
-    flow = flow_estimate(scene)
-    half = {name: _on_velocity(c) for name, c in loss_contributions(scene).items()}
-    if half[LOSS].value:
-        value = abs(((PAPER_DRAG_COEFFICIENT + 1) / (flow.k + 1)) ** 0.5 - 1)
-        formula = "|sqrt(51/(k + 1)) - 1| with k by correlations at equal fills"
-        half[LOSS] = replace(half[LOSS], value=value, formula=formula)
+    losses = {
+        term: _contribution(term, loss_effect(scene, models).velocity, formula)
+        for term, models, formula in _LACKING
+    }
     fills = scene.disc.max_fill_ratio * np.array(SHARES)
     chamber = chamber_contributions(scene, _closed(scene, fills))["pressures"]
     lever = _lever(scene)
@@ -216,13 +272,14 @@ def flow_contributions(scene: Scene) -> Mapping[str, Contribution]:
         )
         for name, of in ((LEVEL, PLATES), (GRAVITY, MEAN))
     }
-    return half | levels | {HUMP: _hump(scene)}
+    return losses | levels | {HUMP: _hump(scene)}
 
 
-def _on_velocity(loss: Contribution) -> Contribution:
-    """Half of the change of k + 1."""
-    value = None if loss.value is None else loss.value / 2
-    return replace(loss, value=value, formula=f"half of {loss.formula}", rough=True)
+def _contribution(term: str, value: float, formula: str) -> Contribution:
+    """Rough, because none counts where the tube is blocked."""
+    return Contribution(
+        term=term, value=value, formula=formula, source="over the range of velocities", rough=True
+    )
 
 
 def _closed(scene: Scene, fills: np.ndarray) -> np.ndarray:

@@ -10,8 +10,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.physics.tube.state import TubeState, tube_state, upstream_loss
-from ringbalance.physics.tube.uncertainty import model_parts, uncertainty_parts
+from ringbalance.physics.tube.state import TubeState, finest_state, tube_state, upstream_loss
+from ringbalance.physics.tube.uncertainty import SIMPLER, model_parts, uncertainty_parts
 from ringbalance.reduced_model.chamber.inputs import half_widths
 from ringbalance.reduced_model.tables.fit import level_table, refined_table
 from ringbalance.reduced_model.tables.hermite import HermiteTable
@@ -97,9 +97,7 @@ def _widths(
     """Uncertainties of `TubeHeads` over even places in ln u; `place`: that of the crest's end."""
     tube, u = to_crest_end(scene.tube), np.exp(log_velocity)
     state = tube_state(tube=tube, liquid=scene.liquid, angular_velocity=scene.rotor.speed, velocity=u)
-    parts: Mapping[str, FloatArray] = (
-        {} if tube.drag_coefficient is not None else model_parts(tube=tube, state=state)
-    )
+    parts: Mapping[str, FloatArray] = model_parts(tube=tube, state=state)
     if by_inputs:
         parts = uncertainty_parts(
             tube=tube,
@@ -112,10 +110,12 @@ def _widths(
     k, upstream = state.k, upstream_loss(tube=tube, state=state)
     width = np.sqrt(sum((part**2 for part in parts.values()), start=np.zeros_like(k)))
     share = np.where(k > 0, upstream / np.where(k > 0, k, 1.0), 1.0)
-    moved = np.hypot(width * share, loss_along(state.terms) * place)
+    finest, to_crest = finest_state(tube=tube, state=state), state.kinetic_factor + upstream
+    simpler = finest.kinetic_factor + upstream_loss(tube=tube, state=finest) - to_crest
+    moved = np.sqrt((width * share) ** 2 + (loss_along(state.terms) * place) ** 2 + simpler**2)
     found = {
         "uncertainty": width / (k + 1),
-        "hump_uncertainty": moved / (state.kinetic_factor + upstream),
+        "hump_uncertainty": moved / to_crest,
         "fraction_uncertainty": _fraction_uncertainty(tube, state, parts, place),
     }
     ends = float(log_velocity[0]), float(log_velocity[-1])
@@ -127,9 +127,14 @@ def _fraction_uncertainty(
 ) -> FloatArray:
     """(s_j - R)/(k + 1) of each part of k with a fraction s_j before the crest's end, and of its place."""
     total = state.k + 1
-    fraction = (state.kinetic_factor + upstream_loss(tube=tube, state=state)) / total
-    squares = (loss_along(state.terms) * place / total) ** 2
+    fraction, finest = (
+        (at.kinetic_factor + upstream_loss(tube=tube, state=at)) / (at.k + 1)
+        for at in (state, finest_state(tube=tube, state=state))
+    )
+    squares = (loss_along(state.terms) * place / total) ** 2 + (finest - fraction) ** 2
     for name, part in parts.items():
+        if name == SIMPLER:
+            continue
         # Which end or bend is wrong is not known: then the worse of before and behind the crest.
         lumped = name in {"ends", "bends"}
         lever = np.maximum(fraction, 1 - fraction) if lumped else np.abs(tube.hump_position - fraction)
@@ -161,20 +166,26 @@ def log_heads(scene: Scene) -> list[LogHead]:
         def head(log_velocity: FloatArray) -> FloatArray:
             there = state(log_velocity.tobytes())
             there = replace(there, bends=there.bends[::order])
-            factor = there.kinetic_factor + upstream_loss(tube=to_crest_end(seen), state=there)
-            kinetic = np.exp(2 * log_velocity) / 2
-            fall = factor * kinetic
-            if lowest:
-                fall = fall + head_behind_crest(
-                    tube=seen, along=loss_along(there.terms) * kinetic, square=scene.rotor.speed**2
-                )
-            return np.asarray(np.log(fall))
+            u = np.exp(log_velocity)
+            return np.log(crest_head(scene=scene, tube=seen, state=there, velocity=u, lowest=lowest))
 
         return head
 
     if tube.hump_radius is None:
         return [between]
     return [between, to_crest(tube, 1), to_crest(reversed_tube(tube), -1), to_crest(tube, 1, lowest=False)]
+
+
+def crest_head(
+    *, scene: Scene, tube: Tube, state: TubeState, velocity: FloatArray, lowest: bool = True
+) -> FloatArray:
+    """Head from the giving chamber to the lowest pressure at the crest, or to its arc's end, m^2/s^2."""
+    kinetic = velocity**2 / 2
+    fall = (state.kinetic_factor + upstream_loss(tube=to_crest_end(tube), state=state)) * kinetic
+    if not lowest:
+        return np.asarray(fall)
+    along = loss_along(state.terms) * kinetic
+    return np.asarray(fall + head_behind_crest(tube=tube, along=along, square=scene.rotor.speed**2))
 
 
 def _head_table(log_head: LogHead, start: float, stop: float) -> tuple[HermiteTable, float]:

@@ -16,6 +16,7 @@ from scipy.spatial import ConvexHull
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import given, number, percent, shown
+from ringbalance.reports.prose import key_words
 from ringbalance.reports.section import Record
 from ringbalance.scene.arrays import FloatArray
 
@@ -134,7 +135,7 @@ def tornado(budgets: dict[str, Record], titles: dict[str, str]) -> Drawing | Non
 
 def _causes(budget: Record) -> list[tuple[str, float]]:
     """Names and relative contributions, the largest first."""
-    own = [(path.split(".")[-1].replace("_", " "), width) for path, width in budget["inputs"].items()]
+    own = [(key_words(path), width) for path, width in budget["inputs"].items()]
     own += [("the model", budget["model"]), ("numerics", budget["numerical"])]
     return sorted(((name, abs(width / budget["value"])) for name, width in own), key=lambda c: -c[1])
 
@@ -288,37 +289,24 @@ def _residual(panel: Axes, vector: Any, limit: float, span: float) -> None:
 def requirement_bars(rows: Iterable[Record]) -> Drawing | None:
     """What is required against what is reached, each over its requirement, with 95 % intervals.
 
-    Args: `rows`: `label`, `required`, `reached`, `uncertainty`, `unit` (SI), and whether more is better,
-    as `at_least`, of each.
+    Args: `rows`: `label`, `required`, `reached`, `low` and `high` (ends of what is reached), `at_least`
+    (whether more is better) and `verdict` of each; a bar beyond the axis ends in its number.
     Returns: The figure; None without rows.
     """
     kept = [row for row in rows if row["required"] and row["reached"] is not None]
     if not kept:
         return None
-    judged = [(row, *_judged(row)) for row in kept]
+    end = min(1.08 * max(1.0, *(row["high"] / row["required"] for row in kept)), _WIDEST)
 
     def paint(axes: Axes) -> None:
-        low, high = 1.0, 1.0
-        for place, (row, verdict, colour) in enumerate(judged):
-            ratio, width = row["reached"] / row["required"], (row["uncertainty"] or 0) / row["required"]
-            axes.barh(place, ratio, height=0.42, color=colour, alpha=0.75, linewidth=0)
-            if width:
-                axes.errorbar(ratio, place, xerr=width, color=style.INK, linewidth=1.2, capsize=3)
-            axes.plot([1, 1], [place - 0.3, place + 0.3], color=style.INK, linewidth=1.8)
-            axes.text(
-                0.0,
-                place - 0.32,
-                f"{row['label']} ({'at least' if row['at_least'] else 'at most'} 1): {verdict}",
-                va="bottom",
-                color=style.INK,
-            )
-            low, high = min(low, ratio - width), max(high, ratio + width)
+        for place, row in enumerate(kept):
+            _requirement_bar(axes, place, row, end)
         axes.set_yticks([])
-        axes.set(ylim=(len(judged) - 0.6, -0.95), xlim=(0, min(1.08 * high, _WIDEST)))
+        axes.set(ylim=(len(kept) - 0.6, -0.95), xlim=(0, end))
         axes.spines["left"].set_visible(False)
         axes.grid(visible=False, axis="y")
 
-    told = "; ".join(f"{row['label']} {verdict}" for row, verdict, _ in judged)
+    told = "; ".join(f"{row['label']} {row['verdict']}" for row in kept)
     return draw(
         name="requirements",
         paint=paint,
@@ -327,15 +315,24 @@ def requirement_bars(rows: Iterable[Record]) -> Drawing | None:
         wide=True,
         height=0.8 + 0.44 * len(kept),
         alt=f"Requirements against what is reached: {told}.",
-        caption="Reached over required, with the 95 % interval of the ratio where known: result and "
-        "requirement are both uncertain. The line is the requirement.",
+        caption="Reached over required, with the 95 % interval where known. The line at 1 is the "
+        "requirement; a number stands where a bar or an interval goes on beyond the axis.",
     )
 
 
-def _judged(row: Record) -> tuple[str, str]:
-    """Verdict of a row in words, and its colour."""
-    excess = row["reached"] - row["required"]
-    excess, width = excess if row["at_least"] else -excess, row["uncertainty"] or 0.0
-    if abs(excess) < width:
-        return "cannot be told", style.FIFTH
-    return ("met", style.THIRD) if excess >= 0 else ("not met", style.PAPER)
+def _requirement_bar(axes: Axes, place: int, row: Record, end: float) -> None:
+    ratio, low, high = (row[key] / row["required"] for key in ("reached", "low", "high"))
+    colour = {"met": style.THIRD, "not met": style.PAPER}.get(row["verdict"], style.FIFTH)
+    axes.barh(place, min(ratio, end), height=0.42, color=colour, alpha=0.75, linewidth=0)
+    if high > low:
+        axes.plot([low, min(high, end)], [place, place], color=style.INK, linewidth=1.2)
+        caps = [each for each in (low, high) if each < end]
+        axes.plot(caps, [place] * len(caps), "|", color=style.INK, markersize=6)
+    axes.plot([1, 1], [place - 0.3, place + 0.3], color=style.INK, linewidth=1.8)
+    if high > end:
+        beyond = f"{'' if ratio > end else 'up to '}{number(max(ratio, high), digits=2)} \u25b8"
+        axes.text(0.995 * end, place - 0.32, beyond, ha="right", va="bottom", color=style.INK)
+    sense = "at least" if row["at_least"] else "at most"
+    axes.text(
+        0.0, place - 0.32, f"{row['label']} ({sense} 1): {row['verdict']}", va="bottom", color=style.INK
+    )

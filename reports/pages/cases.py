@@ -24,6 +24,8 @@ from ringbalance.reports.tables import FOLDER, is_long, table_file
 from ringbalance.reports.traces import traced
 from ringbalance.verification.catalogue import load_cases
 
+_NOTHING: Final = 1e-3
+"""Fraction of a range below which one of its ends is zero."""
 _FACTS: Final = (
     ("claim", "Claim"),
     ("explanation", "Finding"),
@@ -241,8 +243,10 @@ def _width(quantity: Record) -> str:
     if value is not None and low is not None and high is not None:
         sides = sorted((value - low, high - value))
         if sides[1] > _LOPSIDED * sides[0] and sides[1] > 0.1 * abs(value):
-            ends = [number(end * display.factor, digits=2) for end in (low, high)]
-            return with_unit(" to ".join(ends), display.symbol)
+            # What is left of a numerical uncertainty about zero is zero.
+            least = _NOTHING * (high - low)
+            ends = (end * display.factor if abs(end) > least else 0.0 for end in (low, high))
+            return with_unit(" to ".join(number(end, digits=2) for end in ends), display.symbol)
     return with_unit(
         number(None if not half_width else half_width * display.factor, digits=2), display.symbol
     )

@@ -95,6 +95,7 @@ def _development(evidence: Record) -> list[Cells]:
 
 def _use(evidence: Record) -> list[Cells]:
     budgets = (evidence.get("calibration") or {}).get("budgets")
+    moved = any(row["achieved_interval"] for row in evidence.get("requirements", ()))
     origins = (evidence["scene"].get("origins") or {}).values()
     assumed = sum(origin == "assumed" for origin in origins)
     return [
@@ -105,14 +106,20 @@ def _use(evidence: Record) -> list[Cells]:
         ),
         (
             "Uncertainty characterisation",
-            "3" if budgets else "1",
-            "Numerical, input and model parts of each main quantity; the closed loop over drawn inputs "
-            "and noise."
-            if budgets
-            else "The filters’ covariances of one run with one seed.",
+            *(
+                (
+                    "3",
+                    "Numerical, input and model parts of each main quantity; the closed loop over drawn "
+                    "inputs and noise.",
+                )
+                if budgets
+                else ("2", "Stated inputs and noise, of each result of the run; no model part.")
+                if moved
+                else ("1", "The filters’ covariances of one run with one seed.")
+            ),
         ),
         ("Robustness of results", "2", "Sensitivity to each stated input; not to combinations of them.")
-        if budgets
+        if budgets or moved
         else ("Robustness of results", "0", "Not studied."),
         ("Use history", "0", "No decision on a built device is known to rest on this program."),
         ("Management", "2", "Versioned, tested at each change, evidence kept with dates and hashes."),

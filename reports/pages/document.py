@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import json
+from types import MappingProxyType
 from typing import Final
 
 from ringbalance.reports.section import Record, Section, Table
 
 _KEPT: Final = 12
 """Digits of a hash that are printed in a list."""
-NOMENCLATURE: Final = (
+_LIQUID_RING: Final = (
     ("B", "m", "axial width"),
     ("d", "m", "bore"),
     ("h", "1", "loop factor"),
@@ -29,16 +30,36 @@ NOMENCLATURE: Final = (
     ("θ", "rad", "central angle"),
     ("λ", "m", "lambda"),
 )
-"""Symbol, unit and term of the glossary."""
-BIBLIOGRAPHY: Final = (
+_ECCENTRIC_MASS: Final = (
+    ("b", "kg m", "moment of a mass"),
+    ("m_b", "kg", "eccentric masses"),
+    ("μ_f", "m", "friction arm"),
+    ("r_b", "m", "track radius"),
+    ("θ", "kg m", "imbalance"),
+    ("φ", "rad", "angle of a mass"),
+    ("ω", "rad/s", "speed"),
+)
+NOMENCLATURE: Final = MappingProxyType({"liquid_ring": _LIQUID_RING, "eccentric_mass": _ECCENTRIC_MASS})
+"""Symbol, unit and term of the glossary, by kind of balancer."""
+_DEFINITIONS: Final = MappingProxyType(
+    {
+        "liquid_ring": "Overshoot: a correction that takes the vibration past zero. Misadjustment: an "
+        "injection after which the amplitude is higher by more than the noise. Settled: within the limit for "
+        "the hold time, and expected to stay. Hovering: near the limit without a reason to stay there. "
+        "Separated: the column parts over the siphon crest, and only the driven chamber sets the flow.",
+        "eccentric_mass": "Settled: the amplitude is within the limit and stays there to the end of the run. "
+        "Settling time: from the start of the run until then. Locked: the masses clamped where they start. "
+        "Friction arm: friction torque over the centrifugal force of a mass. Gain margin: factor by which a "
+        "loop’s gain could grow before the loop is unstable.",
+    }
+)
+_RING_SOURCES: Final = (
     "Pan X., Wu H.-Q., Gao J.-J., Mu Y.-Z.: Performance Analysis and Control Simulation of Pneumatic "
     "Liquid Online Automatic Balancing System for Rotating Machinery. The liquid-ring paper; its text "
     "names no DOI.",
     "Pan X., Wu H.-Q., Gao J.-J. et al.: New liquid transfer active balancing system using compressed air "
     "for grinding machine. J. Vib. Acoust. (2014), doi:10.1115/1.4028507. Reference [30] of the liquid-ring "
     "paper; not seen.",
-    "Jung D.: A Control Strategy of Actively Actuated Eccentric Mass System for Imbalance Rotor Vibration. "
-    "Actuators 9 (2020) 69, doi:10.3390/act9030069.",
     "McKeon B. J. et al.: Friction factors for smooth pipe flow. J. Fluid Mech. 511 (2004) 41, "
     "doi:10.1017/S0022112004009796.",
     "Nikuradse J.: Strömungsgesetze in rauhen Rohren. VDI Forschungsheft 361 (1933); no DOI.",
@@ -46,15 +67,21 @@ BIBLIOGRAPHY: Final = (
     "applications. J. Fluids Eng. 130 (2008) 078001, doi:10.1115/1.2960953.",
     "Roache P. J.: Code verification by the method of manufactured solutions. J. Fluids Eng. 124 (2002) 4, "
     "doi:10.1115/1.1436090.",
+)
+_SOURCES: Final = (
+    "Jung D.: A Control Strategy of Actively Actuated Eccentric Mass System for Imbalance Rotor Vibration. "
+    "Actuators 9 (2020) 69, doi:10.3390/act9030069.",
     "ASME V&V 20-2009, Standard for verification and validation in computational fluid dynamics and heat "
     "transfer.",
     "ISO 21940-11:2016, Mechanical vibration, rotor balancing, part 11: procedures and tolerances for rotors "
     "with rigid behaviour.",
     "NASA-STD-7009B, Standard for models and simulations.",
 )
+"""Those of every report."""
 
 
 def _view(_own: Record, evidence: Record) -> Record:
+    balancer = evidence.get("balancer", "liquid_ring")
     return {
         "facts": _facts(evidence),
         "signatures": Table(
@@ -63,8 +90,9 @@ def _view(_own: Record, evidence: Record) -> Record:
             rows=[(role, "", "", "") for role in ("Prepared", "Checked", "Approved")],
             style="",
         ),
-        "nomenclature": NOMENCLATURE,
-        "bibliography": BIBLIOGRAPHY,
+        "nomenclature": NOMENCLATURE[balancer],
+        "definitions": _DEFINITIONS[balancer],
+        "bibliography": (*(_RING_SOURCES if balancer == "liquid_ring" else ()), *_SOURCES),
     }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -19,16 +20,25 @@ from ringbalance.reports.figures.eccentric import (
     sampled_poles,
 )
 from ringbalance.reports.figures.operation import requirement_bars
-from ringbalance.reports.numbers import MISSING, number, percent, shown
+from ringbalance.reports.numbers import MISSING, display_unit, given, number, percent, shown, with_unit
 from ringbalance.reports.pages import credibility, document
 from ringbalance.reports.pages.cases import case_view
+from ringbalance.reports.pages.requirements import OPEN, input_name
 from ringbalance.reports.section import Cells, Record, Section, Table
 
 BALANCER: Final = "eccentric_mass"
-_BASIS: Final = (
-    "Plant and filters are models; no measurement of this machine is compared with here.",
-    "± and bands are 95 % by the filters’ own covariances: what their models leave out is not in them.",
+_MODEL: Final = "Plant and filters are models; no measurement of this machine is compared with here."
+_STATED: Final = (
+    "Intervals (95 %) follow from the uncertainties that the scene states and from the sensors’ noise: each "
+    "input was moved to both ends of its own, and the controller kept as configured. What the models leave "
+    "out is not in them."
 )
+_UNSTATED: Final = (
+    "The scene states no uncertainties: every result holds for exactly its values. [uncertainty] in the "
+    "scene file states them."
+)
+_CAUSES: Final = 2
+"""Inputs that a row names as those it hangs on most."""
 
 
 def _parts(*parts: tuple[str, Any]) -> Record:
@@ -37,61 +47,112 @@ def _parts(*parts: tuple[str, Any]) -> Record:
 
 
 def _summary(_own: Record, evidence: Record) -> Record:
-    run, locked = evidence["closed_loop"]["balanced"], evidence["locked"]
+    run, locked, rows = evidence["closed_loop"]["balanced"], evidence["locked"], evidence["requirements"]
     ratio = percent(run["residual_ratio"])
     worst = [shown(each["worst_amplitude_m"], "m", digits=3) for each in (run, locked)]
+    stated = any(row["achieved_interval"] for row in rows)
     return _parts(
-        ("lead", f"{run['status'][0].upper()}{run['status'][1:].rstrip('.')}."),
+        ("lead", _decision(rows)),
         (
             "text",
-            f"The largest amplitude on the way is {worst[0]}; with the masses locked where they start it is "
-            f"{worst[1]}. At the end {ratio} of the vibration without balancing is left.",
+            f"As the scene stands: {run['status'].rstrip('.')}. The largest amplitude of the run is "
+            f"{worst[0]}; with the masses locked where they start it is {worst[1]}. At the end {ratio} of "
+            "the vibration without balancing is left.",
         ),
         *(("alert", f"{text[0].upper()}{text[1:].rstrip('.')}.") for text in run["warnings"]),
-        ("table", _requirements(evidence["requirements"])),
-        ("figure", requirement_bars(_rows(evidence["requirements"]))),
-        ("items", [*_BASIS, _origins(evidence["scene"]["table"])]),
+        ("table", _requirements(rows)),
+        ("items", _actions(rows)),
+        ("figure", requirement_bars(map(_bar, rows))),
+        ("items", [_MODEL, _STATED if stated else _UNSTATED, _origins(evidence["scene"]["table"])]),
     )
+
+
+def _decision(rows: list[Record]) -> str:
+    """How many requirements are met, and which are not, as for the other balancer."""
+    named = {v: [row["quantity"] for row in rows if row["verdict"] == v] for v in ("not met", OPEN)}
+    met = len(rows) - sum(map(len, named.values()))
+    parts = [f"{verdict}: {', '.join(names)}" for verdict, names in named.items() if names]
+    return f"{'; '.join([f'{met} of {len(rows)} requirements are met', *parts])}."
+
+
+def _actions(rows: list[Record]) -> list[str]:
+    """What to find out first, where the stated uncertainties leave a requirement open."""
+    found: dict[str, list[str]] = {}
+    for row in rows:
+        if row["verdict"] == OPEN and (causes := _causes(row)):
+            found.setdefault(", ".join(sorted(causes)), []).append(row["quantity"])
+    return [
+        f"Determine more closely: {causes}. Whether these requirements are met depends on it: "
+        f"{', '.join(names)}."
+        for causes, names in found.items()
+    ]
+
+
+def _causes(row: Record) -> list[str]:
+    """Names of the inputs that a row hangs on most: those that lose it, then the largest effects."""
+    effects = {path: max(both) for path, both in row["effects"].items()}
+    largest = max(effects.values(), default=0.0)
+    ranked = sorted(effects, key=lambda path: -effects[path])
+    telling = [path for path in ranked if effects[path] > 0.1 * largest]
+    return [input_name(path) for path in dict.fromkeys([*row["lost"], *telling])][
+        : max(_CAUSES, len(row["lost"]))
+    ]
 
 
 def _origins(rows: list[Record]) -> str:
     counts = Counter(row["origin"] for row in rows)
     told = ", ".join(f"{count} {origin}" for origin, count in counts.most_common())
     return (
-        f"Of {len(rows)} values of the scene: {told}. What follows from assumed values holds for them alone."
+        f"Of the {len(rows)} values of the scene: {told}. Results hold only as far as the assumed values do."
     )
 
 
-def _rows(requirements: list[Record]) -> list[Record]:
-    return [
-        {
-            "label": row["quantity"],
-            "required": row["required"],
-            "reached": row["achieved"],
-            "uncertainty": None,
-            "unit": row["unit"] or "1",
-            "at_least": row["sense"] == "at least",
-        }
-        for row in requirements
-    ]
+def _bar(row: Record) -> Record:
+    low, high = row["achieved_interval"] or (row["achieved"], row["achieved"])
+    return {
+        "label": row["quantity"],
+        "required": row["required"],
+        "reached": row["achieved"],
+        "low": low,
+        "high": high,
+        "at_least": row["sense"] == "at least",
+        "verdict": row["verdict"],
+    }
 
 
 def _requirements(requirements: list[Record]) -> Table:
     def cells(row: Record) -> Cells:
-        unit, reached = row["unit"] or "1", row["achieved"]
+        unit, reached, interval = row["unit"] or "1", row["achieved"], row["achieved_interval"]
+        needed = _span(row["required_interval"], unit)
         return (
-            row["quantity"],
-            f"{row['sense']} {shown(row['required'], unit, digits=3)}",
-            MISSING if reached is None else shown(reached, unit, digits=3),
-            "met" if row["met"] else "not met",
+            f"{row['quantity'][0].upper()}{row['quantity'][1:]}",
+            f"{row['sense']} {given(row['required'], unit, digits=3)}{f' ({needed})' if needed else ''}",
+            row["set_by"],
+            "not reached" if reached is None else shown(reached, unit, digits=3),
+            "not always reached" if row["lost"] else _span(interval, unit) or MISSING,
+            row["verdict"],
+            ", ".join(_causes(row)),
         )
 
     return Table(
-        caption="What is required, and what this run and these loops come to.",
-        heads=("Quantity", "Required", "Reached", "Verdict"),
+        caption="Requirements: what sets each, what this run and these loops come to, with its 95 % "
+        "interval, and the inputs on which it depends most. Where only part of the interval meets a "
+        "requirement, the verdict cannot be told.",
+        heads=("Quantity", "Required", "Set by", "Reached", "Interval", "Verdict", "Depends on"),
         rows=[cells(row) for row in requirements],
-        style="",
+        style="words",
     )
+
+
+def _span(interval: Sequence[float] | None, unit: str) -> str:
+    """Both ends in one unit; empty where there is no interval, or none that three digits show."""
+    if interval is None:
+        return ""
+    display = display_unit(unit, *interval)
+    low, high = (number(end * display.factor, digits=3) for end in interval)
+    if low == high:
+        return ""
+    return with_unit(f"up to {high}" if interval[0] == 0 else f"{low} to {high}", display.symbol)
 
 
 def _run(_own: Record, evidence: Record) -> Record:

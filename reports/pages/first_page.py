@@ -7,6 +7,7 @@ from typing import Final
 
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.tuning.tune import tuning_document
+from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.chamber.inputs import half_widths
 from ringbalance.reports.numbers import THIN_SPACE, given, number, percent, shown
 from ringbalance.reports.pages.requirements import (
@@ -23,6 +24,8 @@ from ringbalance.reports.pages.requirements import (
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.reports.traces import traced
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
+from ringbalance.verification.assumptions import assumptions_of
+from ringbalance.verification.case import RestsOn
 from ringbalance.verification.loops import calibration_of
 from ringbalance.verification.runner import paper_scene
 
@@ -46,6 +49,11 @@ _MAIN: Final = {
 }
 _NEEDED: Final = "needed_moment"
 """Results whose causes of uncertainty are compared; k and the margin follow from the velocity's."""
+_CREST: Final = RestsOn(
+    path="tube.hump_radius",
+    documented=True,
+    why="any place between the chamber’s inner wall and the fullest ring fits",
+)
 _ENDINGS: Final = {
     "settled": "settles",
     "hovering": "hovers about its limit",
@@ -61,6 +69,7 @@ def _collect(work: Work) -> Record:
         "needed_uncertainty_kg_m": _needed_uncertainty(work.scene),
         "gas_pressure_uncertainty_Pa": half_widths(work.scene).get("pressure", 0.0),
         "requirement": requirement_record(work.scene),
+        "crest": crest_range(work.scene, work.calibration),
         "bore_m": work.scene.tube.bore,
         "bore_uncertainty_stated": any(i.quantity == "bore" for i in work.scene.uncertainty),
         "time_limit_s": work.scene.run.time_limit,
@@ -73,6 +82,21 @@ def _needed_uncertainty(scene: Scene) -> float:
     """Of the initial unbalance, kg m at 95 %, by that of the influence coefficient."""
     width = half_widths(scene).get("influence_coefficient", 0.0)
     return scene.rotor.initial_amplitude * width / scene.rotor.influence_coefficient**2
+
+
+def crest_range(scene: Scene, calibration: Calibration) -> Record | None:
+    """Where a siphon crest that nobody gave may lie, and the gas pressures that lift the liquid over it."""
+    point = calibration.operating_point
+    (crest,) = assumptions_of((_CREST,), scene) or (None,)
+    if crest is None or point.priming_vented is None:
+        return None
+    head = 0.5 * scene.liquid.density * scene.rotor.speed**2 / calibration.flow_law.gas_factor
+    pressures = [point.priming_vented + head * (crest.value**2 - r**2) for r in (crest.high, crest.low)]
+    return {
+        "radius_m": [crest.low, crest.high],
+        "priming_pressure_Pa": pressures,
+        "why": crest.why,
+    }
 
 
 def _other_reading(work: Work) -> Record | None:
@@ -122,15 +146,13 @@ def loop_sentences(evidence: Record) -> list[str]:
     run = evidence["closed_loop"].get("calibrated")
     if run is None:
         return ["The closed loop was not run."]
-    told = [f"Under the calibrated law the loop {_ending(run)}{_factor(run)}."]
+    line = evidence["calibration"].get("gas_line") or {"given": True}
+    ideal = "" if line["given"] else ", with a valve that acts at once,"
+    told = [f"Under the calibrated law{ideal} the loop {_ending(run)}{_factor(run)}."]
     tuned = retuned(evidence)
     if tuned is not None:
         gain, own = (shown(r, "s/m", digits=2) for r in _gains(evidence, tuned))
-        line = evidence["calibration"].get("gas_line") or {"given": True}
-        ideal = "" if line["given"] else " and a valve that acts at once"
-        told.append(
-            f"Recommended gain: {gain} (the scene has {own}). With it{ideal} this run {_ending(tuned)}."
-        )
+        told.append(f"Recommended gain: {gain} (the scene has {own}). With it this run {_ending(tuned)}.")
     paper = evidence["closed_loop"].get("paper")
     if paper is not None:
         told.append(f"Under the paper’s law, with the scene’s gain, it {_ending(paper)}.")
@@ -165,15 +187,15 @@ def _factor(run: Record) -> str:
         for key in ("loop_factor", "loop_factor_limit")
     )
     if factor > run["loop_factor_limit"]:
-        end = f"From {limit} times on the residual grows, so it grows here"
+        end = f"more than {limit} times, so that it grows"
     elif factor > 1:
         end = (
-            f"The residual turns to the opposite side, and {percent(factor - 1)} of it is left; "
-            f"from {limit} times on it grows"
+            f"so that {percent(factor - 1)} of it is left on the opposite side; "
+            f"from {limit} times on it would grow"
         )
     else:
-        end = f"The rest is left to the next injection; from {limit} times on the residual would grow"
-    return f". One injection moves {value} times the liquid that would just cancel a small residual. {end}"
+        end = f"and leaves the rest to the next; from {limit} times on it would grow"
+    return f". One injection removes {value} times a small residual, {end}"
 
 
 def chance(evidence: Record) -> list[str]:
@@ -239,8 +261,13 @@ def _actions(evidence: Record, rows: Sequence[Requirement]) -> list[str]:
         told.append(valve)
     if verdicts.get("Correction capacity of one pair") in {MISSED, OPEN}:
         told.append("Balance the rotor better by hand, or take a larger disc: the capacity has no reserve.")
-    if any("hump radius" in row.rests for row in rows):
-        told.append("Measure the radius of the siphon crest: it sets the gas pressure that starts the flow.")
+    if any("siphon crest radius" in row.rests for row in rows):
+        crest = (evidence.get("summary") or {}).get("crest")
+        most = shown(crest["priming_pressure_Pa"][-1], "Pa", digits=2) if crest else ""
+        told.append(
+            "Measure the radius of the siphon crest: it sets the gas pressure that starts the flow"
+            f"{f'; {most} would do wherever it may lie' if most else ''}."
+        )
     if any("bore" in row.rests for row in rows):
         told.append(
             "Measure the flow through the tube at three gas pressures; every velocity and gain rests on the "

@@ -11,6 +11,7 @@ from ringbalance.controller.tuning.loop_factor import STAYING_DEVIATIONS
 from ringbalance.reports.figures.operation import requirement_bars
 from ringbalance.reports.figures.style import Drawing
 from ringbalance.reports.numbers import given, number, percent, shown
+from ringbalance.reports.prose import key_words
 from ringbalance.reports.section import Record, Table
 from ringbalance.reports.traces import evidence_at, read, traced, untraced
 from ringbalance.scene import Scene
@@ -19,6 +20,7 @@ MET: Final = "met"
 MISSED: Final = "not met"
 OPEN: Final = "cannot be told"
 UNASKED: Final = "none stated"
+_NONE: Final = "nothing in the scene"
 _CERTAIN: Final = ("given", "measured")
 _LIKELY: Final = 0.95
 """Fraction of runs that must settle in time, the confidence of every interval in the report."""
@@ -38,6 +40,9 @@ class Requirement:
     """As a number of `unit`; None where there is none to draw."""
     reached: float | None = None
     uncertainty: float = 0.0
+    low: float | None = None
+    high: float | None = None
+    """Ends of what is reached, where they are others than plus and minus the uncertainty."""
     unit: str = "1"
     at_least: bool = True
     """Whether more than required is better."""
@@ -94,11 +99,13 @@ def requirement_figure(rows: Iterable[Requirement]) -> Drawing | None:
             "label": untraced(row.name),
             "required": row.required,
             "reached": row.reached,
-            "uncertainty": row.uncertainty,
-            "unit": row.unit,
+            "low": row.reached - row.uncertainty if row.low is None else row.low,
+            "high": row.reached + row.uncertainty if row.high is None else row.high,
             "at_least": row.at_least,
+            "verdict": row.verdict,
         }
         for row in rows
+        if row.reached is not None
     )
 
 
@@ -117,7 +124,7 @@ def resting(evidence: Record, *paths: str) -> str:
     by_origin: dict[str, list[str]] = {}
     for path in paths:
         if (origin := origins.get(path, "given")) not in _CERTAIN:
-            by_origin.setdefault(origin, []).append(path.partition(".")[2].replace("_", " "))
+            by_origin.setdefault(origin, []).append(key_words(path))
     return "; ".join(f"{origin}: {', '.join(names)}" for origin, names in by_origin.items())
 
 
@@ -130,7 +137,7 @@ def named_with_origin(evidence: Record, path: str) -> str:
 def input_name(path: str) -> str:
     """The name of an input that a path in the scene file stands for, such as "bore of the tube"."""
     table, _, key = path.partition(".")
-    return f"{key.replace('_', ' ')} of the {table}" if key else path
+    return f"{key_words(path)} of the {table.replace('_', ' ')}" if key else path
 
 
 def _capacity(evidence: Record) -> Requirement | None:
@@ -175,16 +182,27 @@ def _gas_pressure(evidence: Record) -> Requirement | None:
     starts = point.get("priming_pressure_vented_Pa") is not None
     key = "priming_pressure_vented_Pa" if starts else "stall_pressure_Pa"
     width = point["priming_uncertainty" if starts else "stall_uncertainty"]
-    own = (evidence.get("summary") or {}).get("gas_pressure_uncertainty_Pa") or 0.0
+    summary, gas = evidence.get("summary") or {}, point["gas_pressure_Pa"]
+    own = summary.get("gas_pressure_uncertainty_Pa") or 0.0
+    both, crest = math.hypot(width, own), summary.get("crest") if starts else None
+    # A crest that nobody gave may lie elsewhere, which moves the pressure by more than any tolerance.
+    least, most = crest["priming_pressure_Pa"] if crest else (point[key], point[key])
+    ends = (
+        read(evidence, f"summary.crest.priming_pressure_Pa.{end}", "Pa", digits=2) for end in (0, 1) if crest
+    )
+    anywhere = f"; {' to '.join(ends)} wherever the crest may lie" if crest else ""
+    verdicts = {_above(gas, bound, both) for bound in (least, most)}
     return Requirement(
         name="Gas pressure " + ("that lifts the liquid over the siphon crest" if starts else "above stall"),
-        wanted=f"at least {read(evidence, f'operating_point.{key}', 'Pa', width=width)}",
+        wanted=f"at least {read(evidence, f'operating_point.{key}', 'Pa', width=width)}{anywhere}",
         result=read(evidence, "operating_point.gas_pressure_Pa", "Pa", width=own),
-        verdict=_above(point["gas_pressure_Pa"], point[key], math.hypot(width, own)),
+        verdict=verdicts.pop() if len(verdicts) == 1 else OPEN,
         rests=resting(evidence, "tube.hump_radius", "tube.port_radius", "tube.hump_gas"),
         required=point[key],
-        reached=point["gas_pressure_Pa"],
-        uncertainty=math.hypot(width, own),
+        reached=gas,
+        uncertainty=both,
+        low=gas * point[key] / most - both if most > 0 else None,
+        high=gas * point[key] / least + both if least > 0 else None,
         unit="Pa",
     )
 
@@ -253,7 +271,7 @@ def _settling(evidence: Record) -> Requirement | None:
     slow = read(evidence, "summary.tuning.settling_time_s.p95", "s", digits=2)
     return Requirement(
         name="Settling time with the recommended gain",
-        wanted=UNASKED if wanted is None else f"at most {given(wanted, 's')} in {percent(_LIKELY)} of runs",
+        wanted=_NONE if wanted is None else f"at most {given(wanted, 's')} in {percent(_LIKELY)} of runs",
         result=f"median {middle}, {percent(_LIKELY)} of runs within {slow}; settled: "
         f"{traced(percent(tuning['fraction_settled']), 'summary.tuning.fraction_settled')} of "
         f"{tuning['runs']} runs, with 95 % confidence {percent(low)} to {percent(high)}"
@@ -324,7 +342,7 @@ def _grade_row(evidence: Record) -> Requirement | None:
     path = "summary.requirement.grade_at_residual_m_s"
     return Requirement(
         name="Balance quality grade at the residual, ISO 21940-11",
-        wanted=UNASKED if bound is None else f"at most G {number(1e3 * bound, digits=3)}",
+        wanted=_NONE if bound is None else f"at most G {number(1e3 * bound, digits=3)}",
         result=f"G {traced(number(1e3 * reached, digits=2), path)}, in mm/s",
         verdict=UNASKED if bound is None else (MET if reached <= bound else MISSED),
         rests=resting(evidence, "rotor.mass", "rotor.influence_coefficient"),

@@ -109,7 +109,7 @@ def _collect(work: Work) -> Record | None:
     found = [(regime, _state_in(regime, work.scene, law)) for regime in _ORDER]
     return {
         "hump_radius_m": work.scene.tube.hump_radius,
-        "states": [_record(work.scene, law, *state) for _, state in found if state is not None],
+        "states": [_record(work.calibration.scene, law, *state) for _, state in found if state is not None],
         "absent": [regime.label for regime, state in found if state is None],
     }
 

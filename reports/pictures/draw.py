@@ -56,6 +56,8 @@ def main(arguments: list[str]) -> int:
             plotter: Any = pv.Plotter(
                 off_screen=True, window_size=[SCALE * side for side in PICTURE], lighting="light kit"
             )
+            # The reduction smooths already.
+            plotter.render_window.SetMultiSamples(0)
             plotter.set_background(theme.background)
             labels, scale = paint(plotter, job | {"lengths": lengths}, liquid, theme)
             _save(plotter, labels, scale, theme, Path(job["folder"]) / f"{name}-{theme.name}.png")

@@ -33,7 +33,8 @@ def tube_field(scene: Scene) -> Record | None:
     """
     if scene.tube.hump_radius is None:
         return None
-    law = calibration_of(scene).flow_law
+    calibration = calibration_of(scene)
+    scene, law = calibration.scene, calibration.flow_law
     equal = law.max_fill_ratio / 2
     found = hump_profile(scene=scene, law=law, fill_ratio=equal, opposite_fill_ratio=equal, points=_POINTS)
     # Where a step stands twice, the later entry is kept: a line may not stand still.

@@ -269,7 +269,6 @@ def _gain_document(gain: LoopGain) -> dict[str, Any]:
         "margin_to_instability": 2 / gain.per_operation,
         "lag_margin_rad": gain.lag_margin,
         "over_drag_coefficient": _curve_document(gain.over_drag),
-        "over_moment_per_transferred_mass": _curve_document(gain.over_moment),
     }
 
 

@@ -3,29 +3,35 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 
 from ringbalance.controller.ensemble.moment import moment_table
 from ringbalance.controller.ensemble.monte_carlo import simulate_members
+from ringbalance.controller.ensemble.run import MemberRuns
 from ringbalance.controller.ensemble.samples import Members, members_alike
 from ringbalance.controller.ensemble.transfer import PairTransfer
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.models import Scene
 
 SMALL_FILL: Final = 1e-3
 """Change of fill over which a loop counts as linear."""
-GAINS: Final = 61
+_Seen: TypeAlias = BoolArray | IntArray
+"""By member, whether or how often something happened."""
+
+GAINS: Final = 11
 """Tried at once for each onset."""
-PASSES: Final = 2
+PASSES: Final = 3
+"""Each narrows an onset down tenfold in its logarithm; the last leaves 0.3 per cent."""
 SEARCH: Final = (0.3, 4.0)
 """Gains per operation between which onsets are looked for."""
 OPERATIONS: Final = 12
 CURVE_FACTORS: Final[FloatArray] = np.geomspace(0.25, 4.0, 21)
-"""Of k and of lambda, along the analytic curves."""
+"""Of k, along the analytic curves."""
 SIMULATED_FACTORS: Final[FloatArray] = np.geomspace(0.25, 4.0, 5)
 """The same where the loop is simulated."""
 
@@ -68,7 +74,6 @@ class LoopGain:
     lag_margin: float
     """Error of the assumed lag angle at which the residual no longer falls, acos(h/2), rad; 0 if h >= 2."""
     over_drag: GainCurve
-    over_moment: GainCurve
 
     @property
     def overshoot_gain(self) -> float:
@@ -85,7 +90,7 @@ def loop_gain(scene: Scene, model: BalancerModel, *, transfer: PairTransfer) -> 
     """Linearise the loop about level chambers, and find its margins by simulation as well.
 
     e_(n+1) = (1 - h) e_n with h = Kc dA/dt and dA/dt = kappa |dM/dx| u S/V, so a residual turns round from h
-    = 1 and grows from h = 2. With k and lambda h varies as lambda/sqrt(k + 1); for a law whose k depends on
+    = 1 and grows from h = 2. With k h varies as 1/sqrt(k + 1); for a law whose k depends on
     the velocity that is the curve for a constant k that gives the same velocity at equal fills.
     Returns: LoopGain; None when the gas does not drive a flow at equal fills.
     Source: sections 4.2 and 5 of the liquid-ring paper; a discrete first-order loop.
@@ -100,11 +105,8 @@ def loop_gain(scene: Scene, model: BalancerModel, *, transfer: PairTransfer) -> 
     k = 2 * pressure / (model.density * u**2) - 1
     arm = per_fill / (model.density * model.chamber_volume)
     h = scene.controller.proportional * slope
-    ones = np.ones(SIMULATED_FACTORS.size)
-    slowed = np.sqrt((k + 1) / (k * SIMULATED_FACTORS + 1))
-    arms = SIMULATED_FACTORS
-    drag = _simulated(scene, model, transfer, slope * slowed, (slowed, ones))
-    moment = _simulated(scene, model, transfer, slope * arms, (ones, arms))
+    slowed, simulated = (np.sqrt((k + 1) / (k * f + 1)) for f in (CURVE_FACTORS, SIMULATED_FACTORS))
+    overshoot, growth = _onsets(scene, model, transfer, slope, simulated)
     return LoopGain(
         law=model.name,
         velocity=u,
@@ -114,8 +116,14 @@ def loop_gain(scene: Scene, model: BalancerModel, *, transfer: PairTransfer) -> 
         gain=scene.controller.proportional,
         per_operation=h,
         lag_margin=math.acos(min(h / 2, 1.0)),
-        over_drag=_curve(k, slope * np.sqrt((k + 1) / (k * CURVE_FACTORS + 1)), drag),
-        over_moment=_curve(arm, slope * CURVE_FACTORS, moment),
+        over_drag=GainCurve(
+            values=k * CURVE_FACTORS,
+            overshoot_gain=1 / (slope * slowed),
+            instability_gain=2 / (slope * slowed),
+            simulated_values=k * SIMULATED_FACTORS,
+            simulated_overshoot_gain=overshoot,
+            simulated_instability_gain=growth,
+        ),
     )
 
 
@@ -127,52 +135,43 @@ def _moment_per_fill(scene: Scene, model: BalancerModel) -> float:
     return float(abs(ends[1] - ends[0])) / (2 * step)
 
 
-def _curve(value: float, slopes: FloatArray, simulated: tuple[FloatArray, FloatArray]) -> GainCurve:
-    return GainCurve(
-        values=value * CURVE_FACTORS,
-        overshoot_gain=1 / slopes,
-        instability_gain=2 / slopes,
-        simulated_values=value * SIMULATED_FACTORS,
-        simulated_overshoot_gain=simulated[0],
-        simulated_instability_gain=simulated[1],
-    )
-
-
-def _simulated(
-    scene: Scene,
-    model: BalancerModel,
-    transfer: PairTransfer,
-    slopes: FloatArray,
-    factors: tuple[FloatArray, FloatArray],
+def _onsets(
+    scene: Scene, model: BalancerModel, transfer: PairTransfer, slope: float, slowed: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Smallest gains with an overshoot and with growth, for each pair of factors of velocity and moment."""
+    """Smallest gains with an overshoot and with growth, at factors of the velocity."""
     quiet = _small_and_exact(scene, model)
-    onsets = []
-    for which in ("overshoots", "diverged"):
-        low, high = SEARCH[0] / slopes, SEARCH[1] / slopes
-        for _ in range(PASSES):
-            gains = np.geomspace(low, high, GAINS, axis=1)
-            members = _members(quiet, gains, factors)
-            runs = simulate_members(quiet, model, members=members, transfer=transfer)
-            seen = np.asarray(getattr(runs, which)).reshape(gains.shape) > 0
-            first = np.argmax(seen, axis=1)
-            rows = np.arange(slopes.size)
-            found = seen.any(axis=1) & (first > 0)
-            low, high = gains[rows, np.maximum(first - 1, 0)], gains[rows, first]
-        onsets.append(np.where(found, np.sqrt(low * high), np.inf))
-    return onsets[0], onsets[1]
+
+    def run(gains: FloatArray) -> MemberRuns:
+        members = _members(quiet, gains, slowed)
+        return simulate_members(quiet, model, members=members, transfer=transfer)
+
+    low, high = (end / (slope * slowed) for end in SEARCH)
+    first = np.geomspace(low, high, GAINS, axis=1)
+    found = run(first)
+    overshoot = _onset(first, found.overshoots, lambda gains: run(gains).overshoots)
+    growth = _onset(first, found.diverged, lambda gains: run(gains).diverged)
+    return overshoot, growth
 
 
-def _members(scene: Scene, gains: FloatArray, factors: tuple[FloatArray, FloatArray]) -> Members:
+def _onset(gains: FloatArray, seen: _Seen, look: Callable[[FloatArray], _Seen]) -> FloatArray:
+    """Gain in each row from which on something is seen; infinite where that is none of them, or all."""
+    low, high = _bracket(gains, seen)
+    for _ in range(PASSES - 1):
+        gains = np.geomspace(low, high, GAINS, axis=1)
+        low, high = _bracket(gains, look(gains))
+    return np.where(low < high, np.sqrt(low * high), np.inf)
+
+
+def _bracket(gains: FloatArray, seen: _Seen) -> tuple[FloatArray, FloatArray]:
+    """The last gain of each row before something is seen, and the next; equal where there is no such step."""
+    first = np.argmax(seen.reshape(gains.shape) > 0, axis=1)
+    rows = np.arange(len(gains))
+    return gains[rows, np.maximum(first - 1, 0)], gains[rows, first]
+
+
+def _members(scene: Scene, gains: FloatArray, slowed: FloatArray) -> Members:
     alike = members_alike(scene, size=gains.size)
-    velocity, moment = (np.repeat(factor, gains.shape[1]) for factor in factors)
-    return Members(
-        velocity_factor=velocity,
-        moment_factor=moment,
-        influence_coefficient=alike.influence_coefficient,
-        lag_angle=alike.lag_angle,
-        proportional=gains.ravel(),
-    )
+    return replace(alike, velocity_factor=np.repeat(slowed, gains.shape[1]), proportional=gains.ravel())
 
 
 def _small_and_exact(scene: Scene, model: BalancerModel) -> Scene:

@@ -257,7 +257,7 @@ def _parts(
 ) -> Mapping[str, FloatArray]:
     """Half-widths of k at a fixed velocity, one per cause; a bore or viscosity of the scene is not one."""
     stated = tuple(i for i in scene.uncertainty if i.quantity not in {"bore", "kinematic_viscosity"})
-    parts = {} if tube.drag_coefficient is not None else model_parts(tube=tube, state=state)
+    parts = model_parts(tube=tube, state=state)
 
     def k_of(t: Tube, nu: FloatArray, speed: float) -> FloatArray:
         return tube_state_at(

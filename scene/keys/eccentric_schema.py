@@ -7,7 +7,14 @@ from types import MappingProxyType
 from ringbalance.scene import eccentric_control_models as control
 from ringbalance.scene import eccentric_models as machine
 from ringbalance.scene.keys.declaration import needed
-from ringbalance.scene.keys.schema import RUN, Schema, table_of, top_keys, with_origins
+from ringbalance.scene.keys.schema import (
+    RUN,
+    Schema,
+    table_of,
+    top_keys,
+    uncertainty_by_table,
+    with_origins,
+)
 
 _ECCENTRIC = {
     "rotor": table_of(machine.EccentricRotor, "the rotor on its bearing, and its speed"),
@@ -23,7 +30,7 @@ _ECCENTRIC = {
 }
 ECCENTRIC_MASS = Schema(
     top=MappingProxyType(top_keys(needed('"eccentric_mass" for eccentric masses'))),
-    tables=with_origins({**_ECCENTRIC, **RUN}),
+    tables=with_origins({**_ECCENTRIC, "uncertainty": uncertainty_by_table(_ECCENTRIC), **RUN}),
     scene=machine.EccentricScene,
 )
 """A scene whose balancer is two eccentric masses."""

@@ -193,6 +193,19 @@ def each_of(reader: Reader, *, count: int, example: str) -> Reader:
     return Reader(read=read, allowed=allowed, summary=summary, dimension=reader.dimension)
 
 
+def one_or_each(reader: Reader, *, example: str) -> Reader:
+    """Reader of one value, or of a list of values of its sort; its values are tuples."""
+    allowed = f"{reader.allowed}; or a list of one for each chamber, such as {example}"
+
+    def read(value: object) -> tuple[Any, ...]:
+        if not isinstance(value, list):
+            return (reader.read(value),)
+        return each_of(reader, count=len(value), example=example).read(value)
+
+    summary = f"{reader.summary}, or a list of one for each chamber"
+    return Reader(read=read, allowed=allowed, summary=summary, dimension=reader.dimension)
+
+
 def choice(words: Any) -> Reader:
     """Reader of one of a few words, which a `Literal` lists."""
     options: tuple[str, ...] = get_args(words)

@@ -11,6 +11,7 @@ from ringbalance.scene.keys.fields import (
     angle_of_turn,
     each_of,
     number,
+    one_or_each,
     quantity,
     share,
     text,
@@ -26,6 +27,9 @@ Turn = Annotated[float, angle_of_turn()]
 PositiveTime = Annotated[float, quantity("time", POSITIVE)]
 Time = Annotated[float, quantity("time", NOT_NEGATIVE)]
 Pressure = Annotated[float, quantity("pressure", NOT_NEGATIVE)]
+TimePerChamber = Annotated[
+    tuple[float, ...], one_or_each(quantity("time", NOT_NEGATIVE), example='["50 ms", "30 ms"]')
+]
 PositivePressure = Annotated[float, quantity("pressure", POSITIVE)]
 Temperature = Annotated[float, quantity("temperature")]
 Influence = Annotated[float, quantity("influence_coefficient", POSITIVE)]

@@ -25,6 +25,7 @@ BALANCERS: tuple[str, ...] = get_args(Balancer)
 Place = tuple[int | str, ...]
 ORIGIN = "origin"
 """Key of every table that says where its values come from."""
+_UNCERTAINTY = "expanded uncertainties (95 %) of the inputs"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,7 +111,26 @@ def _uncertainty(tables: Mapping[str, Table]) -> Table:
         for name, key in content.keys.items()
         if key.uncertain
     }
-    return Table(text="Expanded uncertainties (95 %) of the inputs", keys=keys)
+    return Table(text=_UNCERTAINTY, keys=keys)
+
+
+def uncertainty_by_table(tables: Mapping[str, Table]) -> Table:
+    """[uncertainty] with a table of half-widths for each table, where tables share names of keys."""
+    keys = {
+        table: {name: _half_width_of(table, key) for name, key in content.keys.items() if key.uncertain}
+        for table, content in tables.items()
+    }
+    return Table(
+        text=_UNCERTAINTY,
+        keys={
+            table: Key(
+                takes=Entries(record=dict, keys=inside, example=""),
+                presence=unused("exact", f"expanded uncertainties of quantities in [{table}]"),
+            )
+            for table, inside in keys.items()
+            if inside
+        },
+    )
 
 
 def with_origins(tables: Mapping[str, Table]) -> Mapping[str, Table]:

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping
 from itertools import pairwise
 
 from ringbalance.scene.eccentric_models import SpeedPoint
-from ringbalance.scene.rules.check import Check, Finding, check, written
+from ringbalance.scene.keys.declaration import Entries
+from ringbalance.scene.keys.eccentric_schema import ECCENTRIC_MASS
+from ringbalance.scene.keys.schema import ORIGIN
+from ringbalance.scene.rules.check import Check, Finding, Rule, check, written
 
 _ROUNDING = 1e-9
 
@@ -90,6 +94,33 @@ def _limit_above_position_noise(limit: float, noise: float) -> Finding | None:
     )
 
 
+def _widths_below(names: tuple[str, ...]) -> Rule:
+    """No stated uncertainty is larger than its quantity, of those whose values follow the widths."""
+
+    def below(
+        widths: Mapping[str, tuple[float, bool]], *values: float | tuple[float, float]
+    ) -> Finding | None:
+        for name, value in zip(names, values, strict=True):
+            width, relative = widths.get(name, (0.0, True))
+            if not relative and width > min(value if isinstance(value, tuple) else (value,)):
+                return Finding(
+                    problem=f"the uncertainty of {name} is larger than {name} itself",
+                    allowed="at most the quantity itself, or below 100 %",
+                )
+        return None
+
+    return below
+
+
+def _width_checks() -> Iterator[Check]:
+    """An angle may be less than its uncertainty."""
+    for table, key in ECCENTRIC_MASS.tables["uncertainty"].keys.items():
+        if table != ORIGIN and isinstance(key.takes, Entries):
+            names = tuple(name for name in key.takes.keys if name != "phase")
+            paths = (f"{table}.{name}" for name in names)
+            yield check(_widths_below(names), f"uncertainty.{table}", *paths)
+
+
 _ARC, _GUIDE = "masses.arc_length", "masses.guide_radius"
 _STEPS = ("imbalance_filter.step", "friction_filter.step", "lqr.step")
 
@@ -101,4 +132,5 @@ CHECKS: tuple[Check, ...] = (
     *(check(_step_is_multiple, step, "sensor.step") for step in _STEPS),
     check(_moves_in_order, "fine_tuning.stop", "fine_tuning.step"),
     check(_limit_above_position_noise, "supervisor.limit", "sensor.position_noise"),
+    *_width_checks(),
 )

@@ -92,6 +92,16 @@ def _sequence_complete(sequence: tuple[str, ...], chambers: int) -> Finding | No
     )
 
 
+def _one_for_each(offsets: tuple[float, ...] | None, chambers: int) -> Finding | None:
+    """One time for all chambers, or one for each."""
+    if offsets is None or len(offsets) in (1, chambers):
+        return None
+    return Finding(
+        problem=f"a list of {len(offsets)} times for {chambers} chambers",
+        allowed=f"one time for all, or a list of {chambers} in the order of the letters",
+    )
+
+
 _VAPOUR, _AMBIENT = "liquid.vapour_pressure", "gas.ambient_pressure"
 _GAS_TIMES = ("controller.minimum_gas_time", "controller.maximum_gas_time")
 _TRIAL_TIMES = ("controller.first_trial", "controller.long_step", "controller.short_step")
@@ -121,6 +131,7 @@ CHECKS: tuple[Check, ...] = (
     ),
     check(_steps_in_order, "controller.short_step", "controller.long_step", when=_by_trial),
     check(_sequence_complete, "controller.sequence", "disc.chambers"),
+    check(_one_for_each, "controller.gas_time_offset", "disc.chambers"),
 )
 
 

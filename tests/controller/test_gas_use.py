@@ -20,8 +20,15 @@ from ringbalance.controller.liquid_ring.transfer import Event
 from ringbalance.controller.loop import simulate
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.calibration import calibrate
-from ringbalance.reduced_model.gas_line import line_answers, line_text, line_warning
+from ringbalance.reduced_model.gas_line import (
+    line_answers,
+    line_ends,
+    line_text,
+    line_warning,
+    short_injection,
+)
 from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.short_injection import Fills
 from ringbalance.scene.models import Scene
 
 Plant = Callable[..., Dynamics]
@@ -63,6 +70,51 @@ def test_the_mass_of_the_column_counts_in_a_short_injection(
     moved = 0.25 - pulse(dynamics, answer.shortest_opening, np.array([3.0])).fill
     assert answer.smallest_correction == pytest.approx(_change(calibrated, scene, moved), rel=0.1)
     assert (answer.smallest_correction or 0.0) < 0.5 * (at_once.smallest_correction or 0.0)
+
+
+@pytest.mark.parametrize("pressure", [0.7e6, 1.05e6])
+@pytest.mark.parametrize("conductance", [0.6e-8, 2e-8, 5e-8, 20e-8])
+def test_a_fast_line_moves_as_much_as_in_the_plant(
+    calibrated: BalancerModel,
+    plant_of: Plant,
+    pulse: Pulse,
+    scene: Scene,
+    conductance: float,
+    pressure: float,
+) -> None:
+    """Within 10 % to either side, just primed and open for 5 ms longer; separated columns start and stop."""
+    gas = replace(scene.gas, conductance=conductance, critical_ratio=0.3, valve_lag=0.0, pressure=pressure)
+    given = replace(scene, gas=gas)
+    dynamics = plant_of(given, calibrated, "gas filling", "tube inertia")
+    (end,) = line_ends(given)
+    estimate = short_injection(given, end, Fills(model=calibrated, driven=0.25, opposite=0.25))
+    assert estimate is not None
+    primed, volume = estimate.shortest(0.0).time, calibrated.chamber_volume / calibrated.tube_area
+    for opening in (1.02 * primed, primed + 5e-3):
+        moved = (0.25 - pulse(dynamics, opening, np.array([3.0])).fill) * volume
+        assert estimate.shortest(opening).metres == pytest.approx(moved, rel=0.1)
+
+
+@pytest.mark.parametrize("fill", [0.15, 0.25, 0.35])
+def test_the_dead_time_is_that_of_the_plant(
+    calibrated: BalancerModel, plant_of: Plant, pulse: Pulse, scene: Scene, fill: float
+) -> None:
+    """An opening longer by the dead time moves what the steady velocity moves in the time alone."""
+    gas = replace(scene.gas, conductance=0.6e-8, critical_ratio=0.3, valve_lag=4e-3, pressure=0.9e6)
+    given = replace(scene, gas=gas)
+    dynamics = plant_of(given, calibrated, "gas filling", "tube inertia", "valve lag")
+    fills = Fills(model=calibrated, driven=fill, opposite=0.5 - fill)
+    (end,) = line_ends(given)
+    estimate = short_injection(given, end, fills)
+    assert estimate is not None
+    wanted = 0.02 * fills.steady_velocity(0.9e6)
+    opening = estimate.dead_time(wanted) + 0.02
+    moved = fill - pulse(dynamics, opening, np.array([3.0]), fill=fill).fill
+    metres = moved * calibrated.chamber_volume / calibrated.tube_area
+    assert metres == pytest.approx(wanted, rel=0.1)
+    # Without it most of the injection only fills gas.
+    short = fill - pulse(dynamics, 0.02, np.array([3.0]), fill=fill).fill
+    assert short * calibrated.chamber_volume / calibrated.tube_area < 0.5 * wanted
 
 
 def test_a_line_that_is_not_given_is_a_range(calibrated: BalancerModel, scene: Scene) -> None:

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from ringbalance.reduced_model.calibration import Calibration, calibrate
+from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.selection.registry import models_used
 from ringbalance.scene import Scene, bundled_scene, load_scene
 from ringbalance.scene.accuracy import with_tolerance
+from ringbalance.scene.tube_models import FINEST_MODELS
 from ringbalance.verification.selection_studies.scenes import random_scene
 
 pytestmark = pytest.mark.faults
@@ -28,6 +30,38 @@ def scene_at_the_edge(number: int) -> Scene:
     gravity = {used.term: used.estimated_contribution for used in models_used(scene)}[GRAVITY]
     assert gravity is not None
     return replace(scene, tolerance=min(max(1.2 * gravity, 1e-6), 0.1))
+
+
+TUBE_TOLERANCES = (0.1, 0.01, 0.001)
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+def test_the_tube_keeps_the_tolerance_at_every_fill_and_pressure(number: int) -> None:
+    """Without gravity, which is another choice: k, and the velocity wherever the regime can be told."""
+    base = load_scene(bundled_scene("liquid_ring_paper"))
+    assert isinstance(base, Scene)
+    drawn = random_scene(base, number)
+    scene = replace(drawn, environment=replace(drawn.environment, gravity=0.0))
+    finest = calibrate(with_tolerance(scene, models="finest"))
+    assert finest.scene.tube.models == FINEST_MODELS
+    simpler = 0
+    for tolerance in TUBE_TOLERANCES:
+        selected = calibrate(replace(scene, tolerance=tolerance))
+        simpler += selected.scene.tube.models != FINEST_MODELS
+        for name in ("k", "velocity"):
+            value, expected = answers(selected)[name], answers(finest)[name]
+            assert abs(value - expected) <= tolerance * abs(expected), name
+        fills = scene.disc.max_fill_ratio * np.linspace(0.15, 0.85, 8)
+        for pressure in scene.gas.pressure * np.array([0.75, 1.0, 1.5]):
+            one, other = (
+                made.flow_law.evaluate(fill_ratio=fills, gas_pressure=pressure) for made in (selected, finest)
+            )
+            told = (one.regime != Regime.UNDECIDED) & (other.regime != Regime.UNDECIDED)
+            difference = np.abs(one.velocity - other.velocity)
+            assert np.all(one.regime[told] == other.regime[told])
+            assert np.all(difference[told] <= tolerance * np.abs(other.velocity[told]))
+            assert np.all(difference <= one.uncertainty + other.uncertainty)
+    assert simpler
 
 
 def answers(calibration: Calibration) -> dict[str, float]:

@@ -26,8 +26,11 @@ from ringbalance.physics.tube.rotation_table import (
 from ringbalance.verification.navier_stokes.continuation import StepRule, follow
 from ringbalance.verification.navier_stokes.newton import FlowSolution, FlowSystem, NewtonSettings
 from ringbalance.verification.navier_stokes.rotating_section import (
+    DuctMesh,
     SectionMesh,
+    developed_section,
     friction_ratio,
+    march_section,
     section_system,
     solve_section,
     solve_section_without_inertia,
@@ -246,3 +249,30 @@ def test_ito_and_nanbus_formula_holds_for_slow_rotation_only() -> None:
     assert gap(0.05) < 0.03
     assert gap(0.5) < 0.08
     assert gap(2.0) > 0.13
+
+
+def test_a_flow_that_changes_in_time_settles_at_the_steady_one() -> None:
+    system = section_system(cells=SectionMesh(around=3, across=4, wall_ratio=5.0))
+    steady = developed_section(system=system, kl=1e4, s=1.0).driving_gradient
+    flow = march_section(system=system, kl=1e4, s=1.0, step=2e-4, steps=1000)
+    assert flow.gradients[-1] == pytest.approx(steady, rel=1e-4)
+    assert abs(flow.gradients[5] / steady - 1) > 0.01
+
+
+def test_a_march_with_too_long_a_step_says_so() -> None:
+    system = section_system(cells=DuctMesh(across=8, along=4))
+    with pytest.raises(ArithmeticError, match="shorter steps"):
+        march_section(system=system, kl=1e6, s=0.1, step=1e-3, steps=500)
+
+
+@pytest.mark.parametrize(("aspect", "product"), [(1.0, 56.908), (2.0, 62.192), (8.0, 82.34)])
+def test_laminar_friction_of_ducts_is_the_exact_series(aspect: float, product: float) -> None:
+    """f Re of a rectangular duct; the series is summed here."""
+    ratio, odd = 1 / aspect, np.arange(1, 200, 2)
+    series = 1 - 192 / np.pi**5 * ratio * np.sum(np.tanh(odd * np.pi / (2 * ratio)) / odd**5)
+    exact = 96 / ((1 + ratio) ** 2 * series)
+    assert exact == pytest.approx(product, rel=1e-3)
+    flow = solve_section_without_inertia(
+        system=section_system(cells=DuctMesh(aspect_ratio=aspect)), rotation_reynolds=0.0
+    )
+    assert 64 * friction_ratio(flow) == pytest.approx(exact, rel=1e-4)

@@ -29,6 +29,7 @@ from ringbalance.verification.navier_stokes.newton import (
 )
 from ringbalance.verification.navier_stokes.rotating_section import (
     SectionMesh,
+    developed_section,
     section_mesh,
     section_system,
     solve_section_without_inertia,
@@ -176,7 +177,7 @@ def test_profile_in_rotation_carries_the_energy_that_the_formula_says(re: float,
     if re == 0:
         flow = solve_section_without_inertia(system=system, rotation_reynolds=rotation)
     else:
-        flow = bent_tube.developed_section(system=system, reynolds=re, rotation_reynolds=rotation)
+        flow = developed_section(system=system, kl=re * rotation, s=rotation / re)
     ratio = rotating_friction_ratio(reynolds=re, rotation_reynolds=rotation).value
     found = kinetic_factor(reynolds=max(re, 1e-3), friction_ratio=ratio)
     assert float(found) == pytest.approx(_alpha(flow, system), abs=ROTATING_PROFILE_UNCERTAINTY)
@@ -201,7 +202,7 @@ def _entry_excess(re: float, rotation: float, blunt: float) -> float:
     """Head lost beyond developed friction, over U^2/2, behind an inflow ~ 1 - (2 r/d)^blunt, in 3-D."""
     cells = SectionMesh(around=2, across=4, wall_ratio=6.0)
     system = section_system(cells=cells)
-    developed = bent_tube.developed_section(system=system, reynolds=re, rotation_reynolds=rotation)
+    developed = developed_section(system=system, kl=re * rotation, s=rotation / re)
     way = 5 * bound(re, rotation)
     tube = swept_tube(section=section_mesh(cells=cells), segments=[Segment(length=way, cells=16, ratio=6.0)])
     flow = bent_tube._system(tube, system, developed, re)

@@ -223,7 +223,7 @@ def test_a_device_is_what_the_calibration_tabulates(table_1_scene: Scene, change
     for quantity, value in changes.items():
         scene = with_value(scene=scene, quantity=quantity, value=value)
     calibration = calibrate(scene)
-    told = budgets(scene=scene, calibration=calibration)
+    scene, told = calibration.scene, calibration.budgets
     near = calibration.operating_point.loss_velocity or 1.0
     found = device_of(scene, near=near, near_fill=calibration.residual.fill_ratio).values()
     assert set(told) == set(found)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.optimize import fsolve, minimize_scalar
 
 from ringbalance.physics.tube.loss import tube_loss
-from ringbalance.reduced_model.calibration import Calibration
+from ringbalance.reduced_model.calibration import Calibration, calibrated_model
 from ringbalance.reduced_model.chamber.calibration import calibrate_chamber
 from ringbalance.reduced_model.law.building import calibrated_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
@@ -21,6 +21,7 @@ from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.operating.pressure_profile import hump_profile
 from ringbalance.reduced_model.tube.heads import tube_heads
 from ringbalance.reduced_model.tube.path import crest_span, path_radius, share_at_radius
+from ringbalance.scene.accuracy import with_tolerance
 from ringbalance.scene.models import InputUncertainty, Scene
 
 AMBIENT, VAPOUR, DENSITY = 101325.0, 2339.0, 1000.0
@@ -29,9 +30,9 @@ FLOWS = (Regime.SIPHON, Regime.SEPARATED, Regime.UNDECIDED)
 
 
 @pytest.fixture(scope="module")
-def law(table_1_calibration: Calibration) -> CalibratedLaw:
-    """Arc and dissolved gas."""
-    return table_1_calibration.flow_law
+def law(table_1_scene: Scene) -> CalibratedLaw:
+    """Arc and dissolved gas; the finest models."""
+    return calibrated_model(with_tolerance(table_1_scene, models="finest")).flow  # type: ignore[return-value]
 
 
 def changed(scene: Scene, *, viscosity: float | None = None, **tube: Any) -> Scene:

@@ -7,9 +7,10 @@ import dataclasses
 import pytest
 
 from ringbalance.reduced_model.calibration import Calibration
-from ringbalance.reduced_model.selection.registry import LEFT_OUT, ModelUsed, models_used
+from ringbalance.reduced_model.selection.registry import ModelUsed, models_used
 from ringbalance.reduced_model.time_scales import first_gas_time
 from ringbalance.scene.models import Scene
+from ringbalance.scene.tube_models import LEFT_OUT
 
 INERTIA = "rho L du/dt of the liquid in the tube, in injections"
 

@@ -6,11 +6,10 @@ import dataclasses
 import math
 from typing import Literal
 
-import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from ringbalance.reduced_model.selection.estimates import FILLING, LAG, arc_moment, term_estimates
+from ringbalance.reduced_model.selection.estimates import FILLING, LAG, term_estimates
 from ringbalance.reduced_model.time_scales import (
     deciding_gas_time,
     long_start_up_loss,
@@ -82,13 +81,3 @@ def test_a_line_that_is_not_given_is_a_range_and_not_unknown(table_1_scene: Scen
     given = term_estimates(dataclasses.replace(table_1_scene, gas=own))
     assert given[LAG].contribution == pytest.approx(0.25)
     assert given[LAG].default_range is None
-
-
-def test_a_full_tube_along_half_a_turn_has_a_moment(table_1_scene: Scene) -> None:
-    """The first moment of an arc, summed in pieces: 1.77 g/m over 120 mm."""
-    density, tube = table_1_scene.liquid.density, table_1_scene.tube
-    radius = tube.length / math.pi
-    angle = np.linspace(0.0, math.pi, 20001)
-    pieces = density * math.pi / 4 * tube.bore**2 * radius * np.diff(angle)
-    moment = np.sum(pieces * radius * np.exp(0.5j * (angle[1:] + angle[:-1])))
-    assert arc_moment(table_1_scene) == pytest.approx(abs(moment), rel=1e-6)

@@ -90,18 +90,26 @@ def test_the_first_page_compares_with_the_locked_rotor(folder: Path, evidence: R
 
 def test_an_unmet_requirement_is_not_called_met(evidence: Record) -> None:
     changed = json.loads(json.dumps(evidence))
-    changed["requirements"] = [
-        {
-            "quantity": "patience",
-            "unit": "s",
-            "sense": "at most",
-            "required": 1.0,
-            "achieved": None,
-            "met": False,
-        }
-    ]
+    missed = {**changed["requirements"][0], "quantity": "patience", "achieved": None, "verdict": "not met"}
+    changed["requirements"] = [{**missed, "achieved_interval": None, "required_interval": None}]
     page = render(changed)["report.html"]
-    assert re.search(r"patience</th>.*?not met", page)
+    assert re.search(r"Patience</th>.*?not reached.*?not met", page)
+    assert "0 of 1 requirements are met; not met: patience." in page
+
+
+def test_what_a_requirement_depends_on_is_named_with_what_to_do(evidence: Record) -> None:
+    changed = json.loads(json.dumps(evidence))
+    row = changed["requirements"][1]
+    row["effects"] = {
+        "rotor.mass": [1e-9, 0.0],
+        "rotor.damping": [5e-7, 0.0],
+        "motor.resistance": [1e-12, 0.0],
+    }
+    row.update(verdict="cannot be told", lost=[], achieved_interval=[0.0, 6e-7])
+    changed["requirements"] = [row]
+    page = render(changed)["report.html"]
+    assert "up to 0.600\u202fµm" in page
+    assert "Determine more closely: damping of the rotor." in page
 
 
 def test_every_value_has_its_origin(scene: EccentricScene) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from ringbalance.reports.pages.first_page import SECTION, dominant, loop_sentences
+from ringbalance.reports.pages.first_page import SECTION, crest_range, dominant, loop_sentences
 from ringbalance.reports.pages.loop import SECTION as LOOP
 from ringbalance.reports.pages.requirements import (
     OPEN,
@@ -19,6 +19,7 @@ from ringbalance.reports.pages.requirements import (
 )
 from ringbalance.reports.traces import untraced
 from ringbalance.scene import Scene
+from ringbalance.verification.loops import calibration_of
 
 Record = dict[str, Any]
 
@@ -80,8 +81,8 @@ def test_the_verdict_is_named_with_the_loop_factor(evidence: Record, verdict: st
     run.update(verdict=verdict, loop_factor=1.93, settled=verdict == "settled")
     lead = untraced(loop_sentences(evidence)[0])
     assert said in lead
-    assert "One injection moves 1.93 times the liquid that would just cancel a small residual" in lead
-    assert "from 2.00 times on it grows" in lead
+    assert "One injection removes 1.93 times a small residual, so that 93\u202f% of it is left" in lead
+    assert "from 2.00 times on it would grow" in lead
 
 
 def test_a_loop_factor_is_explained_on_either_side_of_one(evidence: Record) -> None:
@@ -90,14 +91,14 @@ def test_a_loop_factor_is_explained_on_either_side_of_one(evidence: Record) -> N
     for factor in (0.8, 1.5, 2.3):
         run["loop_factor"] = factor
         ends[factor] = untraced(loop_sentences(evidence)[0]).split(". ")[-1]
-    assert ends[0.8].startswith("The rest is left to the next injection")
-    assert ends[1.5].startswith("The residual turns to the opposite side")
-    assert ends[2.3].endswith("so it grows here.")
+    assert "and leaves the rest to the next;" in ends[0.8]
+    assert "50\u202f% of it is left on the opposite side" in ends[1.5]
+    assert ends[2.3].endswith("so that it grows.")
 
 
 def test_no_run_is_compared_with_another_by_a_ratio(evidence: Record) -> None:
     told = " ".join(view(with_consequences(evidence))["loop_lead"])
-    assert told.count("times the") == told.count("times the liquid")
+    assert told.count("times the") == 0
 
 
 def test_the_recommended_gain_stands_beside_the_scene_s(evidence: Record) -> None:
@@ -156,6 +157,35 @@ def test_a_stated_moment_takes_the_place_of_the_initial_vibration(evidence: Reco
     row = row_of(evidence, "Correction capacity")
     assert row.verdict == "not met"
     assert "1100\u202fg\u202fmm" in untraced(row.wanted)
+
+
+@pytest.mark.parametrize(
+    ("pressures", "verdict"),
+    [
+        (None, "met"),
+        ([0.2e6, 0.6e6], "met"),
+        # Somewhere within its range the crest asks for more than the supply gives.
+        ([0.2e6, 0.9e6], "cannot be told"),
+        ([0.8e6, 0.9e6], "not met"),
+    ],
+)
+def test_a_crest_that_nobody_gave_widens_what_the_gas_must_do(
+    evidence: Record, pressures: list[float] | None, verdict: str
+) -> None:
+    evidence["operating_point"].update(gas_pressure_Pa=0.7e6, priming_pressure_vented_Pa=0.54e6)
+    evidence["summary"]["crest"] = pressures and {"priming_pressure_Pa": pressures, "why": "inferred"}
+    row = row_of(evidence, "Gas pressure")
+    assert row.verdict == verdict
+    assert ("wherever the crest may lie" in row.wanted) == (pressures is not None)
+
+
+def test_the_crest_may_lie_wherever_the_tube_is_empty_at_rest(paper_scene: Scene) -> None:
+    """Both ends by hydrostatics, rho omega^2 (R2^2 - r^2)/2; none where its radius is given."""
+    crest, rotor = crest_range(paper_scene, calibration_of(paper_scene)), paper_scene.rotor
+    assert crest is not None
+    for r, pressure in zip(reversed(crest["radius_m"]), crest["priming_pressure_Pa"], strict=True):
+        head = 0.5 * paper_scene.liquid.density * rotor.speed**2 * (paper_scene.disc.outer_radius**2 - r**2)
+        assert pressure == pytest.approx(head, rel=5e-3)
 
 
 def tuned(evidence: Record, **changes: Any) -> Record:

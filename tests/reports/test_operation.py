@@ -150,14 +150,17 @@ def test_pairs_together_cancel_the_sum_of_what_each_does(pairs: int, corners: in
 
 
 @pytest.mark.parametrize(
-    ("reached", "at_least", "verdict"),
-    [(1.2, True, "met"), (1.05, True, "cannot be told"), (0.8, True, "not met"), (1.2, False, "not met")],
+    ("reached", "high", "number"),
+    [(1.2, 1.3, ""), (8.0, 8.0, "8.0 \u25b8"), (0.1, 3.5, "up to 3.5 \u25b8")],
 )
-def test_a_requirement_is_judged_in_words(reached: float, at_least: bool, verdict: str) -> None:
-    row = {"label": "moment", "required": 1.0, "reached": reached, "uncertainty": 0.1, "unit": "kg m"}
-    drawing = requirement_bars([{**row, "at_least": at_least}])
+def test_a_requirement_is_judged_in_words(reached: float, high: float, number: str) -> None:
+    """A bar or an interval that goes on beyond the axis ends in its number."""
+    row = {"label": "moment", "required": 1.0, "reached": reached, "low": 0.1, "high": high}
+    drawing = requirement_bars([{**row, "at_least": True, "verdict": "met"}])
     assert drawing is not None
-    assert any(text.endswith(f": {verdict}") for text in texts(drawing))
+    told = texts(drawing)
+    assert any(text.endswith(": met") for text in told)
+    assert [text for text in told if "\u25b8" in text] == ([number] if number else [])
 
 
 def test_text_is_no_smaller_than_eight_points_in_print(collected: Record) -> None:

@@ -89,6 +89,23 @@ def test_the_papers_scene_has_the_papers_values() -> None:
     assert scene.balancer == "eccentric_mass"
 
 
+def test_each_table_has_its_uncertainties(driven_document: dict[str, Any], load: Load) -> None:
+    """By path; an angle may be less than its uncertainty, and a list has one for all its entries."""
+    driven_document["imbalance"]["phase"] = "0 deg"
+    driven_document["uncertainty"] = {
+        "rotor": {"mass": "1 %"},
+        "imbalance": {"mass": "10 g", "phase": "5 deg"},
+        "masses": {"friction_arm": "10 mm"},
+    }
+    stated = {each.quantity: (each.half_width, each.relative) for each in load(driven_document).uncertainty}
+    assert stated == {
+        "rotor.mass": (0.01, True),
+        "imbalance.mass": (pytest.approx(0.01), False),
+        "imbalance.phase": (pytest.approx(math.radians(5)), False),
+        "masses.friction_arm": (pytest.approx(0.01), False),
+    }
+
+
 def test_the_washing_machine_runs_through_its_critical_speed() -> None:
     scene = eccentric_scene(load_scene(bundled_scene("washing_machine")))
     critical = math.sqrt(scene.rotor.stiffness / (scene.rotor.mass + 2 * scene.masses.mass))
@@ -133,6 +150,18 @@ FAULTS: Mapping[str, tuple[str, Any, str, str]] = {
         "6 kg",
         "part of the rotor's mass (5 kg)",
         "at most",
+    ),
+    "more uncertain than it is large": (
+        "uncertainty.rotor",
+        {"mass": "6 kg"},
+        "the uncertainty of mass is larger than mass itself",
+        "below 100 %",
+    ),
+    "uncertainty of a list": (
+        "uncertainty.masses",
+        {"friction_arm": "11 mm"},
+        "the uncertainty of friction_arm is larger",
+        "at most the quantity",
     ),
     "masses too long": ("masses.arc_length", "800 mm", "do not fit on the track", "722.566 mm"),
     "masses overlap": ("masses.initial_angle", ["0 deg", "350 deg"], "they are 10 deg apart", "12.4556 deg"),
@@ -229,7 +258,7 @@ def test_what_needs_a_liquid_refuses_eccentric_masses(function: Callable[[Any], 
 def test_keys_are_fields(table: str) -> None:
     """A key reaches the record's field of its name; nothing is written in a file and then ignored."""
     assert _keys(table) == {field.name for field in fields(RECORDS[table])}
-    assert set(TABLES) == {*RECORDS, "accuracy"}
+    assert set(TABLES) == {*RECORDS, "accuracy", "uncertainty"}
 
 
 _PATHS = [(table, key) for table in TABLES for key in sorted(_keys(table))]

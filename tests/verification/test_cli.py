@@ -91,3 +91,55 @@ def test_only_code_verification_and_missed_defects_fail_the_run(
     sound = run_definition(claim, blind, scene=paper_scene)
     assert exit_code([sound]) == 0
     assert exit_code([dataclasses.replace(sound, mutations=mutations)]) == 1
+
+
+_VESSEL = (
+    '# kind = "vessel"\n# source = "rig 4"\n# uncertainty = 0.05\n'
+    "time [ms],pressure [kPa],start_pressure [kPa],far_pressure [kPa],temperature [K],volume [ml],"
+    "conductance [l/(s*bar)],series\n"
+)
+
+
+def _judged(path: Path, rows: str, capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
+    path.write_text(_VESSEL + rows, encoding="utf-8")
+    code = verify(data=path, json=True)
+    printed = capsys.readouterr()
+    return code, printed.out, printed.err
+
+
+def test_a_file_of_measurements_is_predicted_and_judged(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "rig.csv"
+    # V/(C p0) = 51 ms; choked up to 0.5, so 300 kPa take 2/8 of it, less up to 1/1.4 when adiabatic.
+    isothermal = 51 * 200 / 800
+    rows = "".join(f"{0.86 * isothermal * f:.4f},300,100,800,293.15,51,1,a\n" for f in (0.98, 1.0, 1.02))
+    code, out, _ = _judged(path, rows, capsys)
+    document = json.loads(out)
+    assert (code, document["verdict"]) == (0, "confirmed")
+    assert document["points"][1]["predicted"] == pytest.approx(
+        isothermal * (1 + 1 / 1.4) / 2 / 1000, rel=1e-3
+    )
+    _, out, _ = _judged(path, rows.replace(",51,", ",80,"), capsys)
+    assert json.loads(out)["verdict"] == "refuted"
+    assert verify(data=path) == 0
+    assert "refuted (rig 4)" in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.parametrize(
+    ("rows", "named"),
+    [
+        ("10,900,100,800,293,51,1,a\n" * 2, "between start_pressure and far_pressure"),
+        ("10,300,100,800,293,0,1,a\n" * 2, '"volume" must be positive'),
+        ("10,300,100,800,293,51,1,a\n", "1 point"),
+        ("10,300,100,800,293,51,x,a\n" * 2, 'line 6, column "conductance [l/(s*bar)]"'),
+    ],
+)
+def test_a_file_that_cannot_be_judged_is_bad_input(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], rows: str, named: str
+) -> None:
+    path = tmp_path / "rig.csv"
+    code, out, err = _judged(path, rows, capsys)
+    assert (code, out) == (2, "")
+    assert named in err
+    assert all("rig.csv: " in line for line in err.splitlines())

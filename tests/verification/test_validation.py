@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 
+import measurement_reference
 import numpy as np
 import pytest
 from scipy.stats import binomtest
 
+from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY
+from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.scene.models import Scene
 from ringbalance.verification.catalogue import case_code
-from ringbalance.verification.validation.measurements import measurements
+from ringbalance.verification.validation.comparison import KINDS, compare
+from ringbalance.verification.validation.measurements import (
+    MeasurementsError,
+    measurements,
+    parse_measurements,
+)
 from ringbalance.verification.validation.model_bias import ModelStatistics, model_statistics
-from ringbalance.verification.validation.tube_friction import friction_points, predicted_friction
+from ringbalance.verification.validation.tube_friction import friction_points
+from ringbalance.verification.validation.wave_frequency import CALIBRATING, tank_frequency
 
 _DATA = files("ringbalance.verification.validation") / "data"
 _NAMES = sorted(path.name.removesuffix(".csv") for path in _DATA.iterdir() if path.name.endswith(".csv"))
@@ -25,6 +36,7 @@ def test_a_data_set_says_where_it_comes_from_and_what_it_supports(name: str) -> 
     data = measurements(name)
     assert len(data) > 5
     assert 0 < data.source.uncertainty < 0.2
+    assert data.source.read in ("tables", "transcription", "figure")
     assert all(np.all(np.isfinite(column)) for column in data.columns.values())
     head = (_DATA / f"{name}.csv").read_text(encoding="utf-8").split("\n")
     stated = tomllib.loads("\n".join(line[2:] for line in head if line.startswith("# ")))
@@ -88,23 +100,129 @@ def test_points_come_in_ascending_order_with_their_walls() -> None:
     assert np.all(np.diff(points.reynolds) >= 0)
     smooth = points.relative_roughness == 0
     assert smooth.sum() == len(measurements("mckeon_2004"))
-    rough = predicted_friction(points.reynolds, points.relative_roughness)
-    plain = predicted_friction(points.reynolds, np.zeros_like(points.reynolds))
+    rough = points.predicted()
+    plain = replace(points, relative_roughness=np.zeros_like(points.reynolds)).predicted()
     assert np.array_equal(rough[smooth], plain[smooth])
     assert np.all(rough[~smooth] > plain[~smooth])
 
 
+def test_the_budget_of_k_holds_bias_and_scatter_of_turbulent_friction(paper_scene: Scene) -> None:
+    numbers = case_code("measured_smooth_tubes").compute(paper_scene, "light").numbers
+    spread = math.hypot(numbers["turbulent_bias"], 2 * numbers["turbulent_standard_deviation"])
+    smooth = replace(paper_scene.tube, roughness=0.0)
+    loss = tube_loss(tube=smooth, liquid=paper_scene.liquid, angular_velocity=0.0, velocity=np.array([15.0]))
+    assert loss.uncertainty_parts["friction correlation"] >= spread * loss.terms["friction"]
+    assert loss.k.uncertainty >= loss.uncertainty_parts["friction correlation"]
+
+
 def test_the_readme_says_what_the_comparison_finds(paper_scene: Scene) -> None:
     readme = " ".join((Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8").split())
-    smooth, rough, rotor = (
-        cases_code.compute(paper_scene, "light")
-        for cases_code in (case_code(f"measured_{name}") for name in ("smooth_tubes", "rough_tubes", "rotor"))
+    smooth, rough, ducts, rotor = (
+        case_code(f"measured_{name}").compute(paper_scene, "light")
+        for name in ("smooth_tubes", "rough_tubes", "ducts", "rotor")
     )
     numbers, share = smooth.numbers, smooth.found["share_within"].value
     assert (
         f"({numbers['points']:.0f} points of {numbers['series']:.0f} tubes and rigs, "
         f"bias {numbers['turbulent_bias']:.1%}, {share:.1%} within both intervals)"
     ).replace("%", " %") in readme
-    assert rough.found["share_within"].value == 1.0
-    assert f"({rough.numbers['points']:.0f} points, all within)" in readme
+    for one in (rough, ducts):
+        share = one.found["share_within"].value
+        assert f"({one.numbers['points']:.0f} points, {share:.1%} within)".replace("%", " %") in readme
     assert f"({rotor.numbers['points']:.0f} points)" in readme
+
+
+_HEAD = '# kind = "friction"\n# source = "me"\n# uncertainty = 0.02\n'
+
+
+def test_units_of_a_file_become_si() -> None:
+    head = _HEAD.replace("friction", "vessel")
+    data = parse_measurements(head + "time [ms],pressure [bar],series\n250,2,a\n500,3,b\n", file="x.csv")
+    assert data.columns["time"] == pytest.approx([0.25, 0.5])
+    assert data.columns["pressure"] == pytest.approx([2e5, 3e5])
+    assert list(data.series) == ["a", "b"]
+    assert data.uncertainty == pytest.approx([0.02, 0.02])
+
+
+def test_all_errors_of_a_file_are_reported_together_with_row_and_column() -> None:
+    text = '# kind = 3\n# sorce = "me"\n# uncertainty = 2\nreynolds,friction factor,x [furlong]\n1,2,3\n'
+    with pytest.raises(MeasurementsError) as error:
+        parse_measurements(text, file="bad.csv")
+    lines = str(error.value).splitlines()
+    assert all(line.startswith("bad.csv: ") for line in lines)
+    assert len(lines) == 6
+    with pytest.raises(MeasurementsError) as error:
+        parse_measurements(_HEAD + "reynolds,friction_factor\n100,nan\n\n200\n300,x\n", file="bad.csv")
+    assert [line.split(":")[1] for line in str(error.value).splitlines()] == [
+        ' line 5, column "friction_factor"',
+        " line 7 has 1 values, the columns are 2",
+        ' line 8, column "friction_factor"',
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ('# kind = "rain"\n# source = "me"\n# uncertainty = 0.1\na\n1\n', "rain"),
+        (_HEAD + "friction_factor\n0.02\n", "reynolds"),
+        (_HEAD + "reynolds,friction_factor,colour\n1000,0.02,3\n", "colour"),
+        (_HEAD + "reynolds,friction_factor\n1000,0\n", "friction_factor"),
+    ],
+)
+def test_what_cannot_be_predicted_is_refused_by_name(text: str, named: str) -> None:
+    with pytest.raises(MeasurementsError, match=named):
+        compare(parse_measurements(text, file="x.csv"))
+
+
+def test_a_comparison_is_confirmed_by_its_own_predictions_and_refuted_by_others() -> None:
+    data = measurements("stanton_pannell_1914")
+    found = compare(data)
+    rows = "".join(f"{r},{f}\n" for r, f in zip(data.columns["reynolds"], found.predicted, strict=True))
+    own = compare(parse_measurements(_HEAD + "reynolds,friction_factor\n" + rows, file="own.csv"))
+    assert own.statistics.bias == pytest.approx(0, abs=1e-12)
+    assert (found.verdict, own.verdict) == ("confirmed", "confirmed")
+    assert compare(data, mutation="ten_per_cent_high").verdict == "refuted"
+
+
+def test_the_uncertainty_of_wave_frequencies_comes_from_tanks_that_are_not_judged() -> None:
+    data = measurements("addington_1960")
+    taught = np.isin(data.series, CALIBRATING)
+    deviation = compare(data.where(taught))
+    ratio = np.log(deviation.predicted / deviation.measured)
+    width = math.hypot(float(ratio.mean()), 2 * float(ratio.std(ddof=1)))
+    assert round(width, 2) == FREQUENCY_UNCERTAINTY
+
+
+@pytest.mark.parametrize("depth", [0.06, 0.3, 1.5])
+def test_a_chamber_of_large_radius_is_a_tank(depth: float) -> None:
+    exact = math.sqrt(math.pi * math.tanh(math.pi * depth))
+    assert tank_frequency(depth) == pytest.approx(exact, rel=1e-4)
+
+
+def test_adiabatic_venting_of_a_choked_vessel_is_the_closed_form() -> None:
+    # p/p0 = (1 + (gamma - 1) t/(2 tau))^(-2 gamma/(gamma - 1)), isothermal exp(-t/tau).
+    columns = (
+        "time [s],pressure [bar],start_pressure [bar],far_pressure [bar],temperature [K],volume [l],"
+        "conductance [l/(s*bar)]"
+    )
+    text = _HEAD.replace("friction", "vessel") + f"{columns}\n1,4,10,1,293.15,1,1\n"
+    found = compare(parse_measurements(text, file="x.csv"))
+    adiabatic = 5 * (2.5 ** (1 / 7) - 1)
+    assert found.predicted[0] == pytest.approx((adiabatic + math.log(2.5)) / 2, rel=1e-5)
+    assert found.stated[0] ** 2 - (0.1 * found.predicted[0]) ** 2 == pytest.approx(
+        ((math.log(2.5) - adiabatic) / 2) ** 2, rel=1e-3
+    )
+
+
+def test_every_bundled_set_of_a_kind_that_is_predicted_has_its_columns() -> None:
+    for name in _NAMES:
+        data = measurements(name)
+        if data.source.kind in KINDS:
+            assert compare(data).predicted.size == len(data)
+
+
+def test_the_page_on_measurements_lists_the_kinds_and_its_example_can_be_read() -> None:
+    page = measurement_reference.PAGE.read_text(encoding="utf-8")
+    assert measurement_reference.fresh(page) == page
+    example = page.split("```")[1]
+    assert len(compare(parse_measurements(example, file="example")).measured) == 3

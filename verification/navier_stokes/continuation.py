@@ -9,6 +9,9 @@ from ringbalance.physics.results import Status, StatusCode
 from ringbalance.verification.navier_stokes.newton import FlowSolution
 
 Solve = Callable[[float, FlowSolution], FlowSolution]
+FirstSolve = Callable[[float, FlowSolution | None], FlowSolution]
+_EASY = 2.0
+"""Parameter up to which a start from rest converges."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,3 +111,19 @@ def follow(
             break
         reached.append(walk.flow)
     return _FlowPath(solutions=tuple(reached), status=status, solves=walk.solves, failures=walk.failures)
+
+
+def flow_at(*, solve: FirstSolve, parameter: float, first: float) -> FlowSolution:
+    """Flow at a parameter, followed from where a start from rest still converges with a first step.
+
+    Raises: ArithmeticError: the flow was not found.
+    """
+    flow = solve(min(parameter, _EASY), None)
+    status = flow.status
+    if parameter > _EASY and status.ok:
+        rule = StepRule(first=first, smallest=0.02, largest=3.0)
+        path = follow(solve=solve, start=flow, start_at=_EASY, targets=[parameter], rule=rule)
+        flow, status = path.solutions[-1] if path.solutions else flow, path.status
+    if not status.ok:
+        raise ArithmeticError(f"the flow was not found: {status.text}")
+    return flow

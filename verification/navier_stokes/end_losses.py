@@ -59,10 +59,7 @@ class EndMesh:
 
 
 def _graded_line(*, length: float, longest: float, cells: EndMesh) -> FloatArray:
-    """Vertices from 0 to a length whose cells grow geometrically from the edge cell up to the longest one.
-
-    Args: `longest`: cell allowed, at two cells per fold.
-    """
+    """Vertices from 0 to a length whose cells grow geometrically from the edge cell up to the longest one."""
     growth = np.exp(1 / cells.cells_per_fold)
     limit = 2 * longest / cells.cells_per_fold
     steps = [cells.edge_cell]
@@ -99,19 +96,11 @@ def end_mesh(*, cells: EndMesh, end: End) -> Any:
 
 
 def end_system(*, cells: EndMesh, end: End) -> FlowSystem:
-    """Discrete equations of an end: developed flow deep in the tube, no force on the far reservoir.
-
-    Args: `end`: "entrance" or "exit".
-    """
+    """Discrete equations of an end: developed flow deep in the tube, no force on the far reservoir."""
     space = taylor_hood(mesh=end_mesh(cells=cells, end=end), axisymmetric=True)
-    developed = Dirichlet(boundary="deep", component=0, value=lambda x: 2 * (1 - 4 * x[1] ** 2))
-    conditions = [
-        developed,
-        Dirichlet(boundary="deep", component=1),
-        Dirichlet(boundary="wall", component=0),
-        Dirichlet(boundary="wall", component=1),
-        Dirichlet(boundary="axis", component=1),
-    ]
+    conditions = [Dirichlet(boundary="deep", component=0, value=lambda x: 2 * (1 - 4 * x[1] ** 2))]
+    conditions += [Dirichlet(boundary=name, component=1) for name in ("deep", "wall", "axis")]
+    conditions.append(Dirichlet(boundary="wall", component=0))
     if end == "exit":
         # The jet draws liquid in through the side; left free along it, that goes unstable near Re 1950.
         conditions.append(Dirichlet(boundary="side", component=0))
@@ -125,9 +114,6 @@ def solve_end(
     start: FlowSolution | None = None,
     settings: NewtonSettings | None = None,
 ) -> FlowSolution:
-    """Flow at an end of the tube.
-
-    Args: `reynolds`: Re = U d/nu, at least 0. `start`: a neighbouring flow. `settings`: of Newton's method.
-    """
+    """Flow at an end of the tube at Re = U d/nu, at least 0, from a neighbouring flow where one is given."""
     c = Coefficients(inertia=reynolds, viscosity=1.0)
     return solve_flow(system=system, coefficients=c, start=start, settings=settings)

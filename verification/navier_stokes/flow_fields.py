@@ -16,7 +16,7 @@ from scipy.sparse.linalg import spsolve
 
 from ringbalance.physics.results import Status, StatusCode
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.verification.navier_stokes.continuation import StepRule, follow
+from ringbalance.verification.navier_stokes.continuation import flow_at
 from ringbalance.verification.navier_stokes.end_losses import End, EndMesh, end_mesh, end_system, solve_end
 from ringbalance.verification.navier_stokes.newton import (
     Dirichlet,
@@ -27,9 +27,9 @@ from ringbalance.verification.navier_stokes.newton import (
 )
 from ringbalance.verification.navier_stokes.rotating_section import (
     SectionMesh,
+    developed_section,
     friction_ratio,
     section_system,
-    solve_section,
 )
 from ringbalance.verification.navier_stokes.space import FlowSpace, at_points, stiffness_entries, taylor_hood
 
@@ -38,7 +38,7 @@ LARGEST_KL: Final = 1e6
 LARGEST_ROTATION: Final = 1e4
 """R up to which the drawing's mesh resolves the layer at the wall."""
 LARGEST_END_REYNOLDS: Final = 2000.0
-_KL_SCALE, _END_SCALE, _EASY = 300.0, 5.0, 2.0
+_END_SCALE = 5.0
 _SECTION: Final = SectionMesh(around=6, across=9, wall_ratio=15.0)
 _WINDOWS: Final = {"entrance": (-2.5, 5.0, 2.5), "exit": (-2.0, 8.0, 2.5)}
 _FLOW_THROUGH: Final = 1 / 8
@@ -89,26 +89,8 @@ class EndFlow:
     status: Status
 
 
-def _followed(
-    solve: Callable[[float, FlowSolution | None], FlowSolution], to: float, first: float
-) -> FlowSolution:
-    """Flow at the end of a path that starts where a start from rest still converges."""
-    start = solve(min(to, _EASY), None)
-    if to <= _EASY or not start.status.ok:
-        return start
-    rule = StepRule(first=first, smallest=0.02, largest=3.0)
-    path = follow(solve=solve, start=start, start_at=_EASY, targets=[to], rule=rule)
-    if not path.status.ok:
-        raise ArithmeticError(f"the flow to draw was not found: {path.status.text}")
-    return path.solutions[0]
-
-
 def _quarter_cells(*, space: FlowSpace, cells: IntArray | slice = slice(None)) -> IntArray:
-    """Four straight quadrilaterals per nine-node cell, counter-clockwise.
-
-    Args: `space`: on a plane mesh of quadrilaterals. `cells`: of the mesh; default all.
-    Returns: Node numbers, shape (m, 4).
-    """
+    """Nodes of four straight quadrilaterals per nine-node cell, counter-clockwise, shape (m, 4)."""
     v0, v1, v2, v3, s, e, n, w, c = space.velocity.element_dofs[:, cells]
     quads = [(v0, s, c, w), (s, v1, e, c), (c, e, v2, n), (w, c, n, v3)]
     nodes = np.concatenate([np.stack(quad, axis=1) for quad in quads]).astype(np.int64)
@@ -170,15 +152,9 @@ def section_flow(*, reynolds: float, rotation_reynolds: float) -> SectionFlow:
     drawn = min(kl, LARGEST_KL, LARGEST_ROTATION * (LARGEST_ROTATION / s)) if s > 0.0 else 0.0
     system = section_system(cells=_SECTION)
     settings = NewtonSettings(max_iterations=10, tolerance=1e-6)
-
-    def solve(a: float, start: FlowSolution | None) -> FlowSolution:
-        at = _KL_SCALE * float(np.expm1(a))
-        return solve_section(system=system, kl=at, s=s, start=start, settings=settings)
-
-    flow = _followed(solve, float(np.log1p(drawn / _KL_SCALE)), 2.0)
+    flow = developed_section(system=system, kl=drawn, s=s, settings=settings)
     re = reynolds if drawn == kl else float(np.sqrt(drawn / s))
-    status = flow.status if not flow.status.ok else _section_status(drawn < kl)
-    return _whole_section(system, flow, re, re * s, status)
+    return _whole_section(system, flow, re, re * s, _section_status(drawn < kl))
 
 
 def _whole_section(
@@ -277,9 +253,9 @@ def _end_flow(end: End, system: FlowSystem, reynolds: float, first: float) -> En
         at = _END_SCALE * float(np.expm1(a))
         return solve_end(system=system, reynolds=at, start=start, settings=settings)
 
-    flow = _followed(solve, float(np.log1p(re / _END_SCALE)), first)
-    status = flow.status
-    if status.ok and re < reynolds:
+    flow = flow_at(solve=solve, parameter=float(np.log1p(re / _END_SCALE)), first=first)
+    status = Status()
+    if re < reynolds:
         text = f"drawn at Re = {re:.0f}: beyond, steady laminar flow is not to be expected"
         status = Status(code=StatusCode.OUT_OF_RANGE, text=text)
     return _near_the_mouth(end, system, flow, re, status)

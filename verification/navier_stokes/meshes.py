@@ -43,20 +43,14 @@ def with_midpoints(*, vertices: npt.ArrayLike) -> FloatArray:
 
 
 def geometric_vertices(*, cells: int, ratio: float) -> FloatArray:
-    """Vertices on [0, 1] whose cells grow by one factor from the first to the last.
-
-    Args: `cells`: number of cells, at least 1. `ratio`: last cell over first cell; 1 is uniform.
-    """
+    """Vertices on [0, 1] whose cells grow by one factor; `ratio` is that of the last cell over the first."""
     growth = np.linspace(0.0, 1.0, cells) if cells > 1 else np.zeros(1)
     lengths = ratio**growth
     return np.asarray(np.concatenate(([0.0], np.cumsum(lengths))) / lengths.sum(), dtype=np.float64)
 
 
 def tensor_patch(*, x: FloatArray, y: FloatArray, sides: Mapping[str, str] | None = None) -> Patch:
-    """Rectangular patch from nodes along its two directions.
-
-    Args: `x`: shape (2 m + 1,). `y`: shape (2 n + 1,).
-    """
+    """Rectangular patch from nodes along its two directions, shapes (2 m + 1,) and (2 n + 1,)."""
     grid = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
     return Patch(nodes=grid, sides=sides or {})
 

@@ -22,8 +22,8 @@ from ringbalance.verification.navier_stokes.system import (
     convection_vector,
     flow_system,
     free_matrix,
+    full_matrix,
     linear_entries,
-    linear_product,
     split,
 )
 
@@ -84,7 +84,8 @@ class _Iteration:
 
 
 def _residual(system: FlowSystem, c: Coefficients, entries: FloatArray, state: _Iteration) -> FloatArray:
-    residual = linear_product(system, entries, state.vector) - system.load - state.gradient * system.flow_load
+    residual = np.asarray(full_matrix(system, entries) @ state.vector, dtype=np.float64)
+    residual -= system.load + state.gradient * system.flow_load
     if c.inertia != 0.0:
         residual += c.inertia * convection_vector(system, state.vector)
     if system.enclosed:
@@ -177,6 +178,7 @@ def _solution(
     reaction[system.free] = 0.0
     scale = float(np.abs(reaction).max()) or 1.0
     velocity, pressure = split(system.space, state.vector)
+    update = state.update if np.isfinite(state.update) else float(settings.max_iterations)
     return FlowSolution(
         vector=state.vector,
         velocity=velocity,
@@ -191,9 +193,7 @@ def _solution(
             extra={
                 "factorizations": float(state.factorizations),
                 "pivoted": float(state.factors is not None and state.factors.pivoted),
-                "relative_update": state.update
-                if np.isfinite(state.update)
-                else float(settings.max_iterations),
+                "relative_update": update,
             },
         ),
     )

@@ -1,7 +1,8 @@
 """Laminar fully developed flow in a straight tube that rotates about an axis at right angles to its own.
 
-Half of the circular section, lengths over the bore d, velocities over the mean velocity U.  With x along the
-tube, z along the rotation axis, w the axial and (u, v) the velocity along (y, z), and p the reduced pressure:
+Half of the section, circular or rectangular, lengths over the bore or hydraulic diameter d, velocities over
+the mean velocity U.  With x along the tube, z along the rotation axis, w the axial and (u, v) the velocity
+along (y, z), and p the reduced pressure:
 
     Re (u w_y + v w_z) - 2 R u = G + lap w
     Re (u u_y + v u_z) + 2 R w = -p_y + lap u
@@ -19,11 +20,13 @@ from typing import Any
 import numpy as np
 
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.verification.navier_stokes.continuation import flow_at
 from ringbalance.verification.navier_stokes.meshes import (
     Patch,
     geometric_vertices,
     patch_mesh,
     ruled_patch,
+    tensor_patch,
     with_midpoints,
 )
 from ringbalance.verification.navier_stokes.newton import (
@@ -36,9 +39,12 @@ from ringbalance.verification.navier_stokes.newton import (
     solve_flow,
 )
 from ringbalance.verification.navier_stokes.space import taylor_hood
+from ringbalance.verification.navier_stokes.system import split
+from ringbalance.verification.navier_stokes.time_march import March, march_flow
 
 POISEUILLE_GRADIENT = 32.0
 """G of a tube at rest: -dp/dx d^2/(mu U)."""
+_KL_SCALE = 300.0
 CORIOLIS = ((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (-1.0, 0.0, 0.0))
 """e_z x velocity for components along (y, z, x)."""
 
@@ -54,6 +60,20 @@ class SectionMesh:
     wall_ratio: float = 12.0
     """Innermost cell of the ring over the cell at the wall."""
     shape: str = "quad"
+
+
+@dataclass(frozen=True, kw_only=True)
+class DuctMesh:
+    """Cells of the half section of a rectangular duct, refined towards its walls."""
+
+    aspect_ratio: float = 1.0
+    """Across the axis of rotation over along it."""
+    across: int = 12
+    """Cells across the axis of rotation, an even number."""
+    along: int = 8
+    """Cells of the half along it."""
+    wall_ratio: float = 20.0
+    """Innermost cell over the cell at the wall."""
 
 
 def _lines(points: FloatArray, count: int) -> FloatArray:
@@ -93,9 +113,29 @@ def section_mesh(*, cells: SectionMesh) -> Any:
     return patch_mesh(patches=patches, shape=cells.shape)
 
 
-def section_system(*, cells: SectionMesh) -> FlowSystem:
+def duct_mesh(*, cells: DuctMesh) -> Any:
+    """Mesh of the half section (z >= 0) of a rectangular duct of unit hydraulic diameter.
+
+    Args: `cells`: numbers of cells and their grading.
+    Returns: Quadratic mesh with boundaries wall and symmetry.
+    """
+    width = (1 + cells.aspect_ratio) / 2
+    half = geometric_vertices(cells=cells.across // 2, ratio=cells.wall_ratio) / 2
+    y = width * (np.concatenate([half, 1 - half[-2::-1]]) - 0.5)
+    height = width / cells.aspect_ratio
+    z = height / 2 * (1 - geometric_vertices(cells=cells.along, ratio=cells.wall_ratio)[::-1])
+    patch = tensor_patch(
+        x=with_midpoints(vertices=y),
+        y=with_midpoints(vertices=z),
+        sides={"west": "wall", "east": "wall", "north": "wall", "south": "symmetry"},
+    )
+    return patch_mesh(patches=[patch])
+
+
+def section_system(*, cells: SectionMesh | DuctMesh) -> FlowSystem:
     """Discrete equations of the half section: no slip at the wall, mirror symmetry about z = 0."""
-    space = taylor_hood(mesh=section_mesh(cells=cells), components=3)
+    mesh = duct_mesh(cells=cells) if isinstance(cells, DuctMesh) else section_mesh(cells=cells)
+    space = taylor_hood(mesh=mesh, components=3)
     conditions = [Dirichlet(boundary="symmetry", component=1)]
     conditions += [Dirichlet(boundary="wall", component=c) for c in range(3)]
     return flow_system(space=space, conditions=conditions, enclosed=True, flow_component=2, coriolis=CORIOLIS)
@@ -117,10 +157,51 @@ def solve_section(
     Args: `start`: a neighbouring flow; needed once Kl exceeds a few thousand. `settings`: of Newton's method.
     Returns: The flow; nodal velocity components along (y, z) over nu/d, and along x over U.
     """
-    rotation = ((0.0, 0.0, 2 * kl), (0.0, 0.0, 0.0), (2 * s, 0.0, 0.0))
-    c = Coefficients(inertia=1.0, viscosity=1.0, rotation=rotation)
+    c = _coefficients(kl=kl, s=s, inertia=1.0)
     area = float(system.space.weights.sum())
     return solve_flow(system=system, coefficients=c, flow_rate=area, start=start, settings=settings)
+
+
+def _coefficients(*, kl: float, s: float, inertia: float) -> Coefficients:
+    rotation = ((0.0, 0.0, 2 * kl), (0.0, 0.0, 0.0), (2 * s, 0.0, 0.0))
+    return Coefficients(inertia=inertia, viscosity=1.0, rotation=rotation)
+
+
+def march_section(*, system: FlowSystem, kl: float, s: float, step: float, steps: int) -> March:
+    """The same in time, from the flow without inertia and a disturbance of one per cent.
+
+    It finds what a steady solution leaves out where that is unstable; flow is alike along the tube.
+    Args: `step`: dt over d^2/nu.
+    Raises: ArithmeticError: the step is too long.
+    """
+    area = float(system.space.weights.sum())
+    linear = _coefficients(kl=kl, s=s, inertia=0.0)
+    start = solve_flow(system=system, coefficients=linear, flow_rate=area).vector.copy()
+    velocity = split(system.space, start)[0]
+    noise = np.random.default_rng(0).standard_normal(velocity.shape)
+    noise *= 0.01 * np.abs(velocity).max(axis=1, keepdims=True)
+    moving = system.free[system.free < velocity.size]
+    start[moving] += noise.ravel()[moving]
+    return march_flow(
+        system=system,
+        coefficients=_coefficients(kl=kl, s=s, inertia=1.0),
+        flow_rate=area,
+        start=start,
+        step=step,
+        steps=steps,
+    )
+
+
+def developed_section(
+    *, system: FlowSystem, kl: float, s: float, settings: NewtonSettings | None = None
+) -> FlowSolution:
+    """The same for any Kl, followed from a small one. Raises: ArithmeticError: the flow was not found."""
+
+    def solve(a: float, start: FlowSolution | None) -> FlowSolution:
+        at = _KL_SCALE * float(np.expm1(a))
+        return solve_section(system=system, kl=at, s=s, start=start, settings=settings)
+
+    return flow_at(solve=solve, parameter=float(np.log1p(kl / _KL_SCALE)), first=2.0)
 
 
 def solve_section_without_inertia(*, system: FlowSystem, rotation_reynolds: float) -> FlowSolution:

@@ -49,14 +49,8 @@ class _ScalarPattern:
     """Number of the assembled entry for every element entry, shape (elements * rows * cols,)."""
 
     def assemble(self, element_matrices: FloatArray) -> FloatArray:
-        """Sum element matrices into the entries of the assembled matrix.
-
-        Args: `element_matrices`: shape (elements, rows * cols).
-        """
-        return np.asarray(
-            np.bincount(self.slot, weights=element_matrices.ravel(), minlength=self.rows.size),
-            dtype=np.float64,
-        )
+        """Sum element matrices, shape (elements, rows * cols), into the entries of the assembled matrix."""
+        return _scattered(self.slot, element_matrices, self.rows.size)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -109,10 +103,7 @@ class FlowSpace:
         return self.components * self.velocity_nodes + self.pressure_nodes
 
     def boundary_nodes(self, name: str) -> IntArray:
-        """Velocity nodes on a named boundary.
-
-        Raises: ValueError: the mesh has no such boundary.
-        """
+        """Velocity nodes on a named boundary. Raises: ValueError: the mesh has no such boundary."""
         if name not in (self.mesh.boundaries or {}):
             known = ", ".join(sorted(self.mesh.boundaries or {}))
             raise ValueError(f"the mesh has no boundary {name!r}; it has: {known}")
@@ -200,10 +191,7 @@ def _contract(coefficient: FloatArray, table: FloatArray) -> FloatArray:
 
 
 def mass_entries(space: FlowSpace, coefficient: FloatArray) -> FloatArray:
-    """Assembled entries of the form integral(coefficient N_i N_j).
-
-    Args: `coefficient`: at the quadrature points, shape (elements, points).
-    """
+    """Assembled entries of integral(coefficient N_i N_j), the coefficient of shape (elements, points)."""
     return space.velocity_pattern.assemble(_contract(space.weights * coefficient, mass_table(space)))
 
 
@@ -214,10 +202,7 @@ def stiffness_entries(space: FlowSpace) -> FloatArray:
 
 
 def cross_entries(space: FlowSpace, row: int, col: int) -> FloatArray:
-    """Assembled entries of integral(dN_i/dx_col dN_j/dx_row): the transposed gradient of the stress form.
-
-    Args: `row`: component of the momentum equation.
-    """
+    """Assembled entries of integral(dN_i/dx_col dN_j/dx_row): the transposed gradient of the stress form."""
     product = np.einsum("eq,keq,leq->kleq", space.weights, space.inverse[:, col], space.inverse[:, row])
     return space.velocity_pattern.assemble(_contract(product, _outer(space.slope, space.slope)))
 
@@ -247,10 +232,7 @@ def load_vector(space: FlowSpace, values: FloatArray) -> FloatArray:
 def pressure_load(space: FlowSpace) -> FloatArray:
     """Integral of every pressure shape function. Returns: Shape (pressure nodes,)."""
     local = space.weights @ space.pressure_shape.T
-    dofs = space.pressure.element_dofs.T.ravel()
-    return np.asarray(
-        np.bincount(dofs, weights=local.ravel(), minlength=space.pressure_nodes), dtype=np.float64
-    )
+    return _scattered(space.pressure.element_dofs.T.ravel(), local, space.pressure_nodes)
 
 
 def at_points(space: FlowSpace, velocity: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -265,10 +247,7 @@ def at_points(space: FlowSpace, velocity: FloatArray) -> tuple[FloatArray, Float
 
 
 def nodal(space: FlowSpace, function: Callable[[FloatArray], FloatArray] | float) -> FloatArray:
-    """Values of a function at the velocity nodes.
-
-    Args: `function`: of coordinates, shape (dimension, n), or a constant.
-    """
+    """Values at the velocity nodes of a constant, or of a function of coordinates (dimension, n)."""
     at = space.node_coordinates()
     values = function(at) if callable(function) else function
     return np.broadcast_to(np.asarray(values, dtype=np.float64), at.shape[1]).copy()

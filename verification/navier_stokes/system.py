@@ -234,11 +234,7 @@ def _layers(space: FlowSpace, slab: IntArray) -> IntArray:
 
 
 def split(space: FlowSpace, vector: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Velocity and pressure of a full vector.
-
-    Args: `vector`: shape (unknowns,).
-    Returns: Velocity (components, velocity nodes) and pressure (pressure nodes,).
-    """
+    """Velocity (components, velocity nodes) and pressure (pressure nodes,) of a full vector."""
     velocity = vector[: space.components * space.velocity_nodes]
     return velocity.reshape(space.components, -1), vector[velocity.size :]
 
@@ -252,23 +248,8 @@ def linear_entries(system: FlowSystem, coefficients: Coefficients) -> FloatArray
     return np.concatenate([coefficients.viscosity * system.viscous + rotating, system.coupling])
 
 
-def linear_product(system: FlowSystem, entries: FloatArray, vector: FloatArray) -> FloatArray:
-    """Product of the linear part with a full vector.
-
-    Args: `vector`: shape (unknowns,).
-    Returns: Shape (unknowns,), rows of given unknowns included.
-    """
-    pattern = system.full_pattern
-    data = entries[pattern.data.astype(np.int64) - 1]
-    matrix = sparse.csr_matrix((data, pattern.indices, pattern.indptr), shape=pattern.shape)
-    return np.asarray(matrix @ vector, dtype=np.float64)
-
-
 def convection_vector(system: FlowSystem, vector: FloatArray) -> FloatArray:
-    """Integral of (u . grad) u against every velocity shape function.
-
-    Args: `vector`: shape (unknowns,).
-    """
+    """Integral of (u . grad) u against every velocity shape function."""
     space = system.space
     u, gradient = at_points(space, split(space, vector)[0])
     carried = np.einsum("deq,cdeq->ceq", u[: space.dimension], gradient, optimize=True)
@@ -293,12 +274,17 @@ def convection_entries(system: FlowSystem, vector: FloatArray) -> FloatArray:
     return np.concatenate([*parts, np.zeros(system.coupling.size)])
 
 
-def free_matrix(system: FlowSystem, entries: FloatArray) -> Any:
-    """Matrix of the free rows and columns.
+def full_matrix(system: FlowSystem, entries: FloatArray) -> Any:
+    """CSR matrix of all rows and columns, those of given unknowns included."""
+    return _filled(system.full_pattern, entries)
 
-    Args: `entries`: in the system's order.
-    Returns: `scipy.sparse` CSC matrix.
-    """
-    pattern = system.free_pattern
+
+def free_matrix(system: FlowSystem, entries: FloatArray) -> Any:
+    """CSC matrix of the free rows and columns."""
+    return _filled(system.free_pattern, entries)
+
+
+def _filled(pattern: Any, entries: FloatArray) -> Any:
+    """The matrix of a pattern whose data are numbers of entries, from one."""
     data = entries[pattern.data.astype(np.int64) - 1]
-    return sparse.csc_matrix((data, pattern.indices, pattern.indptr), shape=pattern.shape)
+    return type(pattern)((data, pattern.indices, pattern.indptr), shape=pattern.shape)

@@ -34,9 +34,9 @@ from ringbalance.verification.navier_stokes.newton import (
 )
 from ringbalance.verification.navier_stokes.rotating_section import (
     SectionMesh,
+    developed_section,
     section_mesh,
     section_system,
-    solve_section,
 )
 from ringbalance.verification.navier_stokes.space import FlowSpace, taylor_hood
 from ringbalance.verification.navier_stokes.system import split
@@ -45,7 +45,6 @@ Progress = Callable[[str], None]
 
 CORIOLIS = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 """e_z x velocity for components along (x, y, z)."""
-_KL_SCALE = 300.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -71,28 +70,6 @@ class BentTubeFlow:
     def gradient(self) -> float:
         """G = -dp/dx of the developed flow on the same cells, over mu U/d^2."""
         return self.developed.driving_gradient
-
-
-def developed_section(*, system: FlowSystem, reynolds: float, rotation_reynolds: float) -> FlowSolution:
-    """Developed flow of the straight tube, in-plane velocity over nu/d, by Re and R, each zero or more.
-
-    Raises: ArithmeticError: the flow was not found.
-    """
-    s = rotation_reynolds / reynolds
-    to = float(np.log1p(reynolds * rotation_reynolds / _KL_SCALE))
-
-    def solve(a: float, start: FlowSolution | None) -> FlowSolution:
-        return solve_section(system=system, kl=_KL_SCALE * float(np.expm1(a)), s=s, start=start)
-
-    first = min(to, 2.0)
-    start = solve(first, None)
-    if to > first and start.status.ok:
-        rule = StepRule(first=2.0, smallest=0.02, largest=3.0)
-        path = follow(solve=solve, start=start, start_at=first, targets=[to], rule=rule)
-        start = path.solutions[0] if path.status.ok else replace(start, status=path.status)
-    if not start.status.ok:
-        raise ArithmeticError(f"developed flow: {start.status.text}")
-    return start
 
 
 def _swept_velocity(tube: SweptTube, developed: FlowSolution, reynolds: float) -> FloatArray:
@@ -189,7 +166,8 @@ def bent_tube_flow(
         raise ValueError("reynolds must be above zero, rotation_reynolds zero or more, both finite")
     say = progress or (lambda _: None)
     section = section_system(cells=cells)
-    developed = developed_section(system=section, reynolds=reynolds, rotation_reynolds=rotation_reynolds)
+    kl, s = reynolds * rotation_reynolds, rotation_reynolds / reynolds
+    developed = developed_section(system=section, kl=kl, s=s)
     tube = swept_tube(section=section_mesh(cells=cells), segments=segments)
     system = _system(tube, section, developed, reynolds)
     say(f"{system.free.size} unknowns in {int(tube.slab.max()) + 1} slabs")

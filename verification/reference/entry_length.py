@@ -26,15 +26,17 @@ from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.verification.navier_stokes.linear import factorize
 from ringbalance.verification.navier_stokes.newton import Coefficients, FlowSolution, FlowSystem
-from ringbalance.verification.navier_stokes.rotating_section import solve_section_without_inertia
+from ringbalance.verification.navier_stokes.rotating_section import (
+    developed_section,
+    solve_section_without_inertia,
+)
 from ringbalance.verification.navier_stokes.space import (
     FlowSpace,
     at_points,
     mass_entries,
     pressure_mass_entries,
 )
-from ringbalance.verification.navier_stokes.system import convection_entries, linear_entries
-from ringbalance.verification.reference.bent_tube import developed_section
+from ringbalance.verification.navier_stokes.system import convection_entries, full_matrix, linear_entries
 
 _SHIFTS = (1.0, 0.35, 0.12)
 """Of the expected rate, about which modes are looked for."""
@@ -98,8 +100,8 @@ def _pencil(
         flow = solve_section_without_inertia(system=system, rotation_reynolds=rotation_reynolds)
         c = Coefficients(inertia=0.0, viscosity=1.0, rotation=2 * rotation_reynolds)
         return flow, _matrices(system, flow, c, 1.0)
-    flow = developed_section(system=system, reynolds=reynolds, rotation_reynolds=rotation_reynolds)
     kl, s = reynolds * rotation_reynolds, rotation_reynolds / reynolds
+    flow = developed_section(system=system, kl=kl, s=s)
     turning = ((0.0, 0.0, 2 * kl), (0.0, 0.0, 0.0), (2 * s, 0.0, 0.0))
     c = Coefficients(inertia=1.0, viscosity=1.0, rotation=turning)
     return flow, _matrices(system, flow, c, reynolds**-2)
@@ -124,14 +126,8 @@ def _matrices(system: FlowSystem, flow: FlowSolution, c: Coefficients, along: fl
     two = _sparse(space, rows[:3], cols[:3], [diffused] * 3)
     # The pressure's level, pinned in the section's own problem, is a part of what varies along the tube.
     free = np.union1d(system.free, [first])
-    zero, one, two = (m[free][:, free].tocsc() for m in (_full(system, entries), one, two))
+    zero, one, two = (m[free][:, free].tocsc() for m in (full_matrix(system, entries), one, two))
     return zero, one, two
-
-
-def _full(system: FlowSystem, entries: FloatArray) -> Any:
-    pattern = system.full_pattern
-    data = entries[pattern.data.astype(np.int64) - 1]
-    return sparse.csr_matrix((data, pattern.indices, pattern.indptr), shape=pattern.shape)
 
 
 def _sparse(space: FlowSpace, rows: list[Any], cols: list[Any], values: list[FloatArray]) -> Any:

@@ -19,13 +19,12 @@ import numpy.typing as npt
 from scipy.optimize import brentq
 
 from ringbalance.mesh.geometry import half_angle, liquid_area, surface_radius
-from ringbalance.physics.pressure.assembly import at_points, volume_points
 from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, places
 from ringbalance.physics.pressure.surface import solve_with_gravity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene, Shaft
 from ringbalance.verification.evidence import Evidence, Found
-from ringbalance.verification.orders import order_figure, order_study, order_table
+from ringbalance.verification.orders import field_error, order_figure, order_study, order_table, orders_found
 from ringbalance.verification.reference.mutated_pressure import mutated_pressure
 
 _GAUSS: Final = 60
@@ -168,17 +167,14 @@ def gravity_evidence(
             raise ValueError(solution.status.text)
     size = [cells[0][0] / count[0] for count in cells]
     surface = order_study(size=size, error=[_surface_error(disc, s, exact) for s in solutions])
-    field = order_study(size=size, error=[_field_error(s, exact) for s in solutions])
+    field = order_study(size=size, error=[field_error(s, exact.pressure) for s in solutions])
     volume = max(abs(s.statistics.extra["volume_error"]) for s in solutions)
     middle = float(surface_radius(disc=disc, fill_ratio=fill))
     note = "cells " + ", ".join(" x ".join(map(str, count)) for count in cells)
     table = partial(order_table, formal_order=3.0, geometry="quadratic", note=note)
     return Evidence(
         found={
-            "surface_order": Found(value=surface.settled_order),
-            "surface_error": Found(value=surface.finest_error),
-            "field_order": Found(value=field.settled_order),
-            "field_error": Found(value=field.finest_error),
+            **orders_found({"surface": surface, "field": field}),
             "volume_error": Found(value=volume),
         },
         numbers={"tilt": _GRAVITY / (true.angular_velocity**2 * middle), "direction": _DIRECTION},
@@ -220,11 +216,3 @@ def _surface_error(disc: Disc, solution: PressureSolution, exact: _ExactRing) ->
     away = np.hypot(nodes[0], nodes[1]) - exact.radius(angle, axial)
     depth = disc.outer_radius - float(np.mean(solution.chamber.surface_radius))
     return float(np.max(np.abs(away))) / depth
-
-
-def _field_error(solution: PressureSolution, exact: _ExactRing) -> float:
-    volume = volume_points(solution.chamber)
-    true = exact.pressure(solution.chamber.length_scale * volume.points)
-    difference = at_points(volume, solution.pressure) - true
-    squares = [np.sum(volume.weights * field**2) for field in (difference, true)]
-    return float(np.sqrt(squares[0] / squares[1]))

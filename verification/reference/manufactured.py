@@ -7,7 +7,7 @@ problem uses, so every term of the problem is exercised and none vanishes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
@@ -16,12 +16,12 @@ import numpy as np
 
 from ringbalance.mesh.chamber import ChamberMesh, Geometry, chamber_mesh
 from ringbalance.mesh.geometry import half_angle, surface_radius
-from ringbalance.physics.pressure.assembly import at_points, facet_points, volume_points
+from ringbalance.physics.pressure.assembly import at_points, facet_points
 from ringbalance.physics.pressure.solve import PressureProblem, PressureSolution, solve_pressure
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc
 from ringbalance.verification.evidence import Convergence, Evidence, Found
-from ringbalance.verification.orders import OrderStudy, order_figure, order_study, order_table
+from ringbalance.verification.orders import OrderStudy, field_error, order_figure, order_study, order_table
 
 _SCALE: Final = 1e5
 """P, Pa."""
@@ -178,17 +178,9 @@ def _study(disc: Disc, cells: Sequence[tuple[int, ...]], geometry: Geometry, def
         geometry=geometry,
         cells=cells,
         unknowns=solutions[-1].pressure.size,
-        field=order_study(size=size, error=[_field_error(s, exact.pressure) for s in solutions]),
+        field=order_study(size=size, error=[field_error(s, exact.pressure) for s in solutions]),
         wall=order_study(size=size, error=[abs(_wall_integral(s) / wall - 1) for s in solutions]),
     )
-
-
-def _field_error(solution: PressureSolution, exact: Callable[[FloatArray], FloatArray]) -> float:
-    volume = volume_points(solution.chamber)
-    true = exact(solution.chamber.length_scale * volume.points)
-    difference = at_points(volume, solution.pressure) - true
-    squares = [np.sum(volume.weights * field**2) for field in (difference, true)]
-    return float(np.sqrt(squares[0] / squares[1]))
 
 
 def _wall_integral(solution: PressureSolution) -> float:

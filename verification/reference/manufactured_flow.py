@@ -18,7 +18,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.verification.evidence import Evidence, Found
+from ringbalance.verification.evidence import Evidence
 from ringbalance.verification.navier_stokes.newton import (
     Coefficients,
     Dirichlet,
@@ -28,7 +28,7 @@ from ringbalance.verification.navier_stokes.newton import (
 )
 from ringbalance.verification.navier_stokes.rotating_section import CORIOLIS, SectionMesh, section_mesh
 from ringbalance.verification.navier_stokes.space import FlowSpace, at_points, taylor_hood
-from ringbalance.verification.orders import order_figure, order_study, order_table
+from ringbalance.verification.orders import order_figure, order_study, order_table, orders_found
 
 _TRUE: Final = Coefficients(inertia=3.0, viscosity=0.7, rotation=5.0)
 """Chosen so that no term hides behind another."""
@@ -112,12 +112,7 @@ def flow_evidence(*, around: Sequence[int], defect: str | None) -> Evidence:
     unknowns = [space.unknowns for space, _ in solved]
     table = partial(order_table, geometry="quadratic", note=f"unknowns {', '.join(map(str, unknowns))}")
     return Evidence(
-        found={
-            "velocity_order": Found(value=flow.settled_order),
-            "velocity_error": Found(value=flow.finest_error),
-            "pressure_order": Found(value=stress.settled_order),
-            "pressure_error": Found(value=stress.finest_error),
-        },
+        found=orders_found({"velocity": flow, "pressure": stress}),
         numbers={"unknowns": float(unknowns[-1])},
         series=(order_figure({"velocity": flow, "pressure": stress}),),
         convergence=(

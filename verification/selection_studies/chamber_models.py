@@ -23,11 +23,7 @@ from ringbalance.reduced_model.chamber.terms import (
     chamber_contributions,
     mesh_error,
 )
-from ringbalance.reduced_model.chamber.tilted_ring import (
-    POINTS,
-    RADIAL_POINTS,
-    turn_samples,
-)
+from ringbalance.reduced_model.chamber.tilted_ring import POINTS, RADIAL_POINTS, turn_samples
 from ringbalance.reduced_model.chamber.values import (
     ChamberValues,
     by_closed_form,
@@ -64,12 +60,9 @@ class _Kind:
 
 
 def chamber_hierarchies(scene: Scene) -> tuple[ModelHierarchy, ModelHierarchy]:
-    """The model hierarchies of wall pressure and of moment with lambda.
+    """The model hierarchies of wall pressure and of moment with lambda; a ring must exist.
 
-    Args: `scene`: the scene; a ring must exist.
-    Returns: Wall pressure; moment and lambda. Without a fill at which the ring is closed they have no points,
-        and their status says so.
-    Source: the formulas stand with the models.
+    Without a fill at which the ring is closed they have no points, and their status says so.
     """
     fills = chamber_fills(scene)
     kinds = _kinds(scene)

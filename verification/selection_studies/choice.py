@@ -7,6 +7,7 @@ expensive one than first chosen when the estimate was too small, a cheaper one w
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -65,21 +66,14 @@ class Values:
         self._found: dict[tuple[str, int], FloatArray] = {}
 
     def at(self, fidelity: Fidelity, points: tuple[int, ...]) -> FloatArray:
-        """Values of a model at points.
-
-        Args: `fidelity`: of the hierarchy. `points`: their numbers.
-        Returns: Shape (points, m).
-        """
+        """Values of a model at points given by their numbers, shape (points, m)."""
         for point in points:
             if (fidelity.name, point) not in self._found:
                 self._found[fidelity.name, point] = fidelity.solve(point)
         return np.array([self._found[fidelity.name, point] for point in points])
 
     def error(self, fidelity: Fidelity, reference: Fidelity, points: tuple[int, ...]) -> float:
-        """Largest relative error of a model against another at points.
-
-        Args: `fidelity`: of the hierarchy. `reference`: of the hierarchy. `points`: their numbers.
-        """
+        """Largest relative error of a model against another at points."""
         return relative_error(
             found=self.at(fidelity, points),
             reference=self.at(reference, points),
@@ -87,31 +81,22 @@ class Values:
         )
 
 
-def _checked_tolerance(tolerance: float) -> float:
-    """Check a tolerance.
-
-    Args: `tolerance`: relative.
-    Raises: ValueError: outside 1e-6 to 10 %, or no number.
-    """
+def _check(hierarchy: ModelHierarchy, tolerance: float) -> None:
     low, high = TOLERANCES
     if not (low * (1 - 1e-12) <= tolerance <= high * (1 + 1e-12)):
         raise ValueError(
             f"a tolerance must lie within {low:g} and {high:g} (10 %), not {tolerance:g}: models "
             "are chosen for that range alone"
         )
-    return tolerance
+    if not hierarchy.points:
+        raise ValueError(f"{hierarchy.quantity}: {hierarchy.status.text}")
 
 
 def _predicted_error(fidelity: Fidelity, hierarchy: ModelHierarchy) -> float:
-    """Sum of what a model leaves out and the finest one includes, by the estimates; infinite without a basis.
-
-    Args: `hierarchy`: the model hierarchy it stands on.
-    Returns: Relative error.
-    Source: errors of one sign at worst.
-    """
+    """Relative, the sum of what a model leaves out and the finest one includes; infinite without a basis."""
     left = sorted(fidelity.leaves_out - hierarchy.top.leaves_out)
     values = [hierarchy.contributions[term].value for term in left]
-    return float("inf") if any(v is None for v in values) else float(sum(v for v in values if v is not None))
+    return sum((math.inf if value is None else value for value in values), 0.0)
 
 
 def choose(
@@ -124,45 +109,52 @@ def choose(
 ) -> Choice:
     """Choose the cheapest model of a hierarchy for a tolerance, and check it.
 
-    Args: `hierarchy`: the model hierarchy; it must have points. `tolerance`: relative, from 1e-6 to 0.1.
-    `check`: whether the next finer model is run; without it the estimates alone decide. `costs`: default the
-    committed ones. `values`: of the hierarchy's models, to compute none twice.
-    Raises: ValueError: a tolerance out of range, or a model hierarchy without points.
+    Args: `check`: whether the next finer model is run; without it the estimates alone decide. `costs`:
+        default the committed ones. `values`: of the hierarchy's models, to compute none twice.
+    Raises: ValueError: a tolerance outside 1e-6 to 0.1, or a model hierarchy without points.
     Source: the rule stands in this module's first lines.
     """
-    _checked_tolerance(tolerance)
-    if not hierarchy.points:
-        raise ValueError(f"{hierarchy.quantity}: {hierarchy.status.text}")
-    model = costs or committed_costs()
+    _check(hierarchy, tolerance)
+    model, held = costs or committed_costs(), values or Values(hierarchy)
     ranked = ranked_fidelities(hierarchy, model)
-    first = next(
-        (fidelity for fidelity in ranked if _predicted_error(fidelity, hierarchy) <= tolerance), hierarchy.top
-    )
-    held = values or Values(hierarchy)
+    first = next((f for f in ranked if _predicted_error(f, hierarchy) <= tolerance), hierarchy.top)
     reference = _next_up(hierarchy, first, tolerance, ranked) if check else None
-    if reference is None:
-        return _record(hierarchy, tolerance, model, first, first, None, None, 0.0)
-    kept, tried = first, [reference]
+    kept, tried = first, list[Fidelity]()
+    if reference is not None:
+        kept, tried = _tried(held, reference, tolerance, ranked)
+    measured = None if reference is None else held.error(kept, reference, hierarchy.check)
+    spent = [model.of_fidelity(fidelity, points=len(hierarchy.check)) for fidelity in tried]
+    return Choice(
+        quantity=hierarchy.quantity,
+        tolerance=tolerance,
+        first=first,
+        fidelity=kept,
+        reference=reference,
+        measured=measured,
+        cost=model.of_fidelity(kept, points=len(hierarchy.points)),
+        checking_cost=sum(spent, 0.0),
+        reasons=_reasons(hierarchy, tolerance, first, kept, reference, measured),
+    )
+
+
+def _tried(
+    values: Values, reference: Fidelity, tolerance: float, ranked: list[Fidelity]
+) -> tuple[Fidelity, list[Fidelity]]:
+    """The cheapest model within the tolerance of the reference, and all that were run to find it."""
+    hierarchy, tried = values.hierarchy, [reference]
     for fidelity in ranked:
         if fidelity.name == reference.name:
-            kept = reference
             break
         if _ruled_out(hierarchy, fidelity, tolerance):
             continue
         tried.append(fidelity)
-        if held.error(fidelity, reference, hierarchy.check) <= MARGIN * tolerance:
-            kept = fidelity
-            break
-    measured = held.error(kept, reference, hierarchy.check)
-    spent = sum(model.of_fidelity(fidelity, points=len(hierarchy.check)) for fidelity in tried)
-    return _record(hierarchy, tolerance, model, first, kept, reference, measured, spent)
+        if values.error(fidelity, reference, hierarchy.check) <= MARGIN * tolerance:
+            return fidelity, tried
+    return reference, tried
 
 
 def ranked_fidelities(hierarchy: ModelHierarchy, costs: CostModel) -> list[Fidelity]:
-    """Models of a hierarchy by their cost over all its points; equal ones as they stand.
-
-    Returns: The models, cheapest first.
-    """
+    """Models of a hierarchy, cheapest over all its points first; equal ones as they stand."""
     return sorted(
         hierarchy.fidelities, key=lambda fidelity: costs.of_fidelity(fidelity, points=len(hierarchy.points))
     )
@@ -198,30 +190,6 @@ def _next_up(
         if not new:
             return other
     return hierarchy.top
-
-
-def _record(
-    hierarchy: ModelHierarchy,
-    tolerance: float,
-    model: CostModel,
-    first: Fidelity,
-    kept: Fidelity,
-    reference: Fidelity | None,
-    measured: float | None,
-    spent: float,
-) -> Choice:
-    points = len(hierarchy.points)
-    return Choice(
-        quantity=hierarchy.quantity,
-        tolerance=tolerance,
-        first=first,
-        fidelity=kept,
-        reference=reference,
-        measured=measured,
-        cost=model.of_fidelity(kept, points=points),
-        checking_cost=spent,
-        reasons=_reasons(hierarchy, tolerance, first, kept, reference, measured),
-    )
 
 
 def _reasons(
@@ -276,10 +244,9 @@ def _measured(measured: float | None) -> str:
 
 
 def _below_uncertainty(hierarchy: ModelHierarchy, tolerance: float) -> str:
-    """The sentence for a tolerance that the finest model itself cannot keep. Args: `tolerance`: relative."""
+    """The sentence for a tolerance that the finest model itself cannot keep."""
     return (
         f"a tolerance of {tolerance:.0e} is below what “{hierarchy.top.name}”, the finest model, is known to "
         f"({hierarchy.top_uncertainty:.1e}: {hierarchy.top_uncertainty_from}): the choice keeps to that "
-        "model "
-        "within the tolerance, not to nature"
+        "model within the tolerance, not to nature"
     )

@@ -129,10 +129,9 @@ def choices_evidence(
     quantities_of: Callable[[int], tuple[str, ...]],
     defect: str | None,
 ) -> Evidence:
-    """Choose models for random scenes at every tolerance, and judge the choices.
+    """Choose models for random scenes of these numbers at every tolerance, and judge the choices.
 
-    Args: `scene`: the base of the random scenes. `quantities_of`: judged on a scene, by its number. `defect`:
-        with one of `_DEFECTS` nothing is checked.
+    Args: `quantities_of`: judged on a scene, by its number. `defect`: with one nothing is checked.
     """
     taken = list(numbers)
     worth, check = (1.0, True) if defect is None else (_DEFECTS[defect], False)

@@ -14,7 +14,7 @@ import numpy as np
 from ringbalance.physics import deferred
 from ringbalance.verification.selection_studies.hierarchy import Fidelity, Work
 
-RESOURCE: Final = "cost_model.json"
+_RESOURCE: Final = "cost_model.json"
 _PULL: Final = 0.3
 """Root of the weight of one pull towards a prior."""
 
@@ -29,23 +29,14 @@ class CostModel:
     """How the numbers came about."""
 
     def cost(self, work: Work) -> float:
-        """Cost of some work.
-
-        Args: `work`: counts by kind.
-        Returns: s of the reference machine.
-        Raises: ValueError: a kind of work that this model does not know.
-        """
+        """Cost of some work, s. Raises: ValueError: a kind of work that this model does not know."""
         unknown = sorted(set(work) - set(self.seconds))
         if unknown:
             raise ValueError(f"the cost model knows no work of kind {unknown[0]!r}: fit it again")
         return float(sum(self.seconds[kind] * count for kind, count in work.items()))
 
     def of_fidelity(self, fidelity: Fidelity, *, points: int) -> float:
-        """Cost of a model at a number of points, the tables that it needs included.
-
-        Args: `points`: how many.
-        Returns: s of the reference machine.
-        """
+        """Cost of a model at a number of points, the tables that it needs included, s."""
         return self.cost(fidelity.fixed_work) + points * self.cost(fidelity.work)
 
 
@@ -55,12 +46,8 @@ def committed_costs() -> CostModel:
 
     Source: least squares over measured runs of every model, by `ringbalance trade SCENE --save-costs FILE`.
     """
-    text = (
-        files("ringbalance.verification.selection_studies")
-        .joinpath("data", RESOURCE)
-        .read_text(encoding="utf-8")
-    )
-    record = json.loads(text)
+    path = files("ringbalance.verification.selection_studies") / "data" / _RESOURCE
+    record = json.loads(path.read_text(encoding="utf-8"))
     return CostModel(seconds=dict(record["seconds"]), fitted_on=record["fitted_on"])
 
 

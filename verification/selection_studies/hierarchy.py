@@ -76,13 +76,10 @@ class ModelHierarchy:
 def relative_error(
     *, found: FloatArray, reference: FloatArray, relative_to: Literal["each", "largest"]
 ) -> float:
-    """Largest error of one model against another over points.
+    """Largest relative error of values of shape (points, m); a difference from zero counts as 1.
 
-    Args: `found`: values, shape (points, m). `reference`: values, shape (points, m). `relative_to`: "each":
-        relative to the reference at each place; "largest": to its largest magnitude over the points, column
-        by column.
-    Returns: Largest relative error; a difference from zero counts as 1.
-    Source: definition.
+    Args: `relative_to`: "each": to the reference at each place; "largest": to its largest magnitude over the
+        points, column by column.
     """
     size = np.abs(reference)
     if relative_to == "largest":

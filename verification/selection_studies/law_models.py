@@ -19,6 +19,7 @@ from ringbalance.reduced_model.selection.loss_models import FORMULAS, head_at
 from ringbalance.reduced_model.tables.fit import refined_table, table_from_samples
 from ringbalance.reduced_model.tables.hermite import HermiteTable
 from ringbalance.reduced_model.tube.heads import TABLE_ERROR, TABLE_VELOCITIES, TubeHeads
+from ringbalance.scene.accuracy import with_tolerance
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene, Tube
 from ringbalance.verification.selection_studies.hierarchy import Work
@@ -56,19 +57,13 @@ class LawModels:
 
 
 def base_law(scene: Scene) -> CalibratedLaw:
-    """The scene's calibrated law without gravity, whose parts the models exchange.
-
-    Args: `scene`: the scene; a ring must exist.
-    """
+    """The scene's law by the finest models but without gravity, whose parts are exchanged; a ring exists."""
     still = replace(scene, environment=replace(scene.environment, gravity=0.0))
-    return calibrate(still).flow_law
+    return calibrate(with_tolerance(still, models="finest")).flow_law
 
 
 def levels_available(scene: Scene) -> tuple[str, ...]:
-    """Models of the level that a scene has.
-
-    Returns: Without gravity, or where it leaves some fill without a closed ring, those without gravity alone.
-    """
+    """Models of the level: without gravity alone where there is none, or where it opens some ring."""
     gravity = scene.environment.gravity
     if gravity == 0:
         return LEVELS[:2]
@@ -79,11 +74,7 @@ def levels_available(scene: Scene) -> tuple[str, ...]:
 
 
 def law_of(scene: Scene, models: LawModels, *, base: CalibratedLaw) -> CalibratedLaw:
-    """The base law with its level, moment, loss and regimes exchanged.
-
-    Returns: CalibratedLaw; its half-widths are the base law's.
-    Source: Eqs. 13 to 18 of the liquid-ring paper, each part by its model.
-    """
+    """The base law with its level, moment, loss and regimes exchanged, but for its half-widths."""
     pressure, moment = _level_tables(scene, models.level)
     path, heads = base.path, _loss_heads(scene, models.loss, base=base.heads)
     if models.regimes == SIPHON:
@@ -111,11 +102,9 @@ def law_work(scene: Scene, models: LawModels) -> Work:
 
 
 def _level_tables(scene: Scene, level: str) -> tuple[HermiteTable, HermiteTable]:
-    """Wall pressure and moment over the fill by one model; an empty chamber has neither.
+    """Wall pressure, Pa, and moment, kg m, over the fill by one model; an empty chamber has neither.
 
-    Returns: P, Pa, and U, kg m, over x from 0 to max_fill_ratio. The paper's moment is lambda times half its
-        mass: only differences of two chambers count.
-    Source: the formulas stand with `chamber_values`.
+    The paper's moment is lambda times half its mass: only differences of two chambers count.
     """
     largest = scene.disc.max_fill_ratio
     fills = np.linspace(0.0, largest, LEVEL_NODES)
@@ -149,11 +138,7 @@ def _thin_film(scene: Scene, fills: FloatArray, values: FloatArray, *, moment: b
 
 
 def _loss_heads(scene: Scene, loss: str, *, base: TubeHeads) -> TubeHeads:
-    """Heads of the tube by one model of the loss.
-
-    Args: `loss`: one of `LOSSES`. `base`: heads whose half-widths are kept.
-    Source: definition of k; the crest's energy balance.
-    """
+    """Heads of the tube by one model of the loss, with the half-widths of `base`."""
     returning = replace(scene.tube, hump_position=1 - scene.tube.hump_position, bends=scene.tube.bends[::-1])
     head = _table(scene, scene.tube, loss, hump=False)
     if base.hump_head is None:

@@ -120,9 +120,8 @@ class Trade:
 
 
 def measure(hierarchy: ModelHierarchy, *, values: Values, costs: CostModel, clock: Clock | None) -> Trade:
-    """Measure a model hierarchy; one without points has no models to measure.
+    """Measure a model hierarchy; one without points has no models to measure, without a clock no times.
 
-    Args: `clock`: takes times and memory; None: neither.
     Source: Pareto front over counted cost and error; trade-off point by the largest distance from the chord
         between the front's ends, both axes logarithmic, errors below the finest model's own uncertainty
         counted as that.

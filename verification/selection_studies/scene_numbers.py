@@ -18,8 +18,8 @@ from ringbalance.reduced_model.selection.tube_terms import FlowEstimate, flow_es
 from ringbalance.scene.models import Scene
 
 
-@dataclass(frozen=True, kw_only=True)
-class Number:
+@dataclass(frozen=True)
+class _Number:
     """One dimensionless number of a scene."""
 
     name: str
@@ -30,16 +30,15 @@ class Number:
     """What it decides."""
 
 
-def scene_numbers(scene: Scene) -> tuple[Number, ...]:
+def scene_numbers(scene: Scene) -> tuple[_Number, ...]:
     """All numbers that the choice of models rests on, at equal fills; times over the deciding injection's.
 
-    Returns: Numbers; the tube's by a velocity from the correlations alone.
-    Source: definitions.
+    Those of the tube are by a velocity from the correlations alone.
     """
     return (*_ring(scene), *_tube(scene, flow_estimate(scene)), *_times(scene))
 
 
-def _ring(scene: Scene) -> tuple[Number, ...]:
+def _ring(scene: Scene) -> tuple[_Number, ...]:
     disc, omega = scene.disc, abs(scene.rotor.speed)
     a = float(surface_radius(disc=disc, fill_ratio=disc.max_fill_ratio / 2))
     depth, gravity = disc.outer_radius - a, scene.environment.gravity
@@ -48,40 +47,40 @@ def _ring(scene: Scene) -> tuple[Number, ...]:
     swing = float(amplification(scene, disc.max_fill_ratio / 2))
     across = scene.environment.shaft == "horizontal" and gravity > 0
     return (
-        _number(
+        _Number(
             "omega^2 a/g",
             omega**2 * a / gravity if gravity else None,
             "omega^2 a/g",
             "gravity against the ring",
         ),
-        _number(
+        _Number(
             "sloshing ratio",
             swing if across else None,
             "|1/(1 - 1/s^2)|, s^2 = k tanh(k ln(R2/a)), k = pi/theta",
             "how much swinging enlarges gravity's ripple at 1x",
         ),
-        _number("Bond number", bond, "rho omega^2 a (R2 - a)^2/sigma", "surface tension against the ring"),
-        _number(
+        _Number("Bond number", bond, "rho omega^2 a (R2 - a)^2/sigma", "surface tension against the ring"),
+        _Number(
             "Ekman number", ekman, "nu/(omega R2^2)", "layers at the walls of a chamber, sqrt(Ek) R2 thick"
         ),
     )
 
 
-def _tube(scene: Scene, flow: FlowEstimate) -> tuple[Number, ...]:
+def _tube(scene: Scene, flow: FlowEstimate) -> tuple[_Number, ...]:
     hump = scene.tube.hump_radius
     column = None if hump is None else column_pressure(scene=scene, radius=hump)
     ratio = column / scene.gas.pressure if column is not None and scene.gas.pressure > 0 else None
     return (
-        _number("R_Omega", flow.rotation_reynolds, "omega d^2/nu", "friction by rotation"),
-        _number("Re", flow.reynolds, "u d/nu", "laminar or turbulent"),
-        _number("Kl", flow.rotation_reynolds * flow.reynolds, "R_Omega Re", "rotation in laminar flow"),
-        _number(
+        _Number("R_Omega", flow.rotation_reynolds, "omega d^2/nu", "friction by rotation"),
+        _Number("Re", flow.reynolds, "u d/nu", "laminar or turbulent"),
+        _Number("Kl", flow.rotation_reynolds * flow.reynolds, "R_Omega Re", "rotation in laminar flow"),
+        _Number(
             "priming ratio", ratio, "rho omega^2 (R2^2 - r_m^2)/(2 p)", "whether the gas lifts the column"
         ),
     )
 
 
-def _times(scene: Scene) -> tuple[Number, ...]:
+def _times(scene: Scene) -> tuple[_Number, ...]:
     deciding, found = injection_time(scene), injection_estimates(scene)
 
     def over(term: str) -> float | None:
@@ -89,16 +88,12 @@ def _times(scene: Scene) -> tuple[Number, ...]:
         return None if time is None else time / deciding
 
     return (
-        _number("inertia time over valve-open time", over(INERTIA), "tau ln 2 over T", "start of the column"),
-        _number(
+        _Number("inertia time over valve-open time", over(INERTIA), "tau ln 2 over T", "start of the column"),
+        _Number(
             "filling time over valve-open time",
             over(FILLING),
             "time to fill, or to vent, over T",
             "gas filling",
         ),
-        _number("valve lag over valve-open time", over(LAG), "lag over T", "valve lag"),
+        _Number("valve lag over valve-open time", over(LAG), "lag over T", "valve lag"),
     )
-
-
-def _number(name: str, value: float | None, formula: str, tells: str) -> Number:
-    return Number(name=name, value=value, formula=formula, tells=tells)

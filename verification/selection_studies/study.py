@@ -25,10 +25,7 @@ from ringbalance.verification.selection_studies.measure import (
     measure,
     works_and_seconds,
 )
-from ringbalance.verification.selection_studies.operation import (
-    EXPLICIT,
-    MANY,
-)
+from ringbalance.verification.selection_studies.operation import EXPLICIT, MANY
 from ringbalance.verification.selection_studies.scene_numbers import scene_numbers
 
 Record = dict[str, Any]
@@ -85,15 +82,14 @@ def trade_study(
         values = Values(hierarchy)
         shown = thinned(hierarchy) if level == "light" else hierarchy
         trades.append(measure(shown, values=values, costs=costs, clock=_no_longer(clock, hierarchy)))
-        wanted = _wanted(scene, () if (level, hierarchy.quantity) in _OWN_ALONE else tolerances)
+        wanted = () if (level, hierarchy.quantity) in _OWN_ALONE else tolerances
         chosen[hierarchy.quantity] = tuple(
             choose(hierarchy, tolerance, costs=costs, values=values)
-            for tolerance in wanted
+            for tolerance in (*wanted, held_tolerance(scene.tolerance))
             if hierarchy.points
         )
-    return TradeStudy(
-        scene=scene, trades=tuple(trades), choices=chosen, costs=costs, refit=refitted(trades, costs=costs)
-    )
+    refit = _refitted(trades, costs=costs)
+    return TradeStudy(scene=scene, trades=tuple(trades), choices=chosen, costs=costs, refit=refit)
 
 
 def thinned(hierarchy: ModelHierarchy) -> ModelHierarchy:
@@ -105,9 +101,7 @@ def thinned(hierarchy: ModelHierarchy) -> ModelHierarchy:
             close or fidelity.models.get("operation in time") == EXPLICIT[MANY]
         )
 
-    return replace(
-        hierarchy, fidelities=tuple(fidelity for fidelity in hierarchy.fidelities if kept(fidelity))
-    )
+    return replace(hierarchy, fidelities=tuple(filter(kept, hierarchy.fidelities)))
 
 
 def _clock(level: Level) -> Clock:
@@ -121,18 +115,13 @@ def _no_longer(clock: Clock | None, hierarchy: ModelHierarchy) -> Clock | None:
     return Clock(repeats=1, memory=False) if hierarchy.quantity == "settling_time" else clock
 
 
-def refitted(trades: Sequence[Trade], *, costs: CostModel) -> CostModel | None:
+def _refitted(trades: Sequence[Trade], *, costs: CostModel) -> CostModel | None:
     """Fit the cost model again to measured times; kinds of work without a time keep to `costs`."""
     works, seconds = works_and_seconds(trades)
     if not seconds:
         return None
     told = f"processor times of {len(seconds)} models"
     return fitted_costs(works=works, seconds=seconds, fitted_on=told, prior=costs)
-
-
-def _wanted(scene: Scene, tolerances: Sequence[float]) -> tuple[float, ...]:
-    """The tolerances and, last, the scene's own held within what choices are made for."""
-    return (*tolerances, held_tolerance(scene.tolerance))
 
 
 def held_tolerance(tolerance: float) -> float:
@@ -152,10 +141,7 @@ def trade_document(study: TradeStudy) -> Record:
     return {
         "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
         "tolerance": scene.tolerance,
-        "numbers": [
-            {"name": n.name, "value": n.value, "formula": n.formula, "tells": n.tells}
-            for n in scene_numbers(scene)
-        ],
+        "numbers": [asdict(number) for number in scene_numbers(scene)],
         "terms": terms_document(scene),
         "models_used": [asdict(used) for used in models_used(scene)],
         "cost_model": {"fitted_on": study.costs.fitted_on, "seconds": dict(study.costs.seconds)},

@@ -85,8 +85,7 @@ class LawBook:
 
 
 def k_hierarchy(scene: Scene) -> ModelHierarchy:
-    """The model hierarchy of the tube's loss, as k + 1, which is what heads know. Source:
-    `loss_fidelities`."""
+    """The model hierarchy of the tube's loss, as k + 1, which is what heads know."""
     centre = flow_estimate(scene).velocity or 1.0
     velocities = centre * np.array(VELOCITY_FACTORS)
 
@@ -129,10 +128,7 @@ def _k_uncertainty(scene: Scene, velocities: FloatArray) -> float:
 
 
 def flow_models(scene: Scene) -> tuple[LawModels, ...]:
-    """All laws that a scene may be given, the highest last.
-
-    Returns: Every level with every loss, with the crest's regimes where the scene has a crest and without.
-    """
+    """Every level with every loss, without the crest's regimes and, where there is a crest, with them."""
     regimes = (SIPHON, REGIMES) if scene.tube.hump_radius is not None else (SIPHON,)
     losses = LOSSES if scene.tube.drag_coefficient is None else (CONSTANT,)
     return tuple(
@@ -144,20 +140,13 @@ def flow_models(scene: Scene) -> tuple[LawModels, ...]:
 
 
 def lacks(models: LawModels, *, hump: bool) -> frozenset[str]:
-    """What a law leaves out.
-
-    Args: `hump`: whether the scene has one.
-    Returns: Names of contributions.
-    """
+    """Names of the contributions that a law leaves out on a scene with a crest or without."""
     separated = (HUMP,) if hump and models.regimes == SIPHON else ()
     return frozenset((*LACKS_LEVEL[models.level], *LACKS_LOSS[models.loss], *separated))
 
 
 def velocity_hierarchy(scene: Scene, *, book: LawBook) -> ModelHierarchy:
-    """The model hierarchy of the velocity under the scene's gas pressure, from an empty tube, over the fills.
-
-    Source: `law_fidelities`.
-    """
+    """The model hierarchy of the velocity over the fills, from an empty tube under the scene's pressure."""
     largest, pressure = scene.disc.max_fill_ratio, scene.gas.pressure
     fills = largest * np.array(SHARES)
 
@@ -194,7 +183,7 @@ def velocity_hierarchy(scene: Scene, *, book: LawBook) -> ModelHierarchy:
 
 
 def law_name(models: LawModels, *, hump: bool) -> str:
-    """Short name of a law's models. Args: `hump`: whether the scene has one."""
+    """Short name of a law's models."""
     parts = [models.loss, models.level]
     if hump:
         parts.append("hump" if models.regimes == REGIMES else "no hump")
@@ -204,7 +193,7 @@ def law_name(models: LawModels, *, hump: bool) -> str:
 def velocity_uncertainty(scene: Scene, book: LawBook) -> float:
     """Relative half-width of the base law's velocity at equal fills; zero where nothing flows.
 
-    Returns: Relative half-width; with gravity's worth where no model of this scene holds it.
+    It holds gravity's contribution where no model of this scene does.
     """
     missing = 0.0
     if QUADRATURE not in levels_available(scene):

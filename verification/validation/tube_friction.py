@@ -1,31 +1,43 @@
-"""Friction factors of straight tubes as measured, beside what the program predicts for the same tubes."""
+"""Friction factors of straight tubes and ducts as measured, beside what the program predicts for the same."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 
 from ringbalance.physics.tube.friction import friction_factor, friction_uncertainty
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, StringArray
-from ringbalance.verification.validation.measurements import measurements
+from ringbalance.verification.navier_stokes.rotating_section import (
+    DuctMesh,
+    friction_ratio,
+    section_system,
+    solve_section_without_inertia,
+)
+from ringbalance.verification.validation.kinds import Kind, Prediction
+from ringbalance.verification.validation.measurements import Measurements, measurements
 from ringbalance.verification.validation.model_bias import ModelStatistics, model_statistics
 
 
 class Formula(Protocol):
     """A friction factor, or its uncertainty, over the Reynolds number."""
 
-    def __call__(self, *, reynolds: FloatArray, relative_roughness: float) -> FloatArray: ...
+    def __call__(
+        self, *, reynolds: FloatArray, relative_roughness: float, laminar_ratio: FloatArray
+    ) -> FloatArray: ...
 
 
 @dataclass(frozen=True, kw_only=True)
 class FrictionPoints:
-    """Measured Darcy friction factors of straight tubes at rest; all fields of one length."""
+    """Measured Darcy friction factors of straight tubes and ducts at rest; all fields of one length."""
 
     reynolds: FloatArray
+    """With the hydraulic diameter."""
     relative_roughness: FloatArray
     """ks/d."""
+    laminar_ratio: FloatArray
+    """Laminar friction over that of a circular tube, 1 for tubes."""
     friction: FloatArray
     measurement_uncertainty: FloatArray
     """U_D (95 %), relative."""
@@ -37,11 +49,22 @@ class FrictionPoints:
 
     def predicted(self) -> FloatArray:
         """The program's friction factor of each point."""
-        return predicted_friction(self.reynolds, self.relative_roughness)
+        return self._each(friction_factor)
 
     def stated(self) -> FloatArray:
         """Expanded uncertainty (95 %) that the program states for it."""
-        return _each(friction_uncertainty, self.reynolds, self.relative_roughness)
+        return self._each(friction_uncertainty)
+
+    def _each(self, formula: Formula) -> FloatArray:
+        found = np.empty_like(self.reynolds)
+        for wall in np.unique(self.relative_roughness):
+            here = self.relative_roughness == wall
+            found[here] = formula(
+                reynolds=self.reynolds[here],
+                relative_roughness=float(wall),
+                laminar_ratio=self.laminar_ratio[here],
+            )
+        return found
 
     def statistics(self, predicted: FloatArray) -> ModelStatistics:
         """How predicted friction factors stand to the measured ones."""
@@ -54,33 +77,49 @@ class FrictionPoints:
         )
 
 
-def predicted_friction(reynolds: FloatArray, relative_roughness: FloatArray) -> FloatArray:
-    """The program's friction factor of several straight tubes at rest, one a point."""
-    return _each(friction_factor, reynolds, relative_roughness)
-
-
-def _each(formula: Formula, reynolds: FloatArray, relative_roughness: FloatArray) -> FloatArray:
-    found = np.empty_like(reynolds)
-    for wall in np.unique(relative_roughness):
-        here = relative_roughness == wall
-        found[here] = formula(reynolds=reynolds[here], relative_roughness=float(wall))
-    return found
-
-
 def friction_points(*names: str) -> FrictionPoints:
-    """The points of data sets, those of a tube in ascending order of the Reynolds number."""
-    sets = [measurements(name) for name in names]
+    """The points of data sets, in ascending order of the Reynolds number."""
+    sets = [_points_of(measurements(name), prefix=f"{name}: ") for name in names]
     joined = FrictionPoints(
-        reynolds=np.concatenate([each.columns["reynolds"] for each in sets]),
-        relative_roughness=np.concatenate(
-            [each.columns.get("relative_roughness", np.zeros(len(each))) for each in sets]
-        ),
-        friction=np.concatenate([each.columns["friction_factor"] for each in sets]),
-        measurement_uncertainty=np.concatenate(
-            [np.full(len(each), each.source.uncertainty) for each in sets]
-        ),
-        series=np.concatenate(
-            [np.char.add(f"{name}: ", each.series) for name, each in zip(names, sets, strict=True)]
-        ),
+        **{key: np.concatenate([getattr(each, key) for each in sets]) for key in vars(sets[0])}
     )
     return joined.where(np.argsort(joined.reynolds, kind="stable"))
+
+
+def _points_of(data: Measurements, *, prefix: str = "") -> FrictionPoints:
+    none = np.zeros(len(data))
+    return FrictionPoints(
+        reynolds=data.columns["reynolds"],
+        relative_roughness=data.columns.get("relative_roughness", none),
+        laminar_ratio=_laminar_ratio(data.columns.get("aspect_ratio", none)),
+        friction=data.columns["friction_factor"],
+        measurement_uncertainty=data.uncertainty,
+        series=np.char.add(prefix, data.series),
+    )
+
+
+def _laminar_ratio(aspect_ratio: FloatArray) -> FloatArray:
+    """Laminar friction of rectangular ducts over that of a tube of their hydraulic diameter; 0 for tubes."""
+    ratio = np.ones_like(aspect_ratio)
+    for aspect in np.unique(aspect_ratio[aspect_ratio > 0]):
+        system = section_system(cells=DuctMesh(aspect_ratio=float(aspect)))
+        flow = solve_section_without_inertia(system=system, rotation_reynolds=0.0)
+        ratio[aspect_ratio == aspect] = friction_ratio(flow)
+    return ratio
+
+
+def _predict(data: Measurements) -> Prediction:
+    points = _points_of(data)
+    return Prediction(value=points.predicted(), stated=points.stated())
+
+
+FRICTION: Final = Kind(
+    title="Darcy friction factor of a long straight tube or duct at rest",
+    measured="friction_factor",
+    columns={"reynolds": "Reynolds number with the hydraulic diameter and the mean velocity"},
+    optional={
+        "relative_roughness": "ks/d, grain of the wall over the bore; smooth without this column",
+        "aspect_ratio": "long over short side of a rectangular duct; 0, or no such column, for a tube",
+    },
+    predict=_predict,
+)

@@ -8,14 +8,22 @@ from dataclasses import replace
 
 import pytest
 
-from ringbalance.controller.eccentric_mass.study import EccentricStudy, eccentric_study, study_document
+from ringbalance.controller.eccentric_mass.study import (
+    EccentricStudy,
+    Requirement,
+    eccentric_study,
+    study_document,
+)
 from ringbalance.scene import bundled_scene, eccentric_scene, load_scene
+from ringbalance.scene.eccentric_models import EccentricScene
+from ringbalance.scene.models import InputUncertainty
 from ringbalance.verification.eccentric_mass.scenes import changed
 
 
 @pytest.fixture(scope="module")
 def study() -> EccentricStudy:
-    return eccentric_study(eccentric_scene(load_scene(bundled_scene("eccentric_mass_paper"))))
+    scene = eccentric_scene(load_scene(bundled_scene("eccentric_mass_paper")))
+    return eccentric_study(replace(scene, uncertainty=()))
 
 
 def test_the_locked_run_is_what_balancing_is_judged_by(study: EccentricStudy) -> None:
@@ -48,3 +56,62 @@ def test_a_loop_at_its_gain_margin_is_at_the_edge(study: EccentricStudy) -> None
     assert beyond.gains.speed.radius == pytest.approx(1.0, abs=1e-4)
     row = next(row for row in beyond.requirements if row.quantity == "gain margin of the speed control")
     assert not row.met
+
+
+def uncertain(scene: EccentricScene, **widths: tuple[float, bool]) -> EccentricScene:
+    """A short run of the scene, at one speed, with these uncertainties by path (with _ for the dot)."""
+    stated = tuple(
+        InputUncertainty(quantity=path.replace("__", "."), half_width=width, relative=relative)
+        for path, (width, relative) in widths.items()
+    )
+    first, *_ = scene.rotor.speed_profile
+    return replace(
+        scene,
+        uncertainty=stated,
+        rotor=replace(scene.rotor, speed_profile=(first,)),
+        run=replace(scene.run, time_limit=20.0),
+    )
+
+
+def rows_of(scene: EccentricScene) -> dict[str, Requirement]:
+    return {row.quantity: row for row in eccentric_study(scene).requirements}
+
+
+def test_the_interval_of_the_capacity_follows_from_both_inputs(study: EccentricStudy) -> None:
+    """The capacity is proportional to the mass of each; the need to that of the imbalance."""
+    scene = uncertain(study.scene, masses__mass=(0.01, True), imbalance__mass=(0.009, False))
+    row = rows_of(scene)["balancing moment"]
+    assert row.achieved is not None
+    assert row.achieved_interval == pytest.approx((0.99 * row.achieved, 1.01 * row.achieved))
+    need = scene.imbalance.mass * scene.imbalance.radius
+    assert row.required_interval == pytest.approx((0.95 * need, 1.05 * need))
+    assert row.least_excess == pytest.approx(-math.hypot(0.01 * row.achieved, 0.05 * need))
+    assert row.verdict == "met"
+
+
+def test_an_unknown_stiffness_is_one_that_the_controller_does_not_know(study: EccentricStudy) -> None:
+    """The whirl that is left is what the error of the estimated imbalance gives, D_b/D - 1 of it."""
+    exact = rows_of(uncertain(study.scene))["amplitude at the end"]
+    row = rows_of(uncertain(study.scene, rotor__stiffness=(0.003, True)))["amplitude at the end"]
+    rotor, masses = study.scene.rotor, study.scene.masses
+    speed, mass = rotor.speed_profile[0].speed, rotor.mass + 2 * masses.mass
+    believed = rotor.stiffness - mass * speed**2 + 1j * rotor.damping * speed
+    true = believed - 0.003 * rotor.stiffness
+    need = study.scene.imbalance.mass * study.scene.imbalance.radius
+    left = abs(believed / true - 1) * need * speed**2 / abs(true)
+    assert exact.achieved_interval is None
+    assert row.achieved_interval is not None
+    # Above the limit fine tuning would start, and the amplitude would be another.
+    assert left < study.scene.supervisor.limit
+    # Arrival leaves some micrometres more, wherever friction stops the masses.
+    assert row.effects["rotor.stiffness"][0] == pytest.approx(left, abs=12e-6)
+
+
+def test_an_input_that_loses_a_result_leaves_it_open(study: EccentricStudy) -> None:
+    """An imbalance within reach, beyond it at the upper end of its interval."""
+    row = rows_of(uncertain(study.scene, imbalance__mass=(0.95, True)))
+    reach = rows_of(uncertain(study.scene, imbalance__radius=(0.24, False)))
+    assert row["settling time"].verdict == "met"
+    assert reach["settling time"].lost == ("imbalance.radius",)
+    assert reach["settling time"].verdict == "cannot be told"
+    assert reach["balancing moment"].verdict == "cannot be told"

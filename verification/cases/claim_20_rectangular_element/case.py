@@ -43,8 +43,8 @@ def _balance(scene: Scene, ring: RingQuantities) -> Found:
     """Net force of the liquid on all walls along the centre line, over omega^2 U from the closed form."""
     moment = exact_moment(disc=scene.disc, density=scene.liquid.density, fill_ratio=scene.disc.max_fill_ratio)
     centrifugal = scene.rotor.speed**2 * float(moment)
-    force = float(ring.resultant_force.value[-1, 0])
-    standard_uncertainty = from_half_width(float(ring.resultant_force.uncertainty[-1, 0]))
+    force = float(ring.resultant_force.value[-1])
+    standard_uncertainty = from_half_width(float(ring.resultant_force.uncertainty[-1]))
     return Found(value=force / centrifugal, numerical=standard_uncertainty / centrifugal)
 
 

@@ -91,4 +91,4 @@ def _amplitude(run: Measurements, series: str, washers: int) -> float:
 
 def _chosen(run: Measurements, series: str, washers: int) -> FloatArray:
     here = (run.series == series) & (run.columns["washers"] == washers)
-    return np.asarray(1e-6 * run.columns["amplitude_um"][here], dtype=np.float64)
+    return np.asarray(run.columns["amplitude"][here], dtype=np.float64)

@@ -21,14 +21,18 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     statistics = points.statistics(predicted)
     grain = points.reynolds * np.sqrt(points.friction / 8) * points.relative_roughness
     deviation = predicted / points.friction - 1
+    rough = points.where(grain > _FULLY_ROUGH).statistics(predicted[grain > _FULLY_ROUGH])
     return Evidence(
         found={
             "share_within": Found(value=statistics.share_within),
-            "fully_rough": Found(value=float(np.max(np.abs(deviation[grain > _FULLY_ROUGH])))),
+            "fully_rough": Found(value=abs(rough.bias)),
         },
         numbers={
             **{key: float(value) for key, value in vars(statistics).items() if key != "share_within"},
             "worst": float(np.max(deviation)),
+            "rough_points": float(rough.points),
+            "rough_bias": rough.bias,
+            "rough_standard_deviation": rough.standard_deviation,
         },
         series=tuple(
             _figure(points, predicted, wall) for wall in np.unique(points.relative_roughness)[[0, -1]]

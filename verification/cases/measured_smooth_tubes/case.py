@@ -40,7 +40,9 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 
 def _points() -> FrictionPoints:
     """All but McKeon's laminar ones, which their own authors found up to 14 % high."""
-    others = friction_points("stanton_pannell_1914", "stanton_pannell_1914_oil", "huebscher_1947_round")
+    others = friction_points(
+        "stanton_pannell_1914", "stanton_pannell_1914_oil", "huebscher_1947_round", "senecal_1951"
+    )
     mckeon = friction_points("mckeon_2004")
     turbulent = mckeon.where(mckeon.reynolds >= _TURBULENT)
     joined = FrictionPoints(

@@ -11,11 +11,12 @@ from typing import Final
 import numpy as np
 from scipy.integrate import quad
 
+from ringbalance.physics.tube.friction import friction_factor
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
 from ringbalance.verification.reference.mixing_length import MixingLength, mixing_length, mixing_length_flow
-from ringbalance.verification.validation.tube_friction import friction_points, predicted_friction
+from ringbalance.verification.validation.tube_friction import friction_points
 
 Friction = Callable[[FloatArray, FloatArray], FloatArray]
 
@@ -30,8 +31,9 @@ _CLOSURES: Final = MappingProxyType(
 _EVEN: Final = {"light": (1e5, 1e6), "heavy": (1e5, 1.5e5, 2e5, 3e5, 5e5, 7e5, 1e6)}
 _LOW: Final = (3e3, 1e4)
 _HIGH: Final = 1e5
-_MEASURED: Final = {"light": 5, "heavy": 1}
-"""Every which measured point is taken."""
+_SMOOTH: Final = {"light": 5, "heavy": 1}
+_SAND: Final = {"light": 40, "heavy": 8}
+"""Every which measured point is taken, of smooth tubes and of sand."""
 _CELLS: Final = {"light": 48, "heavy": 128}
 _FULLY_ROUGH: Final = 70.0
 """ks+ above which the wall is fully rough."""
@@ -51,18 +53,14 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         )
         return np.array([flow.friction_factor for flow in flows])
 
-    stride = _MEASURED[level]
-    sand, every = (
-        friction_points("nikuradse_1933").where(slice(None, None, stride)),
-        friction_points("mckeon_2004"),
-    )
-    smooth = every.where(every.reynolds >= _HIGH).where(slice(None, None, -stride))
+    sand = friction_points("nikuradse_1933").where(slice(None, None, _SAND[level]))
+    every = friction_points("mckeon_2004")
+    smooth = every.where(every.reynolds >= _HIGH).where(slice(None, None, -_SMOOTH[level]))
     even = np.array(_LOW + _EVEN[level])
-    apart = by_length(even, np.zeros_like(even)) / predicted_friction(even, np.zeros_like(even)) - 1
+    apart = by_length(even, np.zeros_like(even)) / friction_factor(reynolds=even, relative_roughness=0.0) - 1
     measured = by_length(smooth.reynolds, smooth.relative_roughness) / smooth.friction - 1
-    wall, formula = (
-        f(sand.reynolds, sand.relative_roughness) / sand.friction - 1 for f in (by_length, predicted_friction)
-    )
+    wall = by_length(sand.reynolds, sand.relative_roughness) / sand.friction - 1
+    formula = sand.predicted() / sand.friction - 1
     grain = sand.reynolds * np.sqrt(sand.friction / 8) * sand.relative_roughness
     between = (grain > _BETWEEN[0]) & (grain < _BETWEEN[1])
     return Evidence(
@@ -103,9 +101,9 @@ def _quadrature_gap(closure: MixingLength, cells: int) -> float:
 def _figure(by_length: Friction) -> Series:
     """One sand over Re, where formula and measurements part."""
     sand = friction_points("nikuradse_1933")
-    shown = sand.where(np.isclose(sand.relative_roughness, 0.5 / _SHOWN))
+    shown = sand.where(np.isclose(sand.relative_roughness, 0.5 / _SHOWN)).where(slice(None, None, 8))
     reynolds, roughness = shown.reynolds, shown.relative_roughness
-    formula = predicted_friction(reynolds, roughness)
+    formula = shown.predicted()
     return figure(
         f"friction factor on sand of R/ks = {_SHOWN:.0f}",
         ("Reynolds number", "1", reynolds),

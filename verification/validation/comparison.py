@@ -1,0 +1,165 @@
+"""Measurements beside the program's predictions: statistics, verdict, scatter plot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from ringbalance.scene.arrays import BoolArray, FloatArray, StringArray
+from ringbalance.verification.evidence import Curve, Evidence, Found, Series, figure
+from ringbalance.verification.validation.kinds import Kind
+from ringbalance.verification.validation.measurements import Measurements, MeasurementsError
+from ringbalance.verification.validation.model_bias import ModelStatistics, model_statistics
+from ringbalance.verification.validation.tube_friction import FRICTION
+from ringbalance.verification.validation.vessel import VESSEL
+from ringbalance.verification.validation.wave_frequency import WAVE_FREQUENCY
+from ringbalance.verification.verdicts import Verdict, judge_quantity
+
+KINDS: Final[Mapping[str, Kind]] = MappingProxyType(
+    {"friction": FRICTION, "vessel": VESSEL, "wave_frequency": WAVE_FREQUENCY}
+)
+"""Kinds of data that the program can predict."""
+PROMISED: Final = 0.93
+"""Fraction of the points that both 95 % uncertainties must hold: 0.95, less the chance of a small sample."""
+_FACTORS: Final[Mapping[str | None, float]] = MappingProxyType(
+    {"ten_per_cent_high": 1.1, "ten_per_cent_low": 0.9}
+)
+"""Mutations that every comparison must notice."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """All fields of one length, SI."""
+
+    measured: FloatArray
+    predicted: FloatArray
+    stated: FloatArray
+    """Expanded uncertainty (95 %) of the prediction."""
+    uncertainty: FloatArray
+    """U_D, relative."""
+    series: StringArray
+
+    def where(self, chosen: BoolArray) -> Comparison:
+        """Some of the points."""
+        return Comparison(**{name: column[chosen] for name, column in vars(self).items()})
+
+    @property
+    def within(self) -> BoolArray:
+        """Whether a point's deviation lies within both 95 % uncertainties."""
+        allowed = np.hypot(self.stated, self.uncertainty * self.measured)
+        return np.asarray(np.abs(self.predicted - self.measured) <= allowed)
+
+    @property
+    def bias(self) -> float:
+        """Geometric mean of predicted over measured, less one."""
+        return float(np.expm1(np.mean(np.log(self.predicted / self.measured))))
+
+    @property
+    def statistics(self) -> ModelStatistics:
+        """How the predictions stand to the measurements."""
+        return model_statistics(
+            predicted=self.predicted,
+            measured=self.measured,
+            series=self.series,
+            stated=self.stated,
+            measurement_uncertainty=self.uncertainty,
+        )
+
+    @property
+    def verdict(self) -> Verdict:
+        """Confirmed where both uncertainties hold the promised fraction of the points."""
+        return judge_quantity(
+            kind="validation",
+            metric="at_least",
+            limit=PROMISED,
+            found=Found(value=self.statistics.share_within),
+            reference=None,
+        ).verdict
+
+    def scatter(self, name: str, unit: str) -> Series:
+        """Predicted over measured values. Args: `name`: of the quantity. `unit`: its SI unit."""
+        order = np.argsort(self.measured, kind="stable")
+        measured, predicted = self.measured[order], self.predicted[order]
+        return figure(
+            f"{name}: predicted over measured",
+            ("measured", unit, measured),
+            Curve("equal", unit, measured, uncertainty=(self.uncertainty * self.measured)[order]),
+            Curve("predicted", unit, predicted, style="points"),
+            log=bool(measured[-1] > 10 * measured[0]),
+        )
+
+
+def compare(*sets: Measurements, mutation: str | None = None) -> Comparison:
+    """Predict the points of data sets of one kind.
+
+    Raises: MeasurementsError: a kind that cannot be predicted, a column that is missing, or a measured value
+        that is not positive.
+    """
+    kind = kind_of(sets[0])
+    for each in sets:
+        _check(each, kind)
+    predictions = [kind.predict(each) for each in sets]
+    factor = _FACTORS.get(mutation, 1.0)
+    return Comparison(
+        measured=np.concatenate([each.columns[kind.measured] for each in sets]),
+        predicted=factor * np.concatenate([one.value for one in predictions]),
+        stated=np.concatenate([one.stated for one in predictions]),
+        uncertainty=np.concatenate([each.uncertainty for each in sets]),
+        series=np.concatenate([each.series for each in sets]),
+    )
+
+
+def kind_of(data: Measurements) -> Kind:
+    """The kind of a data set. Raises: MeasurementsError: one that cannot be predicted."""
+    if data.source.kind not in KINDS:
+        raise MeasurementsError(
+            f'kind = "{data.source.kind}" cannot be predicted; allowed: {", ".join(KINDS)}'
+        )
+    return KINDS[data.source.kind]
+
+
+def _check(data: Measurements, kind: Kind) -> None:
+    wanted = (kind.measured, *kind.columns)
+    missing = [name for name in wanted if name not in data.columns]
+    known = {*wanted, *kind.optional, "uncertainty"}
+    strange = [name for name in data.columns if name not in known]
+    faults = [f'the column "{name}" is missing: {_meaning(kind, name)}' for name in missing]
+    faults += [f'the column "{name}" is not known; allowed: {", ".join(sorted(known))}' for name in strange]
+    faults += [
+        f'the column "{name}" must be positive in every row'
+        for name in wanted
+        if name in data.columns and not np.all(data.columns[name] > 0)
+    ]
+    faults += [
+        f'the column "{name}" must not be negative'
+        for name in known & data.columns.keys() - set(wanted)
+        if not np.all(data.columns[name] >= 0)
+    ]
+    if faults:
+        raise MeasurementsError("\n".join(faults))
+
+
+def _meaning(kind: Kind, name: str) -> str:
+    return kind.columns.get(name, f"the measured {kind.title}")
+
+
+def data_evidence(*sets: Measurements, unit: str, mutation: str | None = None) -> Evidence:
+    """Evidence of a case that compares data sets of one kind. Args: `unit`: of what was measured, SI."""
+    comparison = compare(*sets, mutation=mutation)
+    return Evidence(
+        found={
+            "share_within": Found(value=comparison.statistics.share_within),
+            "bias": Found(value=abs(comparison.statistics.bias)),
+        },
+        numbers=statistics_numbers(comparison.statistics),
+        series=(comparison.scatter(kind_of(sets[0]).title, unit),),
+    )
+
+
+def statistics_numbers(statistics: ModelStatistics) -> dict[str, float]:
+    """Numbers for a case's text, by the names of `ModelStatistics`."""
+    return {key: float(value) for key, value in vars(statistics).items()}

@@ -1,0 +1,32 @@
+"""What a kind of measurement is compared with: the columns it needs, and the program's prediction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.verification.validation.measurements import Measurements
+
+
+@dataclass(frozen=True, kw_only=True)
+class Prediction:
+    """What the program says of each point, SI."""
+
+    value: FloatArray
+    stated: FloatArray
+    """Expanded uncertainty (95 %) that it states."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Kind:
+    """One kind of data."""
+
+    title: str
+    measured: str
+    """Column that is predicted."""
+    columns: Mapping[str, str]
+    """Columns that the prediction needs, with what they hold."""
+    optional: Mapping[str, str] = field(default_factory=dict)
+    """Columns that it uses where they are there."""
+    predict: Callable[[Measurements], Prediction]

@@ -252,21 +252,16 @@ def main() -> int:
     parser.add_argument("--keep", action="store_true")
     asked = parser.parse_args()
     scene = liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper")))
+    document = {"date": date.today().isoformat(), "openfoam": "1912", "machine": platform.machine()}
     rows = json.loads(KEPT.read_text(encoding="utf-8"))["rows"] if KEPT.exists() else {}
     for name in asked.only:
         rows[name] = []
         for found in STUDIES[name](scene, asked.out):
             rows[name].append({**asdict(found), "agrees": found.agrees})
             print(_said(found), flush=True)
-    document = {
-        "date": date.today().isoformat(),
-        "openfoam": "1912",
-        "machine": platform.machine(),
-        "rows": rows,
-    }
-    if asked.keep:
-        write_whole(KEPT, json.dumps(document, indent=1) + "\n")
-        write_whole(PAGE, page(document))
+        if asked.keep:
+            write_whole(KEPT, json.dumps({**document, "rows": rows}, indent=1) + "\n")
+            write_whole(PAGE, page({**document, "rows": rows}))
     return 0
 
 

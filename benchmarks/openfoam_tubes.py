@@ -29,7 +29,8 @@ def section(*, around: int, across: int, wall_ratio: float) -> tuple[FloatArray,
     points = np.asarray(mesh.doflocs[:, : mesh.nvertices]).T
     quads = np.asarray(mesh.t[:4]).T
     corner = points[quads]
-    turn = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    (ax, ay), (bx, by) = (corner[:, 1] - corner[:, 0]).T, (corner[:, 2] - corner[:, 0]).T
+    turn = ax * by - ay * bx
     quads[turn < 0] = quads[turn < 0][:, ::-1]
     return points, quads, mesh
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from ringbalance.mesh.chamber import ChamberMesh
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.physics.pressure.assembly import at_points, volume_points
+from ringbalance.physics.pressure.assembly import volume_points
 from ringbalance.physics.pressure.solve import PressureProblem, PressureSolution
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loader import bundled_scene, load_scene
@@ -108,5 +108,5 @@ def relative_error(problem: str, chamber: ChamberMesh, solution: PressureSolutio
     volume = volume_points(chamber)
     surface = float(chamber.surface_radius.mean()) / chamber.length_scale
     true = exact(problem, volume.points, surface)
-    difference = at_points(volume, solution.pressure) - true
+    difference = volume.at_points(solution.pressure) - true
     return float(np.sqrt(np.sum(volume.weights * difference**2) / np.sum(volume.weights * true**2)))

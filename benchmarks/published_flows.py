@@ -24,7 +24,7 @@ from ringbalance.verification.navier_stokes.newton import (
     flow_system,
     solve_flow,
 )
-from ringbalance.verification.navier_stokes.space import at_points, taylor_hood
+from ringbalance.verification.navier_stokes.space import taylor_hood
 
 Field = Callable[[FloatArray], FloatArray]
 
@@ -142,7 +142,7 @@ def field_errors(
     Returns: The three errors.
     """
     space = system.space
-    u, du = at_points(space, solution.velocity)
+    u, du = space.at_points(solution.velocity)
     p = solution.pressure[space.pressure.element_dofs.T] @ space.pressure_shape
     w, area = space.weights, space.weights.sum()
     exact = pressure(space.points)

@@ -14,6 +14,8 @@ from ringbalance.controller.compare_rotor import OneRotor, own_scene, rotor_of, 
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.sampled_loops import recommended_gains
 from ringbalance.controller.loop import simulate
+from ringbalance.controller.rotor import chamber_letters
+from ringbalance.controller.tuning.dead_time import compensated
 from ringbalance.controller.tuning.loop_factor import loop_factor
 from ringbalance.controller.tuning.recommendation import recommended_gain
 from ringbalance.reduced_model.law.model import BalancerModel
@@ -97,6 +99,41 @@ class Comparison:
     sides: tuple[Side, Side]
     """In the order of the scenes."""
 
+    def document(self) -> dict[str, Any]:
+        """All as a JSON document in SI; lists run along `scenes`; null: not settled."""
+        sides, rotor = self.sides, self.rotor
+        return {
+            "scenes": [
+                {"name": side.scene.name, "source": side.scene.source, "sha256": side.scene.sha256}
+                for side in sides
+            ],
+            "balancer": [side.scene.balancer for side in sides],
+            "settled": [side.settled for side in sides],
+            "time_s": [side.time for side in sides],
+            "residual_ratio": [side.middle("residual_ratio") for side in sides],
+            "energy_J": [side.middle("energy") for side in sides],
+            "worst_amplitude_m": [side.middle("worst_amplitude") for side in sides],
+            "spread": [
+                {key: [_finite(end) for end in side.ends(name)] for key, name in _NUMBERS.items()}
+                for side in sides
+            ],
+            "runs": [len(side.results) for side in sides],
+            "runs_settled": [sum(math.isfinite(r.time) for r in side.results) for side in sides],
+            "tuned": [dict(side.tuned) for side in sides],
+            "span_s": self.span,
+            "status": [side.status for side in sides],
+            "models_used": [[asdict(used) for used in side.models_used] for side in sides],
+            "rotor": {
+                "source": rotor.source,
+                "speed_rad_s": rotor.speed,
+                "influence_m_per_kg_m": [rotor.influence.real, rotor.influence.imag],
+                "unbalance_kg_m": [rotor.unbalance.real, rotor.unbalance.imag],
+                "initial_amplitude_m": rotor.amplitude,
+                "noise_m": rotor.noise,
+                "limit_m": rotor.limit,
+            },
+        }
+
 
 def compare(
     first: AnyScene, second: AnyScene, *, model_of: _ModelOf, runs: int = RUNS, tuned: bool = True
@@ -146,6 +183,15 @@ def _liquid_side(scene: Scene, model: BalancerModel, *, span: float, runs: int, 
         if gain > 0:
             changes = {"controller.proportional": gain}
             ready = replace(ready, controller=replace(ready.controller, proportional=gain))
+    if tuned:
+        ready = compensated(ready, model)
+        if ready.controller.gas_time_offset != scene.controller.gas_time_offset:
+            offsets = ready.controller.offsets(ready.disc.chambers)
+            letters = chamber_letters(ready.disc.chambers)
+            changes |= {
+                f"controller.gas_time_offset.{letter}": offset
+                for letter, offset in zip(letters, offsets, strict=True)
+            }
     done = [
         simulate(replace(ready, run=replace(ready.run, seed=ready.run.seed + i)), model, to_time_limit=True)
         for i in range(runs)
@@ -204,39 +250,3 @@ _NUMBERS: Final = {
     "worst_amplitude_m": "worst_amplitude",
 }
 """Keys of the document, each with its number of `Result`."""
-
-
-def comparison_document(comparison: Comparison) -> dict[str, Any]:
-    """A comparison as a JSON document in SI; lists run along `scenes`; null: not settled."""
-    sides, rotor = comparison.sides, comparison.rotor
-    return {
-        "scenes": [
-            {"name": side.scene.name, "source": side.scene.source, "sha256": side.scene.sha256}
-            for side in sides
-        ],
-        "balancer": [side.scene.balancer for side in sides],
-        "settled": [side.settled for side in sides],
-        "time_s": [side.time for side in sides],
-        "residual_ratio": [side.middle("residual_ratio") for side in sides],
-        "energy_J": [side.middle("energy") for side in sides],
-        "worst_amplitude_m": [side.middle("worst_amplitude") for side in sides],
-        "spread": [
-            {key: [_finite(end) for end in side.ends(name)] for key, name in _NUMBERS.items()}
-            for side in sides
-        ],
-        "runs": [len(side.results) for side in sides],
-        "runs_settled": [sum(math.isfinite(r.time) for r in side.results) for side in sides],
-        "tuned": [dict(side.tuned) for side in sides],
-        "span_s": comparison.span,
-        "status": [side.status for side in sides],
-        "models_used": [[asdict(used) for used in side.models_used] for side in sides],
-        "rotor": {
-            "source": rotor.source,
-            "speed_rad_s": rotor.speed,
-            "influence_m_per_kg_m": [rotor.influence.real, rotor.influence.imag],
-            "unbalance_kg_m": [rotor.unbalance.real, rotor.unbalance.imag],
-            "initial_amplitude_m": rotor.amplitude,
-            "noise_m": rotor.noise,
-            "limit_m": rotor.limit,
-        },
-    }

@@ -10,7 +10,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from ringbalance.controller.compare import Comparison, Side, comparison_document
+from ringbalance.controller.compare import Comparison, Side
 from ringbalance.controller.compare import compare as compare_scenes
 from ringbalance.reduced_model.law_by_name import law_by_name
 from ringbalance.scene.accuracy import Models, with_tolerance
@@ -51,7 +51,7 @@ def compare(
     with activity("compare", "both balancers on one rotor ..."):
         found = compare_scenes(*told, model_of=lambda scene: law_by_name(scene, law))
     if json:
-        print(json_format.dumps(comparison_document(found), allow_nan=False))
+        print(json_format.dumps(found.document(), allow_nan=False))
     else:
         _show(found, results_console())
     return SETTLED if all(side.settled for side in found.sides) else NOT_SETTLED

@@ -18,6 +18,7 @@ from ringbalance.controller.liquid_ring.reach import (
 from ringbalance.controller.liquid_ring.transfer import Event
 from ringbalance.controller.rotor import influence, initial_vibration
 from ringbalance.controller.simulation import Injection, Outcome, Sample, Verdict
+from ringbalance.controller.tuning.dead_time import standing_remedy
 from ringbalance.controller.tuning.loop_factor import STAYING_DEVIATIONS, LoopFactor
 from ringbalance.controller.tuning.recommendation import recommended_gain
 from ringbalance.scene.models import Scene
@@ -103,11 +104,11 @@ def outcome_of(facts: Facts) -> Outcome:
     limit = facts.scene.controller.limit
     if facts.settling_time is not None:
         return Outcome.SETTLED
+    if facts.unreachable_amplitude > limit and not facts.loop.unstable:
+        return Outcome.CAPACITY_EXCEEDED
     higher = facts.final_amplitude > facts.initial_amplitude + facts.noise_floor
     if has_grown(facts.cause, higher):
         return Outcome.DRIFTING if facts.drift > NOTICEABLE else Outcome.DIVERGING
-    if facts.unreachable_amplitude > limit:
-        return Outcome.CAPACITY_EXCEEDED
     if facts.loop.unstable:
         return Outcome.UNSTABLE
     if min(facts.since, facts.held_since) < math.inf:
@@ -231,6 +232,10 @@ def _unstable(facts: Facts) -> str:
     )
 
 
+def _standing(facts: Facts) -> str:
+    return standing_remedy(facts.scene, facts.plant.model)
+
+
 def _not_settled(facts: Facts) -> str:
     return (
         f"not settled: {_um(facts.final_amplitude)} at {facts.time:.4g} s against the limit of "
@@ -245,7 +250,7 @@ def _time_limit(facts: Facts) -> str:
             "trial steps"
         )
     else:
-        cure = "raise controller.proportional or run.time_limit"
+        cure = _standing(facts) or "raise controller.proportional or run.time_limit"
     return f"{_not_settled(facts)}; time is up ({facts.scene.run.time_limit:.4g} s): {cure}"
 
 
@@ -324,8 +329,8 @@ def _too_short(facts: Facts) -> str:
         last = _longest(facts)
         return (
             f"{_not_settled(facts)}; {last.operation.duration * 1e3:.4g} ms of gas into chamber "
-            f"{last.chamber} are over before its pressure has pushed any liquid over: raise "
-            "controller.minimum_gas_time or controller.limit, or use a larger or faster valve"
+            f"{last.chamber} are over before its pressure has pushed any liquid over: "
+            f"{_standing(facts) or 'raise controller.limit, or use a larger or faster valve'}"
         )
     return (
         f"{_not_settled(facts)}; the commanded valve-open times have fallen below the valves' minimum of "

@@ -66,11 +66,7 @@ def _stations(*, segments: Sequence[Segment]) -> FloatArray:
 
 
 def _path_points(*, segments: Sequence[Segment], arc_length: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Points of a path and its unit tangents.
-
-    Args: `arc_length`: shape (n,), from 0 to the path's length.
-    Returns: Points and tangents, each of shape (2, n).
-    """
+    """Points of a path at arc lengths, and its unit tangents there, each of shape (2, n)."""
     s = np.asarray(arc_length, dtype=np.float64)
     place, tangent = np.zeros((2, s.size)), np.zeros((2, s.size))
     start, origin, heading = 0.0, np.zeros(2), 0.0

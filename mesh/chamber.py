@@ -69,6 +69,28 @@ class ChamberMesh:
         """Names of the sides."""
         return tuple(name for name, (axis, _) in SIDES.items() if axis < self.dimension)
 
+    def quality(self) -> _Quality:
+        """Quality of a mesh, judged at the nodes of every cell.
+
+        scaled Jacobian = det(J) / prod_b |J_b| with J_b = dx/dX_b, aspect = max_b |J_b| / min_b |J_b|.
+        Source: the scaled Jacobian of the Verdict library (Knupp et al., SAND2007-1751), at all nodes of a
+        quadratic cell instead of its corners alone.
+        """
+        _, gradients = cell_shapes([np.array([-1.0, 0.0, 1.0])] * self.dimension)
+        jacobian = jacobians(self.nodes[:, self.cell_nodes], gradients)
+        lengths = np.linalg.norm(jacobian, axis=-2)
+        return _Quality(
+            minimum_scaled_jacobian=float(np.linalg.det(jacobian / lengths[..., None, :]).min()),
+            maximum_aspect=float((lengths.max(axis=-1) / lengths.min(axis=-1)).max()),
+            cells=len(self.cell_nodes),
+            nodes=self.nodes.shape[1],
+        )
+
+    @property
+    def places(self) -> FloatArray:
+        """Places of the nodes, m, shape (dimension, nodes)."""
+        return np.asarray(self.length_scale * self.nodes)
+
 
 def default_cells(*, disc: Disc, dimension: int = 2) -> tuple[int, ...]:
     """Numbers of cells that keep pressure and moment within 1e-6: 8 x 24 (x 4) for a chamber of 90 degrees.
@@ -192,21 +214,3 @@ class _Quality:
     """Longest over shortest local axis in one cell, at least 1."""
     cells: int
     nodes: int
-
-
-def mesh_quality(chamber: ChamberMesh) -> _Quality:
-    """Quality of a mesh, judged at the nodes of every cell.
-
-    scaled Jacobian = det(J) / prod_b |J_b| with J_b = dx/dX_b, aspect = max_b |J_b| / min_b |J_b|.
-    Source: the scaled Jacobian of the Verdict library (Knupp et al., SAND2007-1751), at all nodes of a
-    quadratic cell instead of its corners alone.
-    """
-    _, gradients = cell_shapes([np.array([-1.0, 0.0, 1.0])] * chamber.dimension)
-    jacobian = jacobians(chamber.nodes[:, chamber.cell_nodes], gradients)
-    lengths = np.linalg.norm(jacobian, axis=-2)
-    return _Quality(
-        minimum_scaled_jacobian=float(np.linalg.det(jacobian / lengths[..., None, :]).min()),
-        maximum_aspect=float((lengths.max(axis=-1) / lengths.min(axis=-1)).max()),
-        cells=len(chamber.cell_nodes),
-        nodes=chamber.nodes.shape[1],
-    )

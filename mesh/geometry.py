@@ -58,11 +58,7 @@ def liquid_first_moment(*, disc: Disc, surface_radius: npt.ArrayLike) -> FloatAr
 
 
 def chamber_volume(*, disc: Disc) -> float:
-    """Volume of one chamber between its plates, V = B A(R1).
-
-    Returns: Volume, m^3.
-    Source: Eq. 4 of the liquid-ring paper, with the exact area.
-    """
+    """Volume of one chamber between its plates, V = B A(R1), m^3: Eq. 4 with the exact area."""
     return float(disc.axial_width * liquid_area(disc=disc, surface_radius=disc.inner_radius))
 
 

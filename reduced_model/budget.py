@@ -14,7 +14,7 @@ from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, Cu
 from ringbalance.reduced_model.chamber.inputs import half_widths, shifted
 from ringbalance.reduced_model.device import HEAD_INPUTS, Device, device_of
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.operating.crest_margin import directed_state, margin_of
+from ringbalance.reduced_model.operating.crest_margin import directed_state
 from ringbalance.reduced_model.operating.point import OperatingPoint
 from ringbalance.reduced_model.operating.residual import ResidualLiquid, usable_moment_uncertainty
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
@@ -181,7 +181,7 @@ def _flow_parts(scene: Scene, calibration: Calibrated) -> dict[str, _Parts]:
     if point.cavitation_margin is None or point.hump_pressure is None or point.velocity == 0:
         return found
     state = directed_state(law=law, fills=fills, gas_pressure=point.gas_pressure, reverse=point.velocity < 0)
-    margin = margin_of(law=law, state=state)[1] or 0.0
+    margin = state.margin(law=law)[1] or 0.0
     rounding = error * abs(point.gas_pressure)
     return found | {
         "crest_pressure": (point.hump_pressure, rounding, _crest_part(law, point, margin)),

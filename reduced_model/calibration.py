@@ -78,6 +78,33 @@ class Calibration:
         """The balancer as the closed loop takes it."""
         return balancer_model(self.flow_law)
 
+    def lambda_over_fill(self, *, fill_ratio: FloatArray) -> FloatArray:
+        """lambda(x) per transferred mass, [U(x) - U(x_max - x)]/(rho V (x - x_max/2)).
+
+        Returns: lambda, m, shape (n,); its limit at the centre.
+        Source: definition; per difference of the two chambers' masses it is half of that.
+        """
+        law, chamber = self.flow_law, self.chamber
+        largest = law.max_fill_ratio
+        away = fill_ratio - largest / 2
+        # Nearer than this the difference of two moments would be mostly interpolation error.
+        centre = np.abs(away) < 0.02 * largest
+        pair = law.moment.pair_moment(
+            fill_ratio=fill_ratio, opposite_fill_ratio=np.clip(largest - fill_ratio, 0.0, largest)
+        )
+        mass = law.density * law.chamber_volume * np.where(centre, 1.0, away)
+        return np.where(centre, float(chamber.moment_per_mass.value), pair / mass)
+
+    @property
+    def lambda_variation(self) -> float:
+        """Variation of lambda over the fill range, (largest - smallest)/value at the centre.
+
+        Source: definition; the liquid-ring paper states 0.7 %.
+        """
+        x = np.linspace(0.0, self.flow_law.max_fill_ratio, 101)
+        values = self.lambda_over_fill(fill_ratio=x)
+        return float(np.ptp(values) / self.chamber.moment_per_mass.value)
+
 
 def calibrate(scene: AnyScene) -> Calibration:
     """Calibrate a scene's balancer: lambda, k(u) and the flow law, with uncertainties.
@@ -138,31 +165,3 @@ def _tube(scene: Scene, velocity: FloatArray) -> TubeLoss:
         velocity=velocity,
         inputs=scene.uncertainty,
     )
-
-
-def lambda_over_fill(*, calibration: Calibration, fill_ratio: FloatArray) -> FloatArray:
-    """lambda(x) per transferred mass, [U(x) - U(x_max - x)]/(rho V (x - x_max/2)), its limit at the centre.
-
-    Returns: lambda, m, shape (n,).
-    Source: definition; per difference of the two chambers' masses it is half of that.
-    """
-    law, chamber = calibration.flow_law, calibration.chamber
-    largest = law.max_fill_ratio
-    away = fill_ratio - largest / 2
-    # Nearer than this the difference of two moments would be mostly interpolation error.
-    centre = np.abs(away) < 0.02 * largest
-    pair = law.moment.pair_moment(
-        fill_ratio=fill_ratio, opposite_fill_ratio=np.clip(largest - fill_ratio, 0.0, largest)
-    )
-    mass = law.density * law.chamber_volume * np.where(centre, 1.0, away)
-    return np.where(centre, float(chamber.moment_per_mass.value), pair / mass)
-
-
-def lambda_variation(*, calibration: Calibration) -> float:
-    """Variation of lambda over the fill range, (largest - smallest)/value at the centre.
-
-    Source: definition; the liquid-ring paper states 0.7 %.
-    """
-    x = np.linspace(0.0, calibration.flow_law.max_fill_ratio, 101)
-    values = lambda_over_fill(calibration=calibration, fill_ratio=x)
-    return float(np.ptp(values) / calibration.chamber.moment_per_mass.value)

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.reduced_model.budget import Budget
-from ringbalance.reduced_model.calibration import Calibration, lambda_over_fill, lambda_variation
+from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.chamber.calibration import Curve
 from ringbalance.reduced_model.chamber.element_check import CHECKED, ElementCheck
 from ringbalance.reduced_model.chamber.gravity import closed_ring
@@ -93,11 +93,7 @@ def _chamber(calibration: Calibration) -> dict[str, Any]:
         | _curve(chamber.wall_pressure, at, "wall_pressure", "Pa")
         | _curve(chamber.moment, at, "moment", "kg_m")
         | {name: _listed(values) for name, values in paper_columns(calibration, fills).items()}
-        | {
-            "lambda_per_transferred_mass_m": _listed(
-                lambda_over_fill(calibration=calibration, fill_ratio=fills)
-            )
-        }
+        | {"lambda_per_transferred_mass_m": _listed(calibration.lambda_over_fill(fill_ratio=fills))}
     )
 
 
@@ -151,7 +147,7 @@ def _lambda(calibration: Calibration) -> dict[str, Any]:
         "status": str(chamber.moment_per_mass.status.code),
         "uncertainty_m": float(chamber.moment_per_mass.uncertainty),
         "input_uncertainty_m": chamber.moment_per_mass_inputs,
-        "variation_over_range": lambda_variation(calibration=calibration),
+        "variation_over_range": calibration.lambda_variation,
         "paper_m": paper.PAPER_LAMBDA,
     }
 

@@ -8,6 +8,8 @@ The liquid that an opening moves is that of `short_injection`.
 
 from __future__ import annotations
 
+import cmath
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -60,6 +62,8 @@ class LineAnswer:
     """Of the vibration, m."""
     dead_time: float | None = None
     """Valve-open time that an injection of the size of the limit loses against the steady velocity, s."""
+    standing_amplitude: float | None = None
+    """Amplitude up to which every injection by the scene's gain and offsets only fills gas, m."""
 
     @property
     def above_limit(self) -> bool:
@@ -128,14 +132,39 @@ def _vibration(scene: Scene, fills: Fills, metres: float) -> float:
     return abs(float(moment)) * scene.rotor.influence_coefficient
 
 
+def _standing_amplitude(scene: Scene, dead_time: float, *, rate: float) -> float | None:
+    """m; None for the trial algorithm, which has no gain. Args: `rate`: of the vibration, m/s."""
+    settings, n = scene.controller, scene.disc.chambers
+    if settings.kind == "trial":
+        return None
+    # The two offsets of a pair belong to the fills about the equal ones.
+    lost = max(dead_time - math.fsum(settings.offsets(n)) / n, 0.0)
+    asked = rate if settings.kind == "law_based" else 1 / settings.proportional
+    return largest_standing([lost] * n) * asked
+
+
+def largest_standing(times: Sequence[float]) -> float:
+    """Largest vector of which no chamber's share is above its time, in the unit of the times.
+
+    Args: `times`: of all chambers in the order of the letters.
+    """
+    turn = cmath.rect(1.0, 2 * math.pi / len(times))
+    if len(times) == 2:
+        return max(times)
+    return max(abs(one + other * turn) for one, other in zip(times, [*times[1:], times[0]], strict=True))
+
+
 def _answer(scene: Scene, end: LineEnd, fills: Fills, *, inertia: bool) -> LineAnswer:
     line, limit, volume = end.line, scene.controller.limit, _gas_volume(scene, fills)
-    opening = correction = dead = None
+    opening = correction = dead = standing = None
     injection = short_injection(scene, end, fills, inertia=inertia)
     if injection is not None:
         shortest = injection.shortest(end.valve_lag)
         opening, correction = shortest.time, _vibration(scene, fills, shortest.metres)
-        dead = injection.dead_time(limit * shortest.metres / correction, least=end.valve_lag)
+        metres = limit * shortest.metres / correction
+        dead = float(injection.dead_time(metres, least=end.valve_lag))
+        rate = limit / metres * fills.steady_velocity(scene.gas.pressure)
+        standing = _standing_amplitude(scene, dead, rate=rate)
     return LineAnswer(
         end=end.name,
         conductance=line.conductance,
@@ -148,6 +177,7 @@ def _answer(scene: Scene, end: LineEnd, fills: Fills, *, inertia: bool) -> LineA
         smallest_correction=correction,
         limit=limit,
         dead_time=dead,
+        standing_amplitude=standing,
     )
 
 
@@ -164,12 +194,23 @@ def line_warning(answers: tuple[LineAnswer, ...]) -> str:
     """Empty where the line can deliver corrections as small as the limit."""
     above = [answer for answer in answers if answer.above_limit]
     if not above:
-        return ""
+        return _standing_warning(answers[0])
     which = "" if above[0].end == "given" else " over its default range" if len(above) > 1 else " if slow"
     return (
         f"the smallest correction that the gas line can deliver{which}, {_sizes(above)} um, is "
         f"above the limit of {1e6 * above[0].limit:.2g} um: no run is sure to settle; take a faster valve, "
         "less dead volume or a higher limit"
+    )
+
+
+def _standing_warning(answer: LineAnswer) -> str:
+    """Empty for a line of the default range, which runs do not model."""
+    still = answer.standing_amplitude or 0.0
+    if answer.end != "given" or still <= answer.limit:
+        return ""
+    return (
+        f"up to {1e6 * still:.2g} um an injection by the controller's gain alone only fills gas, for "
+        f"{1e3 * (answer.dead_time or 0.0):.3g} ms: `ringbalance tune` recommends controller.gas_time_offset"
     )
 
 
@@ -195,6 +236,7 @@ def line_document(answers: tuple[LineAnswer, ...]) -> dict[str, Any]:
                 "shortest_opening_s": answer.shortest_opening,
                 "smallest_correction_m": answer.smallest_correction,
                 "dead_time_s": answer.dead_time,
+                "standing_amplitude_m": answer.standing_amplitude,
                 "above_limit": answer.above_limit,
             }
             for answer in answers

@@ -43,6 +43,8 @@ _SLOWEST_RISE: Final = 100.0
 """Times longer than without liquid that a pressure may take to rise."""
 _STEPS: Final = 33
 """Of filling or venting."""
+_SLOWEST: Final = 1e-9
+"""m/s."""
 _ROUNDS: Final = 3
 """After which the dead time, which hardly depends on the opening, is known to 0.1 ms."""
 
@@ -236,7 +238,7 @@ class ShortInjection:
         """Gauge pressures, Pa, the steady velocities u of a primed column under them, m/s, and c(u), 1/m."""
         highest = self.line.supply_pressure - self.line.ambient_pressure
         p = np.linspace(self.edges.stops, highest, _STEPS)[1:]
-        u = np.maximum.accumulate(self.fills.flow(p, primed=True).velocity)
+        u = np.maximum.accumulate(np.maximum(self.fills.flow(p, primed=True).velocity, _SLOWEST))
         return p, u, self._push(p, p) / u**2
 
     def _moved(self, before: Moved, steady: float, push: float, time: float) -> Moved:
@@ -244,7 +246,7 @@ class ShortInjection:
         if self.mass:
             _, velocities, frictions = self._losses
             friction = float(np.interp(max(before.velocity, steady), velocities, frictions))
-            velocity, metres = ridden(velocity=before.velocity, push=push, friction=friction, time=time)
+            velocity, metres = _ridden(velocity=before.velocity, push=push, friction=friction, time=time)
         return replace(before, metres=before.metres + metres, time=before.time + time, velocity=velocity)
 
     def _braked(self, before: Moved) -> Moved:
@@ -253,7 +255,7 @@ class ShortInjection:
         return self._moved(before, 0.0, push, math.inf) if push and before.velocity else before
 
 
-def ridden(*, velocity: float, push: float, friction: float, time: float) -> tuple[float, float]:
+def _ridden(*, velocity: float, push: float, friction: float, time: float) -> tuple[float, float]:
     """Velocity, m/s, and way, m, after a time under du/dt = B - c u^2, until it rests.
 
     With q = sqrt(B c), w = sqrt(B/c) and v = u/w, u becomes w (v + tanh qt)/(1 + v tanh qt) on a way

@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ringbalance.reduced_model.budget import Budget, rounded
-from ringbalance.reduced_model.calibration import Calibration, lambda_variation
+from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.chamber.row_status import REMEDIES, row_status
 from ringbalance.reduced_model.documents import PRESSURE_FACTORS, paper_columns, velocity_status
 from ringbalance.reduced_model.gas_line import line_text, line_warning
@@ -87,7 +87,7 @@ def _summary_rows(calibration: Calibration) -> Iterator[tuple[str, str]]:
         "lambda",
         f"{_shown(lam, 'mm', scale=1e3)} per transferred mass "
         f"({rounded(1e3 * lam.value / 2, 1e3 * lam.total / 2)} mm per mass difference), "
-        f"varies by {100 * lambda_variation(calibration=calibration):.2g} % over the fill range",
+        f"varies by {100 * calibration.lambda_variation:.2g} % over the fill range",
     )
     yield "usable", _usable_text(calibration)
     yield "operating point", _point_text(calibration)

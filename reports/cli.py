@@ -11,9 +11,7 @@ from rich.console import Console
 from ringbalance.reports.pages.first_page import loop_sentences
 from ringbalance.reports.pictures.process import (
     FOLDERS,
-    finish_drawing,
     start_drawing,
-    stop_drawing,
     write_fields,
 )
 from ringbalance.reports.report import Report, write_report
@@ -100,9 +98,9 @@ def plot(scene: Path, *, out: Path = Path("out")) -> int:
         drawing = start_drawing(scene=told, fields=write_fields(scene=told, folder=stage), folder=stage)
         try:
             shown.show("pictures")
-            pictures = finish_drawing(drawing)
+            pictures = drawing.finish()
         finally:
-            stop_drawing(drawing)
+            drawing.stop()
     if not pictures["drawn"]:
         console.print(pictures["text"], markup=False, highlight=False)
     print(out)

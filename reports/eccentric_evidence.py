@@ -5,9 +5,9 @@ from __future__ import annotations
 from datetime import date
 from typing import Any
 
-from ringbalance.controller.eccentric_mass.study import eccentric_study, study_document
+from ringbalance.controller.eccentric_mass.study import eccentric_study
 from ringbalance.reports.evidence import FORMAT, Progress, finished_cases, scene_record, versions
-from ringbalance.reports.numbers import given, percent, short
+from ringbalance.reports.numbers import given, short, with_unit
 from ringbalance.reports.provenance import provenance
 from ringbalance.reports.section import Level, Record
 from ringbalance.scene.dimensions import DIMENSIONS
@@ -38,7 +38,7 @@ def collect_eccentric(
         cases, scene=paper_scene(), level=level, mutations=level == "heavy", workers=workers
     ) as under_way:
         tell("balanced and locked run")
-        study = study_document(eccentric_study(scene))
+        study = eccentric_study(scene).document()
         verification = finished_cases(under_way, tell)
     run = study.pop("run")
     return {
@@ -84,7 +84,7 @@ def parameters(scene: EccentricScene) -> list[Record]:
 
 def _width(uncertain: InputUncertainty) -> str:
     if uncertain.relative:
-        return percent(uncertain.half_width, digits=3)
+        return with_unit(short(100 * uncertain.half_width), "%")
     table, key = uncertain.quantity.split(".")
     record = ECCENTRIC_MASS.tables[table].record
     return _written(uncertain.half_width, keys_of(record)[key].takes) if record else ""

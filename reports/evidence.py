@@ -25,7 +25,7 @@ from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.reports.pages.cases import typeset_equations
-from ringbalance.reports.pictures.fields import chamber_field, mesh_record, pressure_profile
+from ringbalance.reports.pictures.fields import chamber_field
 from ringbalance.reports.provenance import provenance
 from ringbalance.reports.section import Level, Record, Work
 from ringbalance.reports.sections import collected
@@ -140,7 +140,7 @@ def _paper() -> Record:
 
 def _pressure(scene: Scene) -> Record:
     field = chamber_field(scene, fill_ratio=scene.disc.max_fill_ratio)
-    return {"profile": pressure_profile(scene=scene, field=field), "mesh": mesh_record(field)}
+    return {"profile": field.pressure_profile(scene=scene), "mesh": field.record()}
 
 
 def _closed_loop(scene: Scene, calibration: Calibration) -> Record:

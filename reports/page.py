@@ -47,7 +47,7 @@ DOCUMENTS: Final[Mapping[str, Record]] = MappingProxyType(
 """The documents by file name; the report last, for where it is, all else is."""
 _FIRST_INJECTIONS: Final = 12
 """Injections that are listed."""
-_PICTURE_WIDTH: Final = 1200
+_PICTURE_WIDTH: Final = 1000
 _PICTURE_QUALITY: Final = 80
 
 

@@ -12,17 +12,10 @@ from typing import Final
 
 from ringbalance.reports.eccentric_evidence import collect_eccentric
 from ringbalance.reports.evidence import Progress, collect_evidence
-from ringbalance.reports.figures.style import standalone
 from ringbalance.reports.page import DOCUMENTS, page_content
 from ringbalance.reports.pages.document import evidence_text
 from ringbalance.reports.pictures.opengl import OpenGL
-from ringbalance.reports.pictures.process import (
-    FOLDERS,
-    finish_drawing,
-    start_drawing,
-    stop_drawing,
-    write_fields,
-)
+from ringbalance.reports.pictures.process import FOLDERS, start_drawing, write_fields
 from ringbalance.reports.pictures.view import VIEW, view_page
 from ringbalance.reports.render import render_pages
 from ringbalance.reports.saved import saved_cases
@@ -107,9 +100,9 @@ def _pictures(scene: Scene, stage: Path, opengl: OpenGL | None) -> Iterator[Call
         scene=scene, fields=write_fields(scene=scene, folder=stage), folder=stage, opengl=opengl
     )
     try:
-        yield lambda: finish_drawing(drawing)
+        yield drawing.finish
     finally:
-        stop_drawing(drawing)
+        drawing.stop()
 
 
 def _tell(progress: Progress | None, stage: str) -> None:
@@ -128,7 +121,7 @@ def _write_page(evidence: Record, stage: Path) -> Record:
     pictures = {name: (figures / name).read_bytes() for name in names}
     content = page_content(kept, pictures=pictures)
     for drawing in content.drawings:
-        (figures / f"{drawing.name}.svg").write_text(standalone(drawing), encoding="utf-8")
+        (figures / f"{drawing.name}.svg").write_text(drawing.standalone(), encoding="utf-8")
     (stage / TABLES).mkdir()
     for name, table in csv_tables(kept).items():
         (stage / TABLES / name).write_text(table, encoding="utf-8")

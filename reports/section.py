@@ -56,11 +56,11 @@ class Work:
     @cached_property
     def tuning(self) -> Tuning:
         """The recommended gain of the scene's controller under the calibrated law."""
-        return tuning_of(self.scene)
+        return _tuning_of(self.scene)
 
 
 @lru_cache(maxsize=4)
-def tuning_of(scene: Scene) -> Tuning:
+def _tuning_of(scene: Scene) -> Tuning:
     """One tuning serves every report of a scene within a process."""
     return tune(scene, calibration_of(scene).model, members=_TUNING_RUNS, runs=_TERM_RUNS)
 

@@ -70,7 +70,7 @@ THREAD_COUNTS = (
 EXAMPLE_SCENES = ("my_disc.toml", "other_disc.toml")
 
 
-def build_app() -> App:
+def _build_app() -> App:
     """The application with its commands, none of them imported yet."""
     app = App(
         name="ringbalance",
@@ -111,7 +111,7 @@ def _usage_fault(error: CycloptsError) -> str:
 def _missing(error: MissingArgumentError) -> str:
     required = [
         parameter.name.upper()
-        for parameter in signature(error.target or build_app).parameters.values()
+        for parameter in signature(error.target or _build_app).parameters.values()
         if parameter.default is parameter.empty and parameter.kind is parameter.POSITIONAL_OR_KEYWORD
     ]
     missing = error.argument.field_info.names[0].upper() if error.argument else ""
@@ -131,7 +131,7 @@ def _refusal(error: OSError) -> str:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
-    result = build_app()(arguments, exit_on_error=False, print_error=False)
+    result = _build_app()(arguments, exit_on_error=False, print_error=False)
     sys.stdout.flush()
     return result if isinstance(result, int) else DONE
 

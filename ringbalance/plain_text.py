@@ -77,7 +77,7 @@ def replace(error: UnicodeError) -> tuple[str | bytes, int]:
     return _in_context(text, at), at + 1
 
 
-def equivalent(character: str) -> str:
+def _equivalent(character: str) -> str:
     """ASCII equivalent of one character.
 
     Args: `character`: any one character.
@@ -91,7 +91,7 @@ def equivalent(character: str) -> str:
         return ""
     decomposed = unicodedata.normalize("NFKD", character)
     if decomposed != character:
-        return "".join(map(equivalent, decomposed))
+        return "".join(map(_equivalent, decomposed))
     return _greek(character) or _UNKNOWN
 
 
@@ -106,7 +106,7 @@ def _greek(character: str) -> str:
 def _in_context(text: str, at: int) -> str:
     """The equivalent, with ^ or _ before a raised or lowered part and spaces around the name of a letter."""
     before, character, after = text[at - 1 : at] if at else "", text[at], text[at + 1 : at + 2]
-    found = equivalent(character)
+    found = _equivalent(character)
     mark = _mark(character)
     if mark:
         return found if _mark(before) == mark else mark + found

@@ -40,10 +40,7 @@ def with_tolerance(
 
 
 def _read_tolerance(text: str) -> float:
-    """Relative tolerance from the text of an option.
-
-    Raises: SceneError: no fraction above 0 and below 1.
-    """
+    """Relative tolerance of an option's text. Raises: SceneError: no fraction above 0 and below 1."""
     try:
         value = float(text)
     except ValueError:

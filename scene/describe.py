@@ -78,10 +78,7 @@ _LINES: Mapping[str, _Line] = MappingProxyType({line.path: line for line in _dec
 
 
 def scene_table(scene: Scene) -> tuple[Row, ...]:
-    """Describe a scene line by line.
-
-    Returns: Rows in groups; a value that the file does not give carries the note "default".
-    """
+    """A scene line by line, in groups; a value that the file does not give has the origin "default"."""
     return tuple(
         row
         for group, parts in _GROUPS.items()
@@ -97,12 +94,7 @@ def _lines_of(parts: tuple[str, ...]) -> Iterator[_Line]:
 
 
 def scene_fault(*, scene: Scene, table: str, key: str, problem: str, allowed: str) -> Fault:
-    """Make an error about a loaded scene, for what only a later room can tell.
-
-    Args: `table`: of the value to be changed, such as "rotor". `key`: of the value to be changed, such as
-        "speed". `problem`: what is wrong. `allowed`: what would be accepted.
-    Returns: the error; raise `SceneError` with it.
-    """
+    """The error about a value of a loaded scene that only a later room finds; raise `SceneError` with it."""
     path = f"{table}.{key}"
     line = _LINES.get(path) or _Line(path=path, shown=shown(key), dimension="")
     written = toml_text(_written(line, _value(scene, path)))

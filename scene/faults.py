@@ -76,11 +76,7 @@ def option_error(*, option: str, value: object, problem: str, allowed: str) -> S
 
 
 def closest(word: str, known: Iterable[str]) -> str:
-    """Find the known word that was probably meant.
-
-    Args: `word`: what was written. `known`: the words that exist.
-    Returns: One of them, or an empty string when nothing is close.
-    """
+    """The known word that was probably meant; an empty string when nothing is close."""
     folded = {name.casefold(): name for name in known}
     close = difflib.get_close_matches(word.casefold()[:_LONGEST_VALUE], list(folded), n=1, cutoff=0.6)
     return folded[close[0]] if close else ""

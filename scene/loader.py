@@ -29,18 +29,16 @@ _DECIDE_NOTHING = ("requirement.", "rotor.mass", "liquid.source")
 
 
 def load_scene(path: str | PathLike[str]) -> AnyScene:
-    """Read a scene file (TOML), with its units, defaults and cross-checks.
+    """The scene of a scene file (TOML), in SI, with its units, defaults and cross-checks.
 
-    Returns: The scene, in SI.
     Raises: SceneError: the file cannot be read, or anything in it is wrong; all of it is said at once.
     """
     return read_scene(path)[0]
 
 
 def read_scene(path: str | PathLike[str]) -> tuple[AnyScene, str]:
-    """Read a scene file once, for its scene and its text: a pipe gives its bytes only once.
+    """The scene of a file and the file's own text, read once: a pipe gives its bytes only once.
 
-    Returns: The scene, and the file's own text.
     Raises: SceneError: as `load_scene`.
     """
     name = str(path)
@@ -50,10 +48,8 @@ def read_scene(path: str | PathLike[str]) -> tuple[AnyScene, str]:
 
 
 def scene_from(*, content: bytes, file: str) -> AnyScene:
-    """Make a scene from the bytes of a scene file.
+    """The scene of a scene file's bytes, in SI; `file` is its name, for messages and the scene's `source`.
 
-    Args: `content`: the file's bytes, UTF-8. `file`: its name, for messages and the scene's `source`.
-    Returns: The scene, in SI.
     Raises: SceneError: anything in it is wrong; all of it is said at once.
     """
     document = _document(content, file)
@@ -177,12 +173,7 @@ def _kind(document: Mapping[str, Any]) -> str:
 
 
 def bundled_scene(name: str) -> Path:
-    """Find a scene that comes with the program.
-
-    Args: `name`: such as "liquid_ring_paper".
-    Returns: Path of the file.
-    Raises: SceneError: there is no scene of that name.
-    """
+    """Path of a scene that comes with the program, such as "liquid_ring_paper". Raises: SceneError."""
     folder = Path(str(resources.files("ringbalance.scenes")))
     names = sorted(path.stem for path in folder.glob("*.toml"))
     stem = name.removesuffix(".toml")

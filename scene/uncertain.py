@@ -22,23 +22,13 @@ UNCERTAIN_QUANTITIES: Mapping[str, str] = MappingProxyType(
 
 
 def nominal_value(*, scene: Scene, quantity: str) -> float | None:
-    """Value of a quantity in a scene.
-
-    Args: `quantity`: a key of `UNCERTAIN_QUANTITIES`.
-    Returns: SI; None when the scene does not ask for the term.
-    Raises: ValueError: no such quantity.
-    """
+    """SI value of a key of `UNCERTAIN_QUANTITIES`; None when the scene does not ask for the term."""
     value: float | None = getattr(getattr(scene, _table_of(quantity)), quantity)
     return value
 
 
 def with_value(*, scene: Scene, quantity: str, value: float) -> Scene:
-    """Copy a scene with one quantity changed; nothing is checked again.
-
-    Args: `quantity`: a key of `UNCERTAIN_QUANTITIES`. `value`: its new value, SI.
-    Returns: The changed copy; it keeps the file's name and hash.
-    Raises: ValueError: no such quantity.
-    """
+    """Copy a scene with one of `UNCERTAIN_QUANTITIES` changed, SI; nothing is checked again."""
     table = _table_of(quantity)
     changed: dict[str, Any] = {table: replace(getattr(scene, table), **{quantity: value})}
     return replace(scene, **changed)

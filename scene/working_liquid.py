@@ -14,11 +14,7 @@ _OUTRIGHT = "density and kinematic_viscosity given outright"
 
 
 def with_liquid(reading: Reading) -> tuple[Reading, tuple[Fault, ...]]:
-    """Settle the liquid's properties; what is given outright wins over the known liquid's.
-
-    Args: `reading`: what the file says.
-    Returns: The same with the liquid's values, as far as they can be known, and what is wrong with the table.
-    """
+    """The liquid's values, as far as they can be known, what is given outright first; and what is wrong."""
     if "liquid" in reading.broken or not reading.given("liquid"):
         return reading, ()
     liquid = find_liquid(name=reading.values["liquid.name"]) if reading.known("liquid.name") else None

@@ -18,7 +18,7 @@ from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.reports.numbers import number, percent, shown
 from ringbalance.reports.pages.drag_coefficient import SECTION, liquid_cells
 from ringbalance.reports.section import Record, Work
-from ringbalance.reports.studies.drag_map import DragMap, drag_contour, drag_map
+from ringbalance.reports.studies.drag_map import DragMap, drag_map
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.platform.files import write_whole
 from ringbalance.verification.runner import paper_scene
@@ -71,9 +71,7 @@ def _bores_table(calibration: Calibration) -> str:
 def rule(calibration: Calibration) -> str:
     """Where k = 50 lies, as one number for laminar flow in this tube."""
     laminar = [nu for nu in _VISCOSITIES if 5e-6 <= nu <= 1e-4]
-    viscosity, bore = drag_contour(
-        drag_map=drag_map(calibration=calibration, bore=_BORES, kinematic_viscosity=laminar)
-    )
+    viscosity, bore = drag_map(calibration=calibration, bore=_BORES, kinematic_viscosity=laminar).contour()
     ratio = viscosity / bore**2
     low, high = (number(float(value), digits=2) for value in (ratio.min(), ratio.max()))
     speed = number(float(_velocity_at_fifty(calibration)), digits=2)
@@ -92,7 +90,7 @@ def _velocity_at_fifty(calibration: Calibration) -> FloatArray:
 
 
 def _crossings(found: DragMap) -> list[float | None]:
-    viscosity, bore = drag_contour(drag_map=found)
+    viscosity, bore = found.contour()
     at = {float(nu): float(d) for nu, d in zip(viscosity, bore, strict=True)}
     return [at.get(float(nu)) for nu in found.kinematic_viscosity]
 

@@ -26,7 +26,6 @@ from ringbalance.verification.navier_stokes.continuation import StepRule, follow
 from ringbalance.verification.navier_stokes.end_losses import (
     End,
     EndMesh,
-    end_system,
     solve_end,
 )
 from ringbalance.verification.navier_stokes.newton import FlowSolution, FlowSystem, NewtonSettings
@@ -106,7 +105,7 @@ def run_path(*, end: End, level: int, settings: EndSettings, points: list[float]
     Raises: ArithmeticError: a point could not be reached; the text says which.
     """
     cells = settings.mesh(end, level)
-    system = end_system(cells=cells, end=end)
+    system = cells.system(end=end)
     flow = _solve(system, 0.0, None)
     path = follow(
         solve=partial(_solve, system),

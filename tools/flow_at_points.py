@@ -10,7 +10,6 @@ import numpy.typing as npt
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.verification.navier_stokes.newton import FlowSolution, FlowSystem
 from ringbalance.verification.navier_stokes.space import FlowSpace
-from ringbalance.verification.navier_stokes.system import split
 
 _MARGIN = 0.05
 """Share of an element by which a point may lie outside it: a chord's sagitta on a coarser curved mesh."""
@@ -84,7 +83,7 @@ def probe(*, system: FlowSystem, solution: FlowSolution, points: npt.ArrayLike) 
 
 def _evaluate(space: FlowSpace, vector: FloatArray, points: FloatArray) -> FloatArray:
     element, local = _locate(space=space, points=points)
-    velocity, pressure = split(space, vector)
+    velocity, pressure = space.split(vector)
     rows = []
     for basis, values in [(space.velocity, v) for v in velocity] + [(space.pressure, pressure)]:
         shape, _ = _shape_at(basis.elem, local, basis.Nbfun)

@@ -41,7 +41,6 @@ from ringbalance.verification.navier_stokes.newton import FlowSolution, FlowSyst
 from ringbalance.verification.navier_stokes.rotating_section import (
     SectionMesh,
     friction_ratio,
-    section_system,
     solve_section,
     solve_section_without_inertia,
 )
@@ -156,7 +155,7 @@ def systems(settings: TableSettings) -> list[FlowSystem]:
     meshes = [
         SectionMesh(around=n, across=3 * n // 2, wall_ratio=settings.wall_ratio) for n in settings.around
     ]
-    return [section_system(cells=mesh) for mesh in meshes]
+    return [mesh.system() for mesh in meshes]
 
 
 def _all_values(

@@ -21,6 +21,7 @@ from ringbalance.scene.units import unit_names
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "scene-file.md"
 BLOCK = re.compile(r"<!-- table: (\w+) -->\n.*?<!-- end -->", re.DOTALL)
+WIDTHS = "uncertainty"
 HEAD = "| key | takes | when left out | meaning |\n|---|---|---|---|"
 
 
@@ -28,13 +29,35 @@ def key_reference(schema: Schema, title: str) -> str:
     """One Markdown table of keys for each table of a kind of scene. Args: `title`: of the first table."""
     parts = [f"### {title}", *rows(schema.top)]
     for name, table in schema.tables.items():
-        parts += [f"\n### [{name}]", f"{table.text[0].upper()}{table.text[1:]}.\n", *rows(table.keys)]
+        inside = widths(schema) if name == WIDTHS else rows(table.keys)
+        parts += [f"\n### [{name}]", f"{table.text[0].upper()}{table.text[1:]}.\n", *inside]
     for name, table in schema.tables.items():
+        if name == WIDTHS:
+            continue
         for key, declared in table.keys.items():
             if isinstance(declared.takes, Entries) and key != ORIGIN:
                 each = ", each entry" if declared.takes.example else ""
                 parts += [f"\n### [{name}] {key}{each}", *rows(declared.takes.keys)]
     return "\n".join(parts)
+
+
+def widths(schema: Schema) -> list[str]:
+    """The uncertain quantities of each table: all take the same."""
+    own = {
+        name: [key for key, declared in table.keys.items() if declared.uncertain]
+        for name, table in schema.tables.items()
+    }
+    first, *_ = schema.tables[WIDTHS].keys.values()
+    how = (
+        'a table for each of these, such as `rotor = { mass = "1 %" }`'
+        if isinstance(first.takes, Entries)
+        else "a key for each of these quantities"
+    )
+    return [
+        f"It has {how}: a percentage, or a value with its unit. Left out: exact, or that of the liquid.\n",
+        "| of table | quantities |\n|---|---|",
+        *(f"| [{name}] | `{'`, `'.join(keys)}` |" for name, keys in own.items() if keys),
+    ]
 
 
 def liquid_reference() -> str:

@@ -9,6 +9,7 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, model_validator
 
+from ringbalance.verification.standing import SUBJECTS
 from ringbalance.verification.text import placeholders
 from ringbalance.verification.verdicts import VOCABULARY, Kind, Metric, Role, Verdict
 
@@ -133,6 +134,8 @@ class CaseDefinition(_Record):
     order: int | None = None
     """Position in the report of a case that is no claim; claims go by their number."""
     kind: Kind
+    about: tuple[Identifier, ...] = ()
+    """What it is evidence for: keys of `SUBJECTS`; claims are evidence for none."""
     title: Text
     claim: Text
     """One sentence: what is claimed, or required of the program."""
@@ -175,6 +178,9 @@ class CaseDefinition(_Record):
             raise ValueError(
                 "a case that is no claim has an order, its position in the report; a claim has none"
             )
+        strange = [subject for subject in self.about if subject not in SUBJECTS]
+        if strange or (self.kind == "claim") == bool(self.about):
+            raise ValueError(f"about: a case that is no claim names one or more of {', '.join(SUBJECTS)}")
         _unique("quantity", [quantity.name for quantity in self.quantity])
         _unique("rests_on", [one.path for one in self.rests_on])
         _unique("must_fail", [mutation.id for mutation in self.must_fail])

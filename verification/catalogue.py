@@ -37,11 +37,7 @@ def case_code(case_id: str) -> CaseCode:
 
 @lru_cache(maxsize=64)
 def load_case(case_id: str) -> CaseDefinition:
-    """The text and criteria of a case.
-
-    Raises: UnknownCaseError: no case of that id.
-    Raises: CaseError: its case.toml is not what a case must be.
-    """
+    """The text and criteria of a case. Raises: UnknownCaseError, or CaseError: its case.toml is not one."""
     _check_known(case_id)
     path = files(cases) / case_id / "case.toml"
     definition = parse_case(path.read_text(encoding="utf-8"), source=f"{case_id}/case.toml")

@@ -18,7 +18,7 @@ from ringbalance.scene.platform.progress import Activity, activity
 from ringbalance.scene.platform.terminal import messages_console, results_console
 from ringbalance.verification.case import CaseDefinition
 from ringbalance.verification.catalogue import UnknownCaseError, load_case, load_cases
-from ringbalance.verification.document import comparison_half_width, definition_document, results_document
+from ringbalance.verification.document import definition_document, results_document
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.result import CaseResult, QuantityResult
 from ringbalance.verification.runner import paper_scene, run_cases
@@ -198,7 +198,7 @@ def _quantity_row(result: QuantityResult) -> tuple[str | Text, ...]:
         return title, "", "", "", verdict
     bound = {"at_most": f"≤ {quantity.limit:.4g}", "at_least": f"≥ {quantity.limit:.4g}"}
     reference = "" if result.reference is None else f"{result.reference.value:.6g}"
-    half_width = comparison_half_width(result)
+    half_width = result.half_width
     shown = f"{half_width:.2g}" if half_width else ""
     return title, f"{found.value:.6g}", bound.get(quantity.metric, reference), shown, verdict
 

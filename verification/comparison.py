@@ -62,10 +62,7 @@ def from_half_width(half_width: float) -> float:
 
 
 def from_range(values: Iterable[float]) -> float:
-    """Standard uncertainty of a number equally likely anywhere between the least and the largest value.
-
-    Source: rectangular distribution, GUM (JCGM 100:2008), 4.3.7.
-    """
+    """Standard uncertainty of a number equally likely between the least and the largest value: GUM, 4.3.7."""
     ends = sorted(values)
     return (ends[-1] - ends[0]) / (2 * math.sqrt(3))
 

@@ -4,59 +4,47 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.verification.case import CAUSES, NEEDS_REFERENCE, CaseDefinition
+from ringbalance.verification.case import CAUSES, CaseDefinition
 from ringbalance.verification.comparison import COVERAGE_FACTOR
 from ringbalance.verification.evidence import Convergence, Curve, Evidence, Found, Reference, Series, Table
 from ringbalance.verification.result import CaseResult, MutationResult, QuantityResult
 from ringbalance.verification.verdicts import Verdict
 
 Document = dict[str, Any]
+_LISTED: Final = {"id", "kind", "about", "paper", "number", "title", "claim", "cost"}
+_AS_DEFINED: Final = _LISTED | {
+    *("protects", "assumes", "does_not_cover", "equations", "headline", "judged_on"),
+}
+"""What a record has as its case.toml has it."""
 
 
 def case_document(result: CaseResult) -> Document:
     """One case's result, and all that a report shows of it; SI units, or the unit named beside the number."""
     definition = result.definition
     return {
-        "id": definition.id,
-        "kind": definition.kind,
+        **definition.model_dump(mode="json", include=_AS_DEFINED),
         "verdict": result.verdict.value,
         "quantities": [_quantity(quantity) for quantity in result.quantities],
-        "paper": definition.paper,
-        "number": definition.number,
-        "title": definition.title,
-        "claim": definition.claim,
-        "protects": definition.protects,
-        "assumes": list(definition.assumes),
-        "does_not_cover": list(definition.does_not_cover),
         "explanation": result.filled(definition.explanation),
         "consequence": _consequence(result),
-        "equations": list(definition.equations),
-        "reference": {
-            "kind": definition.reference.kind,
-            "source": definition.reference.source,
-            "uncertainty": definition.reference.uncertainty,
-        },
+        "reference": definition.reference.model_dump(exclude={"doubts"}),
         "doubts": [text for doubt in definition.reference.doubts if (text := result.filled(doubt))],
         "cause": CAUSES[definition.cause] if result.verdict is not Verdict.CONFIRMED else "",
         "judgement": result.filled(definition.judgement),
         "rests_on": [vars(one) for one in result.assumptions],
-        "headline": definition.headline,
-        "cost": definition.cost,
         "level": result.level,
         "status": result.status,
         "scene": result.scene_name,
         "scene_sha256": result.scene_sha256,
-        "judged_on": definition.judged_on,
         "time_s": result.time_s,
         "mutations": [_mutation(mutation) for mutation in result.mutations],
         "declared_mutations": [
-            {"id": mutation.id, "what": mutation.what, "expect": mutation.expect.value, "cost": mutation.cost}
-            for mutation in definition.must_fail
+            mutation.model_dump(mode="json", exclude={"scene"}) for mutation in definition.must_fail
         ],
         "broken": result.broken,
         **_evidence(result.evidence),
@@ -65,30 +53,8 @@ def case_document(result: CaseResult) -> Document:
 
 def definition_document(definition: CaseDefinition) -> Document:
     """What a list of cases says of one of them."""
-    return {
-        "id": definition.id,
-        "kind": definition.kind,
-        "paper": definition.paper,
-        "number": definition.number,
-        "title": definition.title,
-        "claim": definition.claim,
-        "cost": definition.cost,
-        "mutations": [mutation.id for mutation in definition.must_fail],
-    }
-
-
-def comparison_half_width(result: QuantityResult) -> float | None:
-    """Half-width of the comparison that decided a quantity: 2 u_val, and as far as assumed inputs move it.
-
-    Returns: Zero where nothing uncertain entered; None where the case was not run.
-    """
-    found, comparison = result.found, result.comparison
-    if found is None or comparison is None:
-        return None
-    reach = max(map(abs, found.reach))
-    certain = found.numerical == 0 and found.input == 0
-    judged_alone = result.quantity.metric not in NEEDS_REFERENCE
-    return reach if certain and judged_alone else comparison.half_width + reach
+    listed = definition.model_dump(mode="json", include=_LISTED)
+    return listed | {"mutations": [mutation.id for mutation in definition.must_fail]}
 
 
 def _consequence(result: CaseResult) -> str:
@@ -100,27 +66,18 @@ def _consequence(result: CaseResult) -> str:
 def _quantity(result: QuantityResult) -> Document:
     quantity, found, reference = result.quantity, result.found, result.reference
     return {
-        "name": quantity.name,
-        "title": quantity.title,
-        "unit": quantity.unit,
-        "basis": quantity.basis,
+        **quantity.model_dump(),
         "value": None if found is None else found.value,
         "reference": None if reference is None else reference.value,
-        "uncertainty": comparison_half_width(result),
+        "uncertainty": result.half_width,
         "reference_uncertainty": None if reference is None else COVERAGE_FACTOR * reference.uncertainty,
         **_found(found, reference),
-        "correction": quantity.correction,
-        "judges": quantity.judges,
-        "metric": quantity.metric,
-        "limit": quantity.limit,
-        "why": quantity.why,
         "verdict": result.verdict.value,
     }
 
 
 def _found(found: Found | None, reference: Reference | None) -> Document:
-    """Uncertainties of a found number: expanded ones, and the standard ones of V&V 20 by their symbols
-    there."""
+    """Expanded uncertainties of a found number, and the standard ones of V&V 20 by their symbols there."""
     if found is None:
         names = ("error", "value_uncertainty", "value_low", "value_high", "numerical_uncertainty")
         return dict.fromkeys((*names, "input_uncertainty", "corrected", "validation"))
@@ -216,4 +173,5 @@ def _merged(case: Document, earlier: Document | None) -> Document:
     keep = case["cost"] == "heavy" and case["verdict"] == Verdict.NOT_RUN.value
     if not keep or earlier is None or earlier["verdict"] == Verdict.NOT_RUN.value:
         return case
-    return earlier | {"status": f"kept from an earlier run of {earlier.get('date', 'an unknown date')}"}
+    status = f"kept from an earlier run of {earlier.get('date', 'an unknown date')}"
+    return earlier | {"about": case["about"], "status": status}

@@ -53,8 +53,7 @@ class Found:
         _finite(self.value, self.numerical, self.input, corrected, *self.reach)
 
     def moved(self, low: float, high: float) -> Found:
-        """The same number with more inputs that move it: their reaches add, as an assumption is no random
-        error."""
+        """The number with more inputs that move it: reaches add, as an assumption is no random error."""
         return dataclasses.replace(
             self, reach=(self.reach[0] + min(low, 0.0), self.reach[1] + max(high, 0.0))
         )
@@ -63,6 +62,16 @@ class Found:
     def input_standard_uncertainty(self) -> float:
         """u_input with the assumed inputs, the number equally likely within their reach (GUM, 4.3.7)."""
         return math.hypot(self.input, from_range(self.reach))
+
+    def scaled(self, factor: float) -> Found:
+        """The number times a positive constant."""
+        return dataclasses.replace(
+            self, value=self.value * factor, numerical=self.numerical * factor, input=self.input * factor
+        )
+
+    def with_correction(self) -> Found:
+        """The number with its correction made: what a case finds once the plates are left out."""
+        return Found(value=self.value if self.corrected is None else self.corrected)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,7 +17,7 @@ from ringbalance.reduced_model.chamber.calibration import calibrate_chamber
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.law.building import calibrated_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.law.model import BalancerModel, balancer_model
+from ringbalance.reduced_model.law.model import balancer_model
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reduced_model.tube.heads import tube_heads
 from ringbalance.scene.loop_models import ControllerKind
@@ -64,7 +64,8 @@ def mistaken_lag(scene: Scene) -> Scene:
 @lru_cache(maxsize=512)
 def run_loop(scene: Scene, law: str = "paper") -> Simulation:
     """One closed-loop run. Args: `law`: "paper" or "calibrated"."""
-    return simulate(scene, _model(scene, law))
+    paper = law == "paper"
+    return simulate(scene, paper_model(scene) if paper else balancer_model(flow_law_of(_plain(scene))))
 
 
 @lru_cache(maxsize=16)
@@ -75,13 +76,9 @@ def calibration_of(scene: Scene) -> Calibration:
 
 @lru_cache(maxsize=64)
 def flow_law_of(scene: Scene) -> CalibratedLaw:
-    """The law that `calibrate` gives a scene, without the rest, which takes half of the time."""
+    """The law of `calibrate` without the rest, which takes half of the time; the tube's models the finest."""
     check_ring(scene)
     return calibrated_law(scene=scene, chamber=calibrate_chamber(scene), heads=tube_heads(scene))
-
-
-def _model(scene: Scene, law: str) -> BalancerModel:
-    return paper_model(scene) if law == "paper" else balancer_model(flow_law_of(_plain(scene)))
 
 
 def _plain(scene: Scene) -> Scene:

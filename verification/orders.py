@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ringbalance.physics.pressure.assembly import at_points, volume_points
+from ringbalance.physics.pressure.assembly import volume_points
 from ringbalance.physics.pressure.solve import PressureSolution
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.evidence import Convergence, Curve, Found, Series, figure
@@ -38,6 +38,19 @@ class OrderStudy:
         """The lowest order among the two finest pairs: earlier ones are not yet asymptotic."""
         return min(self.order[-2:])
 
+    def table(self, quantity: str, formal_order: float, *, geometry: str = "", note: str = "") -> Convergence:
+        """The errors, all relative, as a table beside the formal order."""
+        return Convergence(
+            quantity=quantity,
+            unit="1",
+            formal_order=formal_order,
+            size=self.size,
+            error=self.error,
+            observed_order=self.order,
+            geometry=geometry,
+            note=note,
+        )
+
 
 def order_study(*, size: Sequence[float], error: Sequence[float]) -> OrderStudy:
     """Observed orders p = ln(e_i/e_(i+1))/ln(h_i/h_(i+1)) of relative errors, coarse to fine.
@@ -66,25 +79,9 @@ def field_error(solution: PressureSolution, exact: Callable[[FloatArray], FloatA
     """Root mean square over the liquid of a pressure's error, relative to that of the exact one at places."""
     volume = volume_points(solution.chamber)
     true = exact(solution.chamber.length_scale * volume.points)
-    difference = at_points(volume, solution.pressure) - true
+    difference = volume.at_points(solution.pressure) - true
     squares = [np.sum(volume.weights * field**2) for field in (difference, true)]
     return float(np.sqrt(squares[0] / squares[1]))
-
-
-def order_table(
-    quantity: str, study: OrderStudy, formal_order: float, *, geometry: str = "", note: str = ""
-) -> Convergence:
-    """The errors of a study, all relative, as a table beside the formal order."""
-    return Convergence(
-        quantity=quantity,
-        unit="1",
-        formal_order=formal_order,
-        size=study.size,
-        error=study.error,
-        observed_order=study.order,
-        geometry=geometry,
-        note=note,
-    )
 
 
 def order_figure(studies: Mapping[str, OrderStudy]) -> Series:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ringbalance.verification.assumptions import Assumption
-from ringbalance.verification.case import CaseDefinition, Quantity
+from ringbalance.verification.case import NEEDS_REFERENCE, CaseDefinition, Quantity
 from ringbalance.verification.comparison import COVERAGE_FACTOR, Comparison
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference
 from ringbalance.verification.text import fill
@@ -22,6 +22,20 @@ class QuantityResult:
     found: Found | None = None
     reference: Reference | None = None
     comparison: Comparison | None = None
+
+    @property
+    def half_width(self) -> float | None:
+        """Of the comparison that decided the quantity: 2 u_val, and as far as assumed inputs move it.
+
+        Zero where nothing uncertain entered; None where the case was not run.
+        """
+        found, comparison = self.found, self.comparison
+        if found is None or comparison is None:
+            return None
+        reach = max(map(abs, found.reach))
+        certain = found.numerical == 0 and found.input == 0
+        judged_alone = self.quantity.metric not in NEEDS_REFERENCE
+        return reach if certain and judged_alone else comparison.half_width + reach
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,10 +83,9 @@ class CaseResult:
     def numbers(self) -> Mapping[str, float]:
         """All numbers that the case's text may ask for.
 
-        For each quantity q: q, q_low and q_high (as far as assumed inputs move it) (as
-        far as the assumed input of key k does), q_reference, q_error,
-        q_relative (error over reference), q_uncertainty (95 % half-width of the comparison), q_limit; and the
-        evidence's own.
+        For each quantity q: q, q_low and q_high (as far as assumed inputs move it), q_reference, q_error,
+        q_relative (error over reference), q_uncertainty (95 % half-width of the comparison), q_limit; and
+        the evidence's own.
         """
         named: dict[str, float] = {}
         for result in self.quantities:

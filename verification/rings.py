@@ -49,20 +49,13 @@ def _conclusive(convergence: GridConvergence) -> bool:
     return convergence.verdict in (Verdict.MONOTONE, Verdict.ROUND_OFF)
 
 
-def scaled(found: Found, factor: float) -> Found:
-    """A found number times a positive constant."""
-    return dataclasses.replace(
-        found, value=found.value * factor, numerical=found.numerical * factor, input=found.input * factor
-    )
-
-
 def chamber_moment(scene: Scene, *, density: float, factor: float = 1.0) -> Found:
     """Moment of one chamber at its largest fill times a factor, kg m, by finite elements.
 
     Its correction is the moment of a ring of the printed radius that no plates take anything from.
     """
     ring = ring_of(scene, (scene.disc.max_fill_ratio,), density=density)
-    found = scaled(found_of(ring, "moment", 0), factor)
+    found = found_of(ring, "moment", 0).scaled(factor)
     return dataclasses.replace(found, corrected=factor * _bare_moment(scene.disc, density))
 
 
@@ -71,11 +64,6 @@ def _bare_moment(disc: Disc, density: float) -> float:
     liquid = disc.axial_width * float(liquid_area(disc=bare, surface_radius=RING_RADIUS.value))
     fill = liquid / chamber_volume(disc=bare)
     return float(exact_moment(disc=bare, density=density, fill_ratio=fill))
-
-
-def without_plates(found: Found) -> Found:
-    """A number with its correction made: what a case finds once the plates are left out."""
-    return Found(value=found.value if found.corrected is None else found.corrected)
 
 
 def mesh_table(quantities: RingQuantities, name: str, unit: str, index: int) -> Convergence:

@@ -57,10 +57,7 @@ def eccentric_document(run: EccentricRun, *, rows: int = _MOST_ROWS) -> dict[str
 
 
 def eccentric_history(run: EccentricRun) -> dict[str, Sequence[Any]]:
-    """Every sample of a run, by name of its column.
-
-    Whirl and imbalance lie along the rotor's axes; angles are not wrapped.
-    """
+    """Every sample of a run by name of its column: rotor-fixed vectors, angles not wrapped."""
     told = run.estimates
     stages = np.searchsorted([stage.start for stage in run.stages], run.time, side="right") - 1
     columns: dict[str, FloatArray] = {
@@ -95,10 +92,7 @@ def _each(name: str, values: FloatArray) -> dict[str, FloatArray]:
 
 
 def thinned(run: EccentricRun, *, rows: int = _MOST_ROWS) -> IntArray:
-    """Which samples of a run to show.
-
-    Returns: Their numbers, ascending: equally spaced, with the stages' edges and the largest vibration.
-    """
+    """Numbers of samples to show: equally spaced, with the stages' edges and the largest vibration."""
     last = run.time.size - 1
     even = np.linspace(0, last, min(rows, run.time.size)).round().astype(np.int64)
     edges = np.searchsorted(run.time, [time for stage in run.stages for time in (stage.start, stage.end)])

@@ -18,7 +18,7 @@ from ringbalance.controller.eccentric_mass.estimation.imbalance_model import Pro
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
 from ringbalance.controller.eccentric_mass.plant.whirl import influence
 from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, Remedy, RunFacts
-from ringbalance.controller.eccentric_mass.sampled_loops import SampledLoop, recommended_gains
+from ringbalance.controller.eccentric_mass.sampled_loops import recommended_gains
 from ringbalance.controller.eccentric_mass.strategy.plan import Stage
 from ringbalance.controller.eccentric_mass.strategy.settings import (
     FRICTION_ERROR,
@@ -94,7 +94,8 @@ def found_beforehand(scene: EccentricScene) -> tuple[str, ...]:
     gains = recommended_gains(scene)
     found = [
         f"the sampled loop of the {loop.name} is unstable (largest pole {loop.radius:.3g} per step): "
-        f"{_lowered(scene, loop).text}, or hold the voltage for {loop.recommended_step:.2g} s"
+        f"{_remedy(scene, (loop.key, loop.recommended)).text}, "
+        f"or hold the voltage for {loop.recommended_step:.2g} s"
         for loop in gains.loops
         if not loop.stable and not (loop is gains.pair and not gains.speed.stable)
     ]
@@ -188,10 +189,6 @@ def remedies_of(facts: RunFacts, outcome: EccentricOutcome) -> tuple[Remedy, ...
     own = _REMEDIES[outcome](facts) if outcome in _REMEDIES else ()
     gains = None if outcome is EccentricOutcome.TIME_LIMIT else _gain_remedy(facts.scene)
     return (gains, *own) if gains else own
-
-
-def _lowered(scene: EccentricScene, loop: SampledLoop) -> Remedy:
-    return _remedy(scene, (loop.key, loop.recommended))
 
 
 _UNITS: Final = {

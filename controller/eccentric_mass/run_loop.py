@@ -96,11 +96,7 @@ def measure(
     noise: SensorNoise,
     numbers: FloatArray,
 ) -> EccentricMeasurement:
-    """What the sensors show.
-
-    Args: `laboratory`: whether the vibration is measured in the fixed frame.
-    Returns: The sample.
-    """
+    """What the sensors show; `laboratory`: the vibration is measured in the fixed frame."""
     speed, speed_rate = speed_at(profile.times, profile.speeds, time)
     turn = turned(profile.times, profile.speeds, time)
     place, velocity = complex(state[0], state[1]), complex(state[2], state[3])

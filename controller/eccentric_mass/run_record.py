@@ -139,10 +139,7 @@ class EccentricRun:
 
     @property
     def residual_ratio(self) -> float | None:
-        """Final amplitude over what the first places would give at the same speed.
-
-        At constant speed that is final over initial steady amplitude.  None where nothing would vibrate.
-        """
+        """Final amplitude over that of the first places at this speed; None where nothing would vibrate."""
         if self.unbalanced_amplitude < _NOTHING * self.limit:
             return None
         return self.final_amplitude / self.unbalanced_amplitude

@@ -136,10 +136,6 @@ def _rises(facts: RunFacts) -> str:
     )
 
 
-def _diverged(facts: RunFacts) -> str:
-    return f"not settled: the loop diverged, and the run was stopped at {facts.time:.4g} s"
-
-
 def _locked(facts: RunFacts) -> str:
     verdict = _not_settled(facts) if facts.settling_time is None else f"settled: {_end(facts)}"
     return f'{verdict}; the masses are locked: set supervisor.strategy = "whole" to balance'
@@ -174,7 +170,9 @@ _Text = Callable[[RunFacts], str]
 _WHOLE_TEXTS: Final[dict[EccentricOutcome, _Text]] = {
     EccentricOutcome.SETTLED: _settled,
     EccentricOutcome.RISES_AGAIN: _rises,
-    EccentricOutcome.DIVERGED: _diverged,
+    EccentricOutcome.DIVERGED: lambda facts: (
+        f"not settled: the loop diverged, and the run was stopped at {facts.time:.4g} s"
+    ),
     EccentricOutcome.LOCKED: _locked,
 }
 _REASONS: Final[dict[EccentricOutcome, _Text]] = {

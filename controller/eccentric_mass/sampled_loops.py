@@ -134,10 +134,7 @@ def _speed(scene: EccentricScene) -> SampledLoop:
 
 
 def _pair(scene: EccentricScene) -> SampledLoop:
-    """Each drive gets the pair's error, so that the angle between the masses gets it twice.
-
-    Recommended beside the lower of both speed gains.
-    """
+    """The angle between the masses gets each drive's error; recommended beside the lower speed gain."""
     told, per_volt = scene.friction_filter, plant_parameters(scene).drive_gain
 
     def poles(pair: float, speed: float, step: float) -> ComplexArray:

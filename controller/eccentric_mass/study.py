@@ -94,6 +94,17 @@ class EccentricStudy:
     gains: RecommendedGains
     requirements: tuple[Requirement, ...]
 
+    def document(self) -> dict[str, Any]:
+        """Plain numbers in SI: both runs as `simulate --json` gives them, the loops as `tune --json` does."""
+        return {
+            "run": eccentric_document(self.run),
+            "locked": eccentric_document(self.locked),
+            "tuning": eccentric_tuning_document(self.scene, self.gains),
+            "requirements": [
+                {**asdict(row), "met": row.met, "verdict": row.verdict} for row in self.requirements
+            ],
+        }
+
 
 def eccentric_study(
     scene: EccentricScene, *, seed: int | None = None, progress: Progress | None = None
@@ -211,15 +222,3 @@ def _largest_balanced(run: EccentricRun) -> float | None:
     if last.name != STAGE_NAMES[Stage.REST]:
         return None
     return float(np.max(run.amplitude[run.time >= last.start]))
-
-
-def study_document(study: EccentricStudy) -> dict[str, Any]:
-    """Plain numbers in SI: both runs as `simulate --json` gives them, the loops as `tune --json` does."""
-    return {
-        "run": eccentric_document(study.run),
-        "locked": eccentric_document(study.locked),
-        "tuning": eccentric_tuning_document(study.scene, study.gains),
-        "requirements": [
-            {**asdict(row), "met": row.met, "verdict": row.verdict} for row in study.requirements
-        ],
-    }

@@ -80,6 +80,33 @@ class Ensemble:
     misadjustment_counts: IntArray
     """Members by number of misadjustments, likewise."""
 
+    def document(self) -> dict[str, Any]:
+        """All as a JSON document of SI numbers, with arrays of at most 41 entries."""
+        shares = ("settled", "not_settled", "overshoot", "misadjustment", "diverged", "drifted")
+        last = int(np.max(np.flatnonzero(self.time_counts), initial=0)) + 1
+        per_bin = -(-last // SHOWN_BINS)
+        padded = np.zeros(per_bin * SHOWN_BINS, dtype=np.int64)
+        padded[:last] = self.time_counts[:last]
+        counts = padded.reshape(SHOWN_BINS, per_bin).sum(axis=1)
+        edges = self.bin_width * per_bin * np.arange(SHOWN_BINS + 1)
+        return {
+            "law": self.law,
+            "members": self.members,
+            "seed": self.seed,
+            "spread_95": asdict(self.uncertainty_95),
+            "left_out": [],
+            "probability": {name: asdict(getattr(self, name)) for name in shares},
+            "settling_time_s": {
+                "quantiles": dict(zip(map(str, QUANTILES), self.settling_quantiles, strict=True)),
+                "resolution": self.bin_width,
+                "edges": edges.tolist(),
+                "counts": counts.tolist(),
+                "settled_fraction": (np.cumsum(counts) / self.members).tolist(),
+            },
+            "overshoots": self.overshoot_counts.tolist(),
+            "misadjustments": self.misadjustment_counts.tolist(),
+        }
+
 
 def simulate_ensemble(
     scene: Scene,
@@ -256,31 +283,3 @@ def binomial_share(*, count: int, of: int) -> Probability:
     centre = (p + z2 / 2) / (1 + z2)
     half = math.sqrt(p * (1 - p) * z2 + z2**2 / 4) / (1 + z2)
     return Probability(value=p, low=max(centre - half, 0.0), high=min(centre + half, 1.0))
-
-
-def ensemble_document(ensemble: Ensemble) -> dict[str, Any]:
-    """An ensemble as a JSON document of SI numbers, with arrays of at most 41 entries."""
-    shares = ("settled", "not_settled", "overshoot", "misadjustment", "diverged", "drifted")
-    last = int(np.max(np.flatnonzero(ensemble.time_counts), initial=0)) + 1
-    per_bin = -(-last // SHOWN_BINS)
-    padded = np.zeros(per_bin * SHOWN_BINS, dtype=np.int64)
-    padded[:last] = ensemble.time_counts[:last]
-    counts = padded.reshape(SHOWN_BINS, per_bin).sum(axis=1)
-    edges = ensemble.bin_width * per_bin * np.arange(SHOWN_BINS + 1)
-    return {
-        "law": ensemble.law,
-        "members": ensemble.members,
-        "seed": ensemble.seed,
-        "spread_95": asdict(ensemble.uncertainty_95),
-        "left_out": [],
-        "probability": {name: asdict(getattr(ensemble, name)) for name in shares},
-        "settling_time_s": {
-            "quantiles": dict(zip(map(str, QUANTILES), ensemble.settling_quantiles, strict=True)),
-            "resolution": ensemble.bin_width,
-            "edges": edges.tolist(),
-            "counts": counts.tolist(),
-            "settled_fraction": (np.cumsum(counts) / ensemble.members).tolist(),
-        },
-        "overshoots": ensemble.overshoot_counts.tolist(),
-        "misadjustments": ensemble.misadjustment_counts.tolist(),
-    }

@@ -116,9 +116,25 @@ def _rows(tuning: Tuning) -> dict[str, str]:
             f"{tuning.first_gas_time:.3g} s at first, {tuning.last_gas_time * 1e3:.3g} ms at the limit; the "
             f"valve's shortest is {settings.minimum_gas_time * 1e3:.3g} ms"
         )
+    if tuning.change:
+        rows["recommended beside the gain"] = tuning.change
+    if tuning.dead_times:
+        low, high = min(tuning.dead_times), max(tuning.dead_times)
+        rows["dead time of the valves"] = (
+            f"{low * 1e3:.3g} to {high * 1e3:.3g} ms; no injection moves liquid up to "
+            f"{tuning.dead_zone * _UM:.3g} um"
+        )
     rows["smallest correction of the valve"] = f"{tuning.smallest_correction * _UM:.4g} um"
     rows["gas line"] = line_text(tuning.gas_line)
-    return rows | _settling(tuning)
+    return rows | _settling(tuning) | _tried(tuning)
+
+
+def _tried(tuning: Tuning) -> dict[str, str]:
+    rows = tuning.search.tried if tuning.search else ()
+    return {
+        f"tried {place}": f"{row.change}: {row.settled:.0%} of {row.runs} short runs"
+        for place, row in enumerate(rows, start=1)
+    }
 
 
 def _settling(tuning: Tuning) -> dict[str, str]:

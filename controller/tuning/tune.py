@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
-from typing import Any, Final
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
-from ringbalance.controller.algorithms.by_name import controller_of, target_vector_of
+from ringbalance.controller.algorithms.by_name import controller_of, law_based_of, target_vector_of
 from ringbalance.controller.checks import check_settings
-from ringbalance.controller.ensemble.monte_carlo import Probability, binomial_share, simulate_ensemble
-from ringbalance.controller.ensemble.samples import MemberUncertainty, drawn_members
-from ringbalance.controller.loop import simulate
-from ringbalance.controller.terms import run_models, terms_modelled
+from ringbalance.controller.liquid_ring.plant import initial_state
+from ringbalance.controller.liquid_ring.reach import unreachable_moment
+from ringbalance.controller.rotor import influence, initial_vibration
+from ringbalance.controller.terms import run_models
+from ringbalance.controller.tuning.dead_time import dead_times, dead_zone
 from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor, vibration_rates
 from ringbalance.controller.tuning.margins import Margins, loop_margins
 from ringbalance.controller.tuning.recommendation import (
@@ -23,33 +23,13 @@ from ringbalance.controller.tuning.recommendation import (
     factor_uncertainty,
     recommended_gain,
 )
+from ringbalance.controller.tuning.search import LIMITS, Candidate, Search, recommended, search
+from ringbalance.controller.tuning.settling import MEMBERS, RUNS, Progress, SettlingTimes, settling_times
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.gas_line import LineAnswer, line_answers, line_document
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.selection.registry import ModelUsed
-from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-
-Progress = Callable[[str], None]
-
-MEMBERS: Final = 2000
-"""Compiled runs of the target-vector algorithm."""
-MOVING_MEMBERS: Final = 200
-"""The most of them where inertia, gas or valves are modelled, which takes a hundred times as long."""
-RUNS: Final = 20
-"""Runs one by one, of an algorithm that is not compiled."""
-QUANTILES: Final = {"p50": 0.5, "p95": 0.95}
-
-
-@dataclass(frozen=True, kw_only=True)
-class SettlingTimes:
-    """Settling under the recommended gain, over the uncertainty and the noise."""
-
-    runs: int
-    settled: Probability
-    """Within the scene's time limit."""
-    quantiles: dict[str, float | None]
-    """s, by which that fraction of all runs has settled; None: fewer have."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +37,7 @@ class Tuning:
     """What is recommended for a scene's controller under a law."""
 
     scene: Scene
+    """With what is recommended."""
     law: str
     gain: float | None
     """Kc, s/m; None for an algorithm without a gain, and where no gain reaches the limit."""
@@ -72,8 +53,16 @@ class Tuning:
     """s, for an amplitude at the limit."""
     smallest_correction: float
     """Change of the vibration by the shortest valve-open time in the fastest chamber, m."""
+    dead_times: tuple[float, ...]
+    """s, of every chamber; empty where runs do not model the filling of gas."""
     dead_zone: float
-    """Largest amplitude at which no valve may open any more, m."""
+    """Largest amplitude at which no valve may open any more, or gas only fills chambers, m."""
+    change: str
+    """Keys and values that are recommended beside the gain; empty: none."""
+    search: Search | None
+    """What was tried because the runs under the first recommendation do not settle; None: they do."""
+    beyond_capacity: float
+    """Vibration that remains with the liquid at its best, m."""
     reachable: bool | None
     """Whether valves and gas line can bring the amplitude below the limit; None: the line is not known."""
     gas_line: tuple[LineAnswer, ...]
@@ -108,39 +97,79 @@ def tune(
     check_ring(scene)
     told("uncertainty ...")
     known = factor_uncertainty(scene, model)
-    widths = known.widths
-    present = loop_factor(scene, model, controller_of(scene, model))
     wanted = recommended_gain(
         scene, model, loop=loop_factor(scene, model, target_vector_of(scene)), uncertainty=known
     )
-    has_gain = scene.controller.kind != "law_based"
-    tuned = _with_gain(scene, wanted) if has_gain and wanted > 0 else scene
+    best, found, settling = recommended(scene, model, known), None, None
+    if wanted > 0:
+        told("settling times ...")
+        settling = settling_times(best.scene, model, known.widths, members=members, runs=runs, told=told)
+        if settling.quantiles["p95"] is None and _beyond_capacity(scene, model) <= scene.controller.limit:
+            found = search(scene, model, known, base=best, told=told)
+            if found.best is not best:
+                best = found.best
+                told("settling times ...")
+                settling = settling_times(
+                    best.scene, model, known.widths, members=members, runs=runs, told=told
+                )
+    return _judged(scene, model, known, best=best, found=found, settling=settling)
+
+
+def _judged(
+    scene: Scene,
+    model: BalancerModel,
+    known: FactorUncertainty,
+    *,
+    best: Candidate,
+    found: Search | None,
+    settling: SettlingTimes | None,
+) -> Tuning:
+    tuned, flows = best.scene, settling is not None
+    settings = tuned.controller
+    present = loop_factor(scene, model, controller_of(scene, model))
     loop = loop_factor(tuned, model, controller_of(tuned, model))
-    smallest = float(np.max(vibration_rates(scene, model))) * scene.controller.minimum_gas_time
-    dead = _dead_zone(tuned, smallest)
-    lines = line_answers(scene, model)
-    within = wanted > 0 and loop.stays and max(dead, smallest / 2) <= scene.controller.limit
-    told("settling times ...")
-    settling = _settling(tuned, model, widths, members=members, runs=runs, told=told) if wanted > 0 else None
-    amplitude, limit = scene.rotor.initial_amplitude, scene.controller.limit
+    smallest = float(np.max(vibration_rates(tuned, model))) * settings.minimum_gas_time
+    dead = dead_times(tuned, model)
+    zone = dead_zone(tuned, model, dead)
+    lines = line_answers(tuned, model)
+    beyond = _beyond_capacity(scene, model)
+    within = flows and loop.stays and max(zone, smallest / 2, beyond) <= settings.limit
+    # The law-based algorithm asks for the time in which the law moves the whole residual.
+    gain = (1.0 / loop.rate if settings.kind == "law_based" else settings.proportional) if flows else None
     return Tuning(
         scene=tuned,
         law=model.name,
-        gain=wanted if has_gain and wanted > 0 else None,
+        gain=None if settings.kind == "law_based" else gain,
         present=present,
         loop=loop,
-        margins=_margins(tuned, loop, known) if wanted > 0 else None,
+        margins=_margins(tuned, loop, known) if flows else None,
         contributions=known.parts,
-        first_gas_time=min(wanted * amplitude, scene.controller.maximum_gas_time) if wanted > 0 else None,
-        last_gas_time=wanted * limit if wanted > 0 else None,
+        first_gas_time=None
+        if gain is None
+        else min(gain * scene.rotor.initial_amplitude, settings.maximum_gas_time),
+        last_gas_time=None if gain is None else gain * settings.limit,
         smallest_correction=smallest,
-        dead_zone=dead,
+        dead_times=dead,
+        dead_zone=zone,
+        change=best.change,
+        search=found,
+        beyond_capacity=beyond,
         reachable=within and _line_reaches(lines),
         gas_line=lines,
         settling=settling,
-        models_used=run_models(scene=scene, model=model),
-        status=_status(tuned, loop, dead=dead, smallest=smallest, settling=settling, flows=present.rate > 0),
+        models_used=run_models(scene=tuned, model=model),
+        status=_over_capacity(scene, beyond)
+        or _status(tuned, loop, zone=zone, smallest=smallest, settling=settling, best=best, found=found),
     )
+
+
+def _beyond_capacity(scene: Scene, model: BalancerModel) -> float:
+    """Vibration that remains with the liquid at its best, m; zero within capacity."""
+    rotor, plant = scene.rotor, law_based_of(scene, model).ring
+    k = influence(coefficient=rotor.influence_coefficient, lag_angle=rotor.lag_angle)
+    wanted = -initial_vibration(rotor=rotor) / k
+    missing = unreachable_moment(plant=plant, state=initial_state(disc=scene.disc), wanted=wanted)
+    return missing * rotor.influence_coefficient
 
 
 def _line_reaches(lines: tuple[LineAnswer, ...]) -> bool | None:
@@ -153,11 +182,6 @@ def _line_reaches(lines: tuple[LineAnswer, ...]) -> bool | None:
 
 def _silent(_: str) -> None:
     """No progress wanted."""
-
-
-def _with_gain(scene: Scene, gain: float) -> Scene:
-    settings = replace(scene.controller, proportional=gain)
-    return replace(scene, controller=replace(settings, kind="target_vector"))
 
 
 def _margins(scene: Scene, loop: LoopFactor, known: FactorUncertainty) -> Margins:
@@ -173,104 +197,66 @@ def _margins(scene: Scene, loop: LoopFactor, known: FactorUncertainty) -> Margin
     )
 
 
-def _dead_zone(scene: Scene, smallest: float) -> float:
-    """Amplitude below which both shares of a vector may be shorter than the valves' minimum, m."""
-    chambers, settings = scene.disc.chambers, scene.controller
-    apart = 1.0 if chambers == 2 else 2.0 * math.cos(math.pi / chambers)
-    if settings.kind == "law_based":
-        return apart * smallest
-    return apart * settings.minimum_gas_time / settings.proportional
-
-
-def _settling(
-    scene: Scene, model: BalancerModel, widths: MemberUncertainty, *, members: int, runs: int, told: Progress
-) -> SettlingTimes:
-    if scene.controller.kind == "target_vector":
-        carried = terms_modelled(run_models(scene=scene, model=model))
-        members = min(members, MOVING_MEMBERS) if carried else members
-        return _of_ensemble(scene, model, widths, members=members, told=told)
-    times = np.array([_one_run(scene, model, widths, number=i, told=told) for i in range(runs)])
-    return SettlingTimes(
-        runs=runs,
-        settled=binomial_share(count=int(np.isfinite(times).sum()), of=runs),
-        quantiles={name: _quantile(times, q) for name, q in QUANTILES.items()},
+def _over_capacity(scene: Scene, beyond: float) -> str:
+    """Empty within capacity."""
+    limit, start, um = scene.controller.limit, scene.rotor.initial_amplitude, 1e6
+    if beyond <= limit:
+        return ""
+    return (
+        f"capacity exceeded: with the liquid at its best {beyond * um:.4g} um remain of {start * um:.4g} um, "
+        f"limit {limit * um:.4g} um: balance the rotor first, use a denser liquid, or a larger or "
+        "differently clocked disc"
     )
-
-
-def _of_ensemble(
-    scene: Scene, model: BalancerModel, widths: MemberUncertainty, *, members: int, told: Progress
-) -> SettlingTimes:
-    found = simulate_ensemble(
-        scene,
-        model,
-        members,
-        scene.run.seed,
-        uncertainty_95=widths,
-        quantiles=tuple(QUANTILES.values()),
-        progress=lambda done, of: told(f"{done} of {of} runs"),
-    )
-    return SettlingTimes(
-        runs=members,
-        settled=found.settled,
-        quantiles=dict(zip(QUANTILES, found.settling_quantiles, strict=True)),
-    )
-
-
-def _one_run(
-    scene: Scene, model: BalancerModel, widths: MemberUncertainty, *, number: int, told: Progress
-) -> float:
-    """Settling time of one drawn run, s; infinite when it does not settle.
-
-    Velocity, moment and influence coefficient act through their product, which is put into the last.
-    """
-    told(f"run {number + 1}")
-    drawn = drawn_members(scene, uncertainty_95=widths, seed=scene.run.seed, block=0)
-    factor = drawn.velocity_factor[number] * drawn.moment_factor[number]
-    rotor = replace(
-        scene.rotor,
-        influence_coefficient=float(drawn.influence_coefficient[number] * factor),
-        lag_angle=float(drawn.lag_angle[number]),
-    )
-    asked = replace(scene, rotor=rotor, run=replace(scene.run, seed=scene.run.seed + number))
-    time = simulate(asked, model).settling_time
-    return math.inf if time is None else time
-
-
-def _quantile(times: FloatArray, q: float) -> float | None:
-    found = float(np.quantile(times, q, method="inverted_cdf"))
-    return found if math.isfinite(found) else None
 
 
 def _status(
     scene: Scene,
     loop: LoopFactor,
     *,
-    dead: float,
+    zone: float,
     smallest: float,
     settling: SettlingTimes | None,
-    flows: bool,
+    best: Candidate,
+    found: Search | None,
 ) -> str:
     limit, um = scene.controller.limit, 1e6
-    if not flows:
+    if loop.rate == 0.0:
         return "no gain: the gas drives no liquid at the balanced fills: raise gas.pressure"
     if settling is None or not loop.stays:
         return (
             f"no gain keeps the amplitude within {limit * um:.4g} um: the sensor's noise is "
             f"{scene.sensor.amplitude_noise * um:.4g} um: raise controller.limit or average the sensor"
         )
-    if max(dead, smallest / 2) > limit:
+    if max(zone, smallest / 2) > limit:
         return (
             f"the valve is too slow for the limit of {limit * um:.4g} um: the shortest valve-open time moves "
-            f"the vibration by {smallest * um:.4g} um, and up to {dead * um:.4g} um no valve opens: lower "
-            "controller.minimum_gas_time or raise controller.limit"
+            f"the vibration by {smallest * um:.4g} um, and up to {zone * um:.4g} um none moves liquid: "
+            f"lower controller.minimum_gas_time{_reached(found)}"
         )
-    reached = settling.quantiles["p95"]
-    if reached is None:
+    reached, also = settling.quantiles["p95"], f", with {best.change}" if best.change else ""
+    if reached is not None:
+        return f"tuned{also}: 95 % of the runs settle within {reached:.3g} s"
+    share = (
+        f"{settling.settled.value:.1%} of the runs settle within the time limit of "
+        f"{scene.run.time_limit:.4g} s{also}: 95 % is not reached"
+    )
+    if found is not None and found.needs is not None and found.needs > scene.run.time_limit:
+        return f"{share}; they need some {found.needs:.2g} s: raise run.time_limit"
+    return f"{share}, nor by other gains and pressures{_reached(found)}"
+
+
+def _reached(found: Search | None) -> str:
+    """What to do about a limit that is out of reach."""
+    if found is None:
+        return " or raise controller.limit"
+    if found.limit is None:
         return (
-            f"{settling.settled.value:.1%} of the runs settle within the time limit of "
-            f"{scene.run.time_limit:.4g} s: 95 % is not reached"
+            f"; no limit up to {LIMITS[-1]:.3g} times as high is reached: take a faster valve or a larger "
+            "conductance"
         )
-    return f"tuned: 95 % of the runs settle within {reached:.3g} s"
+    return (
+        f"; a limit of {found.limit * 1e6:.3g} um is reached: raise controller.limit, or take a faster valve"
+    )
 
 
 def tuning_document(tuning: Tuning) -> dict[str, Any]:
@@ -298,7 +284,13 @@ def tuning_document(tuning: Tuning) -> dict[str, Any]:
         "minimum_gas_time_s": scene.controller.minimum_gas_time,
         "smallest_correction_m": tuning.smallest_correction,
         "dead_zone_m": tuning.dead_zone,
+        "dead_time_s": list(tuning.dead_times) or None,
+        "gas_time_offset_s": list(scene.controller.offsets(scene.disc.chambers)),
+        "change": tuning.change,
+        "tried": [] if tuning.search is None else [asdict(row) for row in tuning.search.tried],
+        "reachable_limit_m": None if tuning.search is None else tuning.search.limit,
         "limit_m": scene.controller.limit,
+        "beyond_capacity_m": tuning.beyond_capacity,
         "reachable": tuning.reachable,
         "gas_line": line_document(tuning.gas_line),
         "settling_time_s": None if settling is None else settling.quantiles,

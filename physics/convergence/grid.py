@@ -92,7 +92,8 @@ def gci(
     _check(phi, h, formal_order)
     noise = max(round_off, 8 * _EPSILON * float(np.abs(phi).max()))
     if _is_noise(phi, h, formal_order, noise):
-        return _at_round_off(phi, noise)
+        change = abs(float(phi[1] - phi[0]))
+        return _record(Verdict.ROUND_OFF, phi, 0.0, 0.0, float(phi[0]), 0.0, noise + change)
     if phi.size > 3:
         return _from_fit(phi, best_fit(phi, h, formal_order=formal_order), formal_order, noise, safety)
     return _from_three(phi, h, formal_order, noise, safety)
@@ -186,10 +187,6 @@ def _from_fit(phi: FloatArray, fit: Fit, formal_order: float, noise: float, safe
         verdict = Verdict.DIVERGING if fit.observed_order <= 0 else Verdict.NOT_ASYMPTOTIC
     index = half_width
     return _record(verdict, phi, fit.observed_order, fit.order, fit.limit, index, half_width + noise)
-
-
-def _at_round_off(phi: FloatArray, noise: float) -> GridConvergence:
-    return _record(Verdict.ROUND_OFF, phi, 0.0, 0.0, float(phi[0]), 0.0, noise + abs(float(phi[1] - phi[0])))
 
 
 def _record(

@@ -43,6 +43,19 @@ class Volume:
     values: FloatArray
     """Shape functions, shape (functions, points)."""
 
+    def load(self, density: FloatArray, *, unknowns: int) -> FloatArray:
+        """Vector of the integrals of f v over the cells or a side, f given at the points."""
+        return _summed(self.nodes, (density * self.weights) @ self.values.T, unknowns)
+
+    def mass(self, *, unknowns: int) -> Matrix:
+        """Symmetric matrix of the integrals of u v over these cells, among the first `unknowns` nodes."""
+        local = np.einsum("fq,iq,jq->fij", self.weights, self.values, self.values, optimize=True)
+        return _matrix(self.nodes, local.reshape(len(local), -1), unknowns)
+
+    def at_points(self, nodal: FloatArray) -> FloatArray:
+        """Values at the quadrature points of a field given at the mesh's nodes."""
+        return np.asarray(nodal[self.nodes] @ self.values)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Facets(Volume):
@@ -99,11 +112,7 @@ def _cofactor(jacobian: FloatArray) -> FloatArray:
 
 
 def stiffness(chamber: ChamberMesh) -> Matrix:
-    """Matrix of the integrals of grad u . grad v.
-
-    Returns: Symmetric matrix over the nodes; in the mesh's unit to the power dimension - 2.
-    Source: standard Galerkin form, Gauss quadrature with three points along each axis.
-    """
+    """Symmetric matrix over the nodes of the integrals of grad u . grad v, by three Gauss points an axis."""
     dimension, unknowns = chamber.dimension, chamber.grid.size
     rule, total = _rule(dimension), None
     for start in range(0, len(chamber.cell_nodes), _CHUNK):
@@ -145,11 +154,7 @@ def volume_points(chamber: ChamberMesh) -> Volume:
 
 
 def facet_points(chamber: ChamberMesh, boundary: str) -> Facets:
-    """Quadrature points over one side, with outward normals, in the mesh's unit.
-
-    Args: `boundary`: one of `chamber.boundaries`.
-    Source: Nanson's formula, n dS = det(J) J^-T N dS_ref.
-    """
+    """Quadrature points over one side, with outward normals by Nanson: n dS = det(J) J^-T N dS_ref."""
     dimension, (axis, end) = chamber.dimension, SIDES[boundary]
     outward = 2 * end + 1  # the last place is -1, the first is 0
     rule = _rule(dimension, axis, -float(outward))
@@ -166,22 +171,3 @@ def facet_points(chamber: ChamberMesh, boundary: str) -> Facets:
         values=rule.values[present],
         nodes=nodes[:, present],
     )
-
-
-def load(over: Volume, density: FloatArray, *, unknowns: int) -> FloatArray:
-    """Vector of the integrals of f v over the cells or a side.
-
-    Args: `density`: f at the points.
-    """
-    return _summed(over.nodes, (density * over.weights) @ over.values.T, unknowns)
-
-
-def mass(over: Volume, *, unknowns: int) -> Matrix:
-    """Symmetric matrix of the integrals of u v over the cells or a side, among the first `unknowns` nodes."""
-    local = np.einsum("fq,iq,jq->fij", over.weights, over.values, over.values, optimize=True)
-    return _matrix(over.nodes, local.reshape(len(local), -1), unknowns)
-
-
-def at_points(over: Volume, nodal: FloatArray) -> FloatArray:
-    """Values at the quadrature points of a field given at the mesh's nodes."""
-    return np.asarray(nodal[over.nodes] @ over.values)

@@ -15,22 +15,13 @@ Radius = TypeVar("Radius", float, FloatArray)
 
 
 def hydrostatic_pressure(*, density: float, angular_velocity: float, inner: Radius, outer: float) -> Radius:
-    """Rise of the pressure from an inner to an outer radius, rho omega^2 (b^2 - a^2)/2.
-
-    Args: `inner`: a, m, a number or an array.
-    Returns: Pa, the shape of `inner`; negative where it is the larger radius.
-    Source: dp = rho omega^2 r dr.
-    """
+    """Rise of pressure from radius a to b, rho omega^2 (b^2 - a^2)/2, Pa; negative where a is larger."""
     # The factors keep full relative accuracy for a film of a micrometre, where b^2 - a^2 cancels.
     return density * angular_velocity**2 * ((outer - inner) * (outer + inner)) / 2
 
 
 def column_radius(*, density: float, angular_velocity: float, pressure: float, outer: float) -> float:
-    """Inner radius of the column that a pressure at an outer radius supports, inverse of the above.
-
-    Args: `pressure`: Pa, relative to that at the inner end.
-    Returns: m; zero when the column would reach beyond the axis.
-    """
+    """Inner radius of the column that a pressure at its outer radius supports, m; zero beyond the axis."""
     return math.sqrt(max(outer**2 - pressure / (density * angular_velocity**2 / 2), 0.0))
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ringbalance.physics.pressure.assembly import at_points, facet_points, volume_points
+from ringbalance.physics.pressure.assembly import facet_points, volume_points
 from ringbalance.physics.pressure.solve import FREE_SURFACE, PressureSolution
 from ringbalance.scene.arrays import FloatArray
 
@@ -43,7 +43,7 @@ def liquid_integrals(*, solution: PressureSolution, density: float, axial_width:
     depth = axial_width if chamber.dimension == 2 else unit
     forces, torques = _wall_loads(solution, depth)
     if chamber.dimension == 2:
-        pressure = float(unit**2 * np.sum(volume.weights * at_points(volume, solution.pressure)))
+        pressure = float(unit**2 * np.sum(volume.weights * volume.at_points(solution.pressure)))
         push = np.array([0.0, 0.0, pressure])
         forces |= {"end_back": -push, "end_front": push}
         torques |= {"end_back": 0.0, "end_front": 0.0}
@@ -60,14 +60,14 @@ def liquid_integrals(*, solution: PressureSolution, density: float, axial_width:
 
 def _wall_pressure(solution: PressureSolution) -> float:
     wall = facet_points(solution.chamber, "outer_wall")
-    return float(np.sum(wall.weights * at_points(wall, solution.pressure)) / wall.weights.sum())
+    return float(np.sum(wall.weights * wall.at_points(solution.pressure)) / wall.weights.sum())
 
 
 def _moment_per_volume(solution: PressureSolution, density: float) -> float:
     surface = facet_points(solution.chamber, FREE_SURFACE)
     gradient = np.zeros(solution.pressure.size)
     gradient[solution.chamber.grid[0]] = solution.surface_gradient
-    speed = surface.weights / np.abs(at_points(surface, gradient))
+    speed = surface.weights / np.abs(surface.at_points(gradient))
     return float(density * solution.chamber.length_scale * np.sum(speed * surface.points[0]) / speed.sum())
 
 
@@ -78,7 +78,7 @@ def _wall_loads(solution: PressureSolution, depth: float) -> tuple[dict[str, Flo
         if name == FREE_SURFACE:
             continue
         wall = facet_points(solution.chamber, name)
-        push = wall.weights * at_points(wall, solution.pressure) * wall.normals
+        push = wall.weights * wall.at_points(solution.pressure) * wall.normals
         turn = wall.points[0] * push[1] - wall.points[1] * push[0]
         total = unit * depth * push.sum(axis=(1, 2))
         forces[name] = np.pad(total, (0, 3 - len(total)))

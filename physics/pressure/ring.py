@@ -16,7 +16,7 @@ import numpy.typing as npt
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.mesh.geometry import half_angle, surface_radius
 from ringbalance.physics.convergence.grid import GridConvergence, gci
-from ringbalance.physics.pressure.ring_bounds import Case, rounding_bound, stated_widths
+from ringbalance.physics.pressure.ring_bounds import Case
 from ringbalance.physics.pressure.ring_samples import (
     QUANTITIES,
     Sample,
@@ -198,7 +198,7 @@ def _collect(case: Case, samples: Sequence[tuple[Sample, ...]]) -> RingQuantitie
     records = _judge(case, kept, values)
     closed = np.array([status.ok for status in failed])
     widths = np.array([[record.uncertainty for record in row] for row in records])
-    widths = stated_widths(case=case, samples=kept, widths=widths, closed=closed)
+    widths = case.stated_widths(samples=kept, widths=widths, closed=closed)
     status = _status(case, failed) if all(s.ok for s in missing) else _status(case, missing, solved=False)
     estimates = {
         name: Estimate(value=values[:, 0, k].copy(), uncertainty=widths[:, k].copy(), status=status)
@@ -239,7 +239,7 @@ def _judge(
     sizes = [float(np.prod(cells)) ** (-1 / len(cells)) for cells in case.meshes]
     rows = []
     for x, levels, found in zip(case.fills, samples, values, strict=True):
-        noise = rounding_bound(case=case, fill_ratio=float(x), samples=levels)
+        noise = case.rounding_bound(fill_ratio=float(x), samples=levels)
         row = zip(found.T, noise, strict=True)
         rows.append(
             [gci(values=v, sizes=sizes, formal_order=FORMAL_ORDER, round_off=float(n)) for v, n in row]

@@ -62,10 +62,8 @@ def turn_mean(
 ) -> Sample:
     """Solve on one mesh at every angle of gravity over half a turn and take the mean over the whole turn.
 
-    Args: `liquid`: without gravity. `fill_ratio`: x, above 0 and at most 1. `coarser`: sample on a mesh with
-        half the cells, whose surfaces are a good start.
-    Returns: The means; the other half of the turn is the mirror image of the first.
-    Raises: ValueError: a fill ratio outside (0, 1].
+    The other half of the turn is the mirror image of the first.
+    Args: `liquid`: without gravity. `coarser`: sample on half the cells, whose surfaces are a good start.
     Source: trapezoidal rule over a period, exact up to harmonics of the order of the number of samples.
     """
     angles, weights = _angles(turn)
@@ -95,10 +93,7 @@ def turn_mean(
 
 
 def empty_sample(*, moment_per_volume: float) -> Sample:
-    """Sample of a chamber without liquid: all zero but the moment that the first drop would bring.
-
-    Args: `moment_per_volume`: limit of dU/dV', kg/m^2.
-    """
+    """Sample of a chamber without liquid: all zero but the moment that the first drop would bring, kg/m^2."""
     values = np.zeros(WIDTH)
     values[QUANTITIES.index("moment_per_volume")] = moment_per_volume
     return replace(_failed(Status()), values=values)

@@ -21,7 +21,7 @@ import numpy as np
 
 from ringbalance.mesh.chamber import ChamberMesh
 from ringbalance.physics import deferred
-from ringbalance.physics.pressure.assembly import facet_points, load, mass, stiffness, volume_points
+from ringbalance.physics.pressure.assembly import facet_points, stiffness, volume_points
 from ringbalance.physics.pressure.linear import LinearSolution, solve_linear
 from ringbalance.physics.results import Statistics, Status
 from ringbalance.scene.arrays import FloatArray
@@ -42,6 +42,22 @@ class PressureProblem:
     """q(x, n), Pa/m, from places and outward unit normals."""
     surface_pressure: Callable[[FloatArray], FloatArray]
     """p_gas(x), Pa, gauge."""
+
+    def discretise(self, *, chamber: ChamberMesh) -> _DiscreteProblem:
+        """Matrix and load of the weak form; the free surface is left without a condition."""
+        unit, volume = chamber.length_scale, volume_points(chamber)
+        total = -(unit**2) * volume.load(self.source(unit * volume.points), unknowns=chamber.grid.size)
+        for name in chamber.boundaries:
+            if name != FREE_SURFACE:
+                total += self.wall_load(chamber=chamber, boundary=name)
+        return _DiscreteProblem(matrix=stiffness(chamber), load=total)
+
+    def wall_load(self, *, chamber: ChamberMesh, boundary: str) -> FloatArray:
+        """Part of the load that one boundary contributes, int q v, in the mesh's unit of length."""
+        unit = chamber.length_scale
+        facets = facet_points(chamber, boundary)
+        flux = self.wall_flux(unit * facets.points, facets.normals)
+        return unit * facets.load(flux, unknowns=chamber.grid.size)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,10 +86,7 @@ class RotatingLiquid:
         return self.density * force
 
     def problem(self) -> PressureProblem:
-        """The right-hand sides of this liquid's pressure problem.
-
-        Returns: f = 2 rho omega^2, q = rho (omega^2 r e_r + g) . n and the gas pressure.
-        """
+        """Its right-hand sides: f = 2 rho omega^2, q = rho (omega^2 r e_r + g) . n and the gas pressure."""
         source = 2 * self.density * self.angular_velocity**2
         return PressureProblem(
             source=lambda places: np.full(places.shape[1:], source),
@@ -120,10 +133,10 @@ def solve_pressure(
     Source: Eqs. 9 to 11 of the liquid-ring paper as a boundary-value problem; quadratic elements, order three
     in the pressure and four in integrals of it, as long as the geometry is quadratic.
     """
-    discrete = discretise(chamber=chamber, problem=problem)
+    discrete = problem.discretise(chamber=chamber)
     surface = chamber.grid[0].ravel()
     pressure = np.zeros(discrete.load.size)
-    pressure[surface] = problem.surface_pressure(places(chamber)[:, surface])
+    pressure[surface] = problem.surface_pressure(chamber.places[:, surface])
     free = chamber.grid[1:].ravel()
     rows = discrete.matrix[free]
     linear = solve_linear(
@@ -135,37 +148,6 @@ def solve_pressure(
     )
     pressure[free] = linear.values
     return _solution(chamber, discrete, pressure, linear)
-
-
-def discretise(*, chamber: ChamberMesh, problem: PressureProblem) -> _DiscreteProblem:
-    """Matrix and load of the weak form; the free surface is left without a condition.
-
-    Args: `chamber`: mesh with its named boundaries. `problem`: right-hand sides.
-    Returns: Matrix and load in the mesh's unit of length, pressures in Pa.
-    """
-    unit, volume = chamber.length_scale, volume_points(chamber)
-    total = -(unit**2) * load(volume, problem.source(unit * volume.points), unknowns=chamber.grid.size)
-    for name in chamber.boundaries:
-        if name != FREE_SURFACE:
-            total += wall_load(chamber=chamber, problem=problem, boundary=name)
-    return _DiscreteProblem(matrix=stiffness(chamber), load=total)
-
-
-def wall_load(*, chamber: ChamberMesh, problem: PressureProblem, boundary: str) -> FloatArray:
-    """Part of the load that one boundary contributes, int q v.
-
-    Args: `chamber`: mesh with its named boundaries. `problem`: right-hand sides.
-    Returns: Vector over the nodes, in the mesh's unit of length.
-    """
-    unit = chamber.length_scale
-    facets = facet_points(chamber, boundary)
-    flux = problem.wall_flux(unit * facets.points, facets.normals)
-    return unit * load(facets, flux, unknowns=chamber.grid.size)
-
-
-def places(chamber: ChamberMesh) -> FloatArray:
-    """Places of the nodes. Returns: m, shape (dimension, nodes)."""
-    return np.asarray(chamber.length_scale * chamber.nodes)
 
 
 def _solution(
@@ -184,12 +166,9 @@ def _solution(
 def _surface_gradient(
     chamber: ChamberMesh, discrete: _DiscreteProblem, pressure: FloatArray
 ) -> LinearSolution:
-    """Flux that balances the weak form on the surface: more accurate than the gradient of the field.
-
-    In units of the mesh.
-    """
+    """Flux that balances the weak form on the surface, in mesh units: better than the field's gradient."""
     nodes = chamber.grid[0].ravel()
     residual = discrete.matrix[nodes] @ pressure - discrete.load[nodes]
     # The nodes of the free surface are the first.
-    matrix = mass(facet_points(chamber, FREE_SURFACE), unknowns=nodes.size)
+    matrix = facet_points(chamber, FREE_SURFACE).mass(unknowns=nodes.size)
     return solve_linear(matrix, residual, dimension=chamber.dimension)

@@ -52,10 +52,7 @@ def linear_prolongation(chamber: ChamberMesh, *, pinned_surface: bool) -> csr_ma
 
 
 def _short_axes(chamber: ChamberMesh) -> list[bool]:
-    """Axes along which cells are at most eight times as long as along the shortest, in the middle of the
-
-    mesh.
-    """
+    """Axes along which cells in the middle are at most eight times as long as along the shortest."""
     places = chamber.nodes[:, chamber.grid]
     lengths = []
     for axis, count in enumerate(chamber.cells):

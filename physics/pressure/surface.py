@@ -14,16 +14,13 @@ import numpy as np
 from ringbalance.mesh.chamber import ChamberMesh, chamber_mesh
 from ringbalance.mesh.geometry import half_angle, liquid_area, surface_radius
 from ringbalance.physics import deferred
-from ringbalance.physics.pressure.assembly import at_points, facet_points, volume_points
+from ringbalance.physics.pressure.assembly import facet_points, volume_points
 from ringbalance.physics.pressure.linear import solve_linear
 from ringbalance.physics.pressure.solve import (
     FREE_SURFACE,
     PressureSolution,
     RotatingLiquid,
-    discretise,
-    places,
     solve_pressure,
-    wall_load,
 )
 from ringbalance.physics.results import Statistics, Status, StatusCode
 from ringbalance.physics.splines import CubicSpline
@@ -171,11 +168,7 @@ def _settled(move: float, before: float) -> bool:
 
 
 def refined_surface(radius: FloatArray) -> FloatArray:
-    """Surface radii carried to a mesh with twice the cells along each direction of the surface.
-
-    Args: `radius`: at the surface nodes of the coarser mesh, m.
-    Returns: Cubic interpolation at the nodes of the finer one, m; a start, not a result.
-    """
+    """Surface radii carried to a mesh with twice the cells by cubic interpolation, m: only a start."""
     for axis, count in enumerate(radius.shape):
         at, lines = np.arange(count, dtype=np.float64), np.moveaxis(radius, axis, -1)
         finer = np.linspace(0, count - 1, 2 * count - 1)
@@ -190,14 +183,13 @@ def refined_surface(radius: FloatArray) -> FloatArray:
 def surface_flux_mismatch(*, solution: PressureSolution, liquid: RotatingLiquid) -> float:
     """How far the flux through the free surface is from the force on it, root mean square, relative.
 
-    Args: `solution`: with the gas pressure imposed on the surface. `liquid`: whose force should balance it.
-    Returns: |n.grad p - rho (omega^2 r + g).n| / |rho (omega^2 r + g).n| over the surface.
+    |n.grad p - rho (omega^2 r + g).n| / |rho (omega^2 r + g).n| over the surface.
     """
     facets = facet_points(solution.chamber, FREE_SURFACE)
     gradient = np.zeros(solution.pressure.size)
     gradient[solution.chamber.grid[0]] = solution.surface_gradient
     force = _normal_force(liquid, solution.chamber.length_scale * facets.points, facets.normals)
-    difference = at_points(facets, gradient) - force
+    difference = facets.at_points(gradient) - force
     return float(np.sqrt(np.sum(facets.weights * difference**2) / np.sum(facets.weights * force**2)))
 
 
@@ -241,9 +233,9 @@ def _far_too_thin(disc: Disc, liquid: RotatingLiquid, radius: float) -> bool:
 def _free_pressure(chamber: ChamberMesh, liquid: RotatingLiquid) -> FloatArray:
     """Pressure up to a constant, with the normal force given on the whole boundary."""
     problem = liquid.problem()
-    discrete = discretise(chamber=chamber, problem=problem)
+    discrete = problem.discretise(chamber=chamber)
     on_surface = replace(problem, wall_flux=lambda x, n: _normal_force(liquid, x, n))
-    load = discrete.load + wall_load(chamber=chamber, problem=on_surface, boundary=FREE_SURFACE)
+    load = discrete.load + on_surface.wall_load(chamber=chamber, boundary=FREE_SURFACE)
     load -= load.mean()  # what quadrature leaves of the balance would become a spike at the pinned node
     free = chamber.grid.ravel()[:-1]
     linear = solve_linear(
@@ -262,10 +254,10 @@ def _wanted_move(chamber: ChamberMesh, liquid: RotatingLiquid, target: float) ->
     pressure, unit = _free_pressure(chamber, liquid), chamber.length_scale
     facets = facet_points(chamber, FREE_SURFACE)
     compliance = facets.weights / _normal_force(liquid, unit * facets.points, facets.normals)
-    here = at_points(facets, pressure)
+    here = facets.at_points(pressure)
     shortage = unit * (target - _measure(chamber))
     level = (shortage + np.sum(compliance * here)) / np.sum(compliance)
-    nodes = places(chamber)[:, chamber.grid[0]]
+    nodes = chamber.places[:, chamber.grid[0]]
     radial = np.zeros_like(nodes)
     radial[:2] = nodes[:2] / np.hypot(nodes[0], nodes[1])
     return np.asarray((level - pressure[chamber.grid[0]]) / _normal_force(liquid, nodes, radial))

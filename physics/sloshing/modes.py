@@ -11,14 +11,13 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import brentq
 
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.convergence.grid import gci
 from ringbalance.physics.results import Estimate, Statistics
-from ringbalance.physics.sloshing.system import SloshingSystem, sloshing_system
+from ringbalance.physics.sloshing.system import sloshing_system
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc
 
@@ -122,29 +121,9 @@ def resonant_fills(
     return tuple(found)
 
 
-def natural_frequencies(system: SloshingSystem) -> FloatArray:
-    """All positive s of one mesh's system, ascending.
-
-    With S = L L^T and y = L^T psi the oscillator y'' + 2 C y' + A y = 0 is d/dt (y', A^(1/2) y) = B (...)
-    with a real antisymmetric B, whose eigenvalues are +- i s.
-    """
-    lower = cholesky(system.kinetic, lower=True)
-
-    def reduced(matrix: FloatArray) -> FloatArray:
-        half = solve_triangular(lower, matrix, lower=True)
-        return np.asarray(solve_triangular(lower, half.T, lower=True).T, dtype=np.float64)
-
-    turning, stiff = reduced(system.coriolis), reduced(system.centrifugal)
-    squares, shapes = np.linalg.eigh((stiff + stiff.T) / 2)
-    root = (shapes * np.sqrt(np.maximum(squares, 0.0))) @ shapes.T
-    first_order = np.block([[turning.T - turning, -root], [root, np.zeros_like(root)]])
-    ratios = np.linalg.eigvalsh(1j * first_order)
-    return np.asarray(ratios[squares.size :], dtype=np.float64)
-
-
 def _lowest(disc: Disc, a: float, cells: tuple[int, int], modes: int) -> FloatArray:
     system = sloshing_system(disc=disc, surface_radius=a, cells=cells)
-    ratios = natural_frequencies(system)
+    ratios = system.natural_frequencies()
     if ratios.size < modes:
         raise ValueError(f"a mesh of {cells} cells has {ratios.size} modes, not {modes}")
     return ratios[:modes]

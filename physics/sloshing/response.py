@@ -121,17 +121,14 @@ def _answer(system: SloshingSystem, ratio: float, ekman: float) -> tuple[float, 
         np.linalg.solve(matrix, 1j * ratio * forcing)
         for matrix in (swinging + layers, swinging, system.centrifugal.astype(np.complex128))
     )
-    moment, reference, undamped = (_size(system, psi) for psi in (damped, still, free))
+    # Of the swing of the liquid's first moment, both components.
+    swings = (float(np.linalg.norm(system.outflow[1:] @ psi)) for psi in (damped, still, free))
+    moment, reference, undamped = swings
     displacement = float(np.abs(system.flux @ damped).max()) / ratio
     pressure = (
         system.wall_drive - 1j * ratio * (system.potential @ damped) + 2 * (system.surface_mean @ damped)
     )
     return moment / reference, displacement, moment / undamped, float(abs(pressure / system.wall_drive))
-
-
-def _size(system: SloshingSystem, psi: npt.NDArray[np.complexfloating]) -> float:
-    """Of the swing of the liquid's first moment, both components."""
-    return float(np.linalg.norm(system.outflow[1:] @ psi))
 
 
 def _status(fills: FloatArray, depth: FloatArray, amplitude: FloatArray, beyond: FloatArray) -> Status:

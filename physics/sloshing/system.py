@@ -29,6 +29,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import cholesky, solve_triangular
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
@@ -69,6 +70,25 @@ class SloshingSystem:
     follows gravity at once."""
     unknowns: int
     """Of the mesh, before condensation."""
+
+    def natural_frequencies(self) -> FloatArray:
+        """All positive s, ascending.
+
+        With S = L L^T and y = L^T psi the oscillator y'' + 2 C y' + A y = 0 is d/dt (y', A^(1/2) y) = B (...)
+        with a real antisymmetric B, whose eigenvalues are +- i s.
+        """
+        lower = cholesky(self.kinetic, lower=True)
+
+        def reduced(matrix: FloatArray) -> FloatArray:
+            half = solve_triangular(lower, matrix, lower=True)
+            return np.asarray(solve_triangular(lower, half.T, lower=True).T, dtype=np.float64)
+
+        turning, stiff = reduced(self.coriolis), reduced(self.centrifugal)
+        squares, shapes = np.linalg.eigh((stiff + stiff.T) / 2)
+        root = (shapes * np.sqrt(np.maximum(squares, 0.0))) @ shapes.T
+        first_order = np.block([[turning.T - turning, -root], [root, np.zeros_like(root)]])
+        ratios = np.linalg.eigvalsh(1j * first_order)
+        return np.asarray(ratios[squares.size :], dtype=np.float64)
 
 
 def sloshing_system(*, disc: Disc, surface_radius: float, cells: tuple[int, int]) -> SloshingSystem:

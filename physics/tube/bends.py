@@ -102,18 +102,13 @@ def turbulent_bend_loss(*, bend: Bend, bore: float, friction_factor: npt.ArrayLi
 
 
 def bend_in_range(*, bend: Bend, bore: float) -> bool:
-    """Whether a bend's shape lies within the formula's range.
-
-    Returns: True for an angle up to 180 degrees and r/d of at least 0.5.
-    Source: Rennels and Hudson, Pipe Flow (2012).
-    """
+    """Whether a bend lies within the formula's range: an angle up to 180 degrees and r/d of at least 0.5."""
     return bend.angle <= math.pi * (1 + 1e-9) and bend.radius >= bore / 2
 
 
 def straight_length(*, tube: Tube) -> float:
-    """Length of the tube without the arcs of its bends, whose friction their loss includes.
+    """Length of the tube, m, without the arcs of its bends, whose friction their loss includes.
 
-    Returns: Length, m.
     Raises: ValueError: arcs longer than the tube.
     """
     straight = tube.length - sum(b.angle * b.radius for b in tube.bends)

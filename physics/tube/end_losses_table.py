@@ -39,10 +39,7 @@ class _EndTable:
 
 @lru_cache(maxsize=2)
 def end_table(end: str) -> _EndTable:
-    """The table of one end, as it comes with the package.
-
-    Args: `end`: "entrance" or "exit".
-    """
+    """The table of the "entrance" or the "exit", as it comes with the package."""
     path = resources.files("ringbalance.physics") / "data" / "end_losses.csv"
     lines = [x for x in path.read_text(encoding="utf-8").splitlines() if not x.startswith("#")]
     rows = [row for row in csv.DictReader(lines) if row["end"] == end]
@@ -103,13 +100,9 @@ def laminar_entrance_loss(*, reynolds: npt.ArrayLike) -> Estimate:
 
 
 def laminar_exit_loss(*, reynolds: npt.ArrayLike) -> Estimate:
-    """Loss of a sharp-edged exit into a large reservoir, laminar and developed.
+    """Loss of a sharp-edged exit into a large reservoir, laminar and developed; otherwise as the entrance.
 
     K_exit = 2 (p_mouth - p_reservoir)/(rho U^2) with the developed line of p carried on to the mouth; about
     zero at high Re, where the stream leaves with the pressure of the reservoir.
-    Returns: Estimate of K_exit, the same shape; OUT_OF_RANGE above Re = 2000.
-    Raises: ValueError: a Reynolds number that is not finite and above zero.
-    Range: 0 < Re <= 2000.
-    Source: finite elements, `end_losses`.
     """
     return _end_loss("exit", reynolds)

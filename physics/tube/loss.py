@@ -13,7 +13,7 @@ import numpy.typing as npt
 from ringbalance.physics.results import Estimate, Status, StatusCode
 from ringbalance.physics.tube.range import FULLY_TURBULENT_REYNOLDS, range_notes
 from ringbalance.physics.tube.rotation import STRAIGHT_CRITICAL_REYNOLDS
-from ringbalance.physics.tube.state import TubeState, tube_state, upstream_loss
+from ringbalance.physics.tube.state import TubeState, tube_state
 from ringbalance.physics.tube.uncertainty import uncertainty_parts
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import InputUncertainty, Liquid, Tube
@@ -94,7 +94,7 @@ def tube_loss(
         flow_state=flow_states(state),
         in_range=np.asarray(~outside),
         range_notes=MappingProxyType(dict(notes)),
-        upstream_k=upstream_loss(tube=tube, state=state),
+        upstream_k=state.upstream_loss(tube=tube),
         kinetic_factor=state.kinetic_factor,
     )
 
@@ -112,11 +112,7 @@ def _estimate(state: TubeState, parts: Mapping[str, FloatArray], stretched: bool
 
 
 def flow_states(state: TubeState) -> npt.NDArray[np.str_]:
-    """Laminar, transitional or turbulent, by the critical Re of the turning tube.
-
-    Returns: Values of `FlowState`, the shape of the state's arrays.
-    Source: `critical_reynolds`.
-    """
+    """Laminar, transitional or turbulent, by the critical Re of the turning tube: values of `FlowState`."""
     critical = state.critical_ratio * STRAIGHT_CRITICAL_REYNOLDS
     turbulent = state.critical_ratio * FULLY_TURBULENT_REYNOLDS
     return np.select(

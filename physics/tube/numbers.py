@@ -9,10 +9,7 @@ from ringbalance.scene.arrays import FloatArray
 
 
 def reynolds_number(*, velocity: npt.ArrayLike, bore: float, kinematic_viscosity: float) -> FloatArray:
-    """Reynolds number of the tube, Re = |u| d/nu.
-
-    Args: `velocity`: u, mean over the bore, m/s, any shape.
-    """
+    """Reynolds number of the tube, Re = |u| d/nu, u the mean over the bore."""
     return np.asarray(np.abs(np.asarray(velocity, dtype=np.float64)) * bore / kinematic_viscosity)
 
 

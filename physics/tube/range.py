@@ -8,7 +8,8 @@ import numpy as np
 
 from ringbalance.physics.tube.bends import bend_in_range
 from ringbalance.physics.tube.ends import LAMINAR_ENTRY_LENGTH
-from ringbalance.physics.tube.rotation import STRAIGHT_CRITICAL_REYNOLDS, rotation_in_range
+from ringbalance.physics.tube.rotation import STRAIGHT_CRITICAL_REYNOLDS
+from ringbalance.physics.tube.rotation_table import rotation_table_covers
 from ringbalance.physics.tube.state import TubeState
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Tube
@@ -24,13 +25,7 @@ VELOCITIES: Final = (0.1, 20.0)
 
 
 def range_notes(*, tube: Tube, state: TubeState, velocity: FloatArray) -> dict[str, BoolArray]:
-    """Say in a sentence each why, and mark where, a correlation is stretched.
-
-    Args: `tube`: the tube; nothing is stretched when its k is prescribed. `state`: its terms.
-        `velocity`: u, m/s, the shape of the state's arrays.
-    Returns: For each sentence that holds anywhere, where it holds.
-    Source: the ranges stand with the correlations.
-    """
+    """For each sentence that holds anywhere on why a correlation is stretched, where it holds."""
     re, rotation = state.reynolds, state.rotation_reynolds
     laminar = re < state.critical_ratio * STRAIGHT_CRITICAL_REYNOLDS
     unsteady = ~laminar & (re < state.critical_ratio * FULLY_TURBULENT_REYNOLDS)
@@ -38,22 +33,17 @@ def range_notes(*, tube: Tube, state: TubeState, velocity: FloatArray) -> dict[s
     notes = {"velocity outside 0.1 to 20 m/s": (velocity < low * (1 - 1e-9)) | (velocity > high * (1 + 1e-9))}
     if tube.drag_coefficient is None:
         shapes = all(bend_in_range(bend=b, bore=tube.bore) for b in tube.bends)
-        untested = ~rotation_in_range(reynolds=re, rotation_reynolds=rotation)
+        untested = ~rotation_table_covers(reynolds=re, rotation_reynolds=rotation)
         developing = LAMINAR_ENTRY_LENGTH * re * tube.bore > tube.length
         notes |= {
             "friction: Re above 1e6": re > LARGEST_REYNOLDS,
             "friction: relative roughness above 0.05": np.full(
                 re.shape, tube.roughness > LARGEST_ROUGHNESS * tube.bore
             ),
-            "rotation: laminar factor beyond Kl = 1e7 or R_Om = 1e5": ~_turbulent(laminar, unsteady)
-            & untested,
+            "rotation: laminar factor beyond Kl = 1e7 or R_Om = 1e5": (laminar | unsteady) & untested,
             "rotation: critical Re extrapolated beyond R_Om = 2000": unsteady & (rotation > 2000),
             "bends: scaled from one computed shape in laminar flow": (laminar | unsteady) & bool(tube.bends),
             "bends: angle above 180 deg or radius below d/2": np.full(re.shape, not shapes),
             "ends: tube too short for a developed laminar profile": laminar & developing,
         }
     return {text: where for text, where in notes.items() if np.any(where)}
-
-
-def _turbulent(laminar: BoolArray, unsteady: BoolArray) -> BoolArray:
-    return np.asarray(~laminar & ~unsteady)

@@ -13,12 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.physics.results import Estimate
-from ringbalance.physics.tube.rotation_table import (
-    laminar_ratio,
-    rotating_friction_ratio,
-    rotation_table_covers,
-)
-from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.physics.tube.rotation_table import laminar_ratio, rotating_friction_ratio
+from ringbalance.scene.arrays import FloatArray
 
 __all__ = [
     "STRAIGHT_CRITICAL_REYNOLDS",
@@ -26,7 +22,6 @@ __all__ = [
     "curved_friction_ratio",
     "laminar_ratio",
     "rotating_friction_ratio",
-    "rotation_in_range",
     "turbulent_friction_ratio",
 ]
 
@@ -36,14 +31,6 @@ STRAIGHT_CRITICAL_REYNOLDS: Final = 1070 * 28**0.23
 _TURBULENT_JOIN: Final = 500.0
 _EQUAL_FORCE: Final = (1.0, 0.25)
 """T of the curved tube that is like the turning one, over Kt: by equal forces, and by equal gradients."""
-
-
-def rotation_in_range(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike) -> BoolArray:
-    """Whether the laminar rotation ratio rests on finite-element solutions: Kl <= 1e7 and R_Om <= 1e5.
-
-    Source: the table of `rotating_section_table`.
-    """
-    return rotation_table_covers(reynolds=reynolds, rotation_reynolds=rotation_reynolds)
 
 
 def turbulent_friction_ratio(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike) -> Estimate:

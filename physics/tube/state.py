@@ -68,15 +68,23 @@ class TubeState:
         """Sum of the terms."""
         return np.asarray(sum(self.terms.values()), dtype=np.float64)
 
+    def upstream_loss(self, *, tube: Tube) -> FloatArray:
+        """The part of k between the driven chamber and the crest.
+
+        Entrance, the share `hump_position` of friction, rotation and extra loss, and the bends before the
+        crest when all are spread evenly along the path; of a prescribed k the share `hump_position`.
+        Source: energy balance from the chamber to the crest; the scene does not say where the bends lie.
+        """
+        share = tube.hump_position
+        if "decree" in self.terms:
+            return np.asarray(share * self.terms["decree"], dtype=np.float64)
+        along = share * (self.terms["friction"] + self.terms["rotation"] + self.terms["extra"])
+        before = [k for i, k in enumerate(self.bends) if (i + 0.5) / len(self.bends) < share]
+        return np.asarray(self.terms["entrance"] + along + sum(before), dtype=np.float64)
+
 
 def tube_state(*, tube: Tube, liquid: Liquid, angular_velocity: float, velocity: npt.ArrayLike) -> TubeState:
-    """Evaluate every term of k.
-
-    Args: `angular_velocity`: omega, rad/s. `velocity`: u, m/s, any shape, positive.
-    Returns: TubeState, arrays of the shape of `velocity`.
-    Raises: ValueError: arcs longer than the tube.
-    Source: the sources of the terms stand with them.
-    """
+    """Every term of k at velocities above zero, m/s, any shape. Raises: ValueError: as `straight_length`."""
     nu = liquid.kinematic_viscosity
     return tube_state_at(
         tube=tube,
@@ -200,18 +208,3 @@ def _bends(
 
     known = {bend: loss(bend) for bend in set(tube.bends)}
     return [known[bend] for bend in tube.bends]
-
-
-def upstream_loss(*, tube: Tube, state: TubeState) -> FloatArray:
-    """The part of k between the driven chamber and the crest.
-
-    Entrance, the share `hump_position` of friction, rotation and extra loss, and the bends that lie before
-    the crest when all are spread evenly along the path; of a prescribed k the share `hump_position`.
-    Source: energy balance from the chamber to the crest; the scene does not say where the bends lie.
-    """
-    share = tube.hump_position
-    if "decree" in state.terms:
-        return np.asarray(share * state.terms["decree"], dtype=np.float64)
-    along = share * (state.terms["friction"] + state.terms["rotation"] + state.terms["extra"])
-    before = [k for i, k in enumerate(state.bends) if (i + 0.5) / len(state.bends) < share]
-    return np.asarray(state.terms["entrance"] + along + sum(before), dtype=np.float64)

@@ -7,7 +7,6 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.mesh.chamber import default_cells
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_area, surface_radius
 from ringbalance.reduced_model.chamber.values import by_closed_form, by_quadrature
 from ringbalance.reduced_model.contribution import Contribution
@@ -21,8 +20,6 @@ PLATES: Final = "plates between the chambers"
 RIPPLE: Final = "gravity, ripple at 1x"
 MEAN: Final = "gravity, mean over a turn"
 SLOSHING: Final = "sloshing at 1x"
-COARSE_MESH: Final = "coarse mesh"
-FINE_MESH: Final = "fine mesh"
 
 SURFACE_TENSION: Final = 0.073
 """Of water at 20 degC against air, N/m: taken for every ordinary liquid, as an upper bound."""
@@ -158,18 +155,6 @@ def resonant_fill(scene: Scene) -> float | None:
     return float(liquid_area(disc=disc, surface_radius=radius)) * disc.axial_width / chamber_volume(disc=disc)
 
 
-def mesh_error(scene: Scene, angular_cells: int) -> float:
-    """Discretisation error of a mesh, relative: an arc drawn by cells of angle h, (h/2)^4/32 R2/depth.
-
-    Returns: Share of the wall pressure at a fifth of the largest fill.
-    Source: remainder of a quadratic interpolation of a circle.
-    """
-    outer = scene.disc.outer_radius
-    surface = float(surface_radius(disc=scene.disc, fill_ratio=0.2 * scene.disc.max_fill_ratio))
-    h = scene.disc.central_angle / angular_cells
-    return (h / 2) ** 4 / 32 * outer / (outer - surface)
-
-
 def chamber_contributions(scene: Scene, fills: FloatArray) -> Mapping[str, Terms]:
     """Contributions to wall pressure and to moment with lambda, the largest over fills."""
     rows = [_at(scene, float(x)) for x in fills]
@@ -203,7 +188,7 @@ def _at(scene: Scene, fill: float) -> Mapping[str, Mapping[str, float]]:
 
 def _terms(scene: Scene, rows: list[Mapping[str, float]], part: str) -> Terms:
     largest = {name: max((row[name] for row in rows), default=0.0) for name in (RIPPLE, SLOSHING, MEAN)}
-    disc, cells = scene.disc, default_cells(disc=scene.disc)[1]
+    disc = scene.disc
     bare = paper.sector_area(disc=disc) * disc.axial_width
     strips = 1 - chamber_volume(disc=disc) / bare
     pressures = part == "pressures"
@@ -225,13 +210,6 @@ def _terms(scene: Scene, rows: list[Mapping[str, float]], part: str) -> Terms:
             "order (G/a)^2, by quadrature",
             "the same surface, mean over a turn",
         ),
-        (
-            COARSE_MESH,
-            mesh_error(scene, max(4, cells // 2)),
-            "(h/2)^4/32 R2/depth",
-            "a circle's interpolation",
-        ),
-        (FINE_MESH, mesh_error(scene, cells), "(h/2)^4/32 R2/depth", "a circle's interpolation"),
     )
     return {
         term: Contribution(term=term, value=float(value), formula=formula, source=source)

@@ -1,18 +1,12 @@
-"""Wall pressure, moment and lambda of a chamber at one fill, by every model there is, one function each."""
+"""Wall pressure, moment and lambda of a chamber at one fill, by formula or quadrature."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from dataclasses import dataclass
 
 import numpy as np
 
-from ringbalance.mesh.chamber import default_cells
-from ringbalance.physics import deferred
-from ringbalance.physics.pressure.ring import RingQuantities
 from ringbalance.reduced_model.chamber.inputs import chamber_closed_forms
-from ringbalance.reduced_model.chamber.scene_ring import scene_ring
 from ringbalance.reduced_model.chamber.tilted_ring import tilted_ring
 from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.scene.arrays import FloatArray
@@ -97,72 +91,3 @@ def by_quadrature(scene: Scene, fill: float) -> ChamberValues:
         moment_ripple=float(found.moment_ripple[0]),
         moment_per_mass=2 * float(found.moment_per_volume[0]) / scene.liquid.density,
     )
-
-
-def by_elements(scene: Scene, fill: float, *, cells: tuple[int, ...], gravity: bool) -> ChamberValues:
-    """Finite elements on a mesh and the two coarser ones that its grid convergence needs.
-
-    Source: `ring_quantities`.
-    """
-    found = _elements_at(scene, fill, cells=cells, gravity=gravity)
-    return ChamberValues(
-        wall_pressure=float(found.wall_pressure.value[0]),
-        wall_pressure_ripple=float(found.ripple["wall_pressure"][0]),
-        moment=float(found.moment.value[0]),
-        moment_ripple=float(found.ripple["moment"][0]),
-        moment_per_mass=2 * float(found.moment_per_volume.value[0]) / scene.liquid.density,
-    )
-
-
-def with_sloshing(
-    scene: Scene, fill: float, *, still: Callable[[Scene, float], ChamberValues]
-) -> ChamberValues:
-    """Values of a quasi-static model with its ripples as the swinging liquid makes them.
-
-    Returns: ChamberValues; the ripples times their amplifications.
-    Source: `sloshing_response`.
-    """
-    found = still(scene, fill)
-    of_pressure, of_moment = _sloshing_factors(scene, fill)
-    return replace(
-        found,
-        wall_pressure_ripple=of_pressure * found.wall_pressure_ripple,
-        moment_ripple=of_moment * found.moment_ripple,
-    )
-
-
-def forget_solves() -> None:
-    """Do every solve again when it is next asked for, so that it can be timed."""
-    _elements_at.cache_clear()
-    _sloshing_factors.cache_clear()
-
-
-def sloshing_meshes(scene: Scene) -> tuple[tuple[int, int], ...]:
-    """Meshes on which the swinging liquid is solved, finest first: half as fine as for frequencies."""
-    radial, angular = default_cells(disc=scene.disc)
-    return tuple((radial // k, angular // k) for k in (1, 2, 4))
-
-
-@lru_cache(maxsize=256)
-def _sloshing_factors(scene: Scene, fill: float) -> tuple[float, float]:
-    """How much the swinging liquid enlarges gravity's ripples, by finite elements.
-
-    Returns: Amplifications of the wall pressure and of the moment.
-    Source: `sloshing_response`.
-    """
-    found = deferred.sloshing_response(
-        disc=scene.disc,
-        fill_ratio=[fill],
-        angular_velocity=abs(scene.rotor.speed),
-        kinematic_viscosity=scene.liquid.kinematic_viscosity,
-        gravity=scene.environment.gravity,
-        cells=sloshing_meshes(scene),
-    )
-    return float(found.pressure_amplification.value[0]), float(found.amplification.value[0])
-
-
-@lru_cache(maxsize=256)
-def _elements_at(scene: Scene, fill: float, *, cells: tuple[int, ...], gravity: bool) -> RingQuantities:
-    """The finite elements of `by_elements`, with all they tell."""
-    meshes = tuple(tuple(max(1, n // k) for n in cells) for k in (1, 2, 4))
-    return scene_ring(scene, fill_ratio=[fill], gravity=gravity, cells=meshes)

@@ -25,6 +25,33 @@ class DirectedState:
     downstream_uncertainty: float
     """The same downstream."""
 
+    def margin(self, *, law: CalibratedLaw) -> tuple[float, float] | tuple[None, None]:
+        """`siphon_margin` over the cavity of a primed tube, Pa; both None without a crest.
+
+        The state is that in the direction of the driving pressure.
+        """
+        crest, head = law.path.crest, law.heads.return_hump_head if self.reverse else law.heads.hump_head
+        if crest is None or head is None:
+            return None, None
+        driving, (low, high) = np.asarray(self.ends.driving_pressure()), crest.cavity_bounds(self.ends)
+        margin, width = siphon_margin(
+            path=law.path,
+            heads=law.heads,
+            hump_head=head,
+            inputs=law.inputs,
+            drive=Drive(
+                ends=self.ends,
+                upstream_uncertainty=self.upstream_uncertainty,
+                downstream_uncertainty=self.downstream_uncertainty,
+                primed=np.asarray(True),
+                allowed=np.asarray(True),
+            ),
+            at_rest=np.asarray(crest.separation_margin(self.ends)),
+            spread=np.asarray(max(crest.released, 1 - crest.released) * (high - low)),
+            velocity=velocity_of(table=law.heads.head, head=driving / law.density, where=driving > 0),
+        )
+        return float(margin), float(width)
+
 
 def directed_state(
     *, law: CalibratedLaw, fills: tuple[float, float], gas_pressure: float, reverse: bool
@@ -46,31 +73,3 @@ def directed_state(
         upstream_uncertainty=upstream,
         downstream_uncertainty=downstream,
     )
-
-
-def margin_of(*, law: CalibratedLaw, state: DirectedState) -> tuple[float, float] | tuple[None, None]:
-    """`siphon_margin` of one state over the cavity of a primed tube, Pa; both None without a crest.
-
-    Args: `state`: in the direction of the driving pressure.
-    """
-    crest, head = law.path.crest, law.heads.return_hump_head if state.reverse else law.heads.hump_head
-    if crest is None or head is None:
-        return None, None
-    driving, (low, high) = np.asarray(state.ends.driving_pressure()), crest.cavity_bounds(state.ends)
-    margin, width = siphon_margin(
-        path=law.path,
-        heads=law.heads,
-        hump_head=head,
-        inputs=law.inputs,
-        drive=Drive(
-            ends=state.ends,
-            upstream_uncertainty=state.upstream_uncertainty,
-            downstream_uncertainty=state.downstream_uncertainty,
-            primed=np.asarray(True),
-            allowed=np.asarray(True),
-        ),
-        at_rest=np.asarray(crest.separation_margin(state.ends)),
-        spread=np.asarray(max(crest.released, 1 - crest.released) * (high - low)),
-        velocity=velocity_of(table=law.heads.head, head=driving / law.density, where=driving > 0),
-    )
-    return float(margin), float(width)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 
@@ -42,8 +41,6 @@ class OperatingPoint:
     """Expanded uncertainty (95 %)."""
     k_model_uncertainty: float | None
     """Its part by correlations, without the inputs."""
-    k_parts: Mapping[str, float]
-    """Terms of k, by name."""
     priming_vented: float | None
     """Gauge pressure that starts a flow, crest gas vented, driven chamber empty, Pa; None: no crest."""
     priming_trapped: float | None
@@ -93,7 +90,6 @@ def operating_point(*, scene: Scene, law: CalibratedLaw) -> OperatingPoint:
         k=None if loss is None else float(loss.k.value),
         k_uncertainty=None if loss is None else float(loss.k.uncertainty),
         k_model_uncertainty=None if loss is None else _model_part(loss.uncertainty_parts),
-        k_parts=MappingProxyType({} if loss is None else {n: float(k) for n, k in loss.terms.items()}),
         priming_vented=None if vented is None else float(vented),
         priming_trapped=None if trapped is None else float(trapped),
         stall=float(np.maximum(siphon_stall_pressure(law=law, fill_ratio=0.0), 0.0)),

@@ -12,7 +12,7 @@ from ringbalance.physics.tube.state import TubeState, tube_state
 from ringbalance.reduced_model.law.building import column_pressure
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Flow, Regime
-from ringbalance.reduced_model.operating.crest_margin import DirectedState, directed_state, margin_of
+from ringbalance.reduced_model.operating.crest_margin import DirectedState, directed_state
 from ringbalance.reduced_model.operating.rest import rest
 from ringbalance.reduced_model.tube.path import (
     Places,
@@ -60,8 +60,6 @@ class HumpProfile:
     it is that of a primed tube."""
     cavitation_margin_uncertainty: float | None
     """Expanded uncertainty (95 %), Pa."""
-    lowest_pressure: float | None
-    """Of the liquid inside the tube, gauge, Pa; None when there is none."""
 
 
 def hump_profile(
@@ -101,7 +99,7 @@ def hump_profile(
     )
     state = backward if forward.ends.driving_pressure() < 0 else forward
     tube = reversed_tube(scene.tube) if state.reverse else scene.tube
-    margin = margin_of(law=law, state=state)
+    margin = state.margin(law=law)
     if Regime(int(flow.regime)) is Regime.BLOCKED and not bool(flow.primed):
         line = _blocked(scene, law, forward, primed, points)
     else:
@@ -133,7 +131,6 @@ def _profile(
     start, end = crest_span(tube)
     crest = start if state.reverse else end
     place = int(np.argmin(np.abs(line.share - crest)))
-    inside = line.pressure[1:-1][line.full[1:-1]]
     return HumpProfile(
         path=line.share * tube.length,
         radius=path_radius(tube=tube, share=line.share),
@@ -146,7 +143,6 @@ def _profile(
         cavity_pressure=_cavity_pressure(law, state),
         cavitation_margin=margin[0],
         cavitation_margin_uncertainty=margin[1],
-        lowest_pressure=float(np.min(inside)) if inside.size else None,
     )
 
 

@@ -14,7 +14,7 @@ from ringbalance.scene.models import Scene
 
 
 @dataclass(frozen=True, kw_only=True)
-class HeldLiquid:
+class _HeldLiquid:
     """Liquid in a tube in one state."""
 
     state: str
@@ -36,11 +36,11 @@ class HeldLiquid:
 class TubeLiquid:
     """Liquid in the tube of a pair around its first injection, at equal fills."""
 
-    before: HeldLiquid
+    before: _HeldLiquid
     """At rest, gas over the crest."""
-    flowing: HeldLiquid
+    flowing: _HeldLiquid
     """Under the scene's gas pressure."""
-    after: HeldLiquid
+    after: _HeldLiquid
     """At rest after venting: a column that stays whole, or legs on both sides of a cavity or of gas."""
     flowing_vibration: float
     """Change of the vibration's amplitude while the tube flows, at most, m."""
@@ -84,14 +84,14 @@ def tube_liquid(scene: Scene, *, law: CalibratedLaw) -> TubeLiquid:
     )
 
 
-def _held(scene: Scene, profile: HumpProfile) -> HeldLiquid:
+def _held(scene: Scene, profile: HumpProfile) -> _HeldLiquid:
     share = profile.path / scene.tube.length
     arm = profile.radius * np.exp(1j * path_angle(tube=scene.tube, share=share))
     # A piece counts where both of its ends are full; where fullness changes a place stands twice.
     wet = profile.full[1:] & profile.full[:-1]
     line = scene.liquid.density * math.pi / 4 * scene.tube.bore**2 * np.diff(profile.path) * wet
     moment = complex(np.sum(line * (arm[1:] + arm[:-1]) / 2))
-    return HeldLiquid(state=_state(profile), mass=float(np.sum(line)), along=moment.real, across=moment.imag)
+    return _HeldLiquid(state=_state(profile), mass=float(np.sum(line)), along=moment.real, across=moment.imag)
 
 
 def _state(profile: HumpProfile) -> str:

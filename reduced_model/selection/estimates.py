@@ -15,6 +15,8 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
+from ringbalance.physics.tube.friction import turbulent_share
+from ringbalance.physics.tube.numbers import reynolds_number
 from ringbalance.reduced_model.chamber.range import (
     chamber_fills,
     mean_gravity,
@@ -32,17 +34,19 @@ from ringbalance.reduced_model.chamber.terms import (
 from ringbalance.reduced_model.chamber.values import by_closed_form
 from ringbalance.reduced_model.gas_line import LineEnd, line_ends
 from ringbalance.reduced_model.selection.loss_models import CONSTANT_MODELS
-from ringbalance.reduced_model.selection.tube_terms import (
-    HUMP,
-    PART_TERMS,
+from ringbalance.reduced_model.selection.range_flow import (
     SHARES,
     RangeFlow,
-    flow_contributions,
-    flow_estimate,
-    loss_effect,
+    equal_velocity,
+    flows,
     range_flow,
     range_velocities,
     steady,
+)
+from ringbalance.reduced_model.selection.tube_terms import (
+    PART_TERMS,
+    crest_contribution,
+    loss_effect,
     without,
 )
 from ringbalance.reduced_model.time_scales import (
@@ -180,7 +184,7 @@ def _sloshing_formula(scene: Scene, fills: np.ndarray) -> str:
 
 
 def _tube(scene: Scene) -> dict[str, TermEstimate]:
-    crest = None if scene.tube.hump_radius is None else flow_contributions(scene)[HUMP]
+    crest = None if scene.tube.hump_radius is None else crest_contribution(scene)
     return _by_term(
         scene,
         (
@@ -195,9 +199,9 @@ def _tube(scene: Scene) -> dict[str, TermEstimate]:
 
 
 def _loss(scene: Scene, term: str, models: TubeModels) -> Row:
+    if scene.tube.drag_coefficient is not None or not flows(scene):
+        return term, None, "the scene prescribes k" if flows(scene) else "nothing flows", None
     u = range_velocities(scene)
-    if scene.tube.drag_coefficient is not None or not u.size:
-        return term, None, "nothing flows" if not u.size else "the scene prescribes k", None
     simpler = "k = 50" if models.constant else "leaving it out"
     return (
         term,
@@ -281,14 +285,16 @@ def injection_time(scene: Scene) -> float:
     """
     equal = by_closed_form(scene, scene.disc.max_fill_ratio / 2)
     area = np.pi / 4 * scene.tube.bore**2
-    flow = scene.liquid.density * area * flow_estimate(steady(scene)).velocity
+    flow = scene.liquid.density * area * equal_velocity(steady(scene))
     return deciding_gas_time(scene, rate=scene.rotor.influence_coefficient * equal.moment_per_mass * flow)
 
 
 def _inertia(scene: Scene, flow: RangeFlow, deciding: float, within: str) -> Row:
     if not np.any(flow.starts):
         return INERTIA, None, "nothing flows", None
-    laminar = flow_estimate(scene).laminar_share
+    u, nu = equal_velocity(scene), scene.liquid.kinematic_viscosity
+    re = reynolds_number(velocity=u, bore=scene.tube.bore, kinematic_viscosity=nu)
+    laminar = float(1 - turbulent_share(reynolds=re))
     times = [
         start_up_time(
             density=scene.liquid.density,

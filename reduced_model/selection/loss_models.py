@@ -36,7 +36,7 @@ _MOST_STEPS: Final = 60
 _ROUND_OFF: Final = 1e-14
 
 
-def with_loss(tube: Tube, loss: str) -> Tube:
+def _with_loss(tube: Tube, loss: str) -> Tube:
     """The tube with one model of its loss; a tube that prescribes k has that k and alpha = 1 on every one.
 
     Raises: ValueError: none of `LOSSES`.
@@ -54,7 +54,7 @@ def loss_at(scene: Scene, *, loss: str, velocity: npt.ArrayLike, tube: Tube | No
     Raises: ValueError: a model that does not exist.
     """
     return tube_state(
-        tube=with_loss(tube or scene.tube, loss),
+        tube=_with_loss(tube or scene.tube, loss),
         liquid=scene.liquid,
         angular_velocity=scene.rotor.speed,
         velocity=velocity,

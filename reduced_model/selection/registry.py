@@ -32,6 +32,7 @@ from ringbalance.reduced_model.selection.estimates import (
     percent,
     term_estimates,
 )
+from ringbalance.reduced_model.selection.range_flow import steady
 from ringbalance.reduced_model.selection.tube_terms import (
     BENDS,
     ENDS,
@@ -39,7 +40,6 @@ from ringbalance.reduced_model.selection.tube_terms import (
     ROTATION,
     ROUGHNESS,
     loss_effect,
-    steady,
     tube_models,
 )
 from ringbalance.scene.models import Scene

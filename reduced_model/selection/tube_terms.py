@@ -9,30 +9,30 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.physics.tube.friction import turbulent_share
-from ringbalance.physics.tube.numbers import reynolds_number, rotation_reynolds_number
 from ringbalance.physics.tube.state import tube_state
 from ringbalance.reduced_model.chamber.gravity import closed_ring
 from ringbalance.reduced_model.chamber.terms import MEAN, PLATES, chamber_contributions
-from ringbalance.reduced_model.chamber.values import by_closed_form
 from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.reduced_model.law.building import tube_path
 from ringbalance.reduced_model.selection.loss_models import (
     CONSTANT_MODELS,
-    CORRELATIONS,
     MODELS,
     ROTATING,
-    velocity_under_head,
+)
+from ringbalance.reduced_model.selection.range_flow import (
+    SHARES,
+    flows,
+    range_ends,
+    range_flow,
+    range_velocities,
+    steady,
 )
 from ringbalance.reduced_model.tube.heads import crest_head
-from ringbalance.reduced_model.tube.regime import SiphonCrest, TubeEnds, can_flow, column_flow
+from ringbalance.reduced_model.tube.regime import SiphonCrest
 from ringbalance.scene.accuracy import FINEST
-from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.tube_models import CORRELATION, FINEST_MODELS, LEFT_OUT, Fidelity, TubeModels
-
-SHARES: Final = (0.15, 0.3, 0.5, 0.7, 0.85)
-"""Fills of the driven chamber at which the flow is judged, as shares of max_fill_ratio."""
 
 LOSS: Final = "k as a function of velocity"
 ROTATION: Final = "friction by rotation"
@@ -42,12 +42,7 @@ ENDS: Final = "entrance and exit of the tube"
 TABLE: Final = "finite elements for rotation and ends"
 LEVEL: Final = "plates, in the level of a chamber"
 GRAVITY: Final = "gravity, in the level of a chamber"
-NO_PRESSURE: Final = 1.0
-"""Gauge, Pa, at or below which the gas drives nothing."""
 HUMP: Final = "priming and separation over the siphon crest"
-_LEAST_HEAD: Final = 1e-16
-"""H without loss at 1e-8 m/s, the slowest flow that is looked for, m^2/s^2."""
-_VELOCITIES: Final = 13
 PARTS: Final[Mapping[str, tuple[Fidelity, ...]]] = {
     "roughness": (LEFT_OUT,),
     "rotation": (LEFT_OUT, CORRELATION),
@@ -60,138 +55,27 @@ PART_TERMS: Final = {ROUGHNESS: "roughness", ROTATION: "rotation", BENDS: "bends
 
 
 @dataclass(frozen=True, kw_only=True)
-class FlowEstimate:
-    """The tube's flow at equal fills as the correlations have it, a full siphon."""
-
-    velocity: float
-    """m/s; zero without gas pressure."""
-    reynolds: float
-    rotation_reynolds: float
-    laminar_share: float
-    """1 laminar, 0 turbulent."""
-
-
-@lru_cache(maxsize=8)
-def flow_estimate(scene: Scene) -> FlowEstimate:
-    """Estimate the flow at equal fills from the gas pressure alone.
-
-    Source: (k + 1) u^2/2 = p/rho with the correlations' k.
-    """
-    tube, nu = scene.tube, scene.liquid.kinematic_viscosity
-    head, u, re, laminar = scene.gas.pressure / scene.liquid.density, 0.0, 0.0, 1.0
-    if head >= _LEAST_HEAD:
-        u = float(velocity_under_head(scene, loss=CORRELATIONS, head=head))
-        re = float(reynolds_number(velocity=u, bore=tube.bore, kinematic_viscosity=nu))
-        laminar = float(1 - turbulent_share(reynolds=re))
-    return FlowEstimate(
-        velocity=u,
-        reynolds=re,
-        rotation_reynolds=rotation_reynolds_number(
-            angular_velocity=scene.rotor.speed, bore=tube.bore, kinematic_viscosity=nu
-        ),
-        laminar_share=laminar,
-    )
-
-
-@dataclass(frozen=True, kw_only=True)
-class RangeFlow:
-    """The tube's flow over the fills of `SHARES` by correlations with rotation; arrays along the fills."""
-
-    driving_pressure: FloatArray
-    """On the full column, Pa."""
-    siphon: FloatArray
-    """Velocity of a full siphon, m/s; zero without a driving pressure."""
-    separated: FloatArray
-    """Velocity of a column separated at the crest, m/s, of one that spills where gas stays there; infinite
-    without a crest, zero where it blocks."""
-    starts: BoolArray
-    """Whether the gas starts a flow in an unprimed tube."""
-
-    @property
-    def velocity(self) -> FloatArray:
-        """The smaller of both, m/s."""
-        return np.minimum(self.siphon, self.separated)
-
-
-@lru_cache(maxsize=8)
-def range_flow(scene: Scene) -> RangeFlow:
-    """Estimate the flow over the range of fills, the opposite chamber with the rest of the pair's liquid.
-
-    Source: `tube_regime`, with closed-form chambers and a loss from correlations.
-    """
-    ends, crest, rho = _ends(scene), tube_path(scene).crest, scene.liquid.density
-    driving = ends.driving_pressure()
-    separated = np.full(driving.shape, np.inf)
-    if crest is not None:
-        separated = column_flow(
-            ends=ends,
-            crest=crest,
-            primed=False,
-            allowed=True,
-            siphon=lambda pressure, flows: _velocities(scene, flows * pressure / rho, to_crest=False),
-            separation=lambda pressure, flows: _velocities(scene, flows * pressure / rho, to_crest=True),
-        ).separation_velocity
-    can = can_flow(ends=ends, crest=crest, primed=False)
-    return RangeFlow(
-        driving_pressure=driving,
-        siphon=_velocities(scene, driving / rho, to_crest=False),
-        separated=separated,
-        starts=np.asarray(can & (scene.gas.pressure > NO_PRESSURE)),
-    )
-
-
-def _velocities(scene: Scene, head: FloatArray, *, to_crest: bool) -> FloatArray:
-    """m/s; zero where no head drives."""
-    found = np.zeros(head.shape)
-    drives = head > 0
-    found[drives] = velocity_under_head(scene, loss=ROTATING, head=head[drives], to_crest=to_crest)
-    return found
-
-
-def steady(scene: Scene) -> Scene:
-    """The scene with fixed values of what no steady flow depends on, tuning and draws of a loop, and without
-    a choice of models."""
-    return replace(
-        scene,
-        tube=replace(scene.tube, models=FINEST_MODELS),
-        rotor=replace(scene.rotor, influence_coefficient=1.0, lag_angle=0.0),
-        controller=replace(scene.controller, proportional=1.0),
-        run=replace(scene.run, seed=0, time_limit=1.0),
-    )
-
-
-@dataclass(frozen=True, kw_only=True)
-class LossEffect:
+class _LossEffect:
     """What simpler models of the tube's loss change at worst over the scene's velocities, relative."""
 
     k: float
-    """Of k, or of the head up to the siphon crest."""
+    """Of k under the same pressure, or of the head up to the siphon crest."""
     velocity: float
-    """Under one of these heads."""
+    """Under the same pressure."""
 
 
-def range_velocities(scene: Scene) -> FloatArray:
-    """Velocities at which the loss is judged, m/s: from a quarter of the slowest flow, full or separated,
-    over the range of fills to twice the fastest; none where nothing flows."""
-    flow = range_flow(scene)
-    if not np.any(flow.velocity > 0):
-        return np.zeros(0)
-    found = np.concatenate([flow.siphon, flow.separated])
-    found = np.log(found[(found > 0) & np.isfinite(found)])
-    return np.exp(np.linspace(np.min(found) - np.log(4), np.max(found) + np.log(2), _VELOCITIES))
-
-
-def loss_effect(scene: Scene, models: TubeModels) -> LossEffect:
+def loss_effect(scene: Scene, models: TubeModels) -> _LossEffect:
     """Compare simpler models of the loss with the finest; without an effect where the scene prescribes k."""
     if scene.tube.drag_coefficient is not None:
-        return LossEffect(k=0.0, velocity=0.0)
+        return _LossEffect(k=0.0, velocity=0.0)
     (k, *heads), (finest_k, *finest_heads) = _heads(scene, models), _heads(scene, FINEST_MODELS)
-    ratios = np.array([own / finest for own, finest in zip(heads, finest_heads, strict=True)])
-    changed = np.abs(np.array([k / finest_k, *ratios[1:]]) - 1)
-    return LossEffect(
-        k=float(np.max(changed, initial=0.0)),
-        velocity=float(np.max(np.abs(ratios**-0.5 - 1), initial=0.0)),
-    )
+    log_u = np.log(range_velocities(scene))
+    ratios = np.array(heads) / np.array(finest_heads)
+    # The same head drives another velocity, at which k is another: fully so in laminar flow.
+    slopes = np.array([np.gradient(np.log(head), log_u) for head in finest_heads])
+    velocity = np.abs(ratios ** (-1 / slopes) - 1)
+    own = np.abs(k / finest_k - 1) + np.abs(np.gradient(np.log(finest_k), log_u)) * velocity[0]
+    return _LossEffect(k=float(np.max([own, *np.abs(ratios[1:] - 1)])), velocity=float(np.max(velocity)))
 
 
 @lru_cache(maxsize=64)
@@ -214,7 +98,7 @@ def tube_models(scene: Scene) -> TubeModels:
     """
     scene = steady(scene)
     prescribed = scene.tube.drag_coefficient is not None
-    if scene.tolerance == FINEST or prescribed or not range_velocities(scene).size:
+    if scene.tolerance == FINEST or prescribed or not flows(scene):
         return FINEST_MODELS
     if loss_effect(scene, CONSTANT_MODELS).k <= scene.tolerance:
         return CONSTANT_MODELS
@@ -272,7 +156,7 @@ def flow_contributions(scene: Scene) -> Mapping[str, Contribution]:
         )
         for name, of in ((LEVEL, PLATES), (GRAVITY, MEAN))
     }
-    return losses | levels | {HUMP: _hump(scene)}
+    return losses | levels | {HUMP: crest_contribution(scene)}
 
 
 def _contribution(term: str, value: float, formula: str) -> Contribution:
@@ -287,21 +171,9 @@ def _closed(scene: Scene, fills: np.ndarray) -> np.ndarray:
     return np.asarray(fills[closed])
 
 
-def _ends(scene: Scene) -> TubeEnds[FloatArray]:
-    """Pressures at the tube's ends at the points, by the closed form."""
-    own = np.array([by_closed_form(scene, scene.disc.max_fill_ratio * x).wall_pressure for x in SHARES])
-    return TubeEnds(
-        upstream_gas=np.full_like(own, scene.gas.pressure),
-        downstream_gas=np.zeros_like(own),
-        upstream_hydrostatic=own,
-        downstream_hydrostatic=own[::-1],
-        port_pressure=tube_path(scene).port_pressure,
-    )
-
-
 def _lever(scene: Scene) -> float:
     """How far a relative error of the wall pressures reaches the velocity."""
-    ends = _ends(scene)
+    ends = range_ends(scene)
     driving = ends.driving_pressure()
     flows = driving > 0
     if not np.any(flows):
@@ -310,21 +182,22 @@ def _lever(scene: Scene) -> float:
     return float(np.max(difference[flows] / (2 * driving[flows])))
 
 
-def _hump(scene: Scene) -> Contribution:
+def crest_contribution(scene: Scene) -> Contribution:
+    """What a full siphon in place of the regimes over the crest leaves out, relative to the velocity."""
     crest = tube_path(scene).crest
     return Contribution(
         term=HUMP,
-        value=0.0 if crest is None else _crest_contribution(scene, crest),
+        value=0.0 if crest is None else _lost_at_crest(scene, crest),
         formula="1 - u_separated/u_siphon, or 1 where the column to the siphon crest outweighs the gas",
         source="energy balance up to the siphon crest",
         rough=True,
     )
 
 
-def _crest_contribution(scene: Scene, crest: SiphonCrest[FloatArray]) -> float:
+def _lost_at_crest(scene: Scene, crest: SiphonCrest[FloatArray]) -> float:
     flow = range_flow(scene)
     flows = flow.driving_pressure > 0
-    if np.any(flows & ~np.asarray(crest.primes(_ends(scene)))):
+    if np.any(flows & ~np.asarray(crest.primes(range_ends(scene)))):
         return 1.0
     lost = 1 - flow.separated[flows] / flow.siphon[flows]
     return float(np.max(np.maximum(lost, 0.0), initial=0.0))

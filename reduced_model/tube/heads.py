@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.physics.tube.state import TubeState, finest_state, tube_state, upstream_loss
+from ringbalance.physics.tube.state import TubeState, finest_state, tube_state
 from ringbalance.physics.tube.uncertainty import SIMPLER, model_parts, uncertainty_parts
 from ringbalance.reduced_model.chamber.inputs import half_widths
 from ringbalance.reduced_model.tables.fit import level_table, refined_table
@@ -107,11 +107,11 @@ def _widths(
             state=state,
             inputs=scene.uncertainty,
         )
-    k, upstream = state.k, upstream_loss(tube=tube, state=state)
+    k, upstream = state.k, state.upstream_loss(tube=tube)
     width = np.sqrt(sum((part**2 for part in parts.values()), start=np.zeros_like(k)))
     share = np.where(k > 0, upstream / np.where(k > 0, k, 1.0), 1.0)
     finest, to_crest = finest_state(tube=tube, state=state), state.kinetic_factor + upstream
-    simpler = finest.kinetic_factor + upstream_loss(tube=tube, state=finest) - to_crest
+    simpler = finest.kinetic_factor + finest.upstream_loss(tube=tube) - to_crest
     moved = np.sqrt((width * share) ** 2 + (loss_along(state.terms) * place) ** 2 + simpler**2)
     found = {
         "uncertainty": width / (k + 1),
@@ -128,7 +128,7 @@ def _fraction_uncertainty(
     """(s_j - R)/(k + 1) of each part of k with a fraction s_j before the crest's end, and of its place."""
     total = state.k + 1
     fraction, finest = (
-        (at.kinetic_factor + upstream_loss(tube=tube, state=at)) / (at.k + 1)
+        (at.kinetic_factor + at.upstream_loss(tube=tube)) / (at.k + 1)
         for at in (state, finest_state(tube=tube, state=state))
     )
     squares = (loss_along(state.terms) * place / total) ** 2 + (finest - fraction) ** 2
@@ -181,7 +181,7 @@ def crest_head(
 ) -> FloatArray:
     """Head from the giving chamber to the lowest pressure at the crest, or to its arc's end, m^2/s^2."""
     kinetic = velocity**2 / 2
-    fall = (state.kinetic_factor + upstream_loss(tube=to_crest_end(tube), state=state)) * kinetic
+    fall = (state.kinetic_factor + state.upstream_loss(tube=to_crest_end(tube))) * kinetic
     if not lowest:
         return np.asarray(fall)
     along = loss_along(state.terms) * kinetic

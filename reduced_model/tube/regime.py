@@ -29,8 +29,9 @@ RELEASED: Final = 0.5
 """Where between vapour pressure and the downstream gas the cavity is taken to lie with dissolved gas: the
 middle, with both ends in the uncertainty.
 
-A siphon of untreated water 1.5 m high choked with bubbles at 37.6 kPa, where vapour pressure alone allows
-17 kPa, and gas-free ran down to 23.8 kPa (Hughes, Sci. Rep. 4 (2014) 4741, doi:10.1038/srep04741).
+A siphon of untreated water (1.5 m high, a height recalled) choked with bubbles at 37.6 kPa, where vapour
+pressure alone allows 17 kPa; raised slowly, so that gas could leave, it ran free of bubbles down to 23.8 kPa
+(Hughes and Gurung, Sci. Rep. 4 (2014) 4741, doi:10.1038/srep04741).
 """
 
 Truth: TypeAlias = bool | BoolArray

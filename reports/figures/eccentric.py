@@ -23,6 +23,8 @@ DEVIATIONS: Final = 2.0
 _LARGE: Final = 0.01
 """Imbalance from which on it is given in kg m."""
 _COLOURS: Final = (style.FOUND, style.THIRD)
+_POLE_ROOM, _NEAR = 0.75, 0.02
+"""Half of the poles' picture over their extent, and the least extent."""
 _SHORTEST: Final = 0.09
 """Fraction of the time axis that the name of a stage needs."""
 _LOCKED: Final = {**style.AS_PAPER, "linewidth": 1.2, "label": "masses locked"}
@@ -187,7 +189,7 @@ def _estimate(
 
 
 def sampled_poles(loops: Sequence[Record]) -> Drawing:
-    """Sampled poles of the drives' loops in the complex plane, with the unit circle.
+    """Sampled poles of the drives' loops in the complex plane, with the unit circle where they are.
 
     Args: `loops`: those of the tuning document.
     """
@@ -197,8 +199,11 @@ def sampled_poles(loops: Sequence[Record]) -> Drawing:
         for index, loop in enumerate(loops):
             poles = np.asarray(loop["poles"])
             axes.plot(poles[:, 0], poles[:, 1], linestyle="", label=loop["name"], **style.line(index, size=6))
-        far = 1.1 * max(1.0, *(abs(part) for loop in loops for pole in loop["poles"] for part in pole))
-        axes.set(xlim=(-far, far), ylim=(-far, far), aspect="equal")
+        points = np.array([[1.0, 0.0], *(pole for loop in loops for pole in loop["poles"])])
+        low, high = points.min(axis=0), points.max(axis=0)
+        middle, half = (low + high) / 2, _POLE_ROOM * max(*(high - low), _NEAR)
+        ends = np.column_stack((middle - half, middle + half))
+        axes.set(xlim=ends[0], ylim=ends[1], aspect="equal")
 
     outside = [loop["name"] for loop in loops if not loop["stable"]]
     told = f"Outside, and unstable: {', '.join(outside)}" if outside else "All lie within: stable"

@@ -15,11 +15,11 @@ from ringbalance.reports.section import Record
 
 def run_figures(run: Record) -> list[Drawing]:
     """Amplitude with its limit, valve-open times, fills, and the path of the residual vector."""
-    times = [valve_open_times(run)] if run["injections"] else []
-    return [run_amplitude(run), *times, fill_ratios(run, early_time({"run": run})), residual_polar(run)]
+    times = [_valve_open_times(run)] if run["injections"] else []
+    return [_run_amplitude(run), *times, fill_ratios(run, early_time({"run": run})), residual_polar(run)]
 
 
-def run_amplitude(run: Record) -> Drawing:
+def _run_amplitude(run: Record) -> Drawing:
     """True and measured vibration amplitude over time, m, with the limit."""
     seen = [
         (time, value)
@@ -46,7 +46,7 @@ def run_amplitude(run: Record) -> Drawing:
     )
 
 
-def valve_open_times(run: Record) -> Drawing:
+def _valve_open_times(run: Record) -> Drawing:
     """How long each injection keeps its valve open, s, by chamber, over the time at which it opens."""
     injections = run["injections"]
 

@@ -169,6 +169,18 @@ class Drawing:
     wide: bool = False
     """Whether it takes the page's whole width."""
 
+    def standalone(self) -> str:
+        """The figure as a file of its own, which follows the viewer's light or dark scheme."""
+
+        def block(colours: dict[str, str]) -> str:
+            return "".join(f"{key}:{value};" for key, value in colours.items())
+
+        font = "--fig-font:system-ui,'Segoe UI',Roboto,'Helvetica Neue',Arial,sans-serif;"
+        dark = f"@media(prefers-color-scheme:dark){{svg{{{block(DARK)}}}}}"
+        style = f"<style>svg{{{font}{block(LIGHT)}}}{dark}</style>"
+        start = self.svg.index(">") + 1
+        return f'<?xml version="1.0" encoding="UTF-8"?>\n{self.svg[:start]}{style}{self.svg[start:]}\n'
+
 
 WIDE: Final = 7.5
 """Width, in, of a figure that takes the page's whole width: its text then has the size of a narrow one's."""
@@ -338,17 +350,3 @@ def legend_above(axes: Axes, *, columns: int) -> None:
     top = _TOP + _LEGEND_ROW * rows + (_TOP_AXIS if axes.child_axes else 0.0)
     box, height = axes.get_position(), figure.get_figheight()
     axes.set_position((box.x0, box.y0, box.width, 1 - (_BOTTOM + top) / height))
-
-
-def standalone(drawing: Drawing) -> str:
-    """The figure as a file of its own, which follows the viewer's light or dark scheme."""
-
-    def block(colours: dict[str, str]) -> str:
-        return "".join(f"{key}:{value};" for key, value in colours.items())
-
-    font = "--fig-font:system-ui,'Segoe UI',Roboto,'Helvetica Neue',Arial,sans-serif;"
-    style = (
-        f"<style>svg{{{font}{block(LIGHT)}}}@media(prefers-color-scheme:dark){{svg{{{block(DARK)}}}}}</style>"
-    )
-    start = drawing.svg.index(">") + 1
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{drawing.svg[:start]}{style}{drawing.svg[start:]}\n'

@@ -27,7 +27,6 @@ from ringbalance.verification.catalogue import load_cases
 _NOTHING: Final = 1e-3
 """Fraction of a range below which one of its ends is zero."""
 _FACTS: Final = (
-    ("claim", "Claim"),
     ("explanation", "Finding"),
     ("judgement", "Why this verdict"),
     ("consequence", "Consequence"),

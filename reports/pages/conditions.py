@@ -11,6 +11,7 @@ from ringbalance.reports.numbers import MISSING, display_unit, fixed, given, num
 from ringbalance.reports.pages.requirements import named_with_origin
 from ringbalance.reports.section import Cells, Record, Section, Table
 from ringbalance.reports.traces import read, traced
+from ringbalance.verification.standing import budget_standing
 
 _NAMES: Final = {
     "lambda": "Lever arm λ, moment per transferred mass",
@@ -55,9 +56,17 @@ def _budget_table(evidence: Record) -> Table:
     budgets = evidence["calibration"].get("budgets") or {}
     return Table(
         caption="Numbers to use, with their expanded uncertainties (95 %): ± is the root of the sum of "
-        "squares of the three parts. Pressures are gauge. In the model part of the tube, friction at rest "
-        "has been compared with measurements; bends, ends and turbulent flow in rotation have not.",
-        heads=("Quantity", "Value ± total", "Numerical", "Inputs", "Model", "Largest input", "The paper"),
+        "squares of the three parts. Pressures are gauge.",
+        heads=(
+            "Quantity",
+            "Value ± total",
+            "Numerical",
+            "Inputs",
+            "Model",
+            "Largest input",
+            "Measurements behind the model part",
+            "The paper",
+        ),
         rows=[_row(evidence, name) for name in _NAMES if name in budgets],
         style="",
     )
@@ -75,7 +84,8 @@ def _row(evidence: Record, name: str) -> Cells:
         for part in ("numerical", "input", "model")
     ]
     value = traced(shown(budget["value"], budget["unit"], budget["total"]), f"{path}.value")
-    return _NAMES[name], value, *parts, _largest(evidence, budget), _paper(evidence, name)
+    behind = budget_standing(evidence["verification"], name)
+    return _NAMES[name], value, *parts, _largest(evidence, budget), behind, _paper(evidence, name)
 
 
 def _part(part: float, total: float, path: str) -> str:

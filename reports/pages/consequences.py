@@ -12,7 +12,7 @@ from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import MISSING, number, percent, short, shown
 from ringbalance.reports.section import Record, Section, Table, Work
-from ringbalance.reports.studies.consequences import consequences_document, find_consequences
+from ringbalance.reports.studies.consequences import find_consequences
 
 _MEMBERS: Final = MappingProxyType({"light": 500, "heavy": 20_000})
 """Runs of each ensemble, by level: at 500 a probability is known to about four per cent."""
@@ -27,7 +27,7 @@ _CHANCES: Final = (
 def _collect(work: Work) -> Record:
     members = _MEMBERS[work.level]
     found = find_consequences(work.scene, work.calibration.model, retuned=work.tuning.gain, members=members)
-    return consequences_document(found)
+    return found.document()
 
 
 def _view(found: Record, _evidence: Record) -> Record:

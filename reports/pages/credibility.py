@@ -8,13 +8,14 @@ from typing import Final
 from ringbalance.reports import summary
 from ringbalance.reports.pages.requirements import input_name
 from ringbalance.reports.section import Cells, Record, Section, Table
+from ringbalance.verification.standing import HEADS, standing_rows
 
 _UNSURE: Final = ("assumed", "inferred", "default")
 
 
 def _view(_own: Record, evidence: Record) -> Record:
     return {
-        "kinds": _kinds(evidence),
+        "standing": _standing(evidence),
         "assumed": _origins(evidence),
         "credibility": _credibility(evidence),
     }
@@ -24,25 +25,16 @@ def _of(evidence: Record, *kinds: str) -> list[Record]:
     return [case for case in evidence["verification"] if case["kind"] in kinds]
 
 
-def _kinds(evidence: Record) -> Table:
-    validated = _of(evidence, "validation")
-    rest = _of(evidence, "code_verification")
-    rows = [
-        ("Device against measurements", "none exists", "Nothing: no measurement of this device is known."),
-        ("Parts against measurements", _outcome(validated), _titles(validated)),
-        ("Code verification", _outcome(rest), "Solvers against manufactured solutions and closed forms."),
-        (
-            "Solution verification",
-            _outcome(_of(evidence, "solution_verification")),
-            "Discretisation, choice of models, coverage of the printed intervals, extremes.",
-        ),
-        ("Claims of the papers", _outcome(_of(evidence, "claim")), "A model against a model."),
-    ]
+def _standing(evidence: Record) -> Table:
+    cases = [case for case in evidence["verification"] if case["kind"] != "claim"]
+    rows = standing_rows(cases, balancer=evidence.get("balancer", "liquid_ring"))
     return Table(
-        caption="What each kind of evidence is and how it came out.",
-        heads=("Kind", "Outcome", "What it compares"),
-        rows=rows,
-        style="",
+        caption="What stands behind each predicted quantity. Measurements are those of others on parts like "
+        "the device’s; “within” is the share of the points that lie within both 95 % intervals, bias and "
+        "scatter are those of predicted over measured values.",
+        heads=HEADS,
+        rows=[tuple(cell.replace(" -", " −") for cell in row) for row in rows],
+        style="dense",
     )
 
 
@@ -51,18 +43,19 @@ def _outcome(cases: Sequence[Record]) -> str:
     return ", ".join(f"{item['count']} {item['verdict']}" for item in counts) or "none run"
 
 
-def _titles(cases: Sequence[Record]) -> str:
-    return "; ".join(case["title"] for case in cases) or "None ran."
-
-
 def _origins(evidence: Record) -> list[str]:
     """Inputs that nobody gave, by origin."""
-    origins = evidence["scene"].get("origins") or {}
     found = {
-        origin: sorted(input_name(path) for path, own in origins.items() if own == origin)
+        origin: sorted(input_name(path) for path, own in _inputs(evidence).items() if own == origin)
         for origin in _UNSURE[:2]
     }
     return [f"{origin.capitalize()}: {', '.join(names)}." for origin, names in found.items() if names]
+
+
+def _inputs(evidence: Record) -> dict[str, str]:
+    """Origins by path, but those of stated uncertainties."""
+    origins: dict[str, str] = evidence["scene"].get("origins") or {}
+    return {path: origin for path, origin in origins.items() if not path.startswith("uncertainty.")}
 
 
 def _credibility(evidence: Record) -> Table:
@@ -96,8 +89,7 @@ def _development(evidence: Record) -> list[Cells]:
 def _use(evidence: Record) -> list[Cells]:
     budgets = (evidence.get("calibration") or {}).get("budgets")
     moved = any(row["achieved_interval"] for row in evidence.get("requirements", ()))
-    origins = (evidence["scene"].get("origins") or {}).values()
-    assumed = sum(origin == "assumed" for origin in origins)
+    assumed = sum(origin == "assumed" for origin in _inputs(evidence).values())
     return [
         (
             "Input pedigree",

@@ -107,7 +107,7 @@ def _facts(evidence: Record) -> tuple[tuple[str, str], ...]:
         ("Date and machine", f"{evidence['times']['date']}; {made.get('machine') or 'not recorded'}"),
         ("Scene file", f"{scene['file']}, SHA-256 {scene['sha256']}"),
         ("Lock file", f"SHA-256 {made['lock_sha256']}" if made.get("lock_sha256") else "not there"),
-        ("evidence.json", f"SHA-256 {evidence_hash(evidence)}"),
+        ("evidence.json", f"SHA-256 {_evidence_hash(evidence)}"),
         ("Kept evidence", _kept(evidence)),
         ("Seeds", ", ".join(f"{name} {value}" for name, value in evidence["seeds"].items())),
         ("Beside this file", "annex.html, evidence.json, figures/, fields/ and tables/"),
@@ -119,7 +119,7 @@ def evidence_text(evidence: Record) -> str:
     return json.dumps(evidence, allow_nan=False, indent=1, ensure_ascii=False) + "\n"
 
 
-def evidence_hash(evidence: Record) -> str:
+def _evidence_hash(evidence: Record) -> str:
     """SHA-256 of the evidence file."""
     return hashlib.sha256(evidence_text(evidence).encode()).hexdigest()
 

@@ -19,10 +19,8 @@ from ringbalance.reports.studies.drag_map import (
     BORES,
     DragMap,
     LiquidVerdicts,
-    drag_contour,
     drag_map,
     liquid_verdicts,
-    velocity_errors,
 )
 from ringbalance.reports.studies.drag_point import DragPoint
 
@@ -73,7 +71,7 @@ def _map_record(found: DragMap) -> Record:
 
 
 def _contour(found: DragMap, *, apparent: bool) -> Record:
-    viscosity, bore = drag_contour(drag_map=found, apparent=apparent)
+    viscosity, bore = found.contour(apparent=apparent)
     return {"kinematic_viscosity_m2_s": _rounded(viscosity), "bore_m": _rounded(bore)}
 
 
@@ -82,7 +80,7 @@ def _liquid_records(verdicts: LiquidVerdicts) -> list[Record]:
 
     Returns: One record a liquid: under the scene's gas where that starts the flow, else at equal heads.
     """
-    errors = velocity_errors(verdicts=verdicts)
+    errors = verdicts.velocity_errors()
     found = []
     for i, liquid in enumerate(verdicts.liquids):
         starts = bool(verdicts.at_scene.regime[i] != Regime.BLOCKED)

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import PurePath
 from typing import Any, Final
 
-from ringbalance.controller.compare import compare, comparison_document
+from ringbalance.controller.compare import compare
 from ringbalance.reports import summary
 from ringbalance.reports.numbers import MISSING, percent, shown
 from ringbalance.reports.pages.cases import case_view
@@ -35,7 +35,7 @@ def _collect(work: Work) -> Record:
         # Without folders: the evidence is the same wherever the files stand.
         faults = (replace(fault, file=PurePath(fault.file).name) for fault in error.faults)
         return {"compared": None, "text": "\n".join(map(str, faults))}
-    return {"compared": comparison_document(found), "text": ""}
+    return {"compared": found.document(), "text": ""}
 
 
 def _view(found: Record, evidence: Record) -> Record | None:

@@ -16,10 +16,8 @@ from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import number
 from ringbalance.reports.section import Cells, Record, Section, Table
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.verification.extremes.axes import Axis, axis_of, places_of
-from ringbalance.verification.extremes.design import GAS_TIME, PERIODS
-from ringbalance.verification.extremes.point import Ending
-from ringbalance.verification.extremes.study import MAP_PREFIX
+from ringbalance.verification.extremes.axes import MAP_PREFIX, Axis, axis_of, places_of
+from ringbalance.verification.extremes.point import GAS_TIME, PERIODS, Ending
 from ringbalance.verification.runner import paper_scene
 
 CASE: Final = "extremes"

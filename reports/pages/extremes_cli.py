@@ -12,7 +12,6 @@ from rich.markup import escape
 from rich.padding import Padding
 from rich.table import Table
 
-from ringbalance.reports.figures.style import standalone
 from ringbalance.reports.numbers import number
 from ringbalance.reports.pages.extremes import axis_rows, map_drawings
 from ringbalance.reports.section import Cells
@@ -24,9 +23,6 @@ from ringbalance.verification.extremes.axes import places_of
 from ringbalance.verification.extremes.study import (
     SIZES,
     Record,
-    broken,
-    extremes_document,
-    extremes_tables,
     find_extremes,
     scene_base,
 )
@@ -76,18 +72,18 @@ def extremes(
                 ),
                 kept=None if out is None else out / KEPT,
             )
-        told, tables = extremes_document(found), extremes_tables(found)
+        told, tables = found.document(), found.tables()
         if stage is not None:
             write_whole(stage / FILE, json_format.dumps(told, allow_nan=False) + "\n")
             for drawing in map_drawings(tables, places_of(base.scene)):
-                write_whole(stage / f"{drawing.name}.svg", standalone(drawing))
+                write_whole(stage / f"{drawing.name}.svg", drawing.standalone())
     if out is not None:
         console.print(f"written to {out}", highlight=False)
     if json:
         print(json_format.dumps(told, allow_nan=False))
     else:
         _show(told, axis_rows(tables["axes"]))
-    return BROKEN if broken(found) else DONE
+    return BROKEN if found.broken() else DONE
 
 
 def _show(told: Record, rows: list[Cells]) -> None:

@@ -16,7 +16,6 @@ from ringbalance.scene.models import Scene
 from ringbalance.verification.selection_studies.study import (
     TradeStudy,
     tolerance_text,
-    trade_document,
     trade_study,
 )
 
@@ -27,7 +26,7 @@ _MOST_ROWS: Final = 8
 
 def _collect(work: Work) -> Record | None:
     """The trade of the scene, light: without the settling time."""
-    return trade_document(_study(work.scene))
+    return _study(work.scene).document()
 
 
 @lru_cache(maxsize=4)

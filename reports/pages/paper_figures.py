@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from dataclasses import replace
 from itertools import pairwise
 from typing import Final
@@ -139,7 +140,9 @@ def _reading(scene: Scene, model: BalancerModel) -> Record:
     literal = replace(model, moment=literal_moment(model))
 
     def onset(balancer: BalancerModel) -> float | None:
-        return next((gain for gain in _SEARCH if _alone(scene, balancer, gain).overshoots > 0), None)
+        # A larger gain never overshoots less.
+        first = bisect_left(_SEARCH, True, key=lambda gain: _alone(scene, balancer, gain).overshoots > 0)
+        return _SEARCH[first] if first < len(_SEARCH) else None
 
     full = loop_scene(scene, kind="target_vector")
     mass = paper.correction_mass(

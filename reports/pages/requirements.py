@@ -20,7 +20,7 @@ MET: Final = "met"
 MISSED: Final = "not met"
 OPEN: Final = "cannot be told"
 UNASKED: Final = "none stated"
-_NONE: Final = "nothing in the scene"
+_NONE: Final = "the scene asks for none"
 _CERTAIN: Final = ("given", "measured")
 _LIKELY: Final = 0.95
 """Fraction of runs that must settle in time, the confidence of every interval in the report."""
@@ -77,8 +77,8 @@ def _grade(scene: Scene) -> float | None:
 
 def requirements(evidence: Record) -> list[Requirement]:
     """The requirements in the order in which a designer meets them."""
-    every = (_capacity, _gas_pressure, _scene_gain, _recommended_gain, _settling, _residual_row, _smallest)
-    return [row for make in (*every, _grade_row) if (row := make(evidence)) is not None]
+    every = (_capacity, _gas_pressure, _scene_gain, _recommended_gain, _settling, _residual_row)
+    return [row for make in (*every, _smallest, _standing, _grade_row) if (row := make(evidence)) is not None]
 
 
 def requirement_table(rows: Iterable[Requirement]) -> Table:
@@ -316,17 +316,26 @@ def _ideal_valve(evidence: Record) -> str:
 
 
 def _smallest(evidence: Record) -> Requirement | None:
+    return _of_line(evidence, "smallest_correction_m", "Smallest correction that the valve can give")
+
+
+def _standing(evidence: Record) -> Requirement | None:
+    """With the scene's own gain and offsets, by the dead time in which gas only fills a chamber."""
+    name = "Vibration up to which the scene’s valve-open times only fill gas"
+    return _of_line(evidence, "standing_amplitude_m", name)
+
+
+def _of_line(evidence: Record, key: str, name: str) -> Requirement | None:
     line = evidence["calibration"].get("gas_line")
-    if not line:
+    if not line or any(end.get(key) is None for end in line["ends"]):
         return None
-    ends = sorted(range(len(line["ends"])), key=lambda i: line["ends"][i]["smallest_correction_m"])
+    ends = sorted(range(len(line["ends"])), key=lambda i: line["ends"][i][key])
     low, high = (
-        read(evidence, f"calibration.gas_line.ends.{i}.smallest_correction_m", "m", digits=2)
-        for i in (ends[0], ends[-1])
+        read(evidence, f"calibration.gas_line.ends.{i}.{key}", "m", digits=2) for i in (ends[0], ends[-1])
     )
-    above = [bool(end["above_limit"]) for end in line["ends"]]
+    above = [end[key] > line["limit_m"] for end in line["ends"]]
     return Requirement(
-        name="Smallest correction that the valve can give",
+        name=name,
         wanted=f"at most {given(line['limit_m'], 'm')}",
         result=low if low == high else f"{low} (fast valve) to {high} (slow valve)",
         verdict=MISSED if all(above) else (OPEN if any(above) else MET),

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ringbalance.physics.sloshing.modes import resonant_fills, sloshing_modes
+from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY
 from ringbalance.physics.sloshing.response import sloshing_response
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
@@ -91,13 +92,23 @@ def _avoid(found: Record) -> str:
     strong = [item for item in found["resonant"] if item["mode"] % 2]
     if not strong and abs(top - 1) > _NEAR:
         return f"No mode that gravity can drive meets the speed up to a fill ratio of {short(fills[-1])}."
-    told = [f"{short(item['fill_ratio'], digits=2)} (mode {item['mode']})" for item in strong]
+    told = [f"{' to '.join(_within(found, item['mode']))} (mode {item['mode']})" for item in strong]
     near = (
         [f"from about {short(_nearing(found), digits=2)} up, where the first mode comes near the speed"]
         if abs(top - 1) <= _NEAR
         else []
     )
-    return f"Fills to pass quickly, at any speed: {', '.join([*told, *near])}."
+    return (
+        f"Fills to pass quickly, at any speed: {', '.join([*told, *near])}; natural frequencies count as "
+        f"known to {percent(FREQUENCY_UNCERTAINTY)}, as measured ones differ."
+    )
+
+
+def _within(found: Record, mode: int) -> list[str]:
+    """Fills between which a mode may meet the speed."""
+    speeds = (1 - FREQUENCY_UNCERTAINTY, 1 + FREQUENCY_UNCERTAINTY)
+    ends = np.interp(speeds, found["frequency_ratio"][mode - 1], found["fill_ratio"])
+    return [short(float(end), digits=2) for end in ends]
 
 
 def _nearing(found: Record) -> float:

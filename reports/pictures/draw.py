@@ -24,11 +24,12 @@ from matplotlib import colormaps
 from matplotlib.colors import ListedColormap
 from PIL import Image
 
-from ringbalance.reports.pictures.disc_shapes import chamber_outline, ring, split_hexahedra, tube_path, web
+from ringbalance.reports.pictures.disc_shapes import chamber_outline, ring, split_hexahedra, web
 from ringbalance.reports.pictures.draw_tube import draw_tube
 from ringbalance.reports.pictures.draw_view import label_at, look
 from ringbalance.reports.pictures.text import Bar, Label, bar, letter
 from ringbalance.reports.pictures.theme import PICTURE, THEMES, Theme
+from ringbalance.reports.pictures.tube_path import tube_path
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.platform.processes import end_with
 

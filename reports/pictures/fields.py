@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from ringbalance.mesh.chamber import chamber_mesh, default_cells, mesh_quality
+from ringbalance.mesh.chamber import chamber_mesh, default_cells
 from ringbalance.mesh.export import write_vtu
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
-from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, places, solve_pressure
+from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, solve_pressure
 from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.scene.models import Scene
 
@@ -28,6 +28,56 @@ class ChamberField:
     """m."""
     solution: PressureSolution
     """On the three-dimensional mesh."""
+
+    def record(self) -> Record:
+        """Sizes and quality of the mesh, and how the solve ended."""
+        chamber, solution = self.solution.chamber, self.solution
+        quality = chamber.quality()
+        return {
+            "cells": list(chamber.cells),
+            "unknowns": quality.nodes,
+            "minimum_scaled_jacobian": quality.minimum_scaled_jacobian,
+            "largest_aspect": quality.maximum_aspect,
+            "relative_residual": solution.statistics.relative_residual,
+            "status": solution.status.text,
+        }
+
+    def pressure_profile(self, *, scene: Scene) -> Record:
+        """Nodal pressure along the middle of the chamber, and the profile that Eq. 12 implies.
+
+        Eq. 12's wall pressure is that of a ring whose surface lies at sqrt(R2^2 - 2 V'/(B theta)).
+        Returns: JSON-able record, SI.
+        Source: Eq. 12 of the liquid-ring paper.
+        """
+        disc, chamber = scene.disc, self.solution.chamber
+        line = chamber.grid[:, chamber.grid.shape[1] // 2, chamber.grid.shape[2] // 2]
+        volume = self.fill_ratio * chamber_volume(disc=disc)
+        implied = math.sqrt(disc.outer_radius**2 - 2 * volume / (disc.axial_width * disc.central_angle))
+        drawn = np.linspace(implied, disc.outer_radius, line.size)
+        factor = scene.liquid.density * scene.rotor.speed**2 / 2
+        wall = paper.wall_pressure_paper(
+            disc=disc, density=scene.liquid.density, angular_velocity=scene.rotor.speed, liquid_volume=volume
+        )
+        return {
+            "fill_ratio": self.fill_ratio,
+            "radius_m": np.hypot(*chamber.places[:2, line]).tolist(),
+            "pressure_Pa": self.solution.pressure[line].tolist(),
+            "paper_radius_m": drawn.tolist(),
+            "paper_pressure_Pa": [*(factor * (drawn[:-1] ** 2 - implied**2)).tolist(), float(wall)],
+        }
+
+    def write(self, *, path: Path) -> Path:
+        """Write the field to a VTU file: gauge pressure in Pa and depth below the free surface in m.
+
+        Raises: OSError: the file cannot be written.
+        """
+        chamber = self.solution.chamber
+        radius = np.hypot(*chamber.places[:2])
+        fields = {
+            "pressure_Pa": self.solution.pressure,
+            "depth_m": np.maximum(radius - self.surface_radius, 0.0),
+        }
+        return write_vtu(path, chamber=chamber, fields=fields)
 
 
 def shown_fill(scene: Scene) -> float:
@@ -50,56 +100,3 @@ def chamber_field(scene: Scene, *, fill_ratio: float) -> ChamberField:
     liquid = RotatingLiquid(density=scene.liquid.density, angular_velocity=scene.rotor.speed)
     solution = solve_pressure(chamber=chamber, problem=liquid.problem())
     return ChamberField(fill_ratio=fill_ratio, surface_radius=radius, solution=solution)
-
-
-def write_field(*, field: ChamberField, path: Path) -> Path:
-    """Write a field to a VTU file: gauge pressure in Pa and depth below the free surface in m.
-
-    Raises: OSError: the file cannot be written.
-    """
-    chamber = field.solution.chamber
-    radius = np.hypot(*places(chamber)[:2])
-    fields = {
-        "pressure_Pa": field.solution.pressure,
-        "depth_m": np.maximum(radius - field.surface_radius, 0.0),
-    }
-    return write_vtu(path, chamber=chamber, fields=fields)
-
-
-def pressure_profile(*, scene: Scene, field: ChamberField) -> Record:
-    """Nodal pressure along the middle of the chamber, and the profile that Eq. 12 implies.
-
-    Eq. 12's wall pressure is that of a ring whose surface lies at sqrt(R2^2 - 2 V'/(B theta)).
-    Returns: JSON-able record, SI.
-    Source: Eq. 12 of the liquid-ring paper.
-    """
-    disc, chamber = scene.disc, field.solution.chamber
-    line = chamber.grid[:, chamber.grid.shape[1] // 2, chamber.grid.shape[2] // 2]
-    volume = field.fill_ratio * chamber_volume(disc=disc)
-    implied = math.sqrt(disc.outer_radius**2 - 2 * volume / (disc.axial_width * disc.central_angle))
-    drawn = np.linspace(implied, disc.outer_radius, line.size)
-    factor = scene.liquid.density * scene.rotor.speed**2 / 2
-    wall = paper.wall_pressure_paper(
-        disc=disc, density=scene.liquid.density, angular_velocity=scene.rotor.speed, liquid_volume=volume
-    )
-    return {
-        "fill_ratio": field.fill_ratio,
-        "radius_m": np.hypot(*places(chamber)[:2, line]).tolist(),
-        "pressure_Pa": field.solution.pressure[line].tolist(),
-        "paper_radius_m": drawn.tolist(),
-        "paper_pressure_Pa": [*(factor * (drawn[:-1] ** 2 - implied**2)).tolist(), float(wall)],
-    }
-
-
-def mesh_record(field: ChamberField) -> Record:
-    """Sizes and quality of the mesh, and how the solve ended."""
-    chamber, solution = field.solution.chamber, field.solution
-    quality = mesh_quality(chamber)
-    return {
-        "cells": list(chamber.cells),
-        "unknowns": quality.nodes,
-        "minimum_scaled_jacobian": quality.minimum_scaled_jacobian,
-        "largest_aspect": quality.maximum_aspect,
-        "relative_residual": solution.statistics.relative_residual,
-        "status": solution.status.text,
-    }

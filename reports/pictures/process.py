@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from ringbalance.controller.rotor import chamber_letters
 from ringbalance.reports.numbers import given, shown
-from ringbalance.reports.pictures.fields import chamber_field, shown_fill, write_field
+from ringbalance.reports.pictures.fields import chamber_field, shown_fill
 from ringbalance.reports.pictures.opengl import OpenGL, find_opengl
 from ringbalance.reports.pictures.theme import PICTURE
 from ringbalance.reports.pictures.tube import tube_field
@@ -40,6 +40,36 @@ class Drawing3D:
     captions: Mapping[str, tuple[str, str]]
     """Alternative text and caption by picture."""
 
+    def finish(self) -> Record:
+        """Wait for the pictures and list them for the evidence."""
+        log = self.folder.parent / _LOG
+        fault = "" if self.process is None else _fault(self.process, log)
+        self.stop()
+        for path in (log, log.with_name(_JOB)):
+            path.unlink(missing_ok=True)
+        if self.process is None or fault:
+            return {"drawn": False, "text": fault or self.text, "files": []}
+        files = [
+            {
+                "name": name,
+                "light": f"{name}-light.png",
+                "dark": f"{name}-dark.png",
+                "width": PICTURE[0],
+                "height": PICTURE[1],
+                "alt": alt,
+                "caption": caption,
+            }
+            for name, (alt, caption) in self.captions.items()
+        ]
+        return {"drawn": True, "text": self.text, "files": files}
+
+    def stop(self) -> None:
+        """End a drawing that nobody waits for any more."""
+        if self.process is not None:
+            # All that is left of it: the pipe is closed, and the process waited for.
+            self.process.kill()
+            self.process.communicate()
+
 
 def write_fields(*, scene: Scene, folder: Path) -> dict[str, Path]:
     """Solve and write the pressure fields that the pictures show.
@@ -49,7 +79,7 @@ def write_fields(*, scene: Scene, folder: Path) -> dict[str, Path]:
     fills = {"pressure": scene.disc.max_fill_ratio, "disc": shown_fill(scene)}
     names = {"pressure": "chamber_largest_fill.vtu", "disc": "chamber_at_start.vtu"}
     return {
-        key: write_field(field=chamber_field(scene, fill_ratio=fill), path=folder / _FIELDS / names[key])
+        key: chamber_field(scene, fill_ratio=fill).write(path=folder / _FIELDS / names[key])
         for key, fill in fills.items()
     }
 
@@ -80,38 +110,6 @@ def start_drawing(
             stderr=log,
         )
     return Drawing3D(process=process, text=found.text, folder=figures, captions=captions)
-
-
-def finish_drawing(drawing: Drawing3D) -> Record:
-    """Wait for the pictures and list them for the evidence."""
-    log = drawing.folder.parent / _LOG
-    fault = "" if drawing.process is None else _fault(drawing.process, log)
-    stop_drawing(drawing)
-    for path in (log, log.with_name(_JOB)):
-        path.unlink(missing_ok=True)
-    if drawing.process is None or fault:
-        return {"drawn": False, "text": fault or drawing.text, "files": []}
-    files = [
-        {
-            "name": name,
-            "light": f"{name}-light.png",
-            "dark": f"{name}-dark.png",
-            "width": PICTURE[0],
-            "height": PICTURE[1],
-            "alt": alt,
-            "caption": caption,
-        }
-        for name, (alt, caption) in drawing.captions.items()
-    ]
-    return {"drawn": True, "text": drawing.text, "files": files}
-
-
-def stop_drawing(drawing: Drawing3D) -> None:
-    """End a drawing that nobody waits for any more."""
-    if drawing.process is not None:
-        # All that is left of it: the pipe is closed, and the process waited for.
-        drawing.process.kill()
-        drawing.process.communicate()
 
 
 def _fault(process: subprocess.Popen[bytes], log: Path) -> str:

@@ -12,8 +12,8 @@ from markupsafe import Markup
 
 from ringbalance.mesh.chamber import ChamberMesh
 from ringbalance.reports.numbers import given, number
-from ringbalance.reports.pictures.disc_shapes import tube_path
 from ringbalance.reports.pictures.fields import ChamberField, chamber_field, shown_fill
+from ringbalance.reports.pictures.tube_path import tube_path
 from ringbalance.scene import Scene
 from ringbalance.scene.arrays import FloatArray, IntArray
 

@@ -12,7 +12,6 @@ from ringbalance.controller.algorithms.by_name import law_based_of, target_vecto
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.ensemble.monte_carlo import (
     Ensemble,
-    ensemble_document,
     ensemble_transfer,
     simulate_ensemble,
 )
@@ -65,6 +64,18 @@ class Consequences:
     """What could not be found, and why."""
     findings: tuple[str, ...]
     """One sentence each."""
+
+    def document(self) -> dict[str, Any]:
+        """All as plain numbers, lists and text in SI; arrays of at most 50 entries."""
+        return {
+            "scene": self.scene,
+            "findings": list(self.findings),
+            "notes": list(self.notes),
+            "retuned_proportional_s_per_m": self.retuned_proportional,
+            "runs": [_run_document(run) for run in self.runs],
+            "gain": [_gain_document(gain) for gain in self.gains],
+            "ensembles": [ensemble.document() for ensemble in self.ensembles],
+        }
 
 
 def find_consequences(
@@ -207,19 +218,6 @@ def _ending(simulation: Simulation) -> str:
     if simulation.settling_time is None:
         return f"{simulation.verdict.value} ({simulation.outcome.value.replace('_', ' ')}), {turns}"
     return f"settled after {simulation.settling_time:.3g} s, {turns}"
-
-
-def consequences_document(found: Consequences) -> dict[str, Any]:
-    """Turn the consequences into plain numbers, lists and text, all in SI, arrays of at most 50 entries."""
-    return {
-        "scene": found.scene,
-        "findings": list(found.findings),
-        "notes": list(found.notes),
-        "retuned_proportional_s_per_m": found.retuned_proportional,
-        "runs": [_run_document(run) for run in found.runs],
-        "gain": [_gain_document(gain) for gain in found.gains],
-        "ensembles": [ensemble_document(ensemble) for ensemble in found.ensembles],
-    }
 
 
 def _run_document(run: Run) -> dict[str, Any]:

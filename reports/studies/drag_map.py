@@ -55,6 +55,28 @@ class DragMap:
         """Eq. 19's velocity over the operating point's, less one; zero where nothing flows, shape (n, m)."""
         return _over(self.velocity_paper, self.point)
 
+    def contour(
+        self, *, k: float = paper.PAPER_DRAG_COEFFICIENT, apparent: bool = False
+    ) -> tuple[FloatArray, FloatArray]:
+        """Where on the map k has one value, for each of the map's viscosities.
+
+        Args: `k`: the value, positive.
+        Returns: Viscosities, m^2/s, and bores, m, of one shape; empty where the map does not reach the value.
+        Raises: ValueError: a k that is not positive and finite.
+        Source: monotone cubic interpolation of ln k over ln d between the map's bores.
+        """
+        if not (np.isfinite(k) and k > 0):
+            raise ValueError("k must be positive and finite")
+        values = self.point.apparent_k if apparent else self.point.k
+        crossings = [
+            (nu, float(np.exp(root)))
+            for nu, column, runs in zip(self.kinematic_viscosity, values.T, self.point.runs.T, strict=True)
+            if np.all(runs & (column > 0)) and self.bore.size > 1
+            for root in _roots(self.bore, column, k)
+        ]
+        pairs = np.array(crossings, dtype=np.float64).reshape(-1, 2)
+        return pairs[:, 0], pairs[:, 1]
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LiquidVerdicts:
@@ -77,23 +99,22 @@ class LiquidVerdicts:
     bore_for_paper: FloatArray
     """Bore at which k is the paper's at equal heads, m; zero where there is none between BORES."""
 
+    def velocity_errors(self) -> tuple[FloatArray, FloatArray]:
+        """How far Eq. 19 with k = 50 is off for each liquid, relative to the operating point's velocity.
+
+        Returns: u_paper/u - 1 under the scene's gas pressure and at equal heads, shape (m,); zero where
+        nothing flows.
+        Source: Eq. 19 of the liquid-ring paper.
+        """
+        return (
+            _over(self.velocity_paper_at_scene, self.at_scene),
+            _over(self.velocity_paper_at_equal_head, self.at_equal_head),
+        )
+
 
 def _over(paper_velocity: npt.ArrayLike, point: DragPoint) -> FloatArray:
     speed = np.where(point.runs, point.velocity, 1.0)
     return np.where(point.runs, np.asarray(paper_velocity, dtype=np.float64) / speed - 1, 0.0)
-
-
-def velocity_errors(*, verdicts: LiquidVerdicts) -> tuple[FloatArray, FloatArray]:
-    """How far Eq. 19 with k = 50 is off for each liquid, relative to the operating point's velocity.
-
-    Returns: u_paper/u - 1 under the scene's gas pressure and at equal heads, shape (m,); zero where nothing
-    flows.
-    Source: Eq. 19 of the liquid-ring paper.
-    """
-    return (
-        _over(verdicts.velocity_paper_at_scene, verdicts.at_scene),
-        _over(verdicts.velocity_paper_at_equal_head, verdicts.at_equal_head),
-    )
 
 
 def drag_map(
@@ -140,31 +161,6 @@ def drag_map(
         point=_stacked(rows),
         velocity_paper=float(_velocity_paper(rho, scene.gas.pressure)),
     )
-
-
-def drag_contour(
-    *, drag_map: DragMap, k: float = paper.PAPER_DRAG_COEFFICIENT, apparent: bool = False
-) -> tuple[FloatArray, FloatArray]:
-    """Where on the map k has one value, for each of the map's viscosities.
-
-    Args: `k`: the value, positive.
-    Returns: Viscosities, m^2/s, and bores, m, of one shape; empty where the map does not reach the value.
-    Raises: ValueError: a k that is not positive and finite.
-    Source: monotone cubic interpolation of ln k over ln d between the map's bores.
-    """
-    if not (np.isfinite(k) and k > 0):
-        raise ValueError("k must be positive and finite")
-    values = drag_map.point.apparent_k if apparent else drag_map.point.k
-    crossings = [
-        (nu, float(np.exp(root)))
-        for nu, column, runs in zip(
-            drag_map.kinematic_viscosity, values.T, drag_map.point.runs.T, strict=True
-        )
-        if np.all(runs & (column > 0)) and drag_map.bore.size > 1
-        for root in _roots(drag_map.bore, column, k)
-    ]
-    pairs = np.array(crossings, dtype=np.float64).reshape(-1, 2)
-    return pairs[:, 0], pairs[:, 1]
 
 
 def _roots(bore: FloatArray, k: FloatArray, wanted: float) -> FloatArray:

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from ringbalance.physics.tube.loss import flow_states
 from ringbalance.physics.tube.range import range_notes
-from ringbalance.physics.tube.state import TubeState, tube_state_at, upstream_loss
+from ringbalance.physics.tube.state import TubeState, tube_state_at
 from ringbalance.physics.tube.uncertainty import input_parts, model_parts
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
@@ -214,7 +214,7 @@ def _separation_factor(tube: Tube, state: TubeState) -> FloatArray:
     """As the head up to the lowest pressure, over u^2/2; R_Om/Re d is omega/u."""
     turns = (state.rotation_reynolds / state.reynolds / tube.bore) ** 2
     behind = head_behind_crest(tube=tube, along=loss_along(state.terms), square=2 * turns)
-    up = upstream_loss(tube=to_crest_end(tube), state=state)
+    up = state.upstream_loss(tube=to_crest_end(tube))
     return np.asarray(state.kinetic_factor + up + behind, dtype=np.float64)
 
 
@@ -314,7 +314,7 @@ def _half_widths(
     ahead = np.where(separated, slope(_separation_factor), siphon)
     up = np.where(
         state.k > 0,
-        upstream_loss(tube=to_crest_end(tube), state=state) / np.where(state.k > 0, state.k, 1.0),
+        state.upstream_loss(tube=to_crest_end(tube)) / np.where(state.k > 0, state.k, 1.0),
         1.0,
     )
     of_head = width * np.where(separated, up / _separation_factor(tube, state), 1 / (state.k + 1))

@@ -47,10 +47,7 @@ def even_number_of_chambers(central_angle: float) -> int | None:
 
 
 def trial_sequence(chambers: int) -> tuple[str, ...]:
-    """Order in which chambers are tried, each followed by its opposite.
-
-    Source: A, C, B, D for four, section 6 of the liquid-ring paper.
-    """
+    """Order in which chambers are tried, each followed by its opposite: A, C, B, D for four, as printed."""
     half = chambers // 2
     return tuple(LETTERS[chamber] for first in range(half) for chamber in (first, first + half))
 

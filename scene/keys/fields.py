@@ -200,7 +200,8 @@ def one_or_each(reader: Reader, *, example: str) -> Reader:
     def read(value: object) -> tuple[Any, ...]:
         if not isinstance(value, list):
             return (reader.read(value),)
-        return each_of(reader, count=len(value), example=example).read(value)
+        values: tuple[Any, ...] = each_of(reader, count=len(value), example=example).read(value)
+        return values
 
     summary = f"{reader.summary}, or a list of one for each chamber"
     return Reader(read=read, allowed=allowed, summary=summary, dimension=reader.dimension)

@@ -32,11 +32,7 @@ _LONGEST_WORK: Final = 86400.0
 
 
 def draft_path(folder: Path) -> Path:
-    """A fresh name for a draft.
-
-    Args: `folder`: in which it shall stand.
-    Returns: Path of nothing yet.
-    """
+    """A fresh name for a draft in a folder."""
     return folder / f"{_PREFIX}{secrets.token_hex(8)}"
 
 
@@ -44,7 +40,6 @@ def draft_path(folder: Path) -> Path:
 def draft_folder(folder: Path) -> Iterator[Path]:
     """A locked folder for outputs that grow, removed at the end whatever happens.
 
-    Args: `folder`: in which it is made; it exists.
     Yields: The folder to write into.
     Raises: OSError: nothing can be made there.
     """
@@ -60,11 +55,7 @@ def draft_folder(folder: Path) -> Iterator[Path]:
 
 
 def replace_whole(target: Path, content: bytes) -> None:
-    """Write a file through a draft beside it.
-
-    Args: `target`: the file; its folder exists. `content`: all of it.
-    Raises: OSError: it cannot be written; nothing is left behind.
-    """
+    """Write a file through a draft beside it. Raises: OSError: it cannot be; nothing is left behind."""
     draft = draft_path(target.parent)
     try:
         with open(draft, "xb") as stream:
@@ -95,10 +86,7 @@ def _sync_folder(folder: Path) -> None:
 
 
 def remove_abandoned(folder: Path) -> None:
-    """Remove the drafts of processes that were killed; those of living ones stay.
-
-    Args: `folder`: where drafts may stand; what cannot be looked at or removed is left alone.
-    """
+    """Remove the drafts of killed processes; those of living ones stay, and what cannot be removed."""
     with suppress(OSError):
         names = [name for name in os.listdir(folder) if _NAME.fullmatch(name)]
         for path in (folder / name for name in names):

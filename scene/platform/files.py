@@ -40,7 +40,6 @@ def write_whole(path: Path, data: str | bytes) -> Path:
 def check_file(path: Path) -> None:
     """Refuse now what `write_whole` would refuse after the work; nothing is left behind.
 
-    Args: `path`: of a file to be written later.
     Raises: OSError: it is a folder, or its folder cannot be made or written.
     """
     with _refused(path):
@@ -158,9 +157,5 @@ def _move(source: Path, target: Path) -> None:
 
 
 def cache_folder() -> Path:
-    """The user's folder for what ringbalance can make again.
-
-    Returns: Path; it may not exist yet.
-    Source: the XDG base directory specification, XDG_CACHE_HOME.
-    """
+    """The user's folder for what ringbalance can make again, after the XDG base directory specification."""
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "ringbalance"

@@ -38,11 +38,7 @@ class Workers(ProcessPoolExecutor):
         self._ended = False
 
     def submit(self, fn: Callable[_P, _R], /, *args: _P.args, **kwargs: _P.kwargs) -> Future[_R]:
-        """Have a function called by a worker.
-
-        Args: `fn`: of an importable module.
-        Returns: The call under way; without a worker left it holds BrokenProcessPool.
-        """
+        """Have a worker call a function of an importable module; without a worker left, BrokenProcessPool."""
         with _quiet_start():
             try:
                 return super().submit(fn, *args, **kwargs)

@@ -21,10 +21,7 @@ class Terminal(Console):
             raise BrokenPipeError
 
     def render_str(self, text: str, **options: Any) -> Text:
-        """Text as the stream will write it, so that columns are as wide as what stands in them.
-
-        Args: `text`: with or without markup. `options`: as for rich.
-        """
+        """Text as the stream will write it, so that columns are as wide as what stands in them."""
         return super().render_str(self._as_written(text), **options)
 
     def _as_written(self, text: str) -> str:

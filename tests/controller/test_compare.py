@@ -10,7 +10,7 @@ from dataclasses import replace
 import pytest
 
 from ringbalance.cli import main
-from ringbalance.controller.compare import compare, comparison_document
+from ringbalance.controller.compare import compare
 from ringbalance.controller.compare_rotor import own_scene, rotor_of, scene_on
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
 from ringbalance.controller.eccentric_mass.plant.whirl import influence, steady_whirl
@@ -145,7 +145,7 @@ def test_two_liquid_rings(paper_scene: Scene) -> None:
         sensor=replace(paper_scene.sensor, amplitude_noise=0.0, phase_noise=0.0),
         run=replace(paper_scene.run, time_limit=20.0),
     )
-    found = comparison_document(compare(quiet, quiet, model_of=paper_model, runs=1))
+    found = compare(quiet, quiet, model_of=paper_model, runs=1).document()
     assert json.loads(json.dumps(found, allow_nan=False)) == found
     assert {"scenes", "time_s", "residual_ratio", "energy_J", "worst_amplitude_m"} <= set(found)
     for key in ("time_s", "residual_ratio", "energy_J", "worst_amplitude_m", "settled"):
@@ -180,7 +180,7 @@ def test_a_comparison_has_both_tuned_over_one_span_and_several_seeds(
     assert low < high
     # The first injections, of a second, fill at least the 33.8 ml that a full chamber leaves, to 0.7 MPa.
     assert low > 2 * 0.801325e6 * 33.8e-6 * math.log(0.801325 / 0.101325)
-    document = comparison_document(found)
+    document = found.document()
     assert document["runs"] == [2, 2]
     assert document["spread"][0]["energy_J"] == [low, high]
     json.dumps(document, allow_nan=False)

@@ -17,7 +17,7 @@ from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Outcome
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_model
-from ringbalance.reports.studies.consequences import Consequences, consequences_document, find_consequences
+from ringbalance.reports.studies.consequences import Consequences, find_consequences
 from ringbalance.reports.studies.consequences_gain import LoopGain, loop_gain
 from ringbalance.scene.models import Scene
 
@@ -122,7 +122,7 @@ def test_no_flow_no_gain(scene: Scene, model: BalancerModel) -> None:
     assert record.gains == ()
     assert record.retuned_proportional is None
     assert sum("drives no flow" in note for note in record.notes) == 2
-    json.dumps(consequences_document(record), allow_nan=False)
+    json.dumps(record.document(), allow_nan=False)
 
 
 def test_what_the_loop_rests_on_and_nobody_gave_is_named(scene: Scene, model: BalancerModel) -> None:
@@ -198,7 +198,7 @@ def arrays(value: Any) -> Iterator[list[Any]]:
 
 
 def test_the_document_is_small_and_clean(found: Consequences) -> None:
-    document = consequences_document(found)
+    document = found.document()
     text = json.dumps(document, allow_nan=False)
     assert len(text) < 40_000
     assert max(len(array) for array in arrays(document)) <= 50

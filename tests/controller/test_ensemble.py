@@ -20,7 +20,6 @@ from ringbalance.controller.ensemble.moment import moment_table
 from ringbalance.controller.ensemble.monte_carlo import (
     QUANTILES,
     binomial_share,
-    ensemble_document,
     simulate_ensemble,
     simulate_members,
 )
@@ -233,10 +232,10 @@ def test_the_same_seed_gives_the_same_numbers_for_any_threads(scene: Scene, mode
     asked = noisy(scene, time_limit=5.0)
     one = simulate_ensemble(asked, model, 2 * BLOCK + 5, 3, workers=1)
     two = simulate_ensemble(asked, model, 2 * BLOCK + 5, 3, workers=2)
-    assert ensemble_document(one) == ensemble_document(two)
+    assert one.document() == two.document()
     assert one.members == 2 * BLOCK + 5
     other = simulate_ensemble(asked, model, 2 * BLOCK + 5, 4, workers=2)
-    assert ensemble_document(other) != ensemble_document(one)
+    assert other.document() != one.document()
 
 
 def test_a_larger_ensemble_begins_with_the_smaller(scene: Scene, model: BalancerModel) -> None:
@@ -365,9 +364,9 @@ def test_a_share_has_its_interval() -> None:
 def test_the_document_is_small_clean_json(scene: Scene, model: BalancerModel) -> None:
     seen: list[tuple[int, int]] = []
     asked = noisy(scene, time_limit=5.0)
-    found = ensemble_document(
-        simulate_ensemble(asked, model, 300, 0, progress=lambda done, of: seen.append((done, of)))
-    )
+    found = simulate_ensemble(
+        asked, model, 300, 0, progress=lambda done, of: seen.append((done, of))
+    ).document()
     text = json.dumps(found, allow_nan=False)
     assert len(text) < 6500
     assert seen == [(300, 300)]

@@ -7,16 +7,14 @@ import pytest
 from skfem import Basis, ElementHex2, FacetBasis
 
 from ringbalance.mesh.bent_tube import Segment, SweptTube, swept_tube
-from ringbalance.verification.navier_stokes.rotating_section import SectionMesh, section_mesh
+from ringbalance.verification.navier_stokes.rotating_section import SectionMesh
 
 BEND = Segment(length=np.pi, turn=-np.pi / 2, cells=4)
 PATH = (Segment(length=1.5, cells=2, ratio=0.5), BEND, Segment(length=2.0, cells=2))
 
 
 def _tube() -> SweptTube:
-    return swept_tube(
-        section=section_mesh(cells=SectionMesh(around=2, across=2, wall_ratio=3.0)), segments=PATH
-    )
+    return swept_tube(section=SectionMesh(around=2, across=2, wall_ratio=3.0).mesh(), segments=PATH)
 
 
 def test_a_path_of_lines_and_a_quarter_circle_ends_where_it_must() -> None:
@@ -59,7 +57,7 @@ def test_volume_and_areas_are_those_of_a_swept_half_disc() -> None:
 
 def test_nodes_stand_at_their_stations_on_their_section_nodes() -> None:
     tube = _tube()
-    section = section_mesh(cells=SectionMesh(around=2, across=2, wall_ratio=3.0))
+    section = SectionMesh(around=2, across=2, wall_ratio=3.0).mesh()
     offset = tube.mesh.doflocs[:2] - tube.place[:, tube.half_station]
     tangent = tube.direction[:, tube.half_station]
     assert np.abs((offset * tangent).sum(axis=0)).max() < 1e-12
@@ -86,6 +84,6 @@ def test_every_slab_has_the_sections_cells() -> None:
     ],
 )
 def test_impossible_paths_are_refused(segments: tuple[Segment, ...]) -> None:
-    section = section_mesh(cells=SectionMesh(around=2, across=2))
+    section = SectionMesh(around=2, across=2).mesh()
     with pytest.raises(ValueError, match=r"segments|tight"):
         swept_tube(section=section, segments=segments)

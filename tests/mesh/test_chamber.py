@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ringbalance.mesh.chamber import ChamberMesh, Geometry, chamber_mesh, default_cells, mesh_quality
+from ringbalance.mesh.chamber import ChamberMesh, Geometry, chamber_mesh, default_cells
 from ringbalance.mesh.export import scikit_fem_mesh
 from ringbalance.mesh.geometry import half_angle
 from ringbalance.scene.models import Disc
@@ -92,7 +92,7 @@ def test_cells_stay_square_down_to_a_micrometre(
     chamber = chamber_mesh(
         disc=disc, surface_radius=disc.outer_radius - depth, cells=cells, geometry=geometry
     )
-    quality = mesh_quality(chamber)
+    quality = chamber.quality()
     assert quality.minimum_scaled_jacobian > 0.95
     assert quality.cells == np.prod(cells)
     assert quality.nodes == np.prod([2 * n + 1 for n in cells])
@@ -102,14 +102,14 @@ def test_aspect_is_that_of_the_cells(disc: Disc) -> None:
     sector = replace(disc, plate_thickness=0.0)
     chamber = chamber_mesh(disc=sector, surface_radius=44e-3, cells=(1, 10))
     longest = disc.outer_radius * disc.central_angle / 10
-    assert mesh_quality(chamber).maximum_aspect == pytest.approx(longest / 0.5e-3, rel=0.02)
+    assert chamber.quality().maximum_aspect == pytest.approx(longest / 0.5e-3, rel=0.02)
 
 
 def test_a_folded_cell_is_seen(disc: Disc) -> None:
     chamber = chamber_mesh(disc=disc, surface_radius=30e-3, cells=(2, 4))
     folded = replace(chamber, nodes=chamber.nodes.copy())
     folded.nodes[:, chamber.grid[0, 4]] = folded.nodes[:, chamber.grid[4, 4]] * 1.1
-    assert mesh_quality(folded).minimum_scaled_jacobian < 0
+    assert folded.quality().minimum_scaled_jacobian < 0
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from ringbalance.mesh.bent_tube import Segment
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.verification.navier_stokes.rotating_section import SectionMesh
 from ringbalance.verification.reference.bend_shift import bend_shift, rotation_with_curvature
-from ringbalance.verification.reference.bent_tube import BentTubeFlow, bent_tube_flow, pressure_loss
+from ringbalance.verification.reference.bent_tube import BentTubeFlow, bent_tube_flow
 
 COARSE = SectionMesh(around=2, across=2, wall_ratio=3.0)
 STRAIGHT = (Segment(length=2.0, cells=2),)
@@ -26,7 +26,7 @@ def _straight(rotation: float, factor: float = 1.0) -> BentTubeFlow:
 
 
 def _loss(flow: BentTubeFlow) -> float:
-    return pressure_loss(flow=flow, start=0.0, end=float(flow.arc_length[-1]))
+    return flow.pressure_loss(start=0.0, end=float(flow.arc_length[-1]))
 
 
 def test_a_straight_tube_at_rest_has_hagen_and_poiseuilles_loss() -> None:

@@ -19,7 +19,6 @@ from ringbalance.physics.tube.end_losses_table import end_table, laminar_entranc
 from ringbalance.verification.navier_stokes.end_losses import (
     End,
     EndMesh,
-    end_system,
     solve_end,
 )
 from ringbalance.verification.navier_stokes.newton import FlowSolution, FlowSystem
@@ -31,7 +30,7 @@ def _cells(end: End) -> EndMesh:
 
 @cache
 def _system(end: End) -> FlowSystem:
-    return end_system(cells=_cells(end), end=end)
+    return _cells(end).system(end=end)
 
 
 @cache
@@ -123,7 +122,7 @@ def test_unseen_reynolds_numbers_in_a_larger_domain(end: End, reynolds: float) -
     cells = EndMesh(
         cells_per_fold=2.2, reservoir=100.0, edge_cell=3e-5, tube=200.0 if end == "entrance" else 10.0
     )
-    system, flow = end_system(cells=cells, end=end), None
+    system, flow = cells.system(end=end), None
     for step in (0.0, 10.0, 40.0, 120.0, reynolds):
         flow = solve_end(system=system, reynolds=step, start=flow)
         assert flow.status.ok

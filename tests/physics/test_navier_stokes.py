@@ -34,13 +34,6 @@ from ringbalance.verification.navier_stokes.newton import (
     solve_flow,
 )
 from ringbalance.verification.navier_stokes.space import taylor_hood
-from ringbalance.verification.navier_stokes.system import (
-    convection_entries,
-    convection_vector,
-    free_matrix,
-    full_matrix,
-    linear_entries,
-)
 
 DATA = Path(__file__).parent / "data"
 
@@ -225,14 +218,14 @@ def test_jacobian_is_the_exact_derivative() -> None:
     c = Coefficients(inertia=1.3, viscosity=0.2, rotation=0.7)
     change = np.zeros_like(vector)
     change[system.free] = np.random.default_rng(1).normal(size=system.free.size)
-    linear = linear_entries(system, c)
+    linear = system.linear_entries(c)
 
     def residual(x: np.ndarray) -> np.ndarray:
-        return np.asarray(full_matrix(system, linear) @ x + c.inertia * convection_vector(system, x))
+        return np.asarray(system.full_matrix(linear) @ x) + c.inertia * system.convection_vector(x)
 
     # The residual is quadratic, so its central difference is exact.
     difference = (residual(vector + change) - residual(vector - change))[system.free] / 2
-    matrix = free_matrix(system, linear + c.inertia * convection_entries(system, vector))
+    matrix = system.free_matrix(linear + c.inertia * system.convection_entries(vector))
     np.testing.assert_allclose(matrix @ change[system.free], difference, rtol=1e-10, atol=1e-10)
 
 

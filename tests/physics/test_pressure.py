@@ -15,15 +15,12 @@ from ringbalance.mesh.export import scikit_fem_mesh
 from ringbalance.physics.pressure import multigrid as pressure_multigrid
 from ringbalance.physics.pressure.assembly import (
     DENSE_LIMIT,
-    at_points,
     facet_points,
-    load,
-    mass,
     stiffness,
     volume_points,
 )
 from ringbalance.physics.pressure.linear import solve_linear
-from ringbalance.physics.pressure.solve import PressureProblem, RotatingLiquid, places, solve_pressure
+from ringbalance.physics.pressure.solve import PressureProblem, RotatingLiquid, solve_pressure
 from ringbalance.physics.pressure.sparse import linear_prolongation
 from ringbalance.physics.results import StatusCode
 from ringbalance.scene.arrays import FloatArray
@@ -76,7 +73,7 @@ def test_polynomials_of_the_space_are_exact(
     problem = polynomial(len(cells), degree)
     chamber = chamber_mesh(disc=disc, surface_radius=wavy, cells=cells, geometry=geometry)
     solution = solve_pressure(chamber=chamber, problem=problem)
-    exact = problem.surface_pressure(places(chamber))
+    exact = problem.surface_pressure(chamber.places)
     np.testing.assert_allclose(solution.pressure, exact, atol=1e-11 * np.abs(exact).max())
 
 
@@ -89,7 +86,7 @@ def test_the_flux_through_the_surface_is_exact_for_a_linear_pressure(disc: Disc)
     nodal = np.zeros(solution.pressure.size)
     nodal[chamber.grid[0]] = solution.surface_gradient
     total = np.sum(facets.weights * flux)
-    found = load(facets, np.ones_like(facets.weights), unknowns=nodal.size) @ nodal
+    found = facets.load(np.ones_like(facets.weights), unknowns=nodal.size) @ nodal
     assert found == pytest.approx(total, rel=1e-11)
 
 
@@ -106,16 +103,16 @@ def test_assembly_agrees_with_scikit_fems_forms(disc: Disc, cells: tuple[int, ..
     assert abs(csr_matrix(mine)[numbers][:, numbers] - laplace).max() < 1e-12 * abs(laplace).max()
     volume = volume_points(chamber)
     expected = skfem.LinearForm(lambda v, w: np.exp(w.x[0]) * v).assemble(basis)
-    found = load(volume, np.exp(volume.points[0]), unknowns=unknowns)
+    found = volume.load(np.exp(volume.points[0]), unknowns=unknowns)
     np.testing.assert_allclose(found[numbers], expected, atol=1e-14)
     for name in chamber.boundaries:
         facets = facet_points(chamber, name)
         other = skfem.FacetBasis(mesh, mesh.elem(), facets=name, intorder=5)
         flux = skfem.LinearForm(lambda v, w: (w.n[0] - 2 * w.n[1]) * w.x[1] * v).assemble(other)
         density = (facets.normals[0] - 2 * facets.normals[1]) * facets.points[1]
-        np.testing.assert_allclose(load(facets, density, unknowns=unknowns)[numbers], flux, atol=1e-11)
+        np.testing.assert_allclose(facets.load(density, unknowns=unknowns)[numbers], flux, atol=1e-11)
         squares = skfem.BilinearForm(lambda u, v, _: u * v).assemble(other)
-        whole = csr_matrix(mass(facets, unknowns=unknowns))
+        whole = csr_matrix(facets.mass(unknowns=unknowns))
         assert abs(whole[numbers][:, numbers] - squares).max() < 1e-11
 
 
@@ -243,5 +240,5 @@ def test_a_deliberate_fault_changes_the_pressure(disc: Disc, factor: str) -> Non
     with mutated_pressure(**{factor: 1.01}):
         faulty = solve_pressure(chamber=chamber, problem=WATER.problem())
     volume = volume_points(chamber)
-    difference = at_points(volume, faulty.pressure - sound.pressure)
+    difference = volume.at_points(faulty.pressure - sound.pressure)
     assert np.abs(difference).max() > 1e-3 * sound.pressure.max()

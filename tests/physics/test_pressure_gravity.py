@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.physics.pressure.assembly import volume_points
-from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, places
+from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid
 from ringbalance.physics.pressure.surface import find_surface, refined_surface, solve_with_gravity
 from ringbalance.physics.results import StatusCode
 from ringbalance.scene.arrays import FloatArray
@@ -38,7 +38,7 @@ def along(speed: float) -> RotatingLiquid:
 def level(solution: PressureSolution, liquid: RotatingLiquid) -> FloatArray:
     """Radius, at mid-height, of the exact isobar through each surface node, m: a constant if it is one."""
     chamber, omega = solution.chamber, liquid.angular_velocity
-    nodes = places(chamber)[:, chamber.grid[0]]
+    nodes = chamber.places[:, chamber.grid[0]]
     pull = np.zeros(3)
     pull[: len(liquid.gravity)] = liquid.gravity
     x, y = nodes[0] + pull[0] / omega**2, nodes[1] + pull[1] / omega**2
@@ -85,7 +85,7 @@ def test_pressure_with_gravity_is_that_of_the_isobars(disc: Disc) -> None:
     liquid = across(600.0, 0.9)
     solution = solve_with_gravity(disc=disc, liquid=liquid, fill_ratio=0.4, cells=(8, 24))
     omega = liquid.angular_velocity
-    x, y = places(solution.chamber) + np.array(liquid.gravity)[:, None] / omega**2
+    x, y = solution.chamber.places + np.array(liquid.gravity)[:, None] / omega**2
     mean = float(np.mean(level(solution, liquid)))
     exact = 500.0 * omega**2 * (x**2 + y**2 - mean**2)
     np.testing.assert_allclose(solution.pressure, exact, atol=1e-6 * exact.max())

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from ringbalance.mesh.chamber import Geometry, SurfaceFunction, chamber_mesh
-from ringbalance.physics.pressure.assembly import at_points, facet_points, volume_points
+from ringbalance.physics.pressure.assembly import facet_points, volume_points
 from ringbalance.physics.pressure.solve import PressureProblem, PressureSolution, solve_pressure
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
@@ -95,7 +95,7 @@ class ManufacturedPressure:
         """Error of a solution over its own mesh, |p_h - p| / |p| in the norm of L2."""
         volume = volume_points(solution.chamber)
         exact = self.value(solution.chamber.length_scale * volume.points)
-        difference = at_points(volume, solution.pressure) - exact
+        difference = volume.at_points(solution.pressure) - exact
         return float(np.sqrt(np.sum(volume.weights * difference**2) / np.sum(volume.weights * exact**2)))
 
 
@@ -180,7 +180,7 @@ def bound(disc: Disc, dimension: int, geometry: Geometry) -> float:
     points = chamber.length_scale * volume.points
     exact, nodal = made_up.value(points), made_up.value(chamber.length_scale * chamber.nodes)
     if geometry == "quadratic":
-        error = at_points(volume, nodal) - exact
+        error = volume.at_points(nodal) - exact
         return 2 * float(np.sqrt(np.sum(volume.weights * error**2) / np.sum(volume.weights * exact**2)))
     chord = disc.outer_radius * (disc.central_angle / cells[1]) ** 2 / 8
     steepest = np.linalg.norm(made_up.gradient(points), axis=0).max()

@@ -31,7 +31,6 @@ from ringbalance.verification.navier_stokes.rotating_section import (
     developed_section,
     friction_ratio,
     march_section,
-    section_system,
     solve_section,
     solve_section_without_inertia,
 )
@@ -39,7 +38,7 @@ from ringbalance.verification.navier_stokes.rotating_section import (
 
 @cache
 def _system(around: int = 8, wall_ratio: float = 15.0) -> FlowSystem:
-    return section_system(cells=SectionMesh(around=around, across=3 * around // 2, wall_ratio=wall_ratio))
+    return SectionMesh(around=around, across=3 * around // 2, wall_ratio=wall_ratio).system()
 
 
 def _still(system: FlowSystem) -> float:
@@ -81,7 +80,7 @@ def test_fast_rotation_without_inertia_tends_to_the_exact_limit() -> None:
 
 @pytest.mark.heavy
 def test_fast_rotation_up_to_a_million() -> None:
-    system = section_system(cells=SectionMesh(around=28, across=44, wall_ratio=60.0))
+    system = SectionMesh(around=28, across=44, wall_ratio=60.0).system()
     for rotation, gap in ((1e2, 0.7754), (1e4, 0.0753), (1e6, 0.0075)):
         flow = solve_section_without_inertia(system=system, rotation_reynolds=rotation)
         found = friction_ratio(flow) / (0.07863 * np.sqrt(rotation)) - 1
@@ -252,7 +251,7 @@ def test_ito_and_nanbus_formula_holds_for_slow_rotation_only() -> None:
 
 
 def test_a_flow_that_changes_in_time_settles_at_the_steady_one() -> None:
-    system = section_system(cells=SectionMesh(around=3, across=4, wall_ratio=5.0))
+    system = SectionMesh(around=3, across=4, wall_ratio=5.0).system()
     steady = developed_section(system=system, kl=1e4, s=1.0).driving_gradient
     flow = march_section(system=system, kl=1e4, s=1.0, step=2e-4, steps=1000)
     assert flow.gradients[-1] == pytest.approx(steady, rel=1e-4)
@@ -260,7 +259,7 @@ def test_a_flow_that_changes_in_time_settles_at_the_steady_one() -> None:
 
 
 def test_a_march_with_too_long_a_step_says_so() -> None:
-    system = section_system(cells=DuctMesh(across=8, along=4))
+    system = DuctMesh(across=8, along=4).system()
     with pytest.raises(ArithmeticError, match="shorter steps"):
         march_section(system=system, kl=1e6, s=0.1, step=1e-3, steps=500)
 
@@ -272,7 +271,5 @@ def test_laminar_friction_of_ducts_is_the_exact_series(aspect: float, product: f
     series = 1 - 192 / np.pi**5 * ratio * np.sum(np.tanh(odd * np.pi / (2 * ratio)) / odd**5)
     exact = 96 / ((1 + ratio) ** 2 * series)
     assert exact == pytest.approx(product, rel=1e-3)
-    flow = solve_section_without_inertia(
-        system=section_system(cells=DuctMesh(aspect_ratio=aspect)), rotation_reynolds=0.0
-    )
+    flow = solve_section_without_inertia(system=DuctMesh(aspect_ratio=aspect).system(), rotation_reynolds=0.0)
     assert 64 * friction_ratio(flow) == pytest.approx(exact, rel=1e-4)

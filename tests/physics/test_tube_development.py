@@ -30,11 +30,8 @@ from ringbalance.verification.navier_stokes.newton import (
 from ringbalance.verification.navier_stokes.rotating_section import (
     SectionMesh,
     developed_section,
-    section_mesh,
-    section_system,
     solve_section_without_inertia,
 )
-from ringbalance.verification.navier_stokes.space import at_points
 from ringbalance.verification.reference import bent_tube
 from ringbalance.verification.reference.entry_length import slowest_decay
 
@@ -43,7 +40,7 @@ Array = np.ndarray
 
 @lru_cache(maxsize=2)
 def section(around: int = 5, across: int = 8, wall_ratio: float = 12.0) -> FlowSystem:
-    return section_system(cells=SectionMesh(around=around, across=across, wall_ratio=wall_ratio))
+    return SectionMesh(around=around, across=across, wall_ratio=wall_ratio).system()
 
 
 def bound(re: float, rotation: float) -> float:
@@ -165,7 +162,7 @@ def test_developing_length_bounds_the_slowest_decay_everywhere(rotation: float) 
 
 
 def _alpha(flow: FlowSolution, system: FlowSystem) -> float:
-    weights, axial = system.space.weights, at_points(system.space, flow.velocity)[0][2]
+    weights, axial = system.space.weights, system.space.at_points(flow.velocity)[0][2]
     return float((weights * axial**3).sum() / weights.sum())
 
 
@@ -201,10 +198,10 @@ def test_what_development_adds_never_exceeds_rotations_share() -> None:
 def _entry_excess(re: float, rotation: float, blunt: float) -> float:
     """Head lost beyond developed friction, over U^2/2, behind an inflow ~ 1 - (2 r/d)^blunt, in 3-D."""
     cells = SectionMesh(around=2, across=4, wall_ratio=6.0)
-    system = section_system(cells=cells)
+    system = cells.system()
     developed = developed_section(system=system, kl=re * rotation, s=rotation / re)
     way = 5 * bound(re, rotation)
-    tube = swept_tube(section=section_mesh(cells=cells), segments=[Segment(length=way, cells=16, ratio=6.0)])
+    tube = swept_tube(section=cells.mesh(), segments=[Segment(length=way, cells=16, ratio=6.0)])
     flow = bent_tube._system(tube, system, developed, re)
     space, nodes = system.space, system.space.velocity_nodes
     profile = 1 - np.minimum(2 * np.hypot(*space.node_coordinates()), 1.0) ** blunt

@@ -12,9 +12,9 @@ from ringbalance.physics.tube.rotation import (
     critical_reynolds,
     curved_friction_ratio,
     rotating_friction_ratio,
-    rotation_in_range,
     turbulent_friction_ratio,
 )
+from ringbalance.physics.tube.rotation_table import rotation_table_covers
 
 Array = np.ndarray
 
@@ -211,5 +211,5 @@ def test_turbulent_half_width_reaches_from_no_effect_to_the_curved_tube() -> Non
 
 
 def test_range_ends_where_the_solutions_end() -> None:
-    inside = rotation_in_range(reynolds=[2800.0, 2900.0, 10.0], rotation_reynolds=[3490.0, 3490.0, 1.1e5])
+    inside = rotation_table_covers(reynolds=[2800.0, 2900.0, 10.0], rotation_reynolds=[3490.0, 3490.0, 1.1e5])
     assert list(inside) == [True, False, False]

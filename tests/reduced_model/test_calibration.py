@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from ringbalance.reduced_model.calibration import Calibration, calibrate, lambda_over_fill, lambda_variation
+from ringbalance.reduced_model.calibration import Calibration, calibrate
 from ringbalance.scene import SceneError
 from ringbalance.scene.models import Disc, InputUncertainty, Scene
 
@@ -118,9 +118,9 @@ def test_lambda_of_the_papers_disc_is_73_mm_and_nearly_constant(
     value = float(found.chamber.moment_per_mass.value)
     assert value == pytest.approx(73.36e-3, abs=0.01e-3)
     assert abs(value / 72e-3 - 1) > 0.007  # outside what the liquid-ring paper allows its 72 mm
-    assert lambda_variation(calibration=found) < 0.007
+    assert found.lambda_variation < 0.007
     x = np.array([0.0, 0.1, 0.25, 0.4, 0.5])
-    over = lambda_over_fill(calibration=found, fill_ratio=x)
+    over = found.lambda_over_fill(fill_ratio=x)
     np.testing.assert_allclose(over, over[::-1], rtol=1e-9)
     exact = Exact(table_1_scene.disc)
     half = exact.moment(0.5, 1000.0) / (1000.0 * found.chamber.volume * 0.25)

@@ -13,10 +13,8 @@ from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.heads import tube_heads
 from ringbalance.reports.studies.drag_map import (
     LiquidVerdicts,
-    drag_contour,
     drag_map,
     liquid_verdicts,
-    velocity_errors,
 )
 from ringbalance.scene.liquids import liquid_at
 from ringbalance.scene.models import InputUncertainty, Scene
@@ -86,7 +84,7 @@ def test_stated_inputs_spread_k_as_they_do_in_tube_loss(calibration: Calibration
 
 
 def test_the_contour_is_really_at_fifty(calibration: Calibration) -> None:
-    nu, bore = drag_contour(drag_map=drag_map(calibration=calibration))
+    nu, bore = drag_map(calibration=calibration).contour()
     assert nu.size > 20
     for one, d in zip(nu[::7], bore[::7], strict=True):
         point = drag_map(calibration=calibration, bore=[d], kinematic_viscosity=[one]).point
@@ -95,7 +93,7 @@ def test_the_contour_is_really_at_fifty(calibration: Calibration) -> None:
 
 def test_where_the_apparent_k_is_fifty_eq_19_has_the_velocity(calibration: Calibration) -> None:
     found = drag_map(calibration=calibration)
-    nu, bore = drag_contour(drag_map=found, apparent=True)
+    nu, bore = found.contour(apparent=True)
     one = drag_map(calibration=calibration, bore=[bore[10]], kinematic_viscosity=[nu[10]])
     assert one.velocity_error[0, 0] == pytest.approx(0, abs=2e-3)
     np.testing.assert_allclose(
@@ -164,7 +162,7 @@ def test_a_gas_that_drives_nothing_maps_nothing(calibration: Calibration) -> Non
     assert not np.any(found.point.runs)
     assert np.all(found.point.regime == Regime.BLOCKED)
     assert np.all(found.point.k == 0)
-    assert drag_contour(drag_map=found)[0].size == 0
+    assert found.contour()[0].size == 0
 
 
 BAD = [
@@ -188,7 +186,7 @@ def test_bad_axes_are_refused(calibration: Calibration, given: dict[str, object]
 def test_a_contour_of_no_k_is_refused(calibration: Calibration, k: float) -> None:
     found = drag_map(calibration=calibration, bore=[1e-3], kinematic_viscosity=[1e-6])
     with pytest.raises(ValueError, match="k must be positive"):
-        drag_contour(drag_map=found, k=k)
+        found.contour(k=k)
 
 
 @pytest.fixture(scope="module")
@@ -249,7 +247,7 @@ def test_the_bore_for_fifty_has_fifty(calibration: Calibration, verdicts: Liquid
 
 
 def test_the_papers_velocity_is_off_by_the_root_of_the_drags(verdicts: LiquidVerdicts) -> None:
-    at_scene, equal = velocity_errors(verdicts=verdicts)
+    at_scene, equal = verdicts.velocity_errors()
     runs = verdicts.at_scene.runs
     expected = np.sqrt((verdicts.at_scene.apparent_k + 1) / 51) - 1
     np.testing.assert_allclose(at_scene[runs], expected[runs], rtol=1e-10)

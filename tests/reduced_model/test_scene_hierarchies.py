@@ -13,12 +13,10 @@ from scipy.optimize import brentq
 from ringbalance.physics.pressure.ring import ring_quantities
 from ringbalance.physics.results import StatusCode
 from ringbalance.physics.tube.loss import tube_loss
-from ringbalance.physics.tube.state import upstream_loss
 from ringbalance.reduced_model.calibration import calibrated_model
 from ringbalance.reduced_model.chamber import terms as chamber_terms
 from ringbalance.reduced_model.chamber.values import (
     by_closed_form,
-    by_elements,
     by_paper,
     by_quadrature,
 )
@@ -35,6 +33,7 @@ from ringbalance.reduced_model.tube.path import to_crest_end
 from ringbalance.scene import models
 from ringbalance.scene.accuracy import with_tolerance
 from ringbalance.scene.models import Scene
+from ringbalance.verification.selection_studies.chamber_elements import by_elements
 from ringbalance.verification.selection_studies.chamber_models import chamber_hierarchies
 from ringbalance.verification.selection_studies.choice import choose
 from ringbalance.verification.selection_studies.law_models import (
@@ -44,7 +43,6 @@ from ringbalance.verification.selection_studies.law_models import (
     SIPHON,
     LawModels,
     base_law,
-    law_of,
 )
 from ringbalance.verification.selection_studies.scene_numbers import scene_numbers
 from ringbalance.verification.selection_studies.tube_models import LawBook, k_hierarchy, velocity_hierarchy
@@ -145,7 +143,7 @@ def test_the_top_of_k_is_the_calibrated_k(table_1_scene: Scene) -> None:
     )
     found = loss_at(table_1_scene, loss=TABLES, velocity=u)
     assert found.k == pytest.approx(top.k.value, rel=1e-12)
-    upstream = upstream_loss(tube=to_crest_end(table_1_scene.tube), state=found)
+    upstream = found.upstream_loss(tube=to_crest_end(table_1_scene.tube))
     assert upstream == pytest.approx(top.upstream_k, rel=1e-12)
     assert np.all(loss_at(table_1_scene, loss=CONSTANT, velocity=u).k == 50.0)
 
@@ -173,13 +171,13 @@ def test_the_highest_law_against_the_calibrated_one_and_a_root_of_its_own(
     table_1_scene: Scene,
 ) -> None:
     base = base_law(table_1_scene)
-    law = law_of(table_1_scene, LawModels(level=QUADRATURE, loss=TABLES, regimes=REGIMES), base=base)
+    law = LawModels(level=QUADRATURE, loss=TABLES, regimes=REGIMES).law(table_1_scene, base=base)
     fills = np.array([0.1, 0.25, 0.4])
     found = law.evaluate(fill_ratio=fills, gas_pressure=7e5)
     finest = calibrated_model(with_tolerance(table_1_scene, models="finest")).flow
     wanted = finest.evaluate(fill_ratio=fills, gas_pressure=7e5)
     assert found.velocity == pytest.approx(wanted.velocity, rel=1e-6)
-    siphon = law_of(table_1_scene, LawModels(level=CLOSED, loss=CORRELATIONS, regimes=SIPHON), base=base)
+    siphon = LawModels(level=CLOSED, loss=CORRELATIONS, regimes=SIPHON).law(table_1_scene, base=base)
     head = (
         700.0
         + (

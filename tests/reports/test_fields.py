@@ -13,9 +13,6 @@ from skfem import Mesh
 from ringbalance.reports.pictures.fields import (
     ChamberField,
     chamber_field,
-    mesh_record,
-    pressure_profile,
-    write_field,
 )
 from ringbalance.scene import Scene
 
@@ -27,7 +24,7 @@ def field(paper_scene: Scene) -> ChamberField:
 
 
 def test_the_profile_is_that_of_liquid_at_rest(paper_scene: Scene, field: ChamberField) -> None:
-    profile = pressure_profile(scene=paper_scene, field=field)
+    profile = field.pressure_profile(scene=paper_scene)
     radius, pressure = np.array(profile["radius_m"]), np.array(profile["pressure_Pa"])
     factor = paper_scene.liquid.density * paper_scene.rotor.speed**2 / 2
     assert radius[0] == pytest.approx(field.surface_radius, rel=1e-12)
@@ -36,7 +33,7 @@ def test_the_profile_is_that_of_liquid_at_rest(paper_scene: Scene, field: Chambe
 
 
 def test_the_papers_profile_ends_at_equation_12(paper_scene: Scene, field: ChamberField) -> None:
-    profile, disc = pressure_profile(scene=paper_scene, field=field), paper_scene.disc
+    profile, disc = field.pressure_profile(scene=paper_scene), paper_scene.disc
     # V' = 33.84 ml, half of the chamber's 67.69 ml; Eq. 12 by hand.
     volume = 0.5 * 67.68766e-6
     wall = paper_scene.liquid.density * paper_scene.rotor.speed**2 * volume / (disc.axial_width * math.pi / 2)
@@ -47,7 +44,7 @@ def test_the_papers_profile_ends_at_equation_12(paper_scene: Scene, field: Chamb
 
 def test_the_file_holds_the_field(tmp_path: Path, paper_scene: Scene, field: ChamberField) -> None:
     data: list[Any] = ["point_data"]
-    stored = Mesh.load(write_field(field=field, path=tmp_path / "field.vtu"), out=data)
+    stored = Mesh.load(field.write(path=tmp_path / "field.vtu"), out=data)
     factor = paper_scene.liquid.density * paper_scene.rotor.speed**2 / 2
     radius = np.hypot(*stored.doflocs[:2])
     assert data[0]["pressure_Pa"] == pytest.approx(
@@ -60,7 +57,7 @@ def test_the_file_holds_the_field(tmp_path: Path, paper_scene: Scene, field: Cha
 
 
 def test_the_mesh_is_reported(field: ChamberField) -> None:
-    record = mesh_record(field)
+    record = field.record()
     assert record["unknowns"] == math.prod(2 * count + 1 for count in record["cells"])
     assert 0.5 < record["minimum_scaled_jacobian"] <= 1
     assert record["status"] == "solved"

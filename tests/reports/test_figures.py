@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 import pytest
 
 from ringbalance.reports.figures.cases import series_plots
-from ringbalance.reports.figures.style import DARK, LIGHT, Drawing, decade, plain_number, standalone
+from ringbalance.reports.figures.style import DARK, LIGHT, Drawing, decade, plain_number
 from ringbalance.reports.page import page_content
 from ringbalance.verification.evidence import CurveStyle
 
@@ -52,7 +52,7 @@ def test_every_figure_is_well_formed_and_told_in_words(drawings: dict[str, Drawi
         assert root.attrib["aria-label"] == drawing.alt
         assert drawing.alt.endswith(".")
         assert len(drawing.caption) > 10
-        ElementTree.fromstring(standalone(drawing).encode())
+        ElementTree.fromstring(drawing.standalone().encode())
 
 
 def test_ids_are_unique_across_the_page(drawings: dict[str, Drawing]) -> None:
@@ -64,7 +64,7 @@ def test_ids_are_unique_across_the_page(drawings: dict[str, Drawing]) -> None:
 
 
 def test_a_file_of_its_own_follows_both_schemes(drawings: dict[str, Drawing]) -> None:
-    text = standalone(drawings["drag"])
+    text = drawings["drag"].standalone()
     assert "prefers-color-scheme:dark" in text
     assert LIGHT["--fig-found"] in text
     assert DARK["--fig-found"] in text

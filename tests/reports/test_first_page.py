@@ -251,10 +251,14 @@ def test_the_grade_stands_only_where_a_mass_is_given(paper_scene: Scene, evidenc
 def test_the_valve_decides_what_can_be_corrected(
     evidence: Record, above: tuple[int, int], verdict: str
 ) -> None:
-    sizes = (2e-8, 1e-7)
-    ends = [{"smallest_correction_m": s, "above_limit": bool(a)} for s, a in zip(sizes, above, strict=True)]
+    keys = ("smallest_correction_m", "standing_amplitude_m")
+    ends: list[Record] = [dict.fromkeys(keys, 1e-7 if each else 2e-8) for each in above]
     evidence["calibration"]["gas_line"] = {"given": False, "limit_m": 5e-8, "ends": ends}
     assert row_of(evidence, "Smallest correction").verdict == verdict
+    assert row_of(evidence, "Vibration up to which").verdict == verdict
+    # The trial algorithm has no gain that could leave an amplitude standing.
+    ends[0]["standing_amplitude_m"] = None
+    assert not any(row.name.startswith("Vibration up to which") for row in requirements(evidence))
 
 
 def test_the_decision_counts_and_names(evidence: Record) -> None:

@@ -173,7 +173,7 @@ CHANGES: tuple[tuple[tuple[Any, ...], Any, str], ...] = (
     (("scene", "name"), "Another disc", "Another disc"),
     (("scene", "sha256"), "cd" * 32, "cd" * 32),
     (("scene", "values_sha256"), "dc" * 32, "dc" * 32),
-    (("scene", "table", 0, "origin"), "measured", "measured"),
+    (("scene", "table", 0, "origin"), "handbook", "handbook"),
     (("versions", "numpy"), "9.9.9", "9.9.9"),
     (("pressure", "mesh", "unknowns"), 12345, "12 345"),
     (("calibration", "models_used", 0, "estimated_contribution"), 0.0777, "7.8 %"),

@@ -12,7 +12,7 @@ from PIL import Image
 
 from ringbalance.reports.cli import plot
 from ringbalance.reports.pictures.opengl import OpenGL, find_opengl
-from ringbalance.reports.pictures.process import finish_drawing, start_drawing, stop_drawing, write_fields
+from ringbalance.reports.pictures.process import start_drawing, write_fields
 from ringbalance.reports.pictures.theme import PICTURE, THEMES
 from ringbalance.reports.pictures.tube import tube_field
 from ringbalance.scene import Scene, bundled_scene
@@ -70,7 +70,7 @@ def test_the_colour_bar_runs_from_end_to_end(drawn: Path) -> None:
 @needs_opengl
 def test_a_drawing_that_fails_is_reported(tmp_path: Path, paper_scene: Scene) -> None:
     missing = {"pressure": tmp_path / "none.vtu", "disc": tmp_path / "none.vtu"}
-    record = finish_drawing(start_drawing(scene=paper_scene, fields=missing, folder=tmp_path))
+    record = start_drawing(scene=paper_scene, fields=missing, folder=tmp_path).finish()
     assert record["drawn"] is False
     assert record["files"] == []
     assert "ended with code 1" in record["text"]
@@ -80,8 +80,8 @@ def test_a_drawing_that_fails_is_reported(tmp_path: Path, paper_scene: Scene) ->
 def test_without_opengl_nothing_is_started(tmp_path: Path, paper_scene: Scene) -> None:
     drawing = start_drawing(scene=paper_scene, fields={}, folder=tmp_path, opengl=NO_OPENGL)
     assert drawing.process is None
-    assert finish_drawing(drawing) == {"drawn": False, "text": NO_OPENGL.text, "files": []}
-    stop_drawing(drawing)
+    assert drawing.finish() == {"drawn": False, "text": NO_OPENGL.text, "files": []}
+    drawing.stop()
 
 
 def test_captions_follow_the_scene(tmp_path: Path, paper_scene: Scene) -> None:

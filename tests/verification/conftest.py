@@ -55,7 +55,7 @@ scene = { "disc.plate_thickness" = 0.004 }
 """
 
 VERIFICATION = (
-    CLAIM.replace("number = 1\n", "order = 10\n")
+    CLAIM.replace("number = 1\n", 'order = 10\nabout = ["ring"]\n')
     .replace('kind = "claim"', 'kind = "code_verification"', 1)
     .replace('metric = "validation"', 'metric = "relative"')
     .replace('expect = "refuted"', 'expect = "failed"')

@@ -64,7 +64,7 @@ def test_all_faults_are_named_at_once(claim_text: str) -> None:
 
 
 def test_a_verification_must_fail_with_a_defect(claim_text: str) -> None:
-    text = claim_text.replace("number = 1\n", "order = 10\n").replace(
+    text = claim_text.replace("number = 1\n", 'order = 10\nabout = ["ring"]\n').replace(
         'kind = "claim"', 'kind = "code_verification"', 1
     )
     with pytest.raises(CaseError, match=r"metric|come out"):

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from measurement_tables import README, fresh, standing_table
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
@@ -354,3 +355,12 @@ def test_light_cases_hold_at_level_heavy(paper_scene: Scene) -> None:
     for result in run_cases(LIGHT, scene=paper_scene, level="heavy"):
         known = (Verdict.PASSED, Verdict.CONFIRMED)
         assert result.definition.kind == "claim" or result.verdict in known, result.definition.id
+
+
+def test_the_readme_has_the_table_of_what_stands_behind_each_quantity(
+    results: Mapping[str, CaseResult],
+) -> None:
+    page = README.read_text(encoding="utf-8")
+    table = standing_table([case_document(results[case.id]) for case in load_cases()])
+    assert fresh(page, "standing", table) == page
+    assert "| Residual liquid over the port | no data |" in page

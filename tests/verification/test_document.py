@@ -83,7 +83,7 @@ def test_gaps_in_a_curve_become_null(claim: CaseDefinition, paper_scene: Scene) 
 
 
 def heavy(verdict: str, *, sha: str = "aa", cost: str = "heavy") -> dict[str, Any]:
-    return {"id": "coverage", "verdict": verdict, "cost": cost, "scene_sha256": sha}
+    return {"id": "coverage", "about": ["range"], "verdict": verdict, "cost": cost, "scene_sha256": sha}
 
 
 @pytest.mark.parametrize(

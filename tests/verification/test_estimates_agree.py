@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from ringbalance.controller.compare import compare, comparison_document
+from ringbalance.controller.compare import compare
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.terms import run_models
@@ -62,7 +62,7 @@ def check_comparison(scene: Scene, calibration: Calibration) -> None:
     comparison = compare(scene, scene, model_of=lambda _: calibration.model, runs=1)
     tuned = comparison.sides[0].scene
     assert isinstance(tuned, Scene)
-    assert comparison_document(comparison)["models_used"][0] == [asdict(used) for used in models_used(tuned)]
+    assert comparison.document()["models_used"][0] == [asdict(used) for used in models_used(tuned)]
 
 
 def tolerance(scene: Scene) -> str:

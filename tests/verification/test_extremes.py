@@ -22,11 +22,11 @@ from ringbalance.scene.models import Scene
 from ringbalance.verification.extremes import design as extremes_design
 from ringbalance.verification.extremes import point as extremes_point
 from ringbalance.verification.extremes.axes import AXES, axis_of, fitted, toml_bytes, varied
-from ringbalance.verification.extremes.design import CHUNK, Base, Point, design, judge, judged
+from ringbalance.verification.extremes.design import CHUNK, Base, Point, design
 from ringbalance.verification.extremes.maps import Sweep
 from ringbalance.verification.extremes.numerics import at_aspect, at_step
 from ringbalance.verification.extremes.point import Defect, Ending, Judgement, judge_point
-from ringbalance.verification.extremes.study import Size, broken, extremes_document, find_extremes
+from ringbalance.verification.extremes.study import Size, find_extremes
 from ringbalance.verification.reference.exact_chamber import exact_moment
 
 
@@ -157,7 +157,7 @@ def test_a_scene_of_little_more_than_a_disc_can_be_varied_along_every_axis(
         document={**kept, "tube": tube, "gas": {"pressure": "0.7 MPa"}, "rotor": {"speed": "10000 rpm"}},
         file="short.toml",
     )
-    found = judge(short, {name: float(axis_of(name).at(0.5))})
+    found = short.judge({name: float(axis_of(name).at(0.5))})
     assert found.violations == ()
     assert found.loop
 
@@ -238,7 +238,7 @@ def counting(monkeypatch: pytest.MonkeyPatch) -> list[Point]:
         good = 300 < point.get("speed", 1000.0) < 2e4
         return Judgement(ending=Ending.SOLVED if good else Ending.REFUSED, text="" if good else "too fast")
 
-    monkeypatch.setattr(extremes_design, "judge", quick)
+    monkeypatch.setattr(Base, "judge", quick)
     return seen
 
 
@@ -246,11 +246,11 @@ def test_an_interrupted_set_goes_on_where_it_stopped(
     base: Base, tmp_path: Path, counting: list[Point]
 ) -> None:
     points, kept = design(count=3 * CHUNK, seed=1), tmp_path / "kept.json"
-    first = judged(base, points[: 2 * CHUNK], kept=kept)
-    whole = judged(base, points, kept=kept)
+    first = base.judged(points[: 2 * CHUNK], kept=kept)
+    whole = base.judged(points, kept=kept)
     assert len(counting) == 3 * CHUNK
     assert whole[: 2 * CHUNK] == first
-    assert judged(base, points) == whole
+    assert base.judged(points) == whole
 
 
 @pytest.mark.parametrize(
@@ -262,26 +262,26 @@ def test_a_damaged_file_of_points_is_made_again(
 ) -> None:
     points, kept = design(count=CHUNK, seed=1), tmp_path / "kept.json"
     kept.write_text(content)
-    whole = judged(base, points, kept=kept)
+    whole = base.judged(points, kept=kept)
     assert len(counting) == CHUNK
     (told,) = caplog.messages
     assert f"{kept} is damaged" in told
-    assert judged(base, points, kept=kept) == whole
+    assert base.judged(points, kept=kept) == whole
     assert len(counting) == CHUNK
 
 
 def test_a_changed_judgement_is_not_taken(base: Base, tmp_path: Path, counting: list[Point]) -> None:
     points, kept = design(count=CHUNK, seed=1), tmp_path / "kept.json"
-    judged(base, points, kept=kept)
+    base.judged(points, kept=kept)
     kept.write_text(kept.read_text().replace('"residual": 0.0', '"residual": "x"', 1))
-    judged(base, points, kept=kept)
+    base.judged(points, kept=kept)
     assert len(counting) == 2 * CHUNK
 
 
 def test_judgements_of_another_scene_are_not_taken(base: Base, tmp_path: Path, counting: list[Point]) -> None:
     points, kept = design(count=CHUNK, seed=1), tmp_path / "kept.json"
-    judged(base, points, kept=kept)
-    judged(replace(base, document={**base.document, "name": "another"}), points, kept=kept)
+    base.judged(points, kept=kept)
+    replace(base, document={**base.document, "name": "another"}).judged(points, kept=kept)
     assert len(counting) == 2 * CHUNK
 
 
@@ -289,9 +289,9 @@ def test_judgements_of_another_version_are_not_taken(
     base: Base, tmp_path: Path, counting: list[Point], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     points, kept = design(count=CHUNK, seed=1), tmp_path / "kept.json"
-    judged(base, points, kept=kept)
+    base.judged(points, kept=kept)
     monkeypatch.setattr(extremes_design, "_sources", lambda: "another version")
-    judged(base, points, kept=kept)
+    base.judged(points, kept=kept)
     assert len(counting) == 2 * CHUNK
 
 
@@ -310,9 +310,9 @@ def test_a_belief_about_the_rotor_follows_the_rotor(document: dict[str, Any], pa
 def test_everything_is_reported(base: Base, counting: list[Point]) -> None:
     size = Size(points=10, sweep=5, fineness=1.0, grid=3)
     found = find_extremes(base, size=size)
-    told = extremes_document(found)
+    told = found.document()
     assert len(counting) == told["judged"] - 2 * 5 == 10 + 5 * len(AXES) + 9 * len(found.maps)
-    assert broken(found) == 0
+    assert found.broken() == 0
     assert sum(told["endings"].values()) == told["judged"]
     json.dumps(told, allow_nan=False)
 
@@ -358,12 +358,12 @@ def test_an_axis_without_any_change_is_one_stretch() -> None:
 @pytest.mark.heavy
 def test_two_workers_find_what_one_finds(base: Base) -> None:
     points = design(count=2 * CHUNK, seed=3)
-    assert judged(base, points, workers=2) == judged(base, points)
+    assert base.judged(points, workers=2) == base.judged(points)
 
 
 def test_a_few_designed_points_hold(base: Base) -> None:
     for point in design(count=4, seed=1):
-        found = judge(base, point)
+        found = base.judge(point)
         assert found.violations == (), (found.text, dict(point))
 
 

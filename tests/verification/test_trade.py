@@ -35,7 +35,6 @@ from ringbalance.verification.selection_studies.scenes import random_scene
 from ringbalance.verification.selection_studies.study import (
     held_tolerance,
     thinned,
-    trade_document,
     trade_study,
 )
 from ringbalance.verification.selection_studies.tube_models import LawBook, k_hierarchy
@@ -160,7 +159,7 @@ def only_k(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("only_k")
 def test_the_document_is_whole_and_the_same_again_but_for_its_times(scene: Scene) -> None:
-    first, again = (trade_document(trade_study(scene, level="light")) for _ in range(2))
+    first, again = (trade_study(scene, level="light").document() for _ in range(2))
     assert json.loads(json.dumps(first, allow_nan=False)) == first
     assert {key for key in first if first[key] != again[key]} <= {"times"}
     (found,) = first["quantities"]

@@ -6,9 +6,8 @@ import math
 import tomllib
 from dataclasses import replace
 from importlib.resources import files
-from pathlib import Path
 
-import measurement_reference
+import measurement_tables
 import numpy as np
 import pytest
 from scipy.stats import binomtest
@@ -115,23 +114,6 @@ def test_the_budget_of_k_holds_bias_and_scatter_of_turbulent_friction(paper_scen
     assert loss.k.uncertainty >= loss.uncertainty_parts["friction correlation"]
 
 
-def test_the_readme_says_what_the_comparison_finds(paper_scene: Scene) -> None:
-    readme = " ".join((Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8").split())
-    smooth, rough, ducts, rotor = (
-        case_code(f"measured_{name}").compute(paper_scene, "light")
-        for name in ("smooth_tubes", "rough_tubes", "ducts", "rotor")
-    )
-    numbers, share = smooth.numbers, smooth.found["share_within"].value
-    assert (
-        f"({numbers['points']:.0f} points of {numbers['series']:.0f} tubes and rigs, "
-        f"bias {numbers['turbulent_bias']:.1%}, {share:.1%} within both intervals)"
-    ).replace("%", " %") in readme
-    for one in (rough, ducts):
-        share = one.found["share_within"].value
-        assert f"({one.numbers['points']:.0f} points, {share:.1%} within)".replace("%", " %") in readme
-    assert f"({rotor.numbers['points']:.0f} points)" in readme
-
-
 _HEAD = '# kind = "friction"\n# source = "me"\n# uncertainty = 0.02\n'
 
 
@@ -222,7 +204,7 @@ def test_every_bundled_set_of_a_kind_that_is_predicted_has_its_columns() -> None
 
 
 def test_the_page_on_measurements_lists_the_kinds_and_its_example_can_be_read() -> None:
-    page = measurement_reference.PAGE.read_text(encoding="utf-8")
-    assert measurement_reference.fresh(page) == page
+    page = measurement_tables.PAGE.read_text(encoding="utf-8")
+    assert measurement_tables.fresh(page, "kinds", measurement_tables.kind_table()) == page
     example = page.split("```")[1]
     assert len(compare(parse_measurements(example, file="example")).measured) == 3

@@ -50,10 +50,7 @@ class FigureSix:
     """With a friction arm that is assumed 20 % too small."""
 
     def growth(self, effort: FloatArray) -> FloatArray:
-        """Effort at the highest over that at the lowest speed.
-
-        Returns: Shape (mass ratios, weight ratios).
-        """
+        """Effort at the highest over that at the lowest speed, shape (mass ratios, weight ratios)."""
         return np.asarray(effort[..., -1] / effort[..., 0], dtype=np.float64)
 
 
@@ -69,9 +66,8 @@ def _positioning_effort(
     duration: float,
     printed: bool,
 ) -> float:
-    """Integral of the norm of the regulator's torques over a move, the whirl's loads compensated.
+    """Integral of the norm of the regulator's torques over a move, N m s, the whirl's loads compensated.
 
-    Returns: J, N m s.
     Source: Eqs. 40 and 55 of the paper on eccentric masses.
     """
     angle, rate, asked = np.array([-first, -second]), np.zeros(2), np.zeros(2)
@@ -113,10 +109,7 @@ def _later_rate(law: DriveLaw, arm: float, speed: float, rate: float, net: float
 
 
 def figure_six(scene: EccentricScene, *, step: float = _STEP) -> FigureSix:
-    """Effort over weights and speed for both mass ratios and four compensations.
-
-    Source: Fig. 6 of the paper on eccentric masses.
-    """
+    """Effort over weights and speed for both mass ratios and four compensations: the paper's Fig. 6."""
     share = {"exact": 1.0, "without": 0.0, "printed": 1.0, "short": 0.8}
     found = {name: _efforts(scene, name == "printed", part, step) for name, part in share.items()}
     return FigureSix(

@@ -98,10 +98,7 @@ def _scene_matrices(scene: EccentricScene, *, angular_velocity: float) -> Filter
 def estimate_imbalance(
     scene: EccentricScene, record: _ImbalanceRecord, *, scale: float = 1.0
 ) -> tuple[FloatArray, FloatArray]:
-    """Run the scene's imbalance filter over a record.
-
-    Returns: States, shape (n, 6), and covariances, shape (n, 6, 6).
-    """
+    """States, shape (n, 6), and covariances, shape (n, 6, 6), of the scene's filter over a record."""
     told = scene.imbalance_filter
     variance = scale**2 * np.repeat([told.position_noise**2, told.velocity_noise**2], 2)
     start = start_estimate(told.initial_position, told.initial_velocity, told.initial_unbalance)
@@ -117,10 +114,7 @@ def estimate_imbalance(
 
 
 def convergence_time(time: FloatArray, error: FloatArray, *, limit: float) -> float:
-    """Instant from which on an error stays within a limit.
-
-    Returns: s; infinite when the last error is beyond the limit.
-    """
+    """Instant from which on an error stays within a limit, s; infinite when the last is beyond it."""
     beyond = np.flatnonzero(error > limit)
     if beyond.size == 0:
         return float(time[0])
@@ -137,10 +131,7 @@ def _time_of(scene: EccentricScene, record: _ImbalanceRecord, scale: float) -> f
 def figure_four(
     scene: EccentricScene, *, duration: float = 8.0, scales: tuple[float, ...] = _SCALES
 ) -> FigureFour:
-    """Estimate the four imbalances of Fig. 4, and one of them under covariances ever less honest.
-
-    Source: Fig. 4 of the paper on eccentric masses.
-    """
+    """Estimates of the four imbalances of the paper's Fig. 4, and of one under dishonest covariances."""
     turned = [changed(scene, "imbalance", phase=math.radians(phase)) for phase in _PAPER_PHASES]
     records = [imbalance_record(one, duration=duration) for one in turned]
     found = [estimate_imbalance(one, record) for one, record in zip(turned, records, strict=True)]

@@ -11,7 +11,6 @@ import numpy as np
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
-from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.verification.eccentric_mass.imbalance import convergence_time
 from ringbalance.verification.eccentric_mass.scenes import at_constant_speed, changed, envelope, thinned
@@ -99,30 +98,21 @@ def figure_five(scene: EccentricScene, *, time_limit: float = 12.0) -> FigureFiv
     )
 
 
-def _arm_error(run: EccentricRun, arm: float) -> FloatArray:
-    return np.asarray(np.max(np.abs(run.estimates.friction_arm - arm), axis=1) / arm, dtype=np.float64)
-
-
 def _friction_time(run: EccentricRun, arm: float) -> float:
     begun = [stage.start for stage in run.stages if stage.name == "friction estimation"]
     if not begun:
         return math.inf
-    return convergence_time(run.time, _arm_error(run, arm), limit=_CONVERGED) - begun[0]
+    error = np.max(np.abs(run.estimates.friction_arm - arm), axis=1) / arm
+    return convergence_time(run.time, error, limit=_CONVERGED) - begun[0]
 
 
 def figure_seven(scene: EccentricScene, *, time_limit: float = 30.0) -> BalancingFigure:
-    """Balance the two imbalances of Fig. 7 at constant speed.
-
-    Source: Fig. 7 of the paper on eccentric masses.
-    """
+    """Balance the two imbalances of the paper's Fig. 7 at constant speed."""
     return _balanced(at_constant_speed(scene, time_limit=time_limit))
 
 
 def figure_eight(scene: EccentricScene, *, time_limit: float = 400.0) -> BalancingFigure:
-    """The same with masses that stop 10 degrees beside their targets, and fine tuning.
-
-    Source: Fig. 8 of the paper on eccentric masses.
-    """
+    """The same with masses that stop 10 degrees beside their targets, and fine tuning: the paper's Fig. 8."""
     level = at_constant_speed(scene, time_limit=time_limit)
     return _balanced(changed(level, "supervisor", target_error=(_PAPER_ERROR, _PAPER_ERROR)))
 

@@ -39,10 +39,7 @@ def driven_scene() -> EccentricScene:
 
 
 def thinned(values: npt.ArrayLike, *, count: int = _DRAWN) -> FloatArray:
-    """Evenly chosen values along the last axis, the first and last among them.
-
-    Returns: Values, shape (..., at most count).
-    """
+    """Evenly chosen values along the last axis, at most `count`, the first and last among them."""
     array = np.asarray(values, dtype=np.float64)
     return np.asarray(array[..., _places(array.shape[-1], count)], dtype=np.float64)
 

@@ -20,6 +20,8 @@ from ringbalance.scene.models import Scene
 Document = dict[str, Any]
 Values = Mapping[str, float]
 """By axis, in the axis' unit."""
+MAP_PREFIX: Final = "map of "
+"""Of the name of a map's table."""
 _TABLES: Final = ("environment", "gas", "sensor", "controller", "run", "accuracy")
 """That a scene file may leave out."""
 

@@ -22,7 +22,16 @@ from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.platform.files import write_whole
 from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification.extremes.axes import AXES, fitted, toml_bytes, varied
-from ringbalance.verification.extremes.point import SOUND, Defect, Ending, Judgement, judge_point, refusal
+from ringbalance.verification.extremes.point import (
+    GAS_TIME,
+    PERIODS,
+    SOUND,
+    Defect,
+    Ending,
+    Judgement,
+    judge_point,
+    refusal,
+)
 
 Point = Mapping[str, float]
 Progress = Callable[[int, int], None]
@@ -30,10 +39,6 @@ Progress = Callable[[int, int], None]
 
 USUAL_SHARE: Final = 0.75
 """Of the coordinates, drawn from where most discs are; else all but a few points would be refused."""
-PERIODS: Final = 20
-"""Of the controller that a point's closed loop may take."""
-GAS_TIME: Final = 0.2
-"""s, beyond those: a short period with long valve-open times is no reason for hundreds of operations."""
 CHUNK: Final = 20
 _LOG: Final = logging.getLogger("ringbalance")
 
@@ -51,6 +56,44 @@ class Base:
     def scene(self) -> Scene:
         """The scene itself, before anything is varied; read once for all points."""
         return _made(self.document, self.file)
+
+    def judge(self, point: Point) -> Judgement:
+        """Judge the scene at one point."""
+        scene = self.scene
+        document = varied(self.document, scene=scene, values=point)
+        period = point.get("period", scene.controller.period)
+        longest = PERIODS * period + GAS_TIME
+        document["run"]["time_limit"] = f"{longest!r} s"
+        try:
+            document = fitted(document, scene=scene, made=_made(document, self.file), values=point)
+        except SceneError as error:
+            return refusal(error)
+        return judge_point(document, file=self.file, defect=self.defect)
+
+    def judged(
+        self,
+        points: Sequence[Point],
+        *,
+        workers: int = 1,
+        progress: Progress | None = None,
+        kept: Path | None = None,
+    ) -> tuple[Judgement, ...]:
+        """Judge many points on several processes, in their order.
+
+        Args: `progress`: called after each chunk. `kept`: file of judgements done, from which an interrupted
+            run resumes; a damaged one is written again, with a note on standard error.
+        Raises: OSError: the kept file cannot be read or written.
+        """
+        done = _done(kept, self, points)
+        rest = [points[start : start + CHUNK] for start in range(len(done), len(points), CHUNK)]
+        with closing(_chunks(self, rest, workers)) as chunks:
+            for chunk in chunks:
+                done += chunk
+                if kept is not None:
+                    _keep(kept, self, points, done)
+                if progress is not None:
+                    progress(len(done), len(points))
+        return tuple(done)
 
 
 def design(*, count: int, seed: int) -> tuple[Point, ...]:
@@ -72,48 +115,8 @@ def _point(shares: Sequence[float], kinds: Sequence[float]) -> Point:
     return values
 
 
-def judge(base: Base, point: Point) -> Judgement:
-    """Judge the scene at one point."""
-    scene = base.scene
-    document = varied(base.document, scene=scene, values=point)
-    period = point.get("period", scene.controller.period)
-    longest = PERIODS * period + GAS_TIME
-    document["run"]["time_limit"] = f"{longest!r} s"
-    try:
-        document = fitted(document, scene=scene, made=_made(document, base.file), values=point)
-    except SceneError as error:
-        return refusal(error)
-    return judge_point(document, file=base.file, defect=base.defect)
-
-
 def _made(document: Mapping[str, Any], file: str) -> Scene:
     return liquid_ring_scene(scene_from(content=toml_bytes(document), file=file))
-
-
-def judged(
-    base: Base,
-    points: Sequence[Point],
-    *,
-    workers: int = 1,
-    progress: Progress | None = None,
-    kept: Path | None = None,
-) -> tuple[Judgement, ...]:
-    """Judge many points on several processes, in their order.
-
-    Args: `progress`: called after each chunk. `kept`: file of judgements done, from which an interrupted run
-        resumes; a damaged one is written again, with a note on standard error.
-    Raises: OSError: the kept file cannot be read or written.
-    """
-    done = _done(kept, base, points)
-    rest = [points[start : start + CHUNK] for start in range(len(done), len(points), CHUNK)]
-    with closing(_chunks(base, rest, workers)) as chunks:
-        for chunk in chunks:
-            done += chunk
-            if kept is not None:
-                _keep(kept, base, points, done)
-            if progress is not None:
-                progress(len(done), len(points))
-    return tuple(done)
 
 
 def _chunks(
@@ -130,7 +133,7 @@ def _chunks(
 
 
 def _judge_all(base: Base, points: Sequence[Point]) -> list[Judgement]:
-    return [judge(base, point) for point in points]
+    return [base.judge(point) for point in points]
 
 
 def _key(base: Base, points: Sequence[Point]) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.extremes.axes import AXES, Axis, axis_of
-from ringbalance.verification.extremes.design import Base, Point, judged
+from ringbalance.verification.extremes.design import Base, Point
 from ringbalance.verification.extremes.point import Ending, Judgement
 
 Progress = Callable[[int, int], None]
@@ -115,7 +115,7 @@ def sweeps(
 
     def judge_all(places: Sequence[tuple[Axis, float]]) -> Sequence[Judgement]:
         points = [{axis.name: value} for axis, value in places]
-        return judged(base, points, workers=workers, progress=progress)
+        return base.judged(points, workers=workers, progress=progress)
 
     return swept(AXES, judge_all, count=count, fineness=fineness)
 
@@ -185,7 +185,7 @@ def stability_maps(
         for vy in axis_of(y).at(grid)
         for vx in axis_of(x).at(grid)
     ]
-    found = judged(base, points, workers=workers, progress=progress)
+    found = base.judged(points, workers=workers, progress=progress)
     size = count**2
     return tuple(
         StabilityMap(

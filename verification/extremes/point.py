@@ -23,6 +23,10 @@ from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.verification.extremes.axes import toml_bytes
 from ringbalance.verification.reference.exact_chamber import exact_wall_pressure
 
+PERIODS: Final = 20
+"""Of the controller that a point's closed loop may take."""
+GAS_TIME: Final = 0.2
+"""s, beyond those: a short period with long valve-open times is no reason for hundreds of operations."""
 ROUND_OFF: Final = 1e-12
 """Relative: what floating point may take from a conserved or monotone quantity."""
 WIDE: Final = 1.0

@@ -14,7 +14,8 @@ import numpy as np
 from ringbalance.scene.loader import read_scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.verification.evidence import Level
-from ringbalance.verification.extremes.design import Base, Point, design, judged
+from ringbalance.verification.extremes.axes import MAP_PREFIX
+from ringbalance.verification.extremes.design import Base, Point, design
 from ringbalance.verification.extremes.maps import StabilityMap, Sweep, stability_maps, sweeps
 from ringbalance.verification.extremes.numerics import numerical_sweeps
 from ringbalance.verification.extremes.point import Ending, Judgement
@@ -24,8 +25,6 @@ Progress = Callable[[str, int, int], None]
 Record = dict[str, Any]
 
 SEED: Final = 1
-MAP_PREFIX: Final = "map of "
-"""Of the name of a map's table."""
 MOST_SHOWN: Final = 20
 """Violations reported in full."""
 
@@ -66,6 +65,40 @@ class _Extremes:
         parts: list[Sweep | StabilityMap] = [*self.sweeps, *self.maps]
         return self.judgements + tuple(j for part in parts for j in part.judgements)
 
+    def document(self) -> Record:
+        """What was found as plain numbers, lists and texts."""
+        everything = self.everything
+        return {
+            "points": len(self.points),
+            "judged": len(everything),
+            "endings": counted(everything),
+            "loop_endings": dict(Counter(j.loop for j in everything if j.loop)),
+            "worst_residual": max((j.residual for j in everything), default=0.0),
+            "worst_error_over_half_width": max((j.worst_ratio for j in everything), default=-1.0),
+            "violations": _violations(self),
+            "axes": [_sweep(sweep) for sweep in self.sweeps],
+            "maps": [_map(found) for found in self.maps],
+        }
+
+    def tables(self) -> dict[str, dict[str, list[Any]]]:
+        """Columns by table: "axes", the spans of each that end alike, and "map of x and y" for each map."""
+        spans = [(sweep.axis, span) for sweep in self.sweeps for span in sweep.spans()]
+        axes: dict[str, list[Any]] = {
+            "axis": [axis.title for axis, _ in spans],
+            "unit": [axis.unit for axis, _ in spans],
+            "from": [span.low for _, span in spans],
+            "to": [span.high for _, span in spans],
+            "ending": [str(span.ending) for _, span in spans],
+            "loop": [span.loop for _, span in spans],
+            "said": [span.text for _, span in spans],
+        }
+        maps = {f"{MAP_PREFIX}{item.x.name} and {item.y.name}": _map_columns(item) for item in self.maps}
+        return {"axes": axes, **maps}
+
+    def broken(self) -> int:
+        """Number of points, of all looked at, at which anything was not as it should be."""
+        return sum(bool(j.violations) for j in self.everything)
+
 
 def scene_base(path: Path) -> Base:
     """Take a scene file as the scene to vary. Raises: SceneError: the file is no liquid-ring scene."""
@@ -92,7 +125,7 @@ def find_extremes(
 
     points = design(count=size.points, seed=SEED)
     # First, so that a kept file that cannot be used is known at once.
-    judgements = judged(base, points, workers=workers, progress=told("designed set"), kept=kept)
+    judgements = base.judged(points, workers=workers, progress=told("designed set"), kept=kept)
     return _Extremes(
         points=points,
         judgements=judgements,
@@ -102,38 +135,6 @@ def find_extremes(
         ),
         maps=stability_maps(base, count=size.grid, workers=workers, progress=told("maps")),
     )
-
-
-def extremes_document(extremes: _Extremes) -> Record:
-    """The extremes as plain numbers, lists and texts."""
-    everything = extremes.everything
-    return {
-        "points": len(extremes.points),
-        "judged": len(everything),
-        "endings": counted(everything),
-        "loop_endings": dict(Counter(j.loop for j in everything if j.loop)),
-        "worst_residual": max((j.residual for j in everything), default=0.0),
-        "worst_error_over_half_width": max((j.worst_ratio for j in everything), default=-1.0),
-        "violations": _violations(extremes),
-        "axes": [_sweep(sweep) for sweep in extremes.sweeps],
-        "maps": [_map(found) for found in extremes.maps],
-    }
-
-
-def extremes_tables(extremes: _Extremes) -> dict[str, dict[str, list[Any]]]:
-    """Columns by table: "axes", the spans of each that end alike, and "map of x and y" for each map."""
-    spans = [(sweep.axis, span) for sweep in extremes.sweeps for span in sweep.spans()]
-    axes: dict[str, list[Any]] = {
-        "axis": [axis.title for axis, _ in spans],
-        "unit": [axis.unit for axis, _ in spans],
-        "from": [span.low for _, span in spans],
-        "to": [span.high for _, span in spans],
-        "ending": [str(span.ending) for _, span in spans],
-        "loop": [span.loop for _, span in spans],
-        "said": [span.text for _, span in spans],
-    }
-    maps = {f"{MAP_PREFIX}{item.x.name} and {item.y.name}": _map_columns(item) for item in extremes.maps}
-    return {"axes": axes, **maps}
 
 
 def _map_columns(item: StabilityMap) -> dict[str, list[Any]]:
@@ -150,11 +151,6 @@ def counted(judgements: Sequence[Judgement]) -> dict[str, int]:
     """Points by how they ended, every ending named. Returns: Numbers of points by ending."""
     numbers = Counter(j.ending for j in judgements)
     return {str(ending): numbers[ending] for ending in Ending}
-
-
-def broken(extremes: _Extremes) -> int:
-    """Number of points, of all looked at, at which anything was not as it should be."""
-    return sum(bool(j.violations) for j in extremes.everything)
 
 
 def _violations(extremes: _Extremes) -> list[Record]:

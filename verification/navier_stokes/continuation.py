@@ -90,9 +90,8 @@ def follow(
     targets: Sequence[float],
     rule: StepRule | None = None,
 ) -> _FlowPath:
-    """Flows at the targets, each reached from the one before in steps that recover from failure.
+    """Flows at the targets, each reached from the one before; a failed step is halved, an easy one grows.
 
-    A failed step is halved; after an easy one the step grows again.
     Args: `solve`: flow at a parameter from a predicted start. `start`: a converged flow. `start_at`: its
         parameter. `targets`: parameters to reach, in monotone order.
     Returns: The flows reached; the status says NOT_CONVERGED, and where, when a target was not reached.
@@ -114,10 +113,7 @@ def follow(
 
 
 def flow_at(*, solve: FirstSolve, parameter: float, first: float) -> FlowSolution:
-    """Flow at a parameter, followed from where a start from rest still converges with a first step.
-
-    Raises: ArithmeticError: the flow was not found.
-    """
+    """Flow at a parameter, followed from where a start from rest converges. Raises: ArithmeticError: none."""
     flow = solve(min(parameter, _EASY), None)
     status = flow.status
     if parameter > _EASY and status.ok:

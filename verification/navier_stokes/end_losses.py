@@ -57,6 +57,37 @@ class EndMesh:
     jet_cell: float = 6.0
     """Longest cell along the axis of the reservoir, at two cells per fold."""
 
+    def mesh(self, *, end: End) -> Any:
+        """Quadratic mesh in (x, r) of a reservoir and a tube of unit bore, flow along x, the end at x = 0.
+
+        The tube is at x > 0 for the entrance and at x < 0 for the exit; boundaries are axis, wall, far
+        (normal to x), side (far, normal to r) and deep (in the tube).
+        """
+        sign = 1.0 if end == "entrance" else -1.0
+        longest = self.longest_cell * self.reservoir
+        outside = -sign * _line(self.reservoir, min(self.jet_cell, longest), self)
+        inside = sign * _line(self.tube, min(self.tube_cell, self.longest_cell * self.tube), self)
+        core = 0.5 - _line(0.5, self.longest_cell * 0.5, self)[::-1]
+        core[0] = 0.0
+        around = 0.5 + _line(self.reservoir, longest, self)
+        patches = [
+            tensor_patch(x=outside, y=core, sides={"east": "far", "south": "axis"}),
+            tensor_patch(x=outside, y=around, sides={"east": "far", "west": "wall", "north": "side"}),
+            tensor_patch(x=inside, y=core, sides={"east": "deep", "south": "axis", "north": "wall"}),
+        ]
+        return patch_mesh(patches=patches, shape="quad")
+
+    def system(self, *, end: End) -> FlowSystem:
+        """Discrete equations of an end: developed flow deep in the tube, no force on the far reservoir."""
+        space = taylor_hood(mesh=self.mesh(end=end), axisymmetric=True)
+        conditions = [Dirichlet(boundary="deep", component=0, value=lambda x: 2 * (1 - 4 * x[1] ** 2))]
+        conditions += [Dirichlet(boundary=name, component=1) for name in ("deep", "wall", "axis")]
+        conditions.append(Dirichlet(boundary="wall", component=0))
+        if end == "exit":
+            # The jet draws liquid in through the side; left free along it, that goes unstable near Re 1950.
+            conditions.append(Dirichlet(boundary="side", component=0))
+        return flow_system(space=space, conditions=conditions)
+
 
 def _graded_line(*, length: float, longest: float, cells: EndMesh) -> FloatArray:
     """Vertices from 0 to a length whose cells grow geometrically from the edge cell up to the longest one."""
@@ -71,40 +102,6 @@ def _graded_line(*, length: float, longest: float, cells: EndMesh) -> FloatArray
 
 def _line(length: float, longest: float, cells: EndMesh) -> FloatArray:
     return with_midpoints(vertices=_graded_line(length=length, longest=longest, cells=cells))
-
-
-def end_mesh(*, cells: EndMesh, end: End) -> Any:
-    """Mesh in (x, r) of a reservoir and a tube of unit bore, flow in the direction of x, the end at x = 0.
-
-    Args: `cells`: domain and grading. `end`: "entrance" (tube at x > 0) or "exit" (tube at x < 0).
-    Returns: Quadratic mesh with boundaries axis, wall, far (normal to x), side (far, normal to r), deep (in
-        the tube).
-    """
-    sign = 1.0 if end == "entrance" else -1.0
-    longest = cells.longest_cell * cells.reservoir
-    outside = -sign * _line(cells.reservoir, min(cells.jet_cell, longest), cells)
-    inside = sign * _line(cells.tube, min(cells.tube_cell, cells.longest_cell * cells.tube), cells)
-    core = 0.5 - _line(0.5, cells.longest_cell * 0.5, cells)[::-1]
-    core[0] = 0.0
-    around = 0.5 + _line(cells.reservoir, longest, cells)
-    patches = [
-        tensor_patch(x=outside, y=core, sides={"east": "far", "south": "axis"}),
-        tensor_patch(x=outside, y=around, sides={"east": "far", "west": "wall", "north": "side"}),
-        tensor_patch(x=inside, y=core, sides={"east": "deep", "south": "axis", "north": "wall"}),
-    ]
-    return patch_mesh(patches=patches, shape="quad")
-
-
-def end_system(*, cells: EndMesh, end: End) -> FlowSystem:
-    """Discrete equations of an end: developed flow deep in the tube, no force on the far reservoir."""
-    space = taylor_hood(mesh=end_mesh(cells=cells, end=end), axisymmetric=True)
-    conditions = [Dirichlet(boundary="deep", component=0, value=lambda x: 2 * (1 - 4 * x[1] ** 2))]
-    conditions += [Dirichlet(boundary=name, component=1) for name in ("deep", "wall", "axis")]
-    conditions.append(Dirichlet(boundary="wall", component=0))
-    if end == "exit":
-        # The jet draws liquid in through the side; left free along it, that goes unstable near Re 1950.
-        conditions.append(Dirichlet(boundary="side", component=0))
-    return flow_system(space=space, conditions=conditions)
 
 
 def solve_end(

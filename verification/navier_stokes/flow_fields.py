@@ -17,7 +17,7 @@ from scipy.sparse.linalg import spsolve
 from ringbalance.physics.results import Status, StatusCode
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.verification.navier_stokes.continuation import flow_at
-from ringbalance.verification.navier_stokes.end_losses import End, EndMesh, end_mesh, end_system, solve_end
+from ringbalance.verification.navier_stokes.end_losses import End, EndMesh, solve_end
 from ringbalance.verification.navier_stokes.newton import (
     Dirichlet,
     FlowSolution,
@@ -29,9 +29,8 @@ from ringbalance.verification.navier_stokes.rotating_section import (
     SectionMesh,
     developed_section,
     friction_ratio,
-    section_system,
 )
-from ringbalance.verification.navier_stokes.space import FlowSpace, at_points, stiffness_entries, taylor_hood
+from ringbalance.verification.navier_stokes.space import FlowSpace, taylor_hood
 
 LARGEST_KL: Final = 1e6
 """R Re up to which the section is drawn; near it further steady flows appear."""
@@ -112,7 +111,7 @@ def _potential(space: FlowSpace, gradient: FloatArray, known: IntArray, values: 
     size = space.velocity_nodes
     right = np.bincount(space.velocity.element_dofs.T.ravel(), weights=local.ravel(), minlength=size)
     pattern = space.velocity_pattern
-    matrix = sparse.csc_matrix((stiffness_entries(space), (pattern.rows, pattern.cols)), shape=(size, size))
+    matrix = sparse.csc_matrix((space.stiffness_entries(), (pattern.rows, pattern.cols)), shape=(size, size))
     psi = np.zeros(size)
     psi[known] = values
     free = np.setdiff1d(np.arange(size), known)
@@ -132,25 +131,23 @@ def _section_status(clipped: bool) -> Status:
 
 def _in_plane_stream_function(system: FlowSystem, flow: FlowSolution) -> FloatArray:
     space = system.space
-    u, v = at_points(space, flow.velocity)[0][:2]
+    u, v = space.at_points(flow.velocity)[0][:2]
     edge = np.concatenate([space.boundary_nodes(name) for name in ("wall", "symmetry")])
     return _potential(space, np.stack([-v, u]), np.unique(edge).astype(np.int64), np.zeros(1))
 
 
 def section_flow(*, reynolds: float, rotation_reynolds: float) -> SectionFlow:
-    """Developed laminar flow in the section of a tube that turns about an axis across it.
+    """Developed laminar flow over the section of a tube that turns about an axis across it.
 
-    Returns: The flow over the whole disc; beyond R Re = 1e6 or R = 1e4 the nearest flow of the same R/Re, its
-        status OUT_OF_RANGE.
+    Beyond R Re = 1e6 or R = 1e4 it is the nearest flow of the same R/Re, its status OUT_OF_RANGE.
     Raises: ValueError: an argument that is not finite or out of its bounds.
     Raises: ArithmeticError: the flow was not found.
-    Source: `rotating_section`.
     """
     _check(reynolds, "reynolds", above=True)
     _check(rotation_reynolds, "rotation_reynolds", above=False)
     kl, s = reynolds * rotation_reynolds, rotation_reynolds / reynolds
     drawn = min(kl, LARGEST_KL, LARGEST_ROTATION * (LARGEST_ROTATION / s)) if s > 0.0 else 0.0
-    system = section_system(cells=_SECTION)
+    system = _SECTION.system()
     settings = NewtonSettings(max_iterations=10, tolerance=1e-6)
     flow = developed_section(system=system, kl=drawn, s=s, settings=settings)
     re = reynolds if drawn == kl else float(np.sqrt(drawn / s))
@@ -194,12 +191,11 @@ def _check(value: float, name: str, *, above: bool) -> None:
 
 
 def entrance_flow(*, reynolds: float) -> EndFlow:
-    """Laminar flow from a large reservoir into a sharp-edged tube.
+    """Laminar flow near the mouth from a large reservoir into a sharp-edged tube, see `end_losses`.
 
-    Returns: The flow near the mouth; beyond Re = 2000 the one there, its status OUT_OF_RANGE.
+    Beyond Re = 2000 it is the one there, its status OUT_OF_RANGE.
     Raises: ValueError: an argument that is not finite or not above zero.
     Raises: ArithmeticError: the flow was not found.
-    Source: `end_losses`.
     """
     _check(reynolds, "reynolds", above=True)
     length = 10.0 + 0.1 * min(reynolds, LARGEST_END_REYNOLDS)
@@ -208,16 +204,10 @@ def entrance_flow(*, reynolds: float) -> EndFlow:
 
 
 def exit_flow(*, reynolds: float) -> EndFlow:
-    """Laminar developed flow from a sharp-edged tube into a large reservoir.
-
-    Returns: The flow near the mouth; beyond Re = 2000 the one there, its status OUT_OF_RANGE.
-    Raises: ValueError: an argument that is not finite or not above zero.
-    Raises: ArithmeticError: the flow was not found.
-    Source: `end_losses`.
-    """
+    """Laminar developed flow from a sharp-edged tube into a large reservoir; otherwise as `entrance_flow`."""
     _check(reynolds, "reynolds", above=True)
     cells = EndMesh(cells_per_fold=1.3, edge_cell=1e-2, reservoir=15.0, tube=2.0, jet_cell=1.0)
-    return _end_flow("exit", end_system(cells=cells, end="exit"), reynolds, 1.2)
+    return _end_flow("exit", cells.system(end="exit"), reynolds, 1.2)
 
 
 def _sink(component: int) -> Callable[[FloatArray], FloatArray]:
@@ -232,7 +222,7 @@ def _sink(component: int) -> Callable[[FloatArray], FloatArray]:
 
 def _entrance_system(cells: EndMesh) -> FlowSystem:
     """An entrance fed by a sink's flow: let in freely so near, liquid at high Re makes the solve unstable."""
-    space = taylor_hood(mesh=end_mesh(cells=cells, end="entrance"), axisymmetric=True)
+    space = taylor_hood(mesh=cells.mesh(end="entrance"), axisymmetric=True)
     conditions = [Dirichlet(boundary=b, component=c, value=_sink(c)) for b in ("far", "side") for c in (0, 1)]
     conditions += [Dirichlet(boundary="wall", component=c) for c in (0, 1)]
     conditions += [Dirichlet(boundary="deep", component=1), Dirichlet(boundary="axis", component=1)]
@@ -263,7 +253,7 @@ def _end_flow(end: End, system: FlowSystem, reynolds: float, first: float) -> En
 
 def _meridional_stream_function(system: FlowSystem, flow: FlowSolution) -> FloatArray:
     space = system.space
-    u, v = at_points(space, flow.velocity)[0]
+    u, v = space.at_points(flow.velocity)[0]
     axis, wall = (space.boundary_nodes(name) for name in ("axis", "wall"))
     values = np.concatenate([np.zeros(axis.size), np.full(wall.size, _FLOW_THROUGH)])
     r = space.points[1]

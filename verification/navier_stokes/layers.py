@@ -74,10 +74,7 @@ class _LayeredFactors:
 
 
 def _factored(block: FloatArray) -> Any:
-    """LU factors of a dense block.
-
-    A singular block leaves infinities, which the residual of the solve shows.
-    """
+    """LU factors of a dense block; a singular one leaves infinities, which the solve's residual shows."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", LinAlgWarning)
         return lu_factor(block, overwrite_a=True, check_finite=False)
@@ -90,8 +87,7 @@ def _solved(factors: Any, right: FloatArray) -> FloatArray:
 def layers_of(*, slab: IntArray, element_dofs: IntArray, size: int) -> IntArray:
     """Layer of every unknown: 2 k inside slab k, 2 k + 1 on the face between slabs k and k + 1.
 
-    Args: `slab`: number of the slab, by element, shape (elements,). `element_dofs`: unknowns of the elements,
-        shape (local, elements).
+    Args: `slab`: by element, shape (elements,). `element_dofs`: shape (local, elements).
     Raises: ValueError: an unknown shared by slabs that are not neighbours.
     """
     low, high = np.full(size, np.iinfo(np.int64).max), np.full(size, -1)
@@ -115,11 +111,7 @@ def _eliminated(
 
 
 def factorize_layers(*, matrix: Any, layers: IntArray) -> _LayeredFactors:
-    """Factors of a matrix, slab by slab.
-
-    Args: `matrix`: sparse, square; odd layers couple over two layers at most, even ones with their
-        neighbours. `layers`: of the unknowns, from `layers_of`.
-    """
+    """Factors slab by slab of a matrix whose unknowns lie in layers from `layers_of`."""
     rows = matrix.tocsr()
     members = [np.flatnonzero(layers == m) for m in range(int(layers.max()) + 1)]
     if len(members) % 2 == 0:

@@ -29,10 +29,7 @@ class Factors:
     pivoted: bool
 
     def solve(self, right: FloatArray) -> FloatArray:
-        """Solution of A x = b, refined; factors with partial pivoting replace the sparse ones if they must.
-
-        Raises: RuntimeError: the matrix is singular.
-        """
+        """Solution of A x = b, refined, with pivots if need be. Raises: RuntimeError: A is singular."""
         x, gap = _refined(self.matrix, self.factors, right)
         if gap > _USABLE and not self.pivoted:
             self.factors, self.pivoted = _with_pivoting(self.matrix), True
@@ -59,11 +56,10 @@ def _with_pivoting(matrix: Any) -> Any:
 
 
 def factorize(*, matrix: Any, along_diagonal: bool, layers: IntArray | None = None) -> Factors:
-    """Factors of a square sparse matrix.
+    """Factors of a square CSC matrix of symmetric pattern. Raises: RuntimeError: it is singular.
 
-    Args: `matrix`: CSC, with symmetric pattern. `along_diagonal`: try without pivoting first. `layers`: of
-        the unknowns on a long, thin mesh, from `layers_of`; None for a mesh of any shape.
-    Raises: RuntimeError: the matrix is singular.
+    Args: `along_diagonal`: try without pivoting first. `layers`: of the unknowns on a long, thin mesh, from
+        `layers_of`; None for a mesh of any shape.
     """
     if layers is not None:
         return Factors(matrix=matrix, factors=factorize_layers(matrix=matrix, layers=layers), pivoted=True)

@@ -58,10 +58,9 @@ def tensor_patch(*, x: FloatArray, y: FloatArray, sides: Mapping[str, str] | Non
 def ruled_patch(
     *, inner: FloatArray, outer: FloatArray, blend: FloatArray, sides: Mapping[str, str] | None = None
 ) -> Patch:
-    """Patch between two curves of nodes, joined by straight lines.
+    """Patch between two curves of nodes, at j = 0 and at j = 2 n, joined by straight lines.
 
-    Args: `inner`: nodes of the curve at j = 0, shape (2 m + 1, 2). `outer`: nodes of the curve at j = 2 n,
-        shape (2 m + 1, 2). `blend`: share of the way from inner to outer, shape (2 n + 1,), from 0 to 1.
+    Args: `blend`: share of the way from inner to outer, shape (2 n + 1,), from 0 to 1.
     """
     share = blend[None, :, None]
     nodes = (1 - share) * inner[:, None, :] + share * outer[:, None, :]
@@ -115,11 +114,9 @@ def _named_facets(mesh: Any, nodes: FloatArray, patches: Sequence[Patch], number
 
 
 def patch_mesh(*, patches: Sequence[Patch], shape: str = "quad") -> Any:
-    """Quadratic mesh of glued patches with named boundaries.
+    """Quadratic mesh of glued patches, whose nodes coincide where two touch, with named boundaries.
 
-    Args: `patches`: in any order; where two touch, their nodes must coincide. `shape`: "quad" for nine-node
-        quadrilaterals, "triangle" for six-node triangles.
-    Returns: `skfem.MeshQuad2` or `skfem.MeshTri2`, its boundaries named by the patches' sides.
+    Args: `shape`: "quad" for nine-node quadrilaterals, "triangle" for six-node triangles.
     Raises: ValueError: an unknown shape.
     """
     if shape not in ("quad", "triangle"):

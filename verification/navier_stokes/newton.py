@@ -18,13 +18,7 @@ from ringbalance.verification.navier_stokes.system import (
     Coefficients,
     Dirichlet,
     FlowSystem,
-    convection_entries,
-    convection_vector,
     flow_system,
-    free_matrix,
-    full_matrix,
-    linear_entries,
-    split,
 )
 
 __all__ = [
@@ -84,10 +78,10 @@ class _Iteration:
 
 
 def _residual(system: FlowSystem, c: Coefficients, entries: FloatArray, state: _Iteration) -> FloatArray:
-    residual = np.asarray(full_matrix(system, entries) @ state.vector, dtype=np.float64)
+    residual = np.asarray(system.full_matrix(entries) @ state.vector, dtype=np.float64)
     residual -= system.load + state.gradient * system.flow_load
     if c.inertia != 0.0:
-        residual += c.inertia * convection_vector(system, state.vector)
+        residual += c.inertia * system.convection_vector(state.vector)
     if system.enclosed:
         # A boundary flow that does not close in the discrete sense is spread evenly instead of
         # becoming a point source at the pinned node.
@@ -99,10 +93,10 @@ def _residual(system: FlowSystem, c: Coefficients, entries: FloatArray, state: _
 def _factorize(system: FlowSystem, c: Coefficients, entries: FloatArray, state: _Iteration) -> Factors:
     jacobian = entries
     if c.inertia != 0.0:
-        jacobian = entries + c.inertia * convection_entries(system, state.vector)
+        jacobian = entries + c.inertia * system.convection_entries(state.vector)
     quads = system.space.mesh.refdom.__name__ == "RefQuad"
     layers = None if system.layers is None else system.layers[system.free]
-    factors = factorize(matrix=free_matrix(system, jacobian), along_diagonal=quads, layers=layers)
+    factors = factorize(matrix=system.free_matrix(jacobian), along_diagonal=quads, layers=layers)
     state.factorizations += 1
     if system.flow_component is not None:
         state.bordering = factors.solve(system.flow_load[system.free])
@@ -122,8 +116,8 @@ def _step(
     full = np.zeros_like(state.vector)
     full[system.free] = change
     state.vector = state.vector + full
-    largest = float(np.abs(split(system.space, state.vector)[0]).max())
-    moved = float(np.abs(split(system.space, full)[0]).max())
+    largest = float(np.abs(system.space.split(state.vector)[0]).max())
+    moved = float(np.abs(system.space.split(full)[0]).max())
     before, state.update = state.update, moved / largest if largest > 0.0 else 0.0
     state.contracting = state.update < 0.1 * before
     state.iterations += 1
@@ -135,7 +129,7 @@ def _iterate(
     system: FlowSystem, c: Coefficients, flow_rate: float, settings: NewtonSettings, state: _Iteration
 ) -> str:
     """Newton steps; returns an empty text on convergence, else what went wrong."""
-    entries = linear_entries(system, c)
+    entries = system.linear_entries(c)
     for _ in range(settings.max_iterations):
         residual = _residual(system, c, entries, state)
         keep = c.inertia == 0.0 or (state.update < settings.keep_factors_below and state.contracting)
@@ -173,17 +167,17 @@ def _solution(
     finite = np.all(np.isfinite(state.vector))
     vector = np.where(np.isfinite(state.vector), state.vector, 0.0)
     state.vector = _centred(system, vector) if system.enclosed else vector
-    residual = _residual(system, c, linear_entries(system, c), state)
+    residual = _residual(system, c, system.linear_entries(c), state)
     reaction = residual.copy()
     reaction[system.free] = 0.0
     scale = float(np.abs(reaction).max()) or 1.0
-    velocity, pressure = split(system.space, state.vector)
+    velocity, pressure = system.space.split(state.vector)
     update = state.update if np.isfinite(state.update) else float(settings.max_iterations)
     return FlowSolution(
         vector=state.vector,
         velocity=velocity,
         pressure=pressure,
-        reaction=split(system.space, reaction)[0],
+        reaction=system.space.split(reaction)[0],
         driving_gradient=state.gradient,
         status=_status(problem or ("" if finite else "the iteration diverged")),
         statistics=Statistics(
@@ -208,16 +202,10 @@ def solve_flow(
     settings: NewtonSettings | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> FlowSolution:
-    """Steady flow of a system for given coefficients.
+    """Steady flow of a system by Newton's method with the exact derivative, at first from the Stokes flow.
 
-    Newton's method on F(u, p, G) = 0 with F's exact derivative; without a start, from the Stokes flow.
-    Args:
-        system: made by `flow_system`.
-        coefficients: inertia, viscosity and rotation factors of the momentum equation.
-        flow_rate: integral of the system's flow component over the domain; unused without one.
-        start: a flow of the same system to start from.
-        settings: of Newton's method.
-        progress: called with a short text on each iteration; None for silence.
+    Args: `flow_rate`: integral of the system's flow component over the domain; unused without one. `start`: a
+        flow of the same system. `progress`: called with a short text on each iteration.
     Returns: The flow; its status says NOT_CONVERGED, with a remedy, when Newton's method failed.
     Raises: ValueError: viscosity not above zero, or a start of another system.
     """

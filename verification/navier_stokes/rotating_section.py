@@ -14,6 +14,7 @@ Kl = R Re and S = R/Re; at Re = 0 (S infinite) the problem is linear.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,7 +40,6 @@ from ringbalance.verification.navier_stokes.newton import (
     solve_flow,
 )
 from ringbalance.verification.navier_stokes.space import taylor_hood
-from ringbalance.verification.navier_stokes.system import split
 from ringbalance.verification.navier_stokes.time_march import March, march_flow
 
 POISEUILLE_GRADIENT = 32.0
@@ -49,8 +49,25 @@ CORIOLIS = ((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (-1.0, 0.0, 0.0))
 """e_z x velocity for components along (y, z, x)."""
 
 
+class _HalfSection(ABC):
+    """Half of a section, with the boundaries wall and symmetry."""
+
+    @abstractmethod
+    def mesh(self) -> Any:
+        """Its mesh."""
+
+    def system(self) -> FlowSystem:
+        """Discrete equations of the half section: no slip at the wall, mirror symmetry about z = 0."""
+        space = taylor_hood(mesh=self.mesh(), components=3)
+        conditions = [Dirichlet(boundary="symmetry", component=1)]
+        conditions += [Dirichlet(boundary="wall", component=c) for c in range(3)]
+        return flow_system(
+            space=space, conditions=conditions, enclosed=True, flow_component=2, coriolis=CORIOLIS
+        )
+
+
 @dataclass(frozen=True, kw_only=True)
-class SectionMesh:
+class SectionMesh(_HalfSection):
     """Cells of the half section: a core of 2 n x n cells inside a ring of 4 n cells around."""
 
     around: int = 6
@@ -61,9 +78,25 @@ class SectionMesh:
     """Innermost cell of the ring over the cell at the wall."""
     shape: str = "quad"
 
+    def mesh(self) -> Any:
+        """Quadratic mesh of the half section (y, z >= 0) of a tube of unit bore, refined at its wall."""
+        n = self.around
+        core, edges = _core(n, 0.26, 0.2)
+        vertices = geometric_vertices(cells=self.across, ratio=self.wall_ratio)
+        blend = 1 - with_midpoints(vertices=vertices)[::-1]
+        patches = [Patch(nodes=core, sides={"south": "symmetry"})]
+        ranges = ((0.0, 0.25, n), (0.25, 0.75, 2 * n), (0.75, 1.0, n))
+        for edge, (first, last, count), flat in zip(edges, ranges, ("west", "", "east"), strict=True):
+            angles = np.pi * np.linspace(first, last, 2 * count + 1)
+            wall = 0.5 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+            wall[np.abs(wall) < 1e-15] = 0.0
+            sides = {"north": "wall"} | ({flat: "symmetry"} if flat else {})
+            patches.append(ruled_patch(inner=edge, outer=wall, blend=blend, sides=sides))
+        return patch_mesh(patches=patches, shape=self.shape)
+
 
 @dataclass(frozen=True, kw_only=True)
-class DuctMesh:
+class DuctMesh(_HalfSection):
     """Cells of the half section of a rectangular duct, refined towards its walls."""
 
     aspect_ratio: float = 1.0
@@ -74,6 +107,20 @@ class DuctMesh:
     """Cells of the half along it."""
     wall_ratio: float = 20.0
     """Innermost cell over the cell at the wall."""
+
+    def mesh(self) -> Any:
+        """Quadratic mesh of the half section (z >= 0) of a duct of unit hydraulic diameter."""
+        width = (1 + self.aspect_ratio) / 2
+        half = geometric_vertices(cells=self.across // 2, ratio=self.wall_ratio) / 2
+        y = width * (np.concatenate([half, 1 - half[-2::-1]]) - 0.5)
+        height = width / self.aspect_ratio
+        z = height / 2 * (1 - geometric_vertices(cells=self.along, ratio=self.wall_ratio)[::-1])
+        patch = tensor_patch(
+            x=with_midpoints(vertices=y),
+            y=with_midpoints(vertices=z),
+            sides={"west": "wall", "east": "wall", "north": "wall", "south": "symmetry"},
+        )
+        return patch_mesh(patches=[patch])
 
 
 def _lines(points: FloatArray, count: int) -> FloatArray:
@@ -93,54 +140,6 @@ def _core(n: int, half_width: float, corner: float) -> tuple[FloatArray, list[Fl
     return nodes, [nodes[-1], nodes[::-1, -1], nodes[0, ::-1]]
 
 
-def section_mesh(*, cells: SectionMesh) -> Any:
-    """Curved mesh of the half section (y, z >= 0) of a tube of unit bore, refined towards the wall.
-
-    Args: `cells`: numbers of cells and their grading.
-    Returns: Quadratic mesh with boundaries wall and symmetry.
-    """
-    n = cells.around
-    core, edges = _core(n, 0.26, 0.2)
-    blend = 1 - with_midpoints(vertices=geometric_vertices(cells=cells.across, ratio=cells.wall_ratio))[::-1]
-    patches = [Patch(nodes=core, sides={"south": "symmetry"})]
-    ranges = ((0.0, 0.25, n), (0.25, 0.75, 2 * n), (0.75, 1.0, n))
-    for edge, (first, last, count), flat in zip(edges, ranges, ("west", "", "east"), strict=True):
-        angles = np.pi * np.linspace(first, last, 2 * count + 1)
-        wall = 0.5 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-        wall[np.abs(wall) < 1e-15] = 0.0
-        sides = {"north": "wall"} | ({flat: "symmetry"} if flat else {})
-        patches.append(ruled_patch(inner=edge, outer=wall, blend=blend, sides=sides))
-    return patch_mesh(patches=patches, shape=cells.shape)
-
-
-def duct_mesh(*, cells: DuctMesh) -> Any:
-    """Mesh of the half section (z >= 0) of a rectangular duct of unit hydraulic diameter.
-
-    Args: `cells`: numbers of cells and their grading.
-    Returns: Quadratic mesh with boundaries wall and symmetry.
-    """
-    width = (1 + cells.aspect_ratio) / 2
-    half = geometric_vertices(cells=cells.across // 2, ratio=cells.wall_ratio) / 2
-    y = width * (np.concatenate([half, 1 - half[-2::-1]]) - 0.5)
-    height = width / cells.aspect_ratio
-    z = height / 2 * (1 - geometric_vertices(cells=cells.along, ratio=cells.wall_ratio)[::-1])
-    patch = tensor_patch(
-        x=with_midpoints(vertices=y),
-        y=with_midpoints(vertices=z),
-        sides={"west": "wall", "east": "wall", "north": "wall", "south": "symmetry"},
-    )
-    return patch_mesh(patches=[patch])
-
-
-def section_system(*, cells: SectionMesh | DuctMesh) -> FlowSystem:
-    """Discrete equations of the half section: no slip at the wall, mirror symmetry about z = 0."""
-    mesh = duct_mesh(cells=cells) if isinstance(cells, DuctMesh) else section_mesh(cells=cells)
-    space = taylor_hood(mesh=mesh, components=3)
-    conditions = [Dirichlet(boundary="symmetry", component=1)]
-    conditions += [Dirichlet(boundary="wall", component=c) for c in range(3)]
-    return flow_system(space=space, conditions=conditions, enclosed=True, flow_component=2, coriolis=CORIOLIS)
-
-
 def solve_section(
     *,
     system: FlowSystem,
@@ -149,12 +148,10 @@ def solve_section(
     start: FlowSolution | None = None,
     settings: NewtonSettings | None = None,
 ) -> FlowSolution:
-    """Fully developed flow in the rotating tube at given Kl = R Re and S = R/Re.
-
-    The in-plane velocity is measured in nu/d: Re and R then enter through Kl and S alone, and S may be zero.
+    """Fully developed flow in the rotating tube at given Kl = R Re and S = R/Re, which may be zero.
 
         u w_y + v w_z - 2 S u = G + lap w,    u u_y + v u_z + 2 Kl w = -p_y + lap u,    ...
-    Args: `start`: a neighbouring flow; needed once Kl exceeds a few thousand. `settings`: of Newton's method.
+    Args: `start`: a neighbouring flow; needed once Kl exceeds a few thousand.
     Returns: The flow; nodal velocity components along (y, z) over nu/d, and along x over U.
     """
     c = _coefficients(kl=kl, s=s, inertia=1.0)
@@ -177,7 +174,7 @@ def march_section(*, system: FlowSystem, kl: float, s: float, step: float, steps
     area = float(system.space.weights.sum())
     linear = _coefficients(kl=kl, s=s, inertia=0.0)
     start = solve_flow(system=system, coefficients=linear, flow_rate=area).vector.copy()
-    velocity = split(system.space, start)[0]
+    velocity = system.space.split(start)[0]
     noise = np.random.default_rng(0).standard_normal(velocity.shape)
     noise *= 0.01 * np.abs(velocity).max(axis=1, keepdims=True)
     moving = system.free[system.free < velocity.size]
@@ -205,18 +202,12 @@ def developed_section(
 
 
 def solve_section_without_inertia(*, system: FlowSystem, rotation_reynolds: float) -> FlowSolution:
-    """Fully developed flow in the rotating tube in the limit Re = 0, where it is linear.
-
-    Returns: The flow; nodal velocity components along (y, z, x) over U.
-    """
+    """Fully developed flow in the limit Re = 0, where it is linear; components along (y, z, x) over U."""
     c = Coefficients(inertia=0.0, viscosity=1.0, rotation=2 * rotation_reynolds)
     area = float(system.space.weights.sum())
     return solve_flow(system=system, coefficients=c, flow_rate=area)
 
 
 def friction_ratio(solution: FlowSolution) -> float:
-    """F = G/32, the pressure gradient over that of the tube at rest at the same flow rate.
-
-    Args: `solution`: of the section, made dimensionless with bore and mean velocity.
-    """
+    """F = G/32, the pressure gradient over that of the tube at rest at the same flow rate."""
     return solution.driving_gradient / POISEUILLE_GRADIENT

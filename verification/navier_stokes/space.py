@@ -113,6 +113,72 @@ class FlowSpace:
         """Coordinates of the velocity nodes. Returns: Shape (dimension, nodes)."""
         return np.asarray(self.velocity.doflocs, dtype=np.float64)
 
+    def mass_table(self) -> FloatArray:
+        """Table of N_i N_j. Returns: Shape (points, local * local)."""
+        return _outer(self.shape[None], self.shape[None])
+
+    def convection_table(self) -> FloatArray:
+        """Table of N_i dN_j/dX_k. Returns: Shape (points * k, local * local)."""
+        return _outer(self.shape[None], self.slope)
+
+    def mass_entries(self, coefficient: FloatArray) -> FloatArray:
+        """Assembled entries of integral(coefficient N_i N_j), the coefficient of shape (elements, points)."""
+        return self.velocity_pattern.assemble(_contract(self.weights * coefficient, self.mass_table()))
+
+    def stiffness_entries(self) -> FloatArray:
+        """Assembled entries of integral(grad N_i . grad N_j)."""
+        metric = np.einsum("eq,kdeq,ldeq->kleq", self.weights, self.inverse, self.inverse)
+        return self.velocity_pattern.assemble(_contract(metric, _outer(self.slope, self.slope)))
+
+    def cross_entries(self, row: int, col: int) -> FloatArray:
+        """Assembled entries of integral(dN_i/dx_col dN_j/dx_row), the stress form's transposed gradient."""
+        product = np.einsum("eq,keq,leq->kleq", self.weights, self.inverse[:, col], self.inverse[:, row])
+        return self.velocity_pattern.assemble(_contract(product, _outer(self.slope, self.slope)))
+
+    def divergence_entries(self, component: int) -> FloatArray:
+        """Assembled entries of integral(psi_i dN_j/dx_component), plus psi_i N_j / r for u_r in (x, r)."""
+        coefficient = self.weights * self.inverse[:, component]
+        entries = _contract(coefficient, _outer(self.pressure_shape[None], self.slope))
+        if self.axisymmetric and component == 1:
+            table = _outer(self.pressure_shape[None], self.shape[None])
+            entries = entries + _contract(self.weights / self.points[1], table)
+        return self.coupling_pattern.assemble(entries)
+
+    def pressure_mass_entries(self) -> FloatArray:
+        """Assembled entries of integral(psi_i N_j), pressure against velocity shape functions."""
+        table = _outer(self.pressure_shape[None], self.shape[None])
+        return self.coupling_pattern.assemble(_contract(self.weights, table))
+
+    def load_vector(self, values: FloatArray) -> FloatArray:
+        """Integral of a function against every velocity shape function."""
+        local = (self.weights * values) @ self.shape.T
+        return _scattered(self.velocity.element_dofs.T.ravel(), local, self.velocity_nodes)
+
+    def pressure_load(self) -> FloatArray:
+        """Integral of every pressure shape function. Returns: Shape (pressure nodes,)."""
+        local = self.weights @ self.pressure_shape.T
+        return _scattered(self.pressure.element_dofs.T.ravel(), local, self.pressure_nodes)
+
+    def at_points(self, velocity: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Velocity and its gradient at the quadrature points, from nodal values (components, velocity nodes).
+
+        Returns: u of shape (components, elements, points), and du_c/dx_d of shape (c, d, elements, points).
+        """
+        local = velocity[:, self.velocity.element_dofs.T]
+        reference = np.einsum("cei,kiq->ckeq", local, self.slope, optimize=True)
+        return local @ self.shape, np.einsum("ckeq,kdeq->cdeq", reference, self.inverse, optimize=True)
+
+    def nodal(self, function: Callable[[FloatArray], FloatArray] | float) -> FloatArray:
+        """Values at the velocity nodes of a constant, or of a function of coordinates (dimension, n)."""
+        at = self.node_coordinates()
+        values = function(at) if callable(function) else function
+        return np.broadcast_to(np.asarray(values, dtype=np.float64), at.shape[1]).copy()
+
+    def split(self, vector: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Velocity (components, velocity nodes) and pressure (pressure nodes,) of a full vector."""
+        velocity = vector[: self.components * self.velocity_nodes]
+        return velocity.reshape(self.components, -1), vector[velocity.size :]
+
 
 def _pattern(row_dofs: IntArray, col_dofs: IntArray, columns: int) -> _ScalarPattern:
     rows = np.repeat(row_dofs.T[:, :, None], col_dofs.shape[0], axis=2)
@@ -174,80 +240,7 @@ def _outer(left: FloatArray, right: FloatArray) -> FloatArray:
     return np.ascontiguousarray(product.reshape(q * a * b, i * j))
 
 
-def mass_table(space: FlowSpace) -> FloatArray:
-    """Table of N_i N_j. Returns: Shape (points, local * local)."""
-    return _outer(space.shape[None], space.shape[None])
-
-
-def convection_table(space: FlowSpace) -> FloatArray:
-    """Table of N_i dN_j/dX_k. Returns: Shape (points * k, local * local)."""
-    return _outer(space.shape[None], space.slope)
-
-
 def _contract(coefficient: FloatArray, table: FloatArray) -> FloatArray:
     """Coefficients of shape (..., elements, points) against a table whose rows run over (points, ...)."""
     moved = np.moveaxis(np.moveaxis(coefficient, -1, 0), -1, 0)
     return moved.reshape(moved.shape[0], -1) @ table
-
-
-def mass_entries(space: FlowSpace, coefficient: FloatArray) -> FloatArray:
-    """Assembled entries of integral(coefficient N_i N_j), the coefficient of shape (elements, points)."""
-    return space.velocity_pattern.assemble(_contract(space.weights * coefficient, mass_table(space)))
-
-
-def stiffness_entries(space: FlowSpace) -> FloatArray:
-    """Assembled entries of integral(grad N_i . grad N_j)."""
-    metric = np.einsum("eq,kdeq,ldeq->kleq", space.weights, space.inverse, space.inverse)
-    return space.velocity_pattern.assemble(_contract(metric, _outer(space.slope, space.slope)))
-
-
-def cross_entries(space: FlowSpace, row: int, col: int) -> FloatArray:
-    """Assembled entries of integral(dN_i/dx_col dN_j/dx_row): the transposed gradient of the stress form."""
-    product = np.einsum("eq,keq,leq->kleq", space.weights, space.inverse[:, col], space.inverse[:, row])
-    return space.velocity_pattern.assemble(_contract(product, _outer(space.slope, space.slope)))
-
-
-def divergence_entries(space: FlowSpace, component: int) -> FloatArray:
-    """Assembled entries of integral(psi_i dN_j/dx_component), plus psi_i N_j / r for u_r in (x, r)."""
-    coefficient = space.weights * space.inverse[:, component]
-    entries = _contract(coefficient, _outer(space.pressure_shape[None], space.slope))
-    if space.axisymmetric and component == 1:
-        table = _outer(space.pressure_shape[None], space.shape[None])
-        entries = entries + _contract(space.weights / space.points[1], table)
-    return space.coupling_pattern.assemble(entries)
-
-
-def pressure_mass_entries(space: FlowSpace) -> FloatArray:
-    """Assembled entries of integral(psi_i N_j), pressure against velocity shape functions."""
-    table = _outer(space.pressure_shape[None], space.shape[None])
-    return space.coupling_pattern.assemble(_contract(space.weights, table))
-
-
-def load_vector(space: FlowSpace, values: FloatArray) -> FloatArray:
-    """Integral of a function against every velocity shape function."""
-    local = (space.weights * values) @ space.shape.T
-    return _scattered(space.velocity.element_dofs.T.ravel(), local, space.velocity_nodes)
-
-
-def pressure_load(space: FlowSpace) -> FloatArray:
-    """Integral of every pressure shape function. Returns: Shape (pressure nodes,)."""
-    local = space.weights @ space.pressure_shape.T
-    return _scattered(space.pressure.element_dofs.T.ravel(), local, space.pressure_nodes)
-
-
-def at_points(space: FlowSpace, velocity: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Velocity and its gradient at the quadrature points.
-
-    Args: `velocity`: nodal values, shape (components, velocity nodes).
-    Returns: u of shape (components, elements, points), and du_c/dx_d of shape (c, d, elements, points).
-    """
-    local = velocity[:, space.velocity.element_dofs.T]
-    reference = np.einsum("cei,kiq->ckeq", local, space.slope, optimize=True)
-    return local @ space.shape, np.einsum("ckeq,kdeq->cdeq", reference, space.inverse, optimize=True)
-
-
-def nodal(space: FlowSpace, function: Callable[[FloatArray], FloatArray] | float) -> FloatArray:
-    """Values at the velocity nodes of a constant, or of a function of coordinates (dimension, n)."""
-    at = space.node_coordinates()
-    values = function(at) if callable(function) else function
-    return np.broadcast_to(np.asarray(values, dtype=np.float64), at.shape[1]).copy()

@@ -21,16 +21,6 @@ from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.verification.navier_stokes.layers import layers_of
 from ringbalance.verification.navier_stokes.space import (
     FlowSpace,
-    at_points,
-    convection_table,
-    cross_entries,
-    divergence_entries,
-    load_vector,
-    mass_entries,
-    mass_table,
-    nodal,
-    pressure_load,
-    stiffness_entries,
 )
 
 
@@ -89,6 +79,46 @@ class FlowSystem:
     layers: IntArray | None = None
     """Layers of all unknowns along a long, thin mesh, for factors slab by slab."""
 
+    def linear_entries(self, coefficients: Coefficients) -> FloatArray:
+        """Entries of the linear part of the equations."""
+        count = self.space.components
+        factors = np.broadcast_to(np.asarray(coefficients.rotation, dtype=np.float64), (count, count))
+        turning = np.array([factors[block] for block in self.blocks])
+        rotating = np.repeat(turning, self.space.velocity_pattern.rows.size) * self.coriolis
+        return np.concatenate([coefficients.viscosity * self.viscous + rotating, self.coupling])
+
+    def convection_vector(self, vector: FloatArray) -> FloatArray:
+        """Integral of (u . grad) u against every velocity shape function."""
+        space = self.space
+        u, gradient = space.at_points(space.split(vector)[0])
+        carried = np.einsum("deq,cdeq->ceq", u[: space.dimension], gradient, optimize=True)
+        out = np.zeros(space.unknowns)
+        parts = [space.load_vector(component) for component in carried]
+        out[: space.components * space.velocity_nodes] = np.concatenate(parts)
+        return out
+
+    def convection_entries(self, vector: FloatArray) -> FloatArray:
+        """Exact derivative of `convection_vector`: u . grad(du) + du . grad(u)."""
+        space, dim = self.space, self.space.dimension
+        u, gradient = space.at_points(space.split(vector)[0])
+        reference = np.einsum("eq,deq,kdeq->eqk", space.weights, u[:dim], space.inverse, optimize=True)
+        along = reference.reshape(reference.shape[0], -1) @ self.convection
+        parts = []
+        for c, d in self.blocks:
+            entry = along if c == d else np.zeros_like(along)
+            if d < dim:
+                entry = entry + (space.weights * gradient[c, d]) @ self.mass
+            parts.append(space.velocity_pattern.assemble(entry))
+        return np.concatenate([*parts, np.zeros(self.coupling.size)])
+
+    def full_matrix(self, entries: FloatArray) -> Any:
+        """CSR matrix of all rows and columns, those of given unknowns included."""
+        return _filled(self.full_pattern, entries)
+
+    def free_matrix(self, entries: FloatArray) -> Any:
+        """CSC matrix of the free rows and columns."""
+        return _filled(self.free_pattern, entries)
+
 
 def _block_list(space: FlowSpace, coriolis: FloatArray) -> tuple[tuple[int, int], ...]:
     count, dim = space.components, space.dimension
@@ -100,17 +130,17 @@ def _block_list(space: FlowSpace, coriolis: FloatArray) -> tuple[tuple[int, int]
 def _constant_entries(
     space: FlowSpace, blocks: Sequence[tuple[int, int]], coriolis: FloatArray, stress_form: bool
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    stiffness, mass = stiffness_entries(space), mass_entries(space, np.ones_like(space.weights))
+    stiffness, mass = space.stiffness_entries(), space.mass_entries(np.ones_like(space.weights))
     viscous, rotating = [], []
     for c, d in blocks:
         entry = stiffness if c == d else np.zeros_like(stiffness)
         if stress_form and max(c, d) < space.dimension:
-            entry = entry + cross_entries(space, c, d)
+            entry = entry + space.cross_entries(c, d)
         if space.axisymmetric and (c, d) == (1, 1):
-            entry = entry + mass_entries(space, 1 / space.points[1] ** 2)
+            entry = entry + space.mass_entries(1 / space.points[1] ** 2)
         viscous.append(entry)
         rotating.append(coriolis[c, d] * mass)
-    divergence = [-divergence_entries(space, d) for d in range(space.dimension)]
+    divergence = [-space.divergence_entries(d) for d in range(space.dimension)]
     return np.concatenate(viscous), np.concatenate(rotating), np.concatenate(divergence + divergence)
 
 
@@ -149,7 +179,7 @@ def _boundary_data(space: FlowSpace, conditions: Sequence[Dirichlet]) -> tuple[F
     for condition in conditions:
         nodes = space.boundary_nodes(condition.boundary)
         where = condition.component * space.velocity_nodes + nodes
-        values[where] = nodal(space, condition.value)[nodes]
+        values[where] = space.nodal(condition.value)[nodes]
         fixed[where] = True
     return values, fixed
 
@@ -158,7 +188,7 @@ def _force_vector(space: FlowSpace, force: Callable[[FloatArray], FloatArray] | 
     load = np.zeros(space.unknowns)
     if force is not None:
         values = np.asarray(force(space.points), dtype=np.float64)
-        parts = [load_vector(space, values[c]) for c in range(space.components)]
+        parts = [space.load_vector(values[c]) for c in range(space.components)]
         load[: space.components * space.velocity_nodes] = np.concatenate(parts)
     return load
 
@@ -203,7 +233,7 @@ def flow_system(
     flow = np.zeros(space.unknowns)
     if flow_component is not None:
         where = slice(flow_component * space.velocity_nodes, (flow_component + 1) * space.velocity_nodes)
-        flow[where] = load_vector(space, np.ones_like(space.weights))
+        flow[where] = space.load_vector(np.ones_like(space.weights))
     return FlowSystem(
         space=space,
         enclosed=enclosed,
@@ -212,15 +242,15 @@ def flow_system(
         fixed_values=values,
         load=_force_vector(space, body_force),
         flow_load=flow,
-        mean_load=pressure_load(space),
+        mean_load=space.pressure_load(),
         viscous=viscous,
         coriolis=rotating,
         coupling=coupling,
         blocks=blocks,
         full_pattern=full,
         free_pattern=part,
-        mass=mass_table(space),
-        convection=convection_table(space),
+        mass=space.mass_table(),
+        convection=space.convection_table(),
         layers=None if slab is None else _layers(space, slab),
     )
 
@@ -231,57 +261,6 @@ def _layers(space: FlowSpace, slab: IntArray) -> IntArray:
         for basis in (space.velocity, space.pressure)
     )
     return np.concatenate([np.tile(velocity, space.components), pressure])
-
-
-def split(space: FlowSpace, vector: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Velocity (components, velocity nodes) and pressure (pressure nodes,) of a full vector."""
-    velocity = vector[: space.components * space.velocity_nodes]
-    return velocity.reshape(space.components, -1), vector[velocity.size :]
-
-
-def linear_entries(system: FlowSystem, coefficients: Coefficients) -> FloatArray:
-    """Entries of the linear part of the equations."""
-    count = system.space.components
-    factors = np.broadcast_to(np.asarray(coefficients.rotation, dtype=np.float64), (count, count))
-    turning = np.array([factors[block] for block in system.blocks])
-    rotating = np.repeat(turning, system.space.velocity_pattern.rows.size) * system.coriolis
-    return np.concatenate([coefficients.viscosity * system.viscous + rotating, system.coupling])
-
-
-def convection_vector(system: FlowSystem, vector: FloatArray) -> FloatArray:
-    """Integral of (u . grad) u against every velocity shape function."""
-    space = system.space
-    u, gradient = at_points(space, split(space, vector)[0])
-    carried = np.einsum("deq,cdeq->ceq", u[: space.dimension], gradient, optimize=True)
-    out = np.zeros(space.unknowns)
-    parts = [load_vector(space, component) for component in carried]
-    out[: space.components * space.velocity_nodes] = np.concatenate(parts)
-    return out
-
-
-def convection_entries(system: FlowSystem, vector: FloatArray) -> FloatArray:
-    """Exact derivative of `convection_vector`: u . grad(du) + du . grad(u)."""
-    space, dim = system.space, system.space.dimension
-    u, gradient = at_points(space, split(space, vector)[0])
-    reference = np.einsum("eq,deq,kdeq->eqk", space.weights, u[:dim], space.inverse, optimize=True)
-    along = reference.reshape(reference.shape[0], -1) @ system.convection
-    parts = []
-    for c, d in system.blocks:
-        entry = along if c == d else np.zeros_like(along)
-        if d < dim:
-            entry = entry + (space.weights * gradient[c, d]) @ system.mass
-        parts.append(space.velocity_pattern.assemble(entry))
-    return np.concatenate([*parts, np.zeros(system.coupling.size)])
-
-
-def full_matrix(system: FlowSystem, entries: FloatArray) -> Any:
-    """CSR matrix of all rows and columns, those of given unknowns included."""
-    return _filled(system.full_pattern, entries)
-
-
-def free_matrix(system: FlowSystem, entries: FloatArray) -> Any:
-    """CSC matrix of the free rows and columns."""
-    return _filled(system.free_pattern, entries)
 
 
 def _filled(pattern: Any, entries: FloatArray) -> Any:

@@ -16,14 +16,7 @@ from scipy import sparse
 
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.navier_stokes.linear import Factors, factorize
-from ringbalance.verification.navier_stokes.space import mass_entries
-from ringbalance.verification.navier_stokes.system import (
-    Coefficients,
-    FlowSystem,
-    convection_vector,
-    free_matrix,
-    linear_entries,
-)
+from ringbalance.verification.navier_stokes.system import Coefficients, FlowSystem
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -59,10 +52,10 @@ def march_flow(
     factors = _factors(system, coefficients, mass, step)
     bordering = factors.solve(border)
     now, before = start, start
-    convection = convection_vector(system, now)
+    convection = system.convection_vector(now)
     found = np.empty(steps)
     for i in range(steps):
-        carried, convection = convection, convection_vector(system, now)
+        carried, convection = convection, system.convection_vector(now)
         pull = coefficients.inertia * (2 * convection - carried)[free]
         change = factors.factors.solve(mass @ (4 * now - before) / (2 * step) - pull)
         found[i] = (flow_rate - border @ change) / (border @ bordering)
@@ -75,14 +68,14 @@ def march_flow(
 
 def _mass(system: FlowSystem) -> Any:
     space = system.space
-    entries, pattern = mass_entries(space, np.ones_like(space.weights)), space.velocity_pattern
+    entries, pattern = space.mass_entries(np.ones_like(space.weights)), space.velocity_pattern
     one = sparse.csr_matrix((entries, (pattern.rows, pattern.cols)), shape=(space.velocity_nodes,) * 2)
     nothing = sparse.csr_matrix((space.pressure_nodes,) * 2)
     return sparse.block_diag([one] * space.components + [nothing], format="csr")
 
 
 def _factors(system: FlowSystem, coefficients: Coefficients, mass: Any, step: float) -> Factors:
-    steady = free_matrix(system, linear_entries(system, coefficients))
+    steady = system.free_matrix(system.linear_entries(coefficients))
     matrix = (steady + 1.5 / step * mass[:, system.free]).tocsc()
     quads = system.space.mesh.refdom.__name__ == "RefQuad"
     return factorize(matrix=matrix, along_diagonal=quads)

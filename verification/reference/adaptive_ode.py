@@ -25,8 +25,7 @@ from ringbalance.scene.arrays import FloatArray
 def adaptive_ode(*, tolerance: float = 1e-10) -> Integrator:
     """An integrator by scipy's DOP853 with events at the ends of the range and at a stall.
 
-    Args: `tolerance`: relative and absolute, on the fill ratio; a stall is where less than its square root of
-        the initial velocity is left.
+    Args: `tolerance`: on the fill ratio; a stall is where its square root of the first velocity is left.
     Raises: ValueError: a tolerance outside (0, 1).
     """
     if not 0 < tolerance < 1:

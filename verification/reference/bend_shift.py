@@ -14,11 +14,9 @@ from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 def rotation_with_curvature(*, reynolds: float, rotation_reynolds: float, curvature: float) -> float:
     """Rotation Reynolds number of the straight tube in which liquid is driven aside as strongly.
 
-    R' = R + (4/3) Re kappa d/2, from 2 omega' U = 2 omega U + mean(u^2) kappa.
-    Args: `curvature`: kappa d, of the path; positive where it turns to the left, the sense of rotation.
-    Returns: R', negative where the curvature outweighs the rotation.
-    Range: an estimate to first order in what the curvature adds.
-    Source: balance of forces across the path.
+    R' = R + (4/3) Re kappa d/2, from 2 omega' U = 2 omega U + mean(u^2) kappa, to first order; negative where
+    the curvature outweighs the rotation.
+    Args: `curvature`: kappa d of the path, positive where it turns in the sense of rotation.
     """
     return rotation_reynolds + MOMENTUM_FACTOR * reynolds * curvature / 2
 
@@ -26,13 +24,11 @@ def rotation_with_curvature(*, reynolds: float, rotation_reynolds: float, curvat
 def bend_shift(
     *, reynolds: float, rotation_reynolds: float, angle: float, radius: float, with_rotation: bool
 ) -> float:
-    """What a bend adds to the rotating friction of its own arc, laminar.
+    """What a bend adds to the rotating friction of its own arc, laminar: (64/Re) phi (r/d) (F(R') - F(R)).
 
-    K = (64/Re) phi (r/d) (F(R') - F(R))
     Args: `radius`: r/d, of the path. `with_rotation`: the path turns in the sense of the disc's rotation.
     Returns: K, negative where the bend turns against a rotation that outweighs it.
     Range: R well above Re d/r; the stream's recovery behind the bend is left out.
-    Source: `rotation_with_curvature` with the table of friction ratios.
     """
     curvature = (1.0 if with_rotation else -1.0) / radius
     shifted = rotation_with_curvature(

@@ -35,11 +35,8 @@ from ringbalance.verification.navier_stokes.newton import (
 from ringbalance.verification.navier_stokes.rotating_section import (
     SectionMesh,
     developed_section,
-    section_mesh,
-    section_system,
 )
 from ringbalance.verification.navier_stokes.space import FlowSpace, taylor_hood
-from ringbalance.verification.navier_stokes.system import split
 
 Progress = Callable[[str], None]
 
@@ -70,6 +67,15 @@ class BentTubeFlow:
     def gradient(self) -> float:
         """G = -dp/dx of the developed flow on the same cells, over mu U/d^2."""
         return self.developed.driving_gradient
+
+    def pressure_loss(self, *, start: float, end: float) -> float:
+        """Loss coefficient between two arc lengths over d, 2 (H_1 - H_2)/U^2 with H = p/rho + alpha U^2/2.
+
+        With developed flow at both places it is the fall of reduced pressure over rho U^2/2.
+        """
+        head = 2 / self.reynolds * self.mean_pressure + self.energy_flux
+        first, last = np.interp([start, end], self.arc_length, head)
+        return float(first - last)
 
 
 def _swept_velocity(tube: SweptTube, developed: FlowSolution, reynolds: float) -> FloatArray:
@@ -122,7 +128,7 @@ def _system(tube: SweptTube, section: FlowSystem, developed: FlowSolution, reyno
 def _guess(tube: SweptTube, system: FlowSystem, developed: FlowSolution, reynolds: float) -> FlowSolution:
     velocity = _swept_velocity(tube, developed, reynolds)
     vector = np.concatenate([velocity.ravel(), _swept_pressure(tube, developed, reynolds)])
-    parts = split(system.space, vector)
+    parts = system.space.split(vector)
     return FlowSolution(
         vector=vector,
         velocity=parts[0],
@@ -165,10 +171,10 @@ def bent_tube_flow(
     if not (np.isfinite(reynolds + rotation_reynolds) and reynolds > 0.0 and rotation_reynolds >= 0.0):
         raise ValueError("reynolds must be above zero, rotation_reynolds zero or more, both finite")
     say = progress or (lambda _: None)
-    section = section_system(cells=cells)
+    section = cells.system()
     kl, s = reynolds * rotation_reynolds, rotation_reynolds / reynolds
     developed = developed_section(system=section, kl=kl, s=s)
-    tube = swept_tube(section=section_mesh(cells=cells), segments=segments)
+    tube = swept_tube(section=cells.mesh(), segments=segments)
     system = _system(tube, section, developed, reynolds)
     say(f"{system.free.size} unknowns in {int(tube.slab.max()) + 1} slabs")
     rotation = 2 * rotation_reynolds * coriolis_factor
@@ -217,13 +223,3 @@ def _energy_flux(tube: SweptTube, section: FlowSystem, solution: FlowSolution) -
     fields = speeds[:, :, space.velocity.element_dofs.T] @ space.shape
     flux = (fields[:, :3] ** 2).sum(axis=1) * fields[:, 3] * space.weights
     return np.asarray(flux.sum(axis=(1, 2)) / space.weights.sum(), dtype=np.float64)
-
-
-def pressure_loss(*, flow: BentTubeFlow, start: float, end: float) -> float:
-    """Loss coefficient between two arc lengths over d, 2 (H_1 - H_2)/U^2 with H = p/rho + alpha U^2/2.
-
-    With developed flow at both places it is the fall of reduced pressure over rho U^2/2.
-    """
-    head = 2 / flow.reynolds * flow.mean_pressure + flow.energy_flux
-    first, last = np.interp([start, end], flow.arc_length, head)
-    return float(first - last)

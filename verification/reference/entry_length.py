@@ -32,11 +32,7 @@ from ringbalance.verification.navier_stokes.rotating_section import (
 )
 from ringbalance.verification.navier_stokes.space import (
     FlowSpace,
-    at_points,
-    mass_entries,
-    pressure_mass_entries,
 )
-from ringbalance.verification.navier_stokes.system import convection_entries, full_matrix, linear_entries
 
 _SHIFTS = (1.0, 0.35, 0.12)
 """Of the expected rate, about which modes are looked for."""
@@ -110,14 +106,14 @@ def _pencil(
 def _matrices(system: FlowSystem, flow: FlowSolution, c: Coefficients, along: float) -> tuple[Any, Any, Any]:
     """A0, A1 and A2; `along` is the factor of pressure and diffusion along the tube."""
     space = system.space
-    entries = linear_entries(system, c)
+    entries = system.linear_entries(c)
     if c.inertia != 0.0:
-        entries = entries + c.inertia * convection_entries(system, flow.vector)
+        entries = entries + c.inertia * system.convection_entries(flow.vector)
     n, v, b = space.velocity_nodes, space.velocity_pattern, space.coupling_pattern
-    axial = at_points(space, flow.velocity)[0][2]
-    carried = c.inertia * mass_entries(space, axial)
-    diffused = -along * mass_entries(space, np.ones_like(axial))
-    coupling = pressure_mass_entries(space)
+    axial = space.at_points(flow.velocity)[0][2]
+    carried = c.inertia * space.mass_entries(axial)
+    diffused = -along * space.mass_entries(np.ones_like(axial))
+    coupling = space.pressure_mass_entries()
     first = 3 * n
     blocks = [(k * n + v.rows, k * n + v.cols) for k in range(3)]
     rows = [r for r, _ in blocks] + [2 * n + b.cols, first + b.rows]
@@ -126,7 +122,7 @@ def _matrices(system: FlowSystem, flow: FlowSolution, c: Coefficients, along: fl
     two = _sparse(space, rows[:3], cols[:3], [diffused] * 3)
     # The pressure's level, pinned in the section's own problem, is a part of what varies along the tube.
     free = np.union1d(system.free, [first])
-    zero, one, two = (m[free][:, free].tocsc() for m in (full_matrix(system, entries), one, two))
+    zero, one, two = (m[free][:, free].tocsc() for m in (system.full_matrix(entries), one, two))
     return zero, one, two
 
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from types import MappingProxyType
 from typing import Final
 
@@ -19,12 +18,12 @@ import numpy.typing as npt
 from scipy.optimize import brentq
 
 from ringbalance.mesh.geometry import half_angle, liquid_area, surface_radius
-from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, places
+from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid
 from ringbalance.physics.pressure.surface import solve_with_gravity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene, Shaft
 from ringbalance.verification.evidence import Evidence, Found
-from ringbalance.verification.orders import field_error, order_figure, order_study, order_table, orders_found
+from ringbalance.verification.orders import field_error, order_figure, order_study, orders_found
 from ringbalance.verification.reference.mutated_pressure import mutated_pressure
 
 _GAUSS: Final = 60
@@ -143,10 +142,9 @@ def _mean_area_along(disc: Disc, ring: _ExactRing) -> float:
 def gravity_evidence(
     scene: Scene, *, cells: Sequence[tuple[int, ...]], shaft: Shaft, defect: str | None
 ) -> Evidence:
-    """Find the free surface on a sequence of meshes, and compare it with the exact one.
+    """Find the free surface on meshes that halve h each time, coarse to fine; compare it with the exact one.
 
-    Args: `cells`: of each level, coarse to fine, halving h each time. `shaft`: "horizontal" for gravity
-        across the chamber, "vertical" for gravity along the shaft.
+    Gravity points across the chamber of a horizontal shaft, along a vertical one.
     Raises: ValueError: a search or solve that failed on some level.
     """
     disc, fill = scene.disc, _FILL_SHARE * scene.disc.max_fill_ratio
@@ -171,7 +169,6 @@ def gravity_evidence(
     volume = max(abs(s.statistics.extra["volume_error"]) for s in solutions)
     middle = float(surface_radius(disc=disc, fill_ratio=fill))
     note = "cells " + ", ".join(" x ".join(map(str, count)) for count in cells)
-    table = partial(order_table, formal_order=3.0, geometry="quadratic", note=note)
     return Evidence(
         found={
             **orders_found({"surface": surface, "field": field}),
@@ -180,8 +177,8 @@ def gravity_evidence(
         numbers={"tilt": _GRAVITY / (true.angular_velocity**2 * middle), "direction": _DIRECTION},
         series=(order_figure({"free surface": surface, "pressure field": field}),),
         convergence=(
-            table("place of the free surface, over the depth", surface),
-            table("pressure field, relative error", field),
+            surface.table("place of the free surface, over the depth", 3.0, geometry="quadratic", note=note),
+            field.table("pressure field, relative error", 3.0, geometry="quadratic", note=note),
         ),
     )
 
@@ -193,7 +190,8 @@ def tilted_liquid(*, disc: Disc, density: float, fill_ratio: float, shaft: Shaft
     """
     middle = float(surface_radius(disc=disc, fill_ratio=fill_ratio))
     speed = float(np.sqrt(_GRAVITY / _offset(disc, middle, shaft)))
-    gravity = (0.0, 0.0, -_GRAVITY) if shaft == "vertical" else _across()
+    across = (_GRAVITY * float(np.cos(_DIRECTION)), _GRAVITY * float(np.sin(_DIRECTION)))
+    gravity = (0.0, 0.0, -_GRAVITY) if shaft == "vertical" else across
     return RotatingLiquid(density=density, angular_velocity=speed, gravity=gravity)
 
 
@@ -205,12 +203,8 @@ def _offset(disc: Disc, middle: float, shaft: Shaft) -> float:
     return _ROOM * min(middle**2 - inner**2, outer**2 - middle**2) / disc.axial_width
 
 
-def _across() -> tuple[float, float]:
-    return _GRAVITY * float(np.cos(_DIRECTION)), _GRAVITY * float(np.sin(_DIRECTION))
-
-
 def _surface_error(disc: Disc, solution: PressureSolution, exact: _ExactRing) -> float:
-    nodes = places(solution.chamber)[:, solution.chamber.grid[0]]
+    nodes = solution.chamber.places[:, solution.chamber.grid[0]]
     angle = np.arctan2(nodes[1], nodes[0])
     axial = nodes[2] if len(nodes) == 3 else np.zeros_like(angle)
     away = np.hypot(nodes[0], nodes[1]) - exact.radius(angle, axial)

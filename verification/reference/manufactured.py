@@ -16,12 +16,12 @@ import numpy as np
 
 from ringbalance.mesh.chamber import ChamberMesh, Geometry, chamber_mesh
 from ringbalance.mesh.geometry import half_angle, surface_radius
-from ringbalance.physics.pressure.assembly import at_points, facet_points
+from ringbalance.physics.pressure.assembly import facet_points
 from ringbalance.physics.pressure.solve import PressureProblem, PressureSolution, solve_pressure
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc
 from ringbalance.verification.evidence import Convergence, Evidence, Found
-from ringbalance.verification.orders import OrderStudy, field_error, order_figure, order_study, order_table
+from ringbalance.verification.orders import OrderStudy, field_error, order_figure, order_study
 
 _SCALE: Final = 1e5
 """P, Pa."""
@@ -122,10 +122,10 @@ class _Study:
         """Both errors beside their formal orders."""
         cells = ", ".join(" x ".join(map(str, count)) for count in self.cells)
         note = f"cells {cells}; up to {self.unknowns} unknowns"
-        table = partial(order_table, geometry=self.geometry, note=note)
+        shape, force = self.geometry, "force on the outer wall, relative error"
         return (
-            table("pressure field, relative error", self.field, _FIELD_ORDER),
-            table("force on the outer wall, relative error", self.wall, _WALL_ORDER[self.geometry]),
+            self.field.table("pressure field, relative error", _FIELD_ORDER, geometry=shape, note=note),
+            self.wall.table(force, _WALL_ORDER[shape], geometry=shape, note=note),
         )
 
 
@@ -187,7 +187,7 @@ def _wall_integral(solution: PressureSolution) -> float:
     """Integral of the pressure over the outer wall, N or N/m."""
     chamber: ChamberMesh = solution.chamber
     facets = facet_points(chamber, "outer_wall")
-    total = float(np.sum(facets.weights * at_points(facets, solution.pressure)))
+    total = float(np.sum(facets.weights * facets.at_points(solution.pressure)))
     return total * chamber.length_scale ** (chamber.dimension - 1)
 
 

@@ -26,9 +26,9 @@ from ringbalance.verification.navier_stokes.newton import (
     flow_system,
     solve_flow,
 )
-from ringbalance.verification.navier_stokes.rotating_section import CORIOLIS, SectionMesh, section_mesh
-from ringbalance.verification.navier_stokes.space import FlowSpace, at_points, taylor_hood
-from ringbalance.verification.orders import order_figure, order_study, order_table, orders_found
+from ringbalance.verification.navier_stokes.rotating_section import CORIOLIS, SectionMesh
+from ringbalance.verification.navier_stokes.space import FlowSpace, taylor_hood
+from ringbalance.verification.orders import order_figure, order_study, orders_found
 
 _TRUE: Final = Coefficients(inertia=3.0, viscosity=0.7, rotation=5.0)
 """Chosen so that no term hides behind another."""
@@ -110,14 +110,14 @@ def flow_evidence(*, around: Sequence[int], defect: str | None) -> Evidence:
     flow = order_study(size=size, error=[_velocity_error(*pair) for pair in solved])
     stress = order_study(size=size, error=[_pressure_error(*pair) for pair in solved])
     unknowns = [space.unknowns for space, _ in solved]
-    table = partial(order_table, geometry="quadratic", note=f"unknowns {', '.join(map(str, unknowns))}")
+    note = f"unknowns {', '.join(map(str, unknowns))}"
     return Evidence(
         found=orders_found({"velocity": flow, "pressure": stress}),
         numbers={"unknowns": float(unknowns[-1])},
         series=(order_figure({"velocity": flow, "pressure": stress}),),
         convergence=(
-            table("velocity, relative error", flow, 3.0),
-            table("pressure, relative error", stress, 2.0),
+            flow.table("velocity, relative error", 3.0, geometry="quadratic", note=note),
+            stress.table("pressure, relative error", 2.0, geometry="quadratic", note=note),
         ),
     )
 
@@ -137,7 +137,7 @@ def _spoiled(defect: str | None) -> Coefficients:
 def _solve(around: int, coefficients: Coefficients) -> tuple[FlowSpace, FlowSolution]:
     across = max(1, round(_ACROSS * around))
     cells = SectionMesh(around=around, across=across, wall_ratio=_WALL_RATIO)
-    space = taylor_hood(mesh=section_mesh(cells=cells), components=3)
+    space = taylor_hood(mesh=cells.mesh(), components=3)
     conditions = [
         Dirichlet(boundary=name, component=c, value=partial(_component, c))
         for name in ("symmetry", "wall")
@@ -157,7 +157,7 @@ def _component(component: int, places: FloatArray) -> FloatArray:
 
 
 def _velocity_error(space: FlowSpace, solution: FlowSolution) -> float:
-    found, _ = at_points(space, solution.velocity)
+    found, _ = space.at_points(solution.velocity)
     true = velocity(space.points)
     return float(np.sqrt(np.sum(space.weights * (found - true) ** 2) / np.sum(space.weights * true**2)))
 

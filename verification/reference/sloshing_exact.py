@@ -34,6 +34,39 @@ class CosineWaves:
     mixed: FloatArray
     """Of -psi: integral of cos(m ...) sin(n ...), rows m."""
 
+    def frequencies(self, *, modes: int) -> FloatArray:
+        """Lowest natural frequencies over the speed, s, of (s^2 mass + 2 i s mixed - spring) B = 0."""
+        n = self.wavenumber.size
+        mass = np.diagonal(self.mass)[:, None]
+        s = eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [self.spring / mass, -2j * self.mixed / mass]]))
+        real = s[np.abs(s.imag) < 1e-6 * np.abs(s)].real
+        return np.asarray(np.sort(real[real > 0])[:modes], dtype=np.float64)
+
+    def amplification(self, *, frequency_ratio: float) -> float:
+        """Swing of the first moment under G = r exp(i angle), over that of a surface that follows at once."""
+        load = _load(self)
+        swing, still = (
+            _potential(self, frequency_ratio, load, still=still) * self.wavenumber for still in (False, True)
+        )
+
+        def size(flux: ComplexArray) -> float:
+            return float(np.hypot(abs(load.real @ flux), abs(load.imag @ flux)))
+
+        return size(swing) / size(still)
+
+    def pressure_amplification(self, *, frequency_ratio: float, depth: float) -> float:
+        """Swing of the mean wall pressure under the same forcing, over that of such a surface.
+
+        Cosines have no mean, so phi has the same one, none, on wall and surface, and p' is left with the
+        difference of G and with 2 psi at the surface: p'/rho = G + c - i s phi - 2 psi.
+        """
+        half, radius = self.central_angle / 2, np.exp(-depth)
+        drive = (1 - radius) * np.sin(half) / half
+        found = _potential(self, frequency_ratio, radius * _load(self), still=False)
+        order = self.wavenumber * self.central_angle / np.pi
+        stream = -np.sum(found * (1 - np.cos(np.pi * order)) / (np.pi * order))
+        return float(abs(1 + 2 * stream / drive))
+
 
 def cosine_waves(*, central_angle: float, depth: float, terms: int = 160) -> CosineWaves:
     """The problem at a depth H = ln(R2/a); frequencies of the lowest modes converge like `terms`^-3."""
@@ -49,42 +82,6 @@ def cosine_waves(*, central_angle: float, depth: float, terms: int = 160) -> Cos
         spring=np.diag(k) * central_angle / 2,
         mixed=np.where(odd, central_angle / np.pi * 2 * columns / gap, 0.0),
     )
-
-
-def cosine_frequencies(waves: CosineWaves, *, modes: int) -> FloatArray:
-    """Lowest natural frequencies over the speed, s: (s^2 mass + 2 i s mixed - spring) B = 0, made linear."""
-    n = waves.wavenumber.size
-    mass = np.diagonal(waves.mass)[:, None]
-    s = eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [waves.spring / mass, -2j * waves.mixed / mass]]))
-    real = s[np.abs(s.imag) < 1e-6 * np.abs(s)].real
-    return np.asarray(np.sort(real[real > 0])[:modes], dtype=np.float64)
-
-
-def cosine_amplification(waves: CosineWaves, *, frequency_ratio: float) -> float:
-    """Swing of the first moment under G = r exp(i angle), over that of a surface that follows at once."""
-    load = _load(waves)
-    swing, still = (
-        _potential(waves, frequency_ratio, load, still=still) * waves.wavenumber for still in (False, True)
-    )
-
-    def size(flux: ComplexArray) -> float:
-        return float(np.hypot(abs(load.real @ flux), abs(load.imag @ flux)))
-
-    return size(swing) / size(still)
-
-
-def cosine_pressure_amplification(waves: CosineWaves, *, frequency_ratio: float, depth: float) -> float:
-    """Swing of the mean wall pressure under the same forcing, over that of such a surface.
-
-    Cosines have no mean, so phi has the same one, none, on wall and surface, and p' is left with the
-    difference of G and with 2 psi at the surface: p'/rho = G + c - i s phi - 2 psi.
-    """
-    half, radius = waves.central_angle / 2, np.exp(-depth)
-    drive = (1 - radius) * np.sin(half) / half
-    found = _potential(waves, frequency_ratio, radius * _load(waves), still=False)
-    order = waves.wavenumber * waves.central_angle / np.pi
-    stream = -np.sum(found * (1 - np.cos(np.pi * order)) / (np.pi * order))
-    return float(abs(1 + 2 * stream / drive))
 
 
 def _load(waves: CosineWaves) -> ComplexArray:

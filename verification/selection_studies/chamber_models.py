@@ -12,8 +12,6 @@ import numpy as np
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.reduced_model.chamber.range import chamber_fills, chamber_status
 from ringbalance.reduced_model.chamber.terms import (
-    COARSE_MESH,
-    FINE_MESH,
     MEAN,
     PLATES,
     RIPPLE,
@@ -21,22 +19,27 @@ from ringbalance.reduced_model.chamber.terms import (
     amplification,
     capillary_share,
     chamber_contributions,
-    mesh_error,
 )
 from ringbalance.reduced_model.chamber.tilted_ring import POINTS, RADIAL_POINTS, turn_samples
 from ringbalance.reduced_model.chamber.values import (
     ChamberValues,
     by_closed_form,
-    by_elements,
     by_paper,
     by_quadrature,
-    forget_solves,
-    sloshing_meshes,
-    with_sloshing,
 )
 from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
+from ringbalance.verification.selection_studies.chamber_elements import (
+    COARSE_MESH,
+    FINE_MESH,
+    by_elements,
+    forget_solves,
+    mesh_contributions,
+    mesh_error,
+    sloshing_meshes,
+    with_sloshing,
+)
 from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy, Work
 
 _SWING_MESH: Final = 2e-3
@@ -67,7 +70,8 @@ def chamber_hierarchies(scene: Scene) -> tuple[ModelHierarchy, ModelHierarchy]:
     fills = chamber_fills(scene)
     kinds = _kinds(scene)
     status = chamber_status(scene)
-    terms = chamber_contributions(scene, fills)
+    meshes = mesh_contributions(scene)
+    terms = {part: {**found, **meshes} for part, found in chamber_contributions(scene, fills).items()}
     floor = mesh_error(scene, default_cells(disc=scene.disc)[1])
     capillary = {part: np.max(s, initial=0.0) for part, s in capillary_share(scene, fills).items()}
     swing = _swing_uncertainty(scene, fills, terms)

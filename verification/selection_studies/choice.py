@@ -116,7 +116,7 @@ def choose(
     """
     _check(hierarchy, tolerance)
     model, held = costs or committed_costs(), values or Values(hierarchy)
-    ranked = ranked_fidelities(hierarchy, model)
+    ranked = model.ranked(hierarchy)
     first = next((f for f in ranked if _predicted_error(f, hierarchy) <= tolerance), hierarchy.top)
     reference = _next_up(hierarchy, first, tolerance, ranked) if check else None
     kept, tried = first, list[Fidelity]()
@@ -151,13 +151,6 @@ def _tried(
         if values.error(fidelity, reference, hierarchy.check) <= MARGIN * tolerance:
             return fidelity, tried
     return reference, tried
-
-
-def ranked_fidelities(hierarchy: ModelHierarchy, costs: CostModel) -> list[Fidelity]:
-    """Models of a hierarchy, cheapest over all its points first; equal ones as they stand."""
-    return sorted(
-        hierarchy.fidelities, key=lambda fidelity: costs.of_fidelity(fidelity, points=len(hierarchy.points))
-    )
 
 
 def _undecided(hierarchy: ModelHierarchy, fidelity: Fidelity, tolerance: float) -> frozenset[str]:

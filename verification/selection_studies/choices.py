@@ -10,7 +10,7 @@ from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Found, Table
 from ringbalance.verification.selection_studies.chamber_models import chamber_hierarchies
-from ringbalance.verification.selection_studies.choice import Values, choose, ranked_fidelities
+from ringbalance.verification.selection_studies.choice import Values, choose
 from ringbalance.verification.selection_studies.cost import committed_costs
 from ringbalance.verification.selection_studies.hierarchy import ModelHierarchy
 from ringbalance.verification.selection_studies.law_models import base_law
@@ -102,7 +102,7 @@ def _judged(
     costs, points = committed_costs(), tuple(range(len(hierarchy.points)))
     choice = choose(hierarchy, tolerance, check=check, costs=costs, values=values)
     cheapest = choice.cost
-    for fidelity in ranked_fidelities(hierarchy, costs):
+    for fidelity in costs.ranked(hierarchy):
         cost = costs.of_fidelity(fidelity, points=len(points))
         if cost >= choice.cost:
             break

@@ -14,7 +14,7 @@ from ringbalance.scene.platform.progress import activity
 from ringbalance.scene.platform.terminal import messages_console, results_console
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.selection_studies.show import trade_view
-from ringbalance.verification.selection_studies.study import TradeStudy, trade_document, trade_study
+from ringbalance.verification.selection_studies.study import TradeStudy, trade_study
 
 DONE: Final = 0
 FILE: Final = "trade.json"
@@ -55,7 +55,7 @@ def trade(
         check_file(out / FILE)
     with activity("trade", "model hierarchies ...") as shown:
         study = trade_study(told, level=level, progress=lambda title: shown.show(f"{title} ..."))
-    text = json_format.dumps(trade_document(study), allow_nan=False)
+    text = json_format.dumps(study.document(), allow_nan=False)
     if json:
         print(text)
     else:

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.physics import deferred
-from ringbalance.verification.selection_studies.hierarchy import Fidelity, Work
+from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy, Work
 
 _RESOURCE: Final = "cost_model.json"
 _PULL: Final = 0.3
@@ -38,6 +38,11 @@ class CostModel:
     def of_fidelity(self, fidelity: Fidelity, *, points: int) -> float:
         """Cost of a model at a number of points, the tables that it needs included, s."""
         return self.cost(fidelity.fixed_work) + points * self.cost(fidelity.work)
+
+    def ranked(self, hierarchy: ModelHierarchy) -> list[Fidelity]:
+        """Models of a hierarchy, cheapest over all its points first; equal ones as they stand."""
+        points = len(hierarchy.points)
+        return sorted(hierarchy.fidelities, key=lambda fidelity: self.of_fidelity(fidelity, points=points))
 
 
 @lru_cache(maxsize=1)

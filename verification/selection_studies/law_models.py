@@ -55,6 +55,32 @@ class LawModels:
             "flow over the siphon crest": self.regimes,
         }
 
+    def work(self, scene: Scene) -> Work:
+        """Counted work of making a law: formulas at the nodes of its tables. Returns: Counts by kind."""
+        tables = 3 if scene.tube.hump_radius is not None and self.regimes == REGIMES else 1
+        level = LEVEL_NODES * _LEVEL_FORMULAS[self.level]
+        return {"formula": float(level), "table": float(tables * FORMULAS[self.loss])}
+
+    def law(self, scene: Scene, *, base: CalibratedLaw) -> CalibratedLaw:
+        """The base law with its level, moment, loss and regimes exchanged, but for its half-widths."""
+        pressure, moment = _level_tables(scene, self.level)
+        path, heads = base.path, _loss_heads(scene, self.loss, base=base.heads)
+        if self.regimes == SIPHON:
+            path = replace(path, hump_pressure=None)
+            heads = replace(heads, hump_head=None, return_hump_head=None)
+        volume = base.chamber_volume
+        if self.level == EQ_12:
+            volume = paper.chamber_volume_paper(disc=scene.disc)
+        return replace(
+            base,
+            name=f"{self.level}; {self.loss}; {self.regimes}",
+            wall_pressure=pressure,
+            moment=replace(base.moment, chamber_moment=moment),
+            path=path,
+            heads=heads,
+            chamber_volume=volume,
+        )
+
 
 def base_law(scene: Scene) -> CalibratedLaw:
     """The scene's law by the finest models but without gravity, whose parts are exchanged; a ring exists."""
@@ -71,34 +97,6 @@ def levels_available(scene: Scene) -> tuple[str, ...]:
     closed = closed_ring(scene, fills)
     # The thinnest film is open under any gravity; what counts is where the chamber works.
     return LEVELS if bool(np.all(closed[2:])) else LEVELS[:2]
-
-
-def law_of(scene: Scene, models: LawModels, *, base: CalibratedLaw) -> CalibratedLaw:
-    """The base law with its level, moment, loss and regimes exchanged, but for its half-widths."""
-    pressure, moment = _level_tables(scene, models.level)
-    path, heads = base.path, _loss_heads(scene, models.loss, base=base.heads)
-    if models.regimes == SIPHON:
-        path = replace(path, hump_pressure=None)
-        heads = replace(heads, hump_head=None, return_hump_head=None)
-    volume = base.chamber_volume
-    if models.level == EQ_12:
-        volume = paper.chamber_volume_paper(disc=scene.disc)
-    return replace(
-        base,
-        name=f"{models.level}; {models.loss}; {models.regimes}",
-        wall_pressure=pressure,
-        moment=replace(base.moment, chamber_moment=moment),
-        path=path,
-        heads=heads,
-        chamber_volume=volume,
-    )
-
-
-def law_work(scene: Scene, models: LawModels) -> Work:
-    """Counted work of making a law: formulas at the nodes of its tables. Returns: Counts by kind."""
-    tables = 3 if scene.tube.hump_radius is not None and models.regimes == REGIMES else 1
-    level = LEVEL_NODES * _LEVEL_FORMULAS[models.level]
-    return {"formula": float(level), "table": float(tables * FORMULAS[models.loss])}
 
 
 def _level_tables(scene: Scene, level: str) -> tuple[HermiteTable, HermiteTable]:

@@ -28,8 +28,9 @@ from ringbalance.reduced_model.selection.estimates import (
     injection_time,
 )
 from ringbalance.reduced_model.selection.loss_models import CONSTANT
+from ringbalance.reduced_model.selection.range_flow import equal_velocity
 from ringbalance.reduced_model.selection.registry import IN_INJECTIONS
-from ringbalance.reduced_model.selection.tube_terms import flow_contributions, flow_estimate
+from ringbalance.reduced_model.selection.tube_terms import flow_contributions
 from ringbalance.reduced_model.time_scales import first_gas_time
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
@@ -40,7 +41,6 @@ from ringbalance.verification.selection_studies.law_models import (
     EQ_12,
     SIPHON,
     LawModels,
-    law_work,
 )
 from ringbalance.verification.selection_studies.tube_models import (
     LawBook,
@@ -174,12 +174,12 @@ def _operation_contributions(scene: Scene) -> Mapping[str, Contribution]:
 
 def _velocity_change(scene: Scene, duration: float) -> float:
     """Relative change of the velocity while the levels shift, (dP/dx) 2 dx/(2 p)."""
-    flow, disc = flow_estimate(scene), scene.disc
+    velocity, disc = equal_velocity(scene), scene.disc
     if scene.gas.pressure <= 0:
         return 0.0
     area = np.pi / 4 * scene.tube.bore**2
     per_fill = scene.liquid.density * scene.rotor.speed**2 / (disc.axial_width * disc.central_angle)
-    return float(min(per_fill * area * flow.velocity * duration / scene.gas.pressure, 1.0))
+    return float(min(per_fill * area * velocity * duration / scene.gas.pressure, 1.0))
 
 
 def mass_hierarchy(scene: Scene, *, book: LawBook) -> ModelHierarchy:
@@ -280,7 +280,7 @@ def _hierarchy(
                 models={**law.named(), "operation in time": time.name},
                 leaves_out=lacks(law, hump=hump) | frozenset(time.lacks),
                 work={kind: count * operations for kind, count in time.work.items()} | {"step": operations},
-                fixed_work={} if time.name == CLOSED_FORM else law_work(scene, law),
+                fixed_work={} if time.name == CLOSED_FORM else law.work(scene),
                 solve=partial(solve, law=law, time=time),
                 prepare=None if time.name == CLOSED_FORM else partial(book.make, law),
             )

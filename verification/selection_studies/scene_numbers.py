@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ringbalance.mesh.geometry import surface_radius
+from ringbalance.physics.tube.numbers import reynolds_number, rotation_reynolds_number
 from ringbalance.reduced_model.chamber.terms import amplification, surface_tension
 from ringbalance.reduced_model.law.building import column_pressure
 from ringbalance.reduced_model.selection.estimates import (
@@ -14,7 +15,7 @@ from ringbalance.reduced_model.selection.estimates import (
     injection_estimates,
     injection_time,
 )
-from ringbalance.reduced_model.selection.tube_terms import FlowEstimate, flow_estimate
+from ringbalance.reduced_model.selection.range_flow import equal_velocity
 from ringbalance.scene.models import Scene
 
 
@@ -35,7 +36,7 @@ def scene_numbers(scene: Scene) -> tuple[_Number, ...]:
 
     Those of the tube are by a velocity from the correlations alone.
     """
-    return (*_ring(scene), *_tube(scene, flow_estimate(scene)), *_times(scene))
+    return (*_ring(scene), *_tube(scene), *_times(scene))
 
 
 def _ring(scene: Scene) -> tuple[_Number, ...]:
@@ -66,14 +67,16 @@ def _ring(scene: Scene) -> tuple[_Number, ...]:
     )
 
 
-def _tube(scene: Scene, flow: FlowEstimate) -> tuple[_Number, ...]:
-    hump = scene.tube.hump_radius
+def _tube(scene: Scene) -> tuple[_Number, ...]:
+    hump, bore, nu = scene.tube.hump_radius, scene.tube.bore, scene.liquid.kinematic_viscosity
+    re = float(reynolds_number(velocity=equal_velocity(scene), bore=bore, kinematic_viscosity=nu))
+    rotation = rotation_reynolds_number(angular_velocity=scene.rotor.speed, bore=bore, kinematic_viscosity=nu)
     column = None if hump is None else column_pressure(scene=scene, radius=hump)
     ratio = column / scene.gas.pressure if column is not None and scene.gas.pressure > 0 else None
     return (
-        _Number("R_Omega", flow.rotation_reynolds, "omega d^2/nu", "friction by rotation"),
-        _Number("Re", flow.reynolds, "u d/nu", "laminar or turbulent"),
-        _Number("Kl", flow.rotation_reynolds * flow.reynolds, "R_Omega Re", "rotation in laminar flow"),
+        _Number("R_Omega", rotation, "omega d^2/nu", "friction by rotation"),
+        _Number("Re", re, "u d/nu", "laminar or turbulent"),
+        _Number("Kl", rotation * re, "R_Omega Re", "rotation in laminar flow"),
         _Number(
             "priming ratio", ratio, "rho omega^2 (R2^2 - r_m^2)/(2 p)", "whether the gas lifts the column"
         ),

@@ -50,6 +50,20 @@ class TradeStudy:
     refit: CostModel | None
     """Fitted to this run's times; None when nothing was timed."""
 
+    def document(self) -> Record:
+        """Plain numbers and texts; all but `times` is the same on every machine."""
+        scene = self.scene
+        return {
+            "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
+            "tolerance": scene.tolerance,
+            "numbers": [asdict(number) for number in scene_numbers(scene)],
+            "terms": terms_document(scene),
+            "models_used": [asdict(used) for used in models_used(scene)],
+            "cost_model": {"fitted_on": self.costs.fitted_on, "seconds": dict(self.costs.seconds)},
+            "quantities": [_quantity(trade, self.choices[trade.hierarchy.quantity]) for trade in self.trades],
+            "times": _times(self),
+        }
+
 
 def hierarchies_of(scene: Scene, *, level: Level = "heavy") -> tuple[ModelHierarchy, ...]:
     """The model hierarchies of a scene; "light" leaves the settling time out.
@@ -75,7 +89,8 @@ def trade_study(
     """
     costs = committed_costs()
     trades, chosen = [], {}
-    clock = _clock(level) if timed else None
+    every = Clock(repeats=3) if level == "heavy" else Clock(repeats=1, memory=False)
+    clock = every if timed else None
     for hierarchy in hierarchies_of(scene, level=level):
         if progress is not None:
             progress(hierarchy.title)
@@ -104,10 +119,6 @@ def thinned(hierarchy: ModelHierarchy) -> ModelHierarchy:
     return replace(hierarchy, fidelities=tuple(filter(kept, hierarchy.fidelities)))
 
 
-def _clock(level: Level) -> Clock:
-    return Clock(repeats=3) if level == "heavy" else Clock(repeats=1, memory=False)
-
-
 def _no_longer(clock: Clock | None, hierarchy: ModelHierarchy) -> Clock | None:
     """Runs of the whole loop are timed once each, and not traced; a light study times no laws."""
     if clock is None or (clock.repeats == 1 and hierarchy.quantity in _LAWS):
@@ -133,21 +144,6 @@ def tolerance_text(tolerance: float, say: Callable[[float], str]) -> str:
     """The tolerance that models are chosen for, beside the scene's own where that is out of range."""
     taken, told = held_tolerance(tolerance), f"this scene's tolerance of {say(tolerance)}"
     return told if taken == tolerance else f"{say(taken)}, the nearest to {told} that models are chosen for"
-
-
-def trade_document(study: TradeStudy) -> Record:
-    """A study as plain numbers and texts. Returns: Record; all but `times` is the same on every machine."""
-    scene = study.scene
-    return {
-        "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
-        "tolerance": scene.tolerance,
-        "numbers": [asdict(number) for number in scene_numbers(scene)],
-        "terms": terms_document(scene),
-        "models_used": [asdict(used) for used in models_used(scene)],
-        "cost_model": {"fitted_on": study.costs.fitted_on, "seconds": dict(study.costs.seconds)},
-        "quantities": [_quantity(trade, study.choices[trade.hierarchy.quantity]) for trade in study.trades],
-        "times": _times(study),
-    }
 
 
 def terms_document(scene: Scene) -> list[Record]:

@@ -21,16 +21,15 @@ from ringbalance.reduced_model.selection.loss_models import (
     TABLES,
     loss_at,
 )
+from ringbalance.reduced_model.selection.range_flow import SHARES, equal_velocity
 from ringbalance.reduced_model.selection.tube_terms import (
     GRAVITY,
     HUMP,
     LEVEL,
     LOSS,
     ROTATION,
-    SHARES,
     TABLE,
     flow_contributions,
-    flow_estimate,
     loss_contributions,
 )
 from ringbalance.scene.arrays import FloatArray
@@ -43,8 +42,6 @@ from ringbalance.verification.selection_studies.law_models import (
     REGIMES,
     SIPHON,
     LawModels,
-    law_of,
-    law_work,
     levels_available,
 )
 
@@ -75,7 +72,7 @@ class LawBook:
     def law(self, models: LawModels) -> CalibratedLaw:
         """The law of some models."""
         if models not in self._made:
-            self._made[models] = law_of(self.scene, models, base=self.base)
+            self._made[models] = models.law(self.scene, base=self.base)
         return self._made[models]
 
     def make(self, models: LawModels) -> CalibratedLaw:
@@ -86,7 +83,7 @@ class LawBook:
 
 def k_hierarchy(scene: Scene) -> ModelHierarchy:
     """The model hierarchy of the tube's loss, as k + 1, which is what heads know."""
-    centre = flow_estimate(scene).velocity or 1.0
+    centre = equal_velocity(scene) or 1.0
     velocities = centre * np.array(VELOCITY_FACTORS)
 
     def solve(point: int, *, loss: str) -> FloatArray:
@@ -170,7 +167,7 @@ def velocity_hierarchy(scene: Scene, *, book: LawBook) -> ModelHierarchy:
                 models=models.named(),
                 leaves_out=lacks(models, hump=hump),
                 work={"law": 1.0},
-                fixed_work=law_work(scene, models),
+                fixed_work=models.work(scene),
                 solve=partial(solve, models=models),
                 prepare=partial(book.make, models),
             )

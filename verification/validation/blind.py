@@ -38,7 +38,7 @@ def data_document(path: Path) -> dict[str, Any]:
         "statistics": vars(comparison.statistics),
         "series": {name: _of_series(comparison, name) for name in np.unique(comparison.series).tolist()},
         "points": [
-            dict(zip(("series", "measured", "predicted", "stated", "u_D"), row, strict=True))
+            dict(zip(("series", "measured", "predicted", "stated", "U_D"), row, strict=True))
             for row in zip(
                 comparison.series.tolist(),
                 comparison.measured.tolist(),

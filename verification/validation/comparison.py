@@ -13,7 +13,11 @@ from ringbalance.scene.arrays import BoolArray, FloatArray, StringArray
 from ringbalance.verification.evidence import Curve, Evidence, Found, Series, figure
 from ringbalance.verification.validation.kinds import Kind
 from ringbalance.verification.validation.measurements import Measurements, MeasurementsError
-from ringbalance.verification.validation.model_bias import ModelStatistics, model_statistics
+from ringbalance.verification.validation.model_bias import (
+    ModelStatistics,
+    model_statistics,
+    statistics_numbers,
+)
 from ringbalance.verification.validation.tube_friction import FRICTION
 from ringbalance.verification.validation.vessel import VESSEL
 from ringbalance.verification.validation.wave_frequency import WAVE_FREQUENCY
@@ -158,8 +162,3 @@ def data_evidence(*sets: Measurements, unit: str, mutation: str | None = None) -
         numbers=statistics_numbers(comparison.statistics),
         series=(comparison.scatter(kind_of(sets[0]).title, unit),),
     )
-
-
-def statistics_numbers(statistics: ModelStatistics) -> dict[str, float]:
-    """Numbers for a case's text, by the names of `ModelStatistics`."""
-    return {key: float(value) for key, value in vars(statistics).items()}

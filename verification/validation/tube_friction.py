@@ -12,7 +12,6 @@ from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, StringArra
 from ringbalance.verification.navier_stokes.rotating_section import (
     DuctMesh,
     friction_ratio,
-    section_system,
     solve_section_without_inertia,
 )
 from ringbalance.verification.validation.kinds import Kind, Prediction
@@ -102,7 +101,7 @@ def _laminar_ratio(aspect_ratio: FloatArray) -> FloatArray:
     """Laminar friction of rectangular ducts over that of a tube of their hydraulic diameter; 0 for tubes."""
     ratio = np.ones_like(aspect_ratio)
     for aspect in np.unique(aspect_ratio[aspect_ratio > 0]):
-        system = section_system(cells=DuctMesh(aspect_ratio=float(aspect)))
+        system = DuctMesh(aspect_ratio=float(aspect)).system()
         flow = solve_section_without_inertia(system=system, rotation_reynolds=0.0)
         ratio[aspect_ratio == aspect] = friction_ratio(flow)
     return ratio

@@ -11,7 +11,6 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.physics.sloshing.modes import natural_frequencies
 from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY
 from ringbalance.physics.sloshing.system import sloshing_system
 from ringbalance.scene.models import Disc
@@ -44,7 +43,7 @@ def tank_frequency(depth: float) -> float:
         initial_fill=0.5,
     )
     surface = _RADIUS - depth
-    lowest = natural_frequencies(sloshing_system(disc=disc, surface_radius=surface, cells=_CELLS))[0]
+    lowest = sloshing_system(disc=disc, surface_radius=surface, cells=_CELLS).natural_frequencies()[0]
     # Gravity of the rotation is omega^2 a, so sigma = s omega = s sqrt(g/a).
     return float(lowest) / math.sqrt(surface)
 

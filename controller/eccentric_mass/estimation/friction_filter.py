@@ -96,7 +96,6 @@ def friction_step(
 ) -> FrictionEstimate:
     """Predict by the flow, its covariance by the flow's derivatives, and take in the encoder's rate.
 
-    Returns: The estimate after the sample.
     Source: Eqs. 32 to 38 of the paper on eccentric masses, with the flow as transition and Joseph's update.
     """
     flow = friction_flow(model, estimate.rate, estimate.arm, speed, torque, step, euler)
@@ -127,8 +126,5 @@ def friction_step(
 def friction_restart(
     estimate: FrictionEstimate, noise: FrictionNoise, measured_rate: float
 ) -> FrictionEstimate:
-    """Take the rate from the encoder alone, and keep what is known of the arm.
-
-    For a mass that sticks or turns round, where the flow does not hold.
-    """
+    """Rate from the encoder alone, arm as known, of a mass that sticks or turns: no flow holds there."""
     return FrictionEstimate(measured_rate, estimate.arm, noise.rate_variance, 0.0, estimate.arm_variance)

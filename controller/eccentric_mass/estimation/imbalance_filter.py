@@ -158,11 +158,7 @@ def _joseph(p: FloatArray, total: float, h: FloatArray, cross_covariance: FloatA
 
 @compiled
 def turned_back(sample: FloatArray, rotor_angle: float) -> FloatArray:
-    """A laboratory sensor's sample along the rotor's axes.
-
-    Returns: The same vectors along the rotor's axes, shape (4,); the velocity is still the one seen from
-    outside.
-    """
+    """A laboratory sensor's sample along the rotor's axes; the velocity is still seen from outside."""
     c, s = math.cos(rotor_angle), math.sin(rotor_angle)
     return np.array(
         [
@@ -176,10 +172,7 @@ def turned_back(sample: FloatArray, rotor_angle: float) -> FloatArray:
 
 @compiled
 def with_fresh_whirl(estimate: ImbalanceEstimate, start: ImbalanceEstimate) -> ImbalanceEstimate:
-    """Forget the whirl and keep the imbalance, after a time in which the filter's model did not hold.
-
-    Returns: The estimate with the whirl of `start`.
-    """
+    """Forget the whirl and keep the imbalance, after a time in which the filter's model did not hold."""
     state, covariance = start.state.copy(), start.covariance.copy()
     for i in range(4, 6):
         state[i] = estimate.state[i]
@@ -190,10 +183,7 @@ def with_fresh_whirl(estimate: ImbalanceEstimate, start: ImbalanceEstimate) -> I
 
 @compiled
 def imbalance_deviation(covariance: FloatArray) -> float:
-    """Largest standard deviation of the imbalance in any direction.
-
-    Returns: Square root of the larger eigenvalue of the imbalance's block, kg m.
-    """
+    """Largest standard deviation of the imbalance in any direction, kg m."""
     a, b, c = covariance[4, 4], covariance[4, 5], covariance[5, 5]
     return math.sqrt(max(0.5 * (a + c) + math.hypot(0.5 * (a - c), b), 0.0))
 

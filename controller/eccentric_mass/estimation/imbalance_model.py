@@ -112,9 +112,8 @@ def whirl_transition(model: WhirlModel, angular_velocity: float, step: float) ->
 
 @compiled
 def euler_transition(model: WhirlModel, angular_velocity: float, step: float) -> FloatArray:
-    """The paper's transition I + A dt, which keeps the steady whirl but not the way there.
+    """The paper's transition I + A dt, shape (6, 6), which keeps the steady whirl but not the way there.
 
-    Returns: Transition, shape (6, 6).
     Source: Eq. 14 of the paper on eccentric masses.
     """
     mass, damping, stiffness = model
@@ -154,10 +153,7 @@ def _process_covariance(
 
 @compiled
 def sandwich(a: FloatArray, p: FloatArray) -> FloatArray:
-    """A P A^T of a symmetric P, by plain sums: the arrays are too small for a library call to pay.
-
-    Returns: Shape (6, 6), symmetric to the last bit.
-    """
+    """A P A^T, symmetric to the last bit, by plain sums: too small for a library call to pay."""
     half, full = np.zeros((6, 6)), np.zeros((6, 6))
     for i in range(6):
         for j in range(6):
@@ -199,10 +195,7 @@ def filter_matrices(
     laboratory: bool,
     euler: bool,
 ) -> FilterMatrices:
-    """All matrices of the imbalance filter at one speed.
-
-    Args: `laboratory`: whether the sensor stands still.
-    """
+    """All matrices of the imbalance filter at one speed, of a sensor that turns or stands still."""
     exact = whirl_transition(model, angular_velocity, step)
     return FilterMatrices(
         angular_velocity,

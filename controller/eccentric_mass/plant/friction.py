@@ -61,11 +61,7 @@ def angular_accelerations(torques: Torques, first: int, second: int) -> tuple[fl
 
 @compiled
 def slips(torques: Torques, mass: int, other_acceleration: float) -> bool:
-    """Whether each held mass breaks loose.
-
-    |g - cross phi''_other| > mu_f b W^2.
-    Returns: True beyond the break-away torque.
-    """
+    """Whether a held mass breaks loose: |g - cross phi''_other| > mu_f b W^2."""
     driving = torques.driving_1 if mass == 0 else torques.driving_2
     most = torques.friction_1 if mass == 0 else torques.friction_2
     return abs(driving - torques.cross * other_acceleration) > most * (1.0 + _ROUNDING)
@@ -91,10 +87,7 @@ def _sliding(rate: float) -> int:
 
 @compiled
 def motions(torques: Torques, state: FloatArray, stuck: IntArray) -> tuple[int, int]:
-    """Find which way each mass moves, or that it is held.
-
-    Returns: Motion of each mass: HELD, FORWARDS or BACKWARDS.
-    """
+    """Which way each mass moves, or that it is held: HELD, FORWARDS or BACKWARDS."""
     loose_1 = stuck[0] != LOCKED and state[6] == 0.0
     loose_2 = stuck[1] != LOCKED and state[7] == 0.0
     known_1 = HELD if stuck[0] == LOCKED else _sliding(state[6])

@@ -31,10 +31,7 @@ def held_step(
     drive: Drive,
     step: float,
 ) -> bool:
-    """Carry the rotor through one step, in place, if both masses are held for sure.
-
-    Returns: Whether it was; else nothing has changed.
-    """
+    """Carry the rotor through one step, in place, if both masses are held for sure; say whether they are."""
     if drive.rate != 0.0 or speed == 0.0 or state[6] != 0.0 or state[7] != 0.0:
         return False
     mass, half = parameters.mass, 0.5 * parameters.damping / parameters.mass

@@ -155,11 +155,7 @@ def _advance(
 
 @compiled
 def fastest_rate(parameters: PlantParameters, speed: float) -> float:
-    """Bound on how fast anything in the plant changes.
-
-    |W| + sqrt(K_B / M) + C_B / M + C_add / (J + J_add - 2 b^2 / M).
-    Returns: rad/s.
-    """
+    """Bound on any rate, rad/s: |W| + sqrt(K_B/M) + C_B/M + C_add/(J + J_add - 2 b^2/M)."""
     least = parameters.inertia + parameters.drive_inertia - 2 * parameters.moment**2 / parameters.mass
     rotor = math.sqrt(parameters.stiffness / parameters.mass) + parameters.damping / parameters.mass
     return abs(speed) + rotor + parameters.drive_damping / least

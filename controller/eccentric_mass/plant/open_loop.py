@@ -59,10 +59,7 @@ def run_steps(
     step: float,
     first: int = 0,
 ) -> tuple[FloatArray, IntArray]:
-    """Carry the plant through steps of equal length.
-
-    Returns: States, shape (steps + 1, 8), and flags, shape (steps + 1, 2).
-    """
+    """States, shape (steps + 1, 8), and flags, shape (steps + 1, 2), over steps of equal length."""
     count = commands.shape[0]
     states, flags = np.empty((count + 1, state.size)), np.empty((count + 1, 2), np.int64)
     for place in range(count + 1):
@@ -107,10 +104,7 @@ def run_plant(
 
 
 def stretches(samples: int) -> Iterator[tuple[int, int]]:
-    """Divide samples into pieces by the time that the caller takes for each.
-
-    Yields: Number of the first sample of a piece, and the number after its last.
-    """
+    """Pieces of the samples by the caller's time for each: its first number and one past its last."""
     begin, size = 0, _FIRST
     while begin < samples:
         end = min(begin + size, samples)

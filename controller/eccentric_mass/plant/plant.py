@@ -70,11 +70,7 @@ class _Loads(NamedTuple):
 
 @compiled
 def _limited(voltage: float, maximum: float) -> float:
-    """Cut a voltage to what the supply can give.
-
-    Args: `maximum`: V, positive; may be infinite.
-    Returns: V within [-maximum, maximum].
-    """
+    """A voltage cut to what the supply can give, which may be infinite."""
     return min(max(voltage, -maximum), maximum)
 
 
@@ -155,10 +151,7 @@ def write_derivative(
 
 
 def rest_state(angles: tuple[float, float]) -> FloatArray:
-    """The state of a rotor at its centre, seen from its own frame, with masses at rest on the track.
-
-    Returns: Shape (8,).
-    """
+    """The state of a rotor at its centre, in its own frame, with masses at rest on the track, shape (8,)."""
     return np.array([0.0, 0.0, 0.0, 0.0, angles[0], angles[1], 0.0, 0.0])
 
 

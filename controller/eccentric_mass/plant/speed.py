@@ -10,20 +10,14 @@ from ringbalance.scene.eccentric_models import EccentricRotor
 
 
 def profile_arrays(rotor: EccentricRotor) -> tuple[FloatArray, FloatArray]:
-    """Corners of the speed profile as arrays.
-
-    Returns: Times, s, and speeds, rad/s, each of shape (corners,).
-    """
+    """Times, s, and speeds, rad/s, of the corners of the speed profile."""
     times = np.array([corner.time for corner in rotor.speed_profile])
     return times, np.array([corner.speed for corner in rotor.speed_profile])
 
 
 @compiled
 def speed_at(times: FloatArray, speeds: FloatArray, time: float) -> tuple[float, float]:
-    """Speed and its rate just after a time.
-
-    Returns: W, rad/s, and W', rad/s^2; constant before the first corner and after the last.
-    """
+    """W, rad/s, and W', rad/s^2, just after a time; constant before the first corner and after the last."""
     if time < times[0]:
         return speeds[0], 0.0
     for place in range(len(times) - 1):

@@ -9,11 +9,7 @@ from ringbalance.controller.eccentric_mass.plant.parameters import PlantParamete
 
 
 def moment_vector(parameters: PlantParameters, angles: Sequence[float]) -> complex:
-    """Unbalance of rotor and eccentric masses together.
-
-    U exp(j phi_m) + b sum exp(j phi_i).
-    Returns: kg m, complex in the rotor's frame.
-    """
+    """Unbalance of rotor and eccentric masses, U exp(j phi_m) + b sum exp(j phi_i), kg m, rotor-fixed."""
     masses = sum(cmath.exp(1j * angle) for angle in angles)
     return parameters.unbalance * cmath.exp(1j * parameters.phase) + parameters.moment * masses
 

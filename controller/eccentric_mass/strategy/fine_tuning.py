@@ -42,10 +42,7 @@ def tuning_start(first: float, second: float, objective: float, step: float) -> 
 
 @compiled
 def tuning_place(tuning: Tuning) -> tuple[float, float]:
-    """Where the masses should go now.
-
-    Returns: Angles of both masses, rad; the best place when the search is done.
-    """
+    """Angles of both masses to go to now, rad; the best place when the search is done."""
     first, second = tuning.base
     if tuning.done:
         return first, second

@@ -48,11 +48,7 @@ def _rotor_load(law: DriveLaw, motion: Motion, imbalance: complex, wanted: Pair)
 
 @compiled
 def _steady_load(law: DriveLaw, motion: Motion) -> Pair:
-    """The same while the imbalance is not yet known, from a whirl without rotor-fixed acceleration.
-
-    a = -W^2 z + 2 j W z' + j W' z.
-    Returns: Torques, N m.
-    """
+    """The same, N m, of a steady whirl while the imbalance is not known: a = -W^2 z + 2 j W z' + j W' z."""
     w = motion.speed
     pull = complex(-w * w, motion.speed_rate) * motion.position
     return _tangential_load(law, motion, pull + complex(0.0, 2 * w) * motion.velocity)
@@ -96,9 +92,8 @@ def friction_torque(
 
 @compiled
 def regulator_torque(law: DriveLaw, angle: float, rate: float, goal: float) -> float:
-    """The regulator's torque, u = -k_p (phi - phi_d) - k_d phi'.
+    """The regulator's torque, u = -k_p (phi - phi_d) - k_d phi', N m.
 
-    Returns: Torque, N m.
     Source: Eq. 49 of the paper on eccentric masses.
     """
     return -law.position_gain * (angle - goal) - law.rate_gain * rate

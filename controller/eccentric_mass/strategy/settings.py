@@ -18,6 +18,7 @@ from ringbalance.controller.eccentric_mass.strategy.records import (
     ImbalanceSettings,
     StrategySettings,
 )
+from ringbalance.scene.eccentric_control_models import Supervisor
 from ringbalance.scene.eccentric_models import EccentricScene
 
 _SMOOTHING_TIME = 0.05
@@ -36,15 +37,13 @@ _SLOWEST_RATE = 1e-3
 """Below which a mass rests, however good the encoder, rad/s."""
 _CERTAIN = 5.0
 """Standard deviations of a smoothed rate beyond which a mass moves."""
+_SUPERVISOR_KEYS = [name for name in Gates._fields if name in Supervisor.__dataclass_fields__]
 FRICTION_ERROR = 0.1
 """Share of the arrival angle that unknown friction may hold a mass off."""
 
 
 def believed_whirl(scene: EccentricScene) -> WhirlModel:
-    """The rotor as configured in filter and controller.
-
-    Returns: WhirlModel; its mass includes the eccentric masses.
-    """
+    """The rotor as configured in filter and controller; its mass includes the eccentric masses."""
     told = scene.imbalance_filter
     return WhirlModel(told.assumed_mass + 2 * scene.masses.mass, told.assumed_damping, told.assumed_stiffness)
 
@@ -159,16 +158,8 @@ def _gates(scene: EccentricScene) -> Gates:
     plant, law = plant_parameters(scene), drive_law(scene)
     averaged = max(tuning.average / scene.sensor.step, 1.0)
     return Gates(
-        start=told.start,
-        limit=told.limit,
-        lowest_speed=told.lowest_speed,
-        arrival_angle=told.arrival_angle,
-        arrival_rate=told.arrival_rate,
+        **{name: getattr(told, name) for name in _SUPERVISOR_KEYS},
         dwell=_DWELL_TIME,
-        imbalance_time=told.imbalance_time,
-        friction_time=told.friction_time,
-        positioning_time=told.positioning_time,
-        fine_tuning_time=told.fine_tuning_time,
         imbalance_gate=scene.imbalance_filter.gate,
         friction_gate=scene.friction_filter.gate,
         friction_torque=FRICTION_ERROR * law.position_gain * told.arrival_angle,
@@ -184,5 +175,4 @@ def _gates(scene: EccentricScene) -> Gates:
         move_time=_LONGEST_TRIAL_MOVE,
         moment=plant.moment,
         gap=scene.masses.arc_length / scene.masses.guide_radius,
-        target_error=told.target_error,
     )

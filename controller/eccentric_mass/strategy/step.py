@@ -79,10 +79,7 @@ def strategy_start(settings: StrategySettings, measurement: EccentricMeasurement
 def strategy_step(
     settings: StrategySettings, state: StrategyState, measurement: EccentricMeasurement
 ) -> tuple[StrategyState, Pair]:
-    """Decide on one sample; the same arguments always give the same answer.
-
-    Returns: The next state and the voltages of both motors, V.
-    """
+    """The next state and both motors' voltages, V; the same arguments always give the same answer."""
     count, old, smoothed, whirl, beliefs, torque, rate, voltage = state
     if not _usable(measurement):
         return StrategyState(count + 1, old, smoothed, whirl, beliefs, torque, rate, voltage), voltage

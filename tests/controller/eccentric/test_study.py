@@ -8,12 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from ringbalance.controller.eccentric_mass.study import (
-    EccentricStudy,
-    Requirement,
-    eccentric_study,
-    study_document,
-)
+from ringbalance.controller.eccentric_mass.study import EccentricStudy, Requirement, eccentric_study
 from ringbalance.scene import bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.models import InputUncertainty
@@ -30,7 +25,7 @@ def test_the_locked_run_is_what_balancing_is_judged_by(study: EccentricStudy) ->
     assert study.locked.outcome.value == "locked"
     assert study.locked.unbalanced_amplitude == study.run.unbalanced_amplitude
     assert study.locked.worst_amplitude > study.run.worst_amplitude
-    assert json.loads(json.dumps(study_document(study), allow_nan=False))["locked"]["settled"] is False
+    assert json.loads(json.dumps(study.document(), allow_nan=False))["locked"]["settled"] is False
 
 
 def test_the_moment_of_both_masses_side_by_side_is_the_capacity(study: EccentricStudy) -> None:

@@ -28,7 +28,7 @@ from ringbalance.verification.evidence import (
 )
 from ringbalance.verification.navier_stokes.rotating_section import SectionMesh
 from ringbalance.verification.reference.bend_shift import bend_shift
-from ringbalance.verification.reference.bent_tube import BentTubeFlow, bent_tube_flow, pressure_loss
+from ringbalance.verification.reference.bent_tube import BentTubeFlow, bent_tube_flow
 
 REYNOLDS: Final = 200.0
 VISCOSITY: Final = 20e-6
@@ -134,7 +134,7 @@ def _straight(flow: BentTubeFlow, scene: Scene) -> float:
     """Gradient where flow has developed again, over that of the table."""
     end = float(flow.arc_length[-1])
     first, last = (end - distance for distance in _DEVELOPED)
-    gradient = REYNOLDS / 2 * pressure_loss(flow=flow, start=first, end=last) / (last - first)
+    gradient = REYNOLDS / 2 * flow.pressure_loss(start=first, end=last) / (last - first)
     table = rotating_friction_ratio(reynolds=REYNOLDS, rotation_reynolds=_rotation(scene))
     return gradient / (32 * float(table.value))
 
@@ -145,7 +145,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     losses: list[float] = []
     for mesh in meshes:
         flow = _solve(scene, mesh=mesh, coriolis_factor=_FACTORS[defect])
-        losses.append(pressure_loss(flow=flow, start=0.0, end=float(flow.arc_length[-1])))
+        losses.append(flow.pressure_loss(start=0.0, end=float(flow.arc_length[-1])))
         # Only the last flow is needed whole; each holds hundreds of megabytes.
         flows = [flow]
     fine, length = flows[0], float(flows[0].arc_length[-1])
@@ -218,7 +218,7 @@ def _half_width(losses: Sequence[float], sizes: Sequence[float]) -> tuple[float,
 def _figure(flow: BentTubeFlow) -> Series:
     s = flow.arc_length
     fall = 2 / flow.reynolds * flow.gradient * s
-    loss = np.array([pressure_loss(flow=flow, start=0.0, end=float(end)) for end in s])
+    loss = np.array([flow.pressure_loss(start=0.0, end=float(end)) for end in s])
     return figure(
         "loss along the path beyond that of the straight turning tube",
         ("arc length over bore", "1", s),

@@ -28,8 +28,6 @@ from ringbalance.verification.rings import (
     found_of,
     mesh_table,
     ring_of,
-    scaled,
-    without_plates,
 )
 
 _FILLS: Final = (0.1, 0.2, 0.3, 0.4, 0.5)
@@ -51,13 +49,13 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     ring = ring_of(given, _FILLS)
     moment = chamber_moment(given, density=DENSITY)
     if defect == "plates_left_out":
-        moment = without_plates(moment)
+        moment = moment.with_correction()
     unrounded, rounded = (_eq_7(given.disc, radius) for radius in (_radius(given.disc), RING_RADIUS.value))
     return Evidence(
         found={
             "moment": moment,
             "arithmetic": Found(value=unrounded, input=rounded_radius(lambda r: _eq_7(given.disc, r))),
-            "without_plates": scaled(_shape(given), _WHOLE_ANGLE if defect == "whole_angle" else 1.0),
+            "without_plates": _shape(given).scaled(_WHOLE_ANGLE if defect == "whole_angle" else 1.0),
         },
         numbers={
             "rounded": rounded,
@@ -74,7 +72,7 @@ def _shape(scene: Scene) -> Found:
     """Finite elements over Eq. 7 where there are no plates to leave out."""
     bare = with_plate(scene.disc, 0.0)
     disc = ring_of(dataclasses.replace(scene, disc=bare), (scene.disc.max_fill_ratio,))
-    return scaled(found_of(disc, "moment", 0), 1 / _eq_7(bare, _radius(bare)))
+    return found_of(disc, "moment", 0).scaled(1 / _eq_7(bare, _radius(bare)))
 
 
 def _radius(disc: Disc) -> float:

@@ -10,7 +10,7 @@ from ringbalance.reduced_model.paper.formulas import capacity
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
 from ringbalance.verification.paper_numbers import CHAMBER_MOMENT, DENSITY, DISC_MOMENT, at_paper_density
-from ringbalance.verification.rings import chamber_moment, ring_of, without_plates
+from ringbalance.verification.rings import chamber_moment, ring_of
 
 reference = dict.fromkeys(("capacity", "arithmetic"), DISC_MOMENT.reference)
 
@@ -20,7 +20,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     ring = ring_of(given, (given.disc.max_fill_ratio,))
     both = chamber_moment(given, density=DENSITY, factor=math.sqrt(2))
     if defect == "plates_left_out":
-        both = without_plates(both)
+        both = both.with_correction()
     printed = float(capacity(chamber_moment=CHAMBER_MOMENT.value))
     if defect == "added_as_numbers":
         printed = 2 * CHAMBER_MOMENT.value

@@ -9,7 +9,7 @@ from ringbalance.scene import liquid_at
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference
 from ringbalance.verification.paper_numbers import DENSE_DISC_MOMENT, DENSITY
-from ringbalance.verification.rings import chamber_moment, found_of, ring_of, without_plates
+from ringbalance.verification.rings import chamber_moment, found_of, ring_of
 
 _DENSE: Final = 2 * DENSITY
 
@@ -22,10 +22,10 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     light, dense = (ring_of(scene, full, density=density) for density in (DENSITY, _DENSE))
     capacity = chamber_moment(scene, density=_DENSE, factor=math.sqrt(2))
     if defect == "plates_left_out":
-        capacity = without_plates(capacity)
+        capacity = capacity.with_correction()
     below, above = (found_of(ring, "moment", 0) for ring in (light, dense))
     ratio = 1.0 if defect == "density_without_effect" else above.value / below.value
-    oil = _oil_density()
+    oil = liquid_at(name="perfluorinated oil GPL 101", temperature=293.15).density
     return Evidence(
         found={
             "ratio": Found(value=ratio, numerical=ratio * below.numerical / below.value),
@@ -34,7 +34,3 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         numbers={"oil_density": oil, "oil_capacity": capacity.value * oil / _DENSE},
         status=dense.status,
     )
-
-
-def _oil_density() -> float:
-    return float(liquid_at(name="perfluorinated oil GPL 101", temperature=293.15).density)

@@ -16,7 +16,7 @@ from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, Series, Table, figure
 from ringbalance.verification.paper_numbers import with_plate
 from ringbalance.verification.reference.exact_chamber import wall_pressure_of, whole_ring_pressure
-from ringbalance.verification.rings import found_of, mesh_table, ring_of, scaled
+from ringbalance.verification.rings import found_of, mesh_table, ring_of
 
 _SHARES: Final = (0.1, 0.3, 0.5, 0.7, 0.9, 1.0)
 """Of the largest fill."""
@@ -89,7 +89,7 @@ def _shape(scene: Scene, bare: Disc, by_eq_12: float, *, whole_ring: bool) -> Fo
     pressure = found_of(ring_of(given, (bare.max_fill_ratio,)), "wall_pressure", 0)
     if whole_ring:
         pressure = dataclasses.replace(pressure, value=whole_ring_pressure(given))
-    return scaled(pressure, 1 / by_eq_12)
+    return pressure.scaled(1 / by_eq_12)
 
 
 def _over_fill(scene: Scene, ring: RingQuantities) -> Series:

@@ -7,7 +7,6 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene.models import Scene
 from ringbalance.verification.comparison import from_half_width
@@ -69,12 +68,8 @@ def _exit(scene: Scene) -> tuple[float, float]:
     return excess, abs(excess) / (2 * (own.k + 1))
 
 
-def _law(scene: Scene) -> CalibratedLaw:
-    return flow_law_of(scene)
-
-
 def _siphon_share(scene: Scene) -> float:
-    law = _law(scene)
+    law = flow_law_of(scene)
     flow = law.evaluate(
         fill_ratio=_FILLS[:, None] * law.max_fill_ratio,
         gas_pressure=_PRESSURES[None, :] * scene.gas.pressure,
@@ -84,7 +79,7 @@ def _siphon_share(scene: Scene) -> float:
 
 
 def _figure(scene: Scene) -> Series:
-    law = _law(scene)
+    law = flow_law_of(scene)
     fills = _FILLS * law.max_fill_ratio
     flow = law.evaluate(fill_ratio=fills, gas_pressure=scene.gas.pressure, primed=False)
     middle = running_tube(scene, head=driving_head(scene, share=0.5))

@@ -22,7 +22,6 @@ from ringbalance.verification.paper_numbers import (
     rounded_radius,
 )
 from ringbalance.verification.reference.exact_chamber import wall_pressure_of
-from ringbalance.verification.rings import without_plates
 
 _PRESSURES: Final = {"low": LOW_PRESSURE, "high": HIGH_PRESSURE}
 _POINTS: Final = 41
@@ -45,7 +44,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     arithmetic = {f"arithmetic_{name}": _arithmetic(given, p) for name, p in _PRESSURES.items()}
     physics = {f"departure_{name}": _physics(given, p) for name, p in _PRESSURES.items()}
     if defect == "eq_12_used":
-        physics = {name: without_plates(found) for name, found in physics.items()}
+        physics = {name: found.with_correction() for name, found in physics.items()}
     share = np.linspace(0, 1, _POINTS)
     fall = _relative_velocity(given, LOW_PRESSURE, share[::-1] if defect == "chambers_exchanged" else share)
     level_now = _level(given, given.disc)

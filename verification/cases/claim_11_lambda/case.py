@@ -16,7 +16,7 @@ from ringbalance.verification.comparison import from_half_width, from_rounding
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, Series, figure
 from ringbalance.verification.paper_numbers import LAMBDA_TOLERANCE, with_plate
 from ringbalance.verification.reference.exact_chamber import central_lambda
-from ringbalance.verification.rings import found_of, mesh_table, ring_of, scaled
+from ringbalance.verification.rings import found_of, mesh_table, ring_of
 
 _SHARES: Final = tuple(np.linspace(0.0, 1.0, 11).tolist())
 """Of the largest fill; the middle one is the centre."""
@@ -39,7 +39,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     ring = ring_of(scene, fills)
     per_density = 2 / scene.liquid.density
     bare = central_lambda(disc=with_plate(scene.disc, 0.0))
-    by_elements = scaled(found_of(ring, "moment_per_volume", _CENTRE), per_density)
+    by_elements = found_of(ring, "moment_per_volume", _CENTRE).scaled(per_density)
     central = dataclasses.replace(by_elements, corrected=bare)
     curve = _over_range(scene, ring, central.value, alone=defect == "opposite_chamber_left_out")
     return Evidence(

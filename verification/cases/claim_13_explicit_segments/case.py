@@ -22,7 +22,7 @@ from ringbalance.verification.evidence import (
     Series,
     figure,
 )
-from ringbalance.verification.orders import extrapolate, order_study, order_table
+from ringbalance.verification.orders import extrapolate, order_study
 from ringbalance.verification.reference.explicit_segments import explicit_segments
 
 _COUNTS = (4, 8, 16, 32, 64, 128, 256, 512)
@@ -85,7 +85,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         },
         numbers=_numbers(operation),
         series=(_figure(error),),
-        convergence=(order_table("moved fill ratio, relative", study, 1.0),),
+        convergence=(study.table("moved fill ratio, relative", 1.0),),
     )
 
 

@@ -39,7 +39,8 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     if not settled.size:
         raise ValueError("no set of steps settles at all four phases")
     counts = [run.misadjustments for runs in sets for run in runs if run.settled]
-    own = min(max(settling(run) for run in _own(scene)), scene.run.time_limit)
+    trials = [run_loop(loop_scene(scene, kind="trial", phase=phase)) for phase in PHASES]
+    own = min(max(map(settling, trials)), scene.run.time_limit)
     return Evidence(
         found={
             "settling_time": Found(value=own).moved(float(settled.min()) - own, float(settled.max()) - own),
@@ -67,10 +68,6 @@ def _runs(scene: Scene, steps: Sequence[float], *, target: bool) -> list[Simulat
         run_loop(loop_scene(scene, kind=kind, phase=phase, **settings))  # type: ignore[arg-type]
         for phase in PHASES
     ]
-
-
-def _own(scene: Scene) -> list[Simulation]:
-    return [run_loop(loop_scene(scene, kind="trial", phase=phase)) for phase in PHASES]
 
 
 def _figure(runs: Sequence[Simulation]) -> Series:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Mapping
 from typing import Final
 
@@ -72,8 +73,14 @@ def _run(scene: Scene, gain: float, *, alone: bool = True) -> Simulation:
 
 def _onset(scene: Scene, *, alone: bool = True) -> float:
     """Smallest searched Kp at which the residual turns round; the largest searched one where none does."""
-    found = (gain for gain in _SEARCHED if _run(scene, gain, alone=alone).overshoots > 0)
-    return float(next(found, _SEARCHED[-1]))
+
+    def turns(gain: float) -> bool:
+        return _run(scene, gain, alone=alone).overshoots > 0
+
+    if alone:
+        # A larger gain never overshoots less, so halving finds what trying one after the other would.
+        return float(_SEARCHED[min(bisect_left(_SEARCHED, True, key=turns), len(_SEARCHED) - 1)])
+    return float(next(filter(turns, _SEARCHED), _SEARCHED[-1]))
 
 
 def _rate(scene: Scene, model: BalancerModel) -> float:

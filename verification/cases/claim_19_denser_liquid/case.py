@@ -29,7 +29,7 @@ _POINTS: Final = 101
 _STANDARD: Final = 1e-6
 """Standard uncertainty of a gain: the fill at which the flow ends is found to a millionth of the largest."""
 _REFINEMENTS: Final = 3
-"""Each finds the fill at which the flow ends a hundred times more closely."""
+"""Each finds the fill at which the flow ends a hundred times more closely; a figure needs one less."""
 
 reference = {"gain": Reference(value=2.0), "gain_raised": Reference(value=2.0)}
 """Twice the density, twice the ability."""
@@ -85,21 +85,19 @@ def _stall_by_elements(scene: Scene, density: float) -> Found:
     return found_of(ring_of(scene, (scene.disc.max_fill_ratio,), density=density), "wall_pressure", 0)
 
 
-def _wall(scene: Scene, density: float, fill: float) -> float:
-    return float(wall_pressure_of(scene, fill, density=density))
-
-
 def _law(scene: Scene, density: float) -> FlowLaw:
     liquid = dataclasses.replace(scene.liquid, density=density)
     return flow_law_of(dataclasses.replace(scene, liquid=liquid))
 
 
-def _reach(law: FlowLaw, gas_pressure: float, *, full: bool = False) -> float:
+def _reach(
+    law: FlowLaw, gas_pressure: float, *, full: bool = False, refinements: int = _REFINEMENTS
+) -> float:
     """Largest fill of the opposite chamber that a law reaches from equal fills and an empty tube."""
     largest = law.max_fill_ratio
     start = law.evaluate(fill_ratio=largest / 2, gas_pressure=gas_pressure, primed=full)
     low, high = 0.0, largest / 2
-    for _ in range(_REFINEMENTS):
+    for _ in range(refinements):
         fill = np.linspace(high, low, _POINTS)
         flow = law.evaluate(fill_ratio=fill, gas_pressure=gas_pressure, primed=full or bool(start.primed))
         stopped = np.flatnonzero(flow.velocity <= 0)
@@ -127,10 +125,11 @@ def _priming(scene: Scene, density: float) -> float:
 
 
 def _figure(scene: Scene, laws: Sequence[FlowLaw]) -> Series:
-    pressure = np.linspace(0.02, 2.5, 60) * _wall(scene, scene.liquid.density, scene.disc.max_fill_ratio)
+    pressure = np.linspace(0.02, 2.5, 60) * wall_pressure_of(scene, scene.disc.max_fill_ratio)
 
     def ability(law: FlowLaw, density: float) -> np.ndarray:
-        return np.array([_ability(scene, density, _reach(law, float(p))) for p in pressure])
+        fills = [_reach(law, float(p), refinements=_REFINEMENTS - 1) for p in pressure]
+        return np.array([_ability(scene, density, fill) for fill in fills])
 
     return figure(
         "ability of a pair against the gas pressure, by the calibrated law",

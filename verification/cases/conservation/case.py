@@ -9,7 +9,7 @@ import numpy as np
 
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.mesh.geometry import chamber_volume
-from ringbalance.physics.pressure.assembly import at_points, facet_points, volume_points
+from ringbalance.physics.pressure.assembly import facet_points, volume_points
 from ringbalance.physics.pressure.integrals import liquid_integrals
 from ringbalance.physics.pressure.solve import FREE_SURFACE, PressureSolution, RotatingLiquid
 from ringbalance.physics.pressure.surface import solve_with_gravity
@@ -87,7 +87,7 @@ def _flux_residual(solution: PressureSolution, liquid: RotatingLiquid) -> float:
     gradient = np.zeros(solution.pressure.size)
     gradient[chamber.grid[0]] = solution.surface_gradient
     surface = facet_points(chamber, FREE_SURFACE)
-    total = float(np.sum(surface.weights * at_points(surface, gradient)))
+    total = float(np.sum(surface.weights * surface.at_points(gradient)))
     for name in chamber.boundaries:
         if name != FREE_SURFACE:
             wall = facet_points(chamber, name)

@@ -88,18 +88,12 @@ def _sample(generator: np.random.Generator) -> _Sample:
 
 
 def _error_ratios(*, samples: tuple[_Sample, ...]) -> FloatArray:
-    """|error| over half-width, shape (samples, quantities); -1 where the error is at round-off.
-
-    Raises: RuntimeError: a sample that could not be solved.
-    """
+    """|error| over half-width, shape (samples, quantities); -1 where the error is at round-off."""
     return np.array([_ratios_of(sample) for sample in samples])
 
 
 def _coverage(*, ratios: FloatArray, width_factor: float = 1.0) -> Mapping[str, _Coverage]:
-    """How often half-widths hold, and how tight they are, of each of `_QUANTITIES`.
-
-    Args: `width_factor`: multiplies every half-width; anything but 1 is a deliberate error.
-    """
+    """How often half-widths times a factor hold, and how tight they are, of each of `_QUANTITIES`."""
     scaled = np.where(ratios < 0, ratios, ratios / width_factor)
     return {name: _judge(scaled[:, index]) for index, name in enumerate(_QUANTITIES)}
 

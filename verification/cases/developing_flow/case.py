@@ -12,7 +12,7 @@ from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table
 from ringbalance.verification.navier_stokes.newton import FlowSystem
-from ringbalance.verification.navier_stokes.rotating_section import SectionMesh, section_system
+from ringbalance.verification.navier_stokes.rotating_section import SectionMesh
 from ringbalance.verification.reference.entry_length import slowest_decay
 
 _CREEPING: Final = 2 * (4.46629832 + 1.46746761j)
@@ -43,7 +43,7 @@ reference = {"fast": Reference(value=_GEOSTROPHIC)}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    coarse, fine = (section_system(cells=cells) for cells in _MESHES[level])
+    coarse, fine = (cells.system() for cells in _MESHES[level])
     rates = slowest_decay(system=coarse, reynolds=0.0, rotation_reynolds=0.0, count=12).rates
     exact = _CREEPING / (2 if defect == "radius_for_bore" else 1)
     fast = [_scaled(fine, rotation, _SPEED[defect]) for rotation in _FAST]

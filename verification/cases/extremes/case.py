@@ -14,9 +14,7 @@ from ringbalance.verification.extremes.point import SOUND, Defect, Ending
 from ringbalance.verification.extremes.study import (
     SIZES,
     Size,
-    broken,
     counted,
-    extremes_tables,
     find_extremes,
 )
 
@@ -49,7 +47,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     endings = counted(everything)
     worst = max(j.worst_ratio for j in everything)
     return Evidence(
-        found={"broken": Found(value=float(broken(found))), "worst": Found(value=worst)},
+        found={"broken": Found(value=float(found.broken())), "worst": Found(value=worst)},
         numbers={
             "judged": float(len(everything)),
             "points": float(len(found.points)),
@@ -57,5 +55,5 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "worst": worst,
             **{name: float(endings[str(ending)]) for name, ending in _NUMBERS.items()},
         },
-        tables=[Table(name=name, columns=columns) for name, columns in extremes_tables(found).items()],
+        tables=[Table(name=name, columns=columns) for name, columns in found.tables().items()],
     )

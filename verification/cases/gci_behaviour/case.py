@@ -75,7 +75,8 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     sequences = _sequences()
     judged = {one.name: _judge(one, defect) for one in sequences}
     wrong = sum(judged[one.name].verdict not in one.expected for one in sequences)
-    missed = sum(_misses(one, judged[one.name]) for one in sequences if one.converges)
+    errors = {one.name: abs(float(one.values[0]) - _LIMIT) for one in sequences if one.converges}
+    missed = sum(error > judged[name].uncertainty for name, error in errors.items())
     return Evidence(
         found={
             "wrong_verdicts": Found(value=float(wrong)),
@@ -96,10 +97,6 @@ def _judge(one: _Sequence, defect: str | None) -> GridConvergence:
 
 def _by_magnitude(values: FloatArray) -> FloatArray:
     return np.concatenate([values[:1], values[0] + np.cumsum(np.abs(np.diff(values)))])
-
-
-def _misses(one: _Sequence, result: GridConvergence) -> bool:
-    return abs(float(one.values[0]) - _LIMIT) > result.uncertainty
 
 
 def _table(judged: Mapping[str, GridConvergence]) -> Table:

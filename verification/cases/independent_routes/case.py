@@ -11,7 +11,7 @@ from ringbalance.verification.evidence import Evidence, Level, Reference
 from ringbalance.verification.paper_numbers import with_plate
 from ringbalance.verification.reference.exact_chamber import central_lambda, exact_moment, wall_pressure_of
 from ringbalance.verification.reference.mutated_pressure import mutated_pressure
-from ringbalance.verification.rings import found_of, mesh_table, scaled
+from ringbalance.verification.rings import found_of, mesh_table
 
 _SCALARS = {"wall_pressure": "Pa", "moment": "kg m", "liquid_volume": "m^3"}
 
@@ -35,7 +35,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         for name in _SCALARS
     }
     centre = _ring(scene, 2, defect, share=0.5)
-    found["lambda_2d"] = scaled(found_of(centre, "moment_per_volume", 0), 2 / scene.liquid.density)
+    found["lambda_2d"] = found_of(centre, "moment_per_volume", 0).scaled(2 / scene.liquid.density)
     moment = found["moment_2d"]
     exact = reference(scene)["moment_2d"].value
     return Evidence(

@@ -22,7 +22,7 @@ from ringbalance.verification.cases.integrator_orders.side_by_side import (
 )
 from ringbalance.verification.cases.integrator_orders.stall import stall_study
 from ringbalance.verification.evidence import Evidence, Found, Level
-from ringbalance.verification.orders import OrderStudy, order_study, order_table
+from ringbalance.verification.orders import OrderStudy, order_study
 from ringbalance.verification.reference.adaptive_ode import adaptive_ode
 from ringbalance.verification.reference.explicit_segments import explicit_segments
 
@@ -71,7 +71,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         numbers={"longest_for_per_mille": stall.longest_for_per_mille, "time_to_stall": _end(low)},
         series=(stall.series,),
         tables=(side_by_side(long, law, duration),),
-        convergence=(order_table("fill by explicit segments, relative error", study, 1.0),),
+        convergence=(study.table("fill by explicit segments, relative error", 1.0),),
     )
 
 

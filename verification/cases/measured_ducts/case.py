@@ -9,7 +9,7 @@ import numpy as np
 
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
-from ringbalance.verification.validation.model_bias import ModelStatistics
+from ringbalance.verification.validation.model_bias import ModelStatistics, statistics_numbers
 from ringbalance.verification.validation.tube_friction import FrictionPoints, friction_points
 
 _LAMINAR: Final = 1800.0
@@ -36,7 +36,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "laminar": Found(value=abs(laminar.bias)),
         },
         numbers={
-            "points": float(whole.points),
+            **statistics_numbers(whole),
             "laminar_points": float(laminar.points),
             "laminar_bias": laminar.bias,
             "turbulent_points": float(turbulent.points),

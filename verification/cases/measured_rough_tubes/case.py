@@ -10,6 +10,7 @@ import numpy as np
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
+from ringbalance.verification.validation.model_bias import statistics_numbers
 from ringbalance.verification.validation.tube_friction import FrictionPoints, friction_points
 
 _FULLY_ROUGH: Final = 70.0
@@ -28,7 +29,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "fully_rough": Found(value=abs(rough.bias)),
         },
         numbers={
-            **{key: float(value) for key, value in vars(statistics).items() if key != "share_within"},
+            **statistics_numbers(statistics),
             "worst": float(np.max(deviation)),
             "rough_points": float(rough.points),
             "rough_bias": rough.bias,

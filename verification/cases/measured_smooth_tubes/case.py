@@ -8,6 +8,7 @@ import numpy as np
 
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
+from ringbalance.verification.validation.model_bias import statistics_numbers
 from ringbalance.verification.validation.tube_friction import FrictionPoints, friction_points
 
 _LAMINAR: Final = 1800.0
@@ -25,7 +26,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     parts = {name: points.where(chosen) for name, chosen in flow.items()}
     statistics = {name: part.statistics(factor * part.predicted()) for name, part in parts.items()}
     whole = points.statistics(factor * points.predicted())
-    numbers = {"points": float(whole.points), "series": float(whole.series)}
+    numbers = statistics_numbers(whole)
     for name, one in statistics.items():
         numbers |= {f"{name}_{key}": float(value) for key, value in vars(one).items()}
     return Evidence(

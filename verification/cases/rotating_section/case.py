@@ -12,7 +12,6 @@ from ringbalance.verification.navier_stokes.newton import FlowSystem
 from ringbalance.verification.navier_stokes.rotating_section import (
     SectionMesh,
     friction_ratio,
-    section_system,
     solve_section,
     solve_section_without_inertia,
 )
@@ -37,7 +36,7 @@ reference = {
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     around = _AROUND[level]
-    system = section_system(cells=SectionMesh(around=around, across=3 * around // 2, wall_ratio=15.0))
+    system = SectionMesh(around=around, across=3 * around // 2, wall_ratio=15.0).system()
     factor = _FACTORS[defect]
     rest = _linear(system, 0.0)
     slow = (_linear(system, factor * _SLOW) - rest) / (_SLOW**2 / _SERIES)

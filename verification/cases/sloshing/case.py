@@ -11,7 +11,6 @@ import numpy as np
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.sloshing.modes import (
     default_sloshing_cells,
-    natural_frequencies,
     resonant_fills,
     sloshing_modes,
 )
@@ -22,9 +21,6 @@ from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
 from ringbalance.verification.reference.sloshing_exact import (
     CosineWaves,
-    cosine_amplification,
-    cosine_frequencies,
-    cosine_pressure_amplification,
     cosine_waves,
 )
 
@@ -38,9 +34,10 @@ _CORIOLIS: Final = {"coriolis_off_by_a_percent": 1.01}
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     bare = replace(scene.disc, plate_thickness=0.0)
+    ratios = _frequencies(bare, _CORIOLIS.get(defect or "", 1.0)) / _exact_frequencies(bare)
     judged = {
         "still": _still_deviation(bare),
-        "frequencies": _frequency_deviation(bare, _CORIOLIS.get(defect or "", 1.0)),
+        "frequencies": float(np.abs(ratios - 1).max()),
         **_forced_deviations(bare, defect),
     }
     return replace(
@@ -91,7 +88,7 @@ def _still_deviation(disc: Disc) -> float:
 def _frequencies(disc: Disc, factor: float) -> FloatArray:
     """With a factor on the Coriolis force: zero for a chamber that does not turn, or a mutation."""
     turned = [replace(system, coriolis=factor * system.coriolis) for system in _systems(disc)]
-    return np.array([natural_frequencies(system)[:_MODES] for system in turned])
+    return np.array([system.natural_frequencies()[:_MODES] for system in turned])
 
 
 @lru_cache(maxsize=1)
@@ -101,13 +98,9 @@ def _systems(disc: Disc) -> tuple[SloshingSystem, ...]:
     return tuple(sloshing_system(disc=disc, surface_radius=float(a), cells=cells) for a in radii)
 
 
-def _frequency_deviation(disc: Disc, factor: float) -> float:
-    return float(np.abs(_frequencies(disc, factor) / _exact_frequencies(disc) - 1).max())
-
-
 @lru_cache(maxsize=1)
 def _exact_frequencies(disc: Disc) -> FloatArray:
-    return np.array([cosine_frequencies(waves, modes=_MODES) for waves in _waves(disc)])
+    return np.array([waves.frequencies(modes=_MODES) for waves in _waves(disc)])
 
 
 def _forced_deviations(disc: Disc, defect: str | None) -> dict[str, float]:
@@ -119,8 +112,8 @@ def _forced_deviations(disc: Disc, defect: str | None) -> dict[str, float]:
     moments, pressures = [], []
     for waves, depth in zip(_waves(disc), _depths(disc), strict=True):
         turned = replace(waves, mixed=-waves.mixed) if defect == "forcing_backwards" else waves
-        moments.append(cosine_amplification(turned, frequency_ratio=1.0))
-        pressures.append(cosine_pressure_amplification(turned, frequency_ratio=1.0, depth=float(depth)))
+        moments.append(turned.amplification(frequency_ratio=1.0))
+        pressures.append(turned.pressure_amplification(frequency_ratio=1.0, depth=float(depth)))
     taken = found.amplification if defect == "pressure_swings_as_the_moment" else found.pressure_amplification
     return {
         "forced": float(np.abs(found.amplification.value / np.array(moments) - 1).max()),

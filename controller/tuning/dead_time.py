@@ -1,0 +1,93 @@
+"""The dead time of the valves: what of a valve-open time only fills gas, and what a controller does about it.
+
+An injection that is commanded for a share s of the gain's vector stays open for s + o, o the offset
+`controller.gas_time_offset`.  With a dead time d of its chamber it moves nothing while s + o <= d, so an
+amplitude stands still while both shares of its vector do.  With o = d at the balanced fills the loop factor
+is what the gain says, down to the smallest residual.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from ringbalance.controller.terms import run_models, terms_modelled
+from ringbalance.controller.tuning.loop_factor import balanced_fills, vibration_rates
+from ringbalance.reduced_model.gas_line import largest_standing, line_ends, short_injection
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.selection.estimates import FILLING
+from ringbalance.reduced_model.short_injection import Fills
+from ringbalance.scene.models import Scene
+
+_DIGITS: Final = 4
+"""Of an offset in s: a tenth of a millisecond."""
+
+
+def dead_times(scene: Scene, model: BalancerModel) -> tuple[float, ...]:
+    """Of every chamber at the balanced fills, for a correction of the size of the limit, s.
+
+    Empty where runs do not model the filling of gas; zero for a chamber that the gas cannot drive.
+    """
+    if FILLING not in terms_modelled(run_models(scene=scene, model=model)):
+        return ()
+    total, fills = 2 * scene.disc.initial_fill, balanced_fills(scene, model)
+    driven, rates = np.concatenate([fills, total - fills]), vibration_rates(scene, model)
+    return tuple(
+        _dead_time(scene, Fills(model=model, driven=float(x), opposite=float(total - x)), rate=float(b))
+        for x, b in zip(driven, rates.T.ravel(), strict=True)
+    )
+
+
+def _dead_time(scene: Scene, fills: Fills, *, rate: float) -> float:
+    injection = short_injection(scene, line_ends(scene)[0], fills)
+    if injection is None or rate == 0.0:
+        return 0.0
+    metres = scene.controller.limit / rate * fills.steady_velocity(scene.gas.pressure)
+    return round(max(float(injection.dead_time(metres)), 0.0), _DIGITS)
+
+
+def compensated(scene: Scene, model: BalancerModel) -> Scene:
+    """The scene with the dead times as offsets where an amplitude above its limit would stand still.
+
+    Not for the trial algorithm, whose valve-open times are the scene's.
+    """
+    dead = () if scene.controller.kind == "trial" else dead_times(scene, model)
+    if not dead or dead_zone(scene, model, dead) <= scene.controller.limit:
+        return scene
+    return replace(scene, controller=replace(scene.controller, gas_time_offset=dead))
+
+
+def dead_zone(scene: Scene, model: BalancerModel, dead: Sequence[float]) -> float:
+    """Largest amplitude, m, at which no commanded injection moves liquid, by the gain alone.
+
+    The law-based algorithm asks for the time in which the law moves the residual.
+    """
+    settings, n = scene.controller, scene.disc.chambers
+    lost = [max(d - o, 0.0) for d, o in zip(dead or (0.0,) * n, settings.offsets(n), strict=True)]
+    still = [max(each, settings.minimum_gas_time) for each in lost]
+    if settings.kind == "law_based":
+        rates = np.maximum(vibration_rates(scene, model).T.ravel(), 0.0)
+        return largest_standing([s * float(b) for s, b in zip(still, rates, strict=True)])
+    return largest_standing(still) / settings.proportional
+
+
+def offset_text(offsets: Sequence[float]) -> str:
+    """As a scene file has them."""
+    each = [f'"{1e3 * offset:.4g} ms"' for offset in offsets]
+    alike = len(set(each)) == 1
+    return f"controller.gas_time_offset = {each[0] if alike else '[' + ', '.join(each) + ']'}"
+
+
+def standing_remedy(scene: Scene, model: BalancerModel) -> str:
+    """What to change where the dead time leaves an amplitude above the limit where it is; else empty."""
+    mended = compensated(scene, model).controller.gas_time_offset
+    if not mended or mended == scene.controller.gas_time_offset:
+        return ""
+    still = dead_zone(scene, model, mended)
+    return (
+        f"by its gain alone an injection moves no liquid up to {1e6 * still:.3g} um, it only fills gas: set "
+        f"{offset_text(mended)}"
+    )

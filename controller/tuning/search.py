@@ -1,0 +1,140 @@
+"""What to change so that the runs of a tuned loop settle: settings that are tried in turn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Final
+
+from ringbalance.controller.algorithms.by_name import target_vector_of
+from ringbalance.controller.tuning.dead_time import compensated, dead_times, offset_text
+from ringbalance.controller.tuning.loop_factor import loop_factor
+from ringbalance.controller.tuning.recommendation import FactorUncertainty, recommended_gain
+from ringbalance.controller.tuning.settling import Progress, SettlingTimes, tried
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.scene.models import Scene
+
+_GAINS: Final = (0.6, 1.6)
+"""Times the recommended gain, lower where an injection moves more than its dead time allows for."""
+_PRESSURES: Final = (1.25, 1.5)
+"""Times the scene's: a shorter dead time, and a faster flow."""
+LIMITS: Final = (1.5, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0)
+"""Times the scene's, of which the lowest that is reached is reported."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """Settings for a scene's controller."""
+
+    scene: Scene
+    change: str
+    """From the scene with its recommended gain, as keys and values; empty: none."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tried:
+    """What became of a candidate in a few short runs."""
+
+    change: str
+    settled: float
+    """Fraction of the runs."""
+    runs: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Search:
+    """What was found."""
+
+    best: Candidate
+    settles: bool
+    """Whether all of its few runs settle."""
+    needs: float | None
+    """s, in which they have settled and held; None: they have not."""
+    limit: float | None
+    """Lowest limit of the vibration that is reached where the scene's is not, m; None: none is."""
+    tried: tuple[Tried, ...]
+
+
+def recommended(scene: Scene, model: BalancerModel, known: FactorUncertainty) -> Candidate:
+    """The scene with its recommended gain, and with offsets where the dead time asks for them."""
+    kept = scene
+    if scene.controller.kind != "law_based":
+        loop = loop_factor(scene, model, target_vector_of(scene))
+        gain = recommended_gain(scene, model, loop=loop, uncertainty=known)
+        if gain > 0:
+            settings = replace(scene.controller, proportional=gain, kind="target_vector")
+            kept = replace(scene, controller=settings)
+    return _candidate(kept, compensated(kept, model))
+
+
+def _candidate(before: Scene, scene: Scene, *changes: str) -> Candidate:
+    given = scene.controller.gas_time_offset
+    if given and given != before.controller.gas_time_offset:
+        changes = (*changes, offset_text(given))
+    return Candidate(scene=scene, change=", ".join(changes))
+
+
+def search(
+    scene: Scene, model: BalancerModel, known: FactorUncertainty, *, base: Candidate, told: Progress
+) -> Search:
+    """Try one candidate after the other until one settles; then the limit, where none does."""
+    rows: list[Tried] = []
+    best, most = base, -1.0
+    for each in (base, *_others(scene, model, known, base)):
+        found = _try(each, model, known, rows, told)
+        if found.settled.value > most:
+            best, most = each, found.settled.value
+        if most >= 1.0:
+            held = (found.quantiles["p95"] or 0.0) + scene.controller.hold_time
+            return Search(best=each, settles=True, needs=held, limit=None, tried=tuple(rows))
+    limit = next(_reached(scene, model, known, rows, told), None)
+    return Search(best=best, settles=False, needs=None, limit=limit, tried=tuple(rows))
+
+
+def _try(
+    each: Candidate, model: BalancerModel, known: FactorUncertainty, rows: list[Tried], told: Progress
+) -> SettlingTimes:
+    what = each.change or "the recommended gain alone"
+    told(f"{what} ...")
+    found = tried(each.scene, model, known.widths, told=lambda _: None)
+    rows.append(Tried(change=what, settled=found.settled.value, runs=found.runs))
+    return found
+
+
+def _others(
+    scene: Scene, model: BalancerModel, known: FactorUncertainty, base: Candidate
+) -> Iterator[Candidate]:
+    dead = dead_times(base.scene, model)
+    settings = base.scene.controller
+    if dead and settings.gas_time_offset != dead:
+        offset = replace(base.scene, controller=replace(settings, gas_time_offset=dead))
+        yield _candidate(scene, offset)
+    if settings.kind == "target_vector":
+        for factor in _GAINS:
+            changed = replace(settings, proportional=factor * settings.proportional)
+            text = f"controller.proportional = {_gain(changed.proportional)}"
+            yield _candidate(scene, replace(base.scene, controller=changed), text)
+    for factor in _PRESSURES:
+        pressure = factor * scene.gas.pressure
+        higher = recommended(replace(scene, gas=replace(scene.gas, pressure=pressure)), model, known)
+        texts = [f'gas.pressure = "{pressure / 1e6:.3g} MPa"']
+        if settings.kind == "target_vector":
+            texts.append(f"controller.proportional = {_gain(higher.scene.controller.proportional)}")
+        yield _candidate(scene, higher.scene, *texts)
+
+
+def _gain(gain: float) -> str:
+    return f'"{gain * 1e-6:.3g} s/um"'
+
+
+def _reached(
+    scene: Scene, model: BalancerModel, known: FactorUncertainty, rows: list[Tried], told: Progress
+) -> Iterator[float]:
+    for factor in LIMITS:
+        limit = factor * scene.controller.limit
+        wider = replace(scene, controller=replace(scene.controller, limit=limit))
+        each = recommended(wider, model, known)
+        text = f'controller.limit = "{1e6 * limit:.3g} um"'
+        listed = replace(each, change=", ".join(t for t in (text, each.change) if t))
+        if _try(listed, model, known, rows, told).settled.value >= 1.0:
+            yield limit

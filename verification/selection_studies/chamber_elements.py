@@ -1,0 +1,115 @@
+"""A chamber at one fill by finite elements, at rest and with the swinging liquid; errors of meshes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import lru_cache
+from typing import Final
+
+from ringbalance.mesh.chamber import default_cells
+from ringbalance.mesh.geometry import surface_radius
+from ringbalance.physics import deferred
+from ringbalance.physics.pressure.ring import RingQuantities
+from ringbalance.reduced_model.chamber.scene_ring import scene_ring
+from ringbalance.reduced_model.chamber.values import ChamberValues
+from ringbalance.reduced_model.contribution import Contribution
+from ringbalance.scene.models import Scene
+
+COARSE_MESH: Final = "coarse mesh"
+FINE_MESH: Final = "fine mesh"
+
+
+def mesh_error(scene: Scene, angular_cells: int) -> float:
+    """Discretisation error of a mesh, relative: an arc drawn by cells of angle h, (h/2)^4/32 R2/depth.
+
+    Returns: Share of the wall pressure at a fifth of the largest fill.
+    Source: remainder of a quadratic interpolation of a circle.
+    """
+    outer = scene.disc.outer_radius
+    surface = float(surface_radius(disc=scene.disc, fill_ratio=0.2 * scene.disc.max_fill_ratio))
+    h = scene.disc.central_angle / angular_cells
+    return (h / 2) ** 4 / 32 * outer / (outer - surface)
+
+
+def mesh_contributions(scene: Scene) -> Mapping[str, Contribution]:
+    """Contributions of the meshes' errors, by name."""
+    cells = default_cells(disc=scene.disc)[1]
+    return {
+        term: Contribution(
+            term=term,
+            value=mesh_error(scene, angular),
+            formula="(h/2)^4/32 R2/depth",
+            source="a circle's interpolation",
+        )
+        for term, angular in ((COARSE_MESH, max(4, cells // 2)), (FINE_MESH, cells))
+    }
+
+
+def by_elements(scene: Scene, fill: float, *, cells: tuple[int, ...], gravity: bool) -> ChamberValues:
+    """Finite elements on a mesh and the two coarser ones that its grid convergence needs.
+
+    Source: `ring_quantities`.
+    """
+    found = _elements_at(scene, fill, cells=cells, gravity=gravity)
+    return ChamberValues(
+        wall_pressure=float(found.wall_pressure.value[0]),
+        wall_pressure_ripple=float(found.ripple["wall_pressure"][0]),
+        moment=float(found.moment.value[0]),
+        moment_ripple=float(found.ripple["moment"][0]),
+        moment_per_mass=2 * float(found.moment_per_volume.value[0]) / scene.liquid.density,
+    )
+
+
+def with_sloshing(
+    scene: Scene, fill: float, *, still: Callable[[Scene, float], ChamberValues]
+) -> ChamberValues:
+    """Values of a quasi-static model with its ripples as the swinging liquid makes them.
+
+    Returns: ChamberValues; the ripples times their amplifications.
+    Source: `sloshing_response`.
+    """
+    found = still(scene, fill)
+    of_pressure, of_moment = _sloshing_factors(scene, fill)
+    return replace(
+        found,
+        wall_pressure_ripple=of_pressure * found.wall_pressure_ripple,
+        moment_ripple=of_moment * found.moment_ripple,
+    )
+
+
+def forget_solves() -> None:
+    """Do every solve again when it is next asked for, so that it can be timed."""
+    _elements_at.cache_clear()
+    _sloshing_factors.cache_clear()
+
+
+def sloshing_meshes(scene: Scene) -> tuple[tuple[int, int], ...]:
+    """Meshes on which the swinging liquid is solved, finest first: half as fine as for frequencies."""
+    radial, angular = default_cells(disc=scene.disc)
+    return tuple((radial // k, angular // k) for k in (1, 2, 4))
+
+
+@lru_cache(maxsize=256)
+def _sloshing_factors(scene: Scene, fill: float) -> tuple[float, float]:
+    """How much the swinging liquid enlarges gravity's ripples, by finite elements.
+
+    Returns: Amplifications of the wall pressure and of the moment.
+    Source: `sloshing_response`.
+    """
+    found = deferred.sloshing_response(
+        disc=scene.disc,
+        fill_ratio=[fill],
+        angular_velocity=abs(scene.rotor.speed),
+        kinematic_viscosity=scene.liquid.kinematic_viscosity,
+        gravity=scene.environment.gravity,
+        cells=sloshing_meshes(scene),
+    )
+    return float(found.pressure_amplification.value[0]), float(found.amplification.value[0])
+
+
+@lru_cache(maxsize=256)
+def _elements_at(scene: Scene, fill: float, *, cells: tuple[int, ...], gravity: bool) -> RingQuantities:
+    """The finite elements of `by_elements`, with all they tell."""
+    meshes = tuple(tuple(max(1, n // k) for n in cells) for k in (1, 2, 4))
+    return scene_ring(scene, fill_ratio=[fill], gravity=gravity, cells=meshes)

@@ -1,0 +1,156 @@
+"""What stands behind each predicted quantity: measurements, verification, calibration, or assumption.
+
+A case says in `about` which subjects its result is evidence for; everything else of the table follows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, Final, Literal
+
+HEADS: Final = ("Quantity", "Validated by measurements", "Verified by cases", "Calibrated", "Assumed")
+NO_DATA: Final = "no data"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Subject:
+    """A quantity or a part of the model, and what no case can say of it."""
+
+    title: str
+    assumed: str
+    calibrated: str = "nothing"
+    """What was fitted to measurements, and to which; they are not judged."""
+    budgets: tuple[str, ...] = ()
+    """Quantities whose uncertainty budget rests on it."""
+    balancer: Literal["liquid_ring", "eccentric_mass"] = "liquid_ring"
+
+
+SUBJECTS: Final[Mapping[str, Subject]] = MappingProxyType(
+    {
+        "ring": Subject(
+            title="Volume, wall pressure, moment and lever arm",
+            assumed="liquid at rest in the disc; waves counted apart",
+            budgets=("chamber_volume", "wall_pressure", "moment", "lambda", "stall_pressure"),
+        ),
+        "friction": Subject(
+            title="Friction in a straight tube at rest",
+            assumed="roughness of the wall",
+            budgets=("drag_coefficient", "velocity"),
+        ),
+        "rotation": Subject(
+            title="Friction in a rotating tube",
+            assumed="turbulent flow: a formula recalled, not read",
+            budgets=("drag_coefficient", "velocity"),
+        ),
+        "fittings": Subject(
+            title="Entrance, exit, bends and developing flow",
+            assumed="bends one by one, far from each other",
+            budgets=("drag_coefficient", "velocity"),
+        ),
+        "crest": Subject(
+            title="Flow over the siphon crest, separation",
+            calibrated="the cavity's pressure, with two thresholds of one siphon in view",
+            assumed="cavity between vapour and gas pressure; air leaves at Froude numbers 0.6 to 1.1",
+            budgets=(
+                "velocity",
+                "crest_pressure",
+                "cavitation_margin",
+                "priming_pressure_vented",
+                "priming_pressure_trapped",
+            ),
+        ),
+        "residual": Subject(
+            title="Residual liquid over the port",
+            assumed="draw-down depth derived, 30 % wide",
+            budgets=("usable_moment",),
+        ),
+        "gas": Subject(
+            title="Filling and venting of a chamber with gas",
+            assumed="conductance, critical ratio and lag of a line that the scene does not give",
+        ),
+        "waves": Subject(
+            title="Waves on the liquid ring",
+            calibrated="7 % of a natural frequency, to 24 points of four tanks",
+            assumed="damping; Coriolis force without data",
+        ),
+        "vibration": Subject(
+            title="Vibration by an unbalance",
+            calibrated="the influence coefficient, to runs with small unbalances",
+            assumed="one plane, away from resonances",
+        ),
+        "loop": Subject(
+            title="Fills and vibration in closed loop", assumed="noise, control period, start of the run"
+        ),
+        "uncertainty": Subject(title="Stated uncertainties", assumed="inputs independent of each other"),
+        "range": Subject(title="Choice of models, limits of validity", assumed="estimates of left-out terms"),
+        "eccentric": Subject(
+            title="Eccentric masses: estimation, positioning, run-up",
+            assumed="friction, motor and filter data; vertical shaft",
+            balancer="eccentric_mass",
+        ),
+    }
+)
+
+
+def standing_rows(
+    cases: Sequence[Mapping[str, Any]], *, balancer: str | None = None
+) -> list[tuple[str, ...]]:
+    """Rows under `HEADS`.
+
+    Args: `cases`: documents of cases, those of measurements with their results. `balancer`: whose subjects;
+        default all.
+    """
+    return [
+        _row(subject, [case for case in cases if name in case.get("about", ())])
+        for name, subject in SUBJECTS.items()
+        if balancer in (None, subject.balancer)
+    ]
+
+
+def budget_standing(cases: Sequence[Mapping[str, Any]], quantity: str) -> str:
+    """What of a quantity's uncertainty budget was compared with measurements, and what was not.
+
+    Such as "friction: 1,005 points; rotation, fittings, crest: no data".
+    """
+    counts = {
+        name: sum(
+            case["numbers"].get("points", 0.0)
+            for case in cases
+            if name in case.get("about", ()) and case["kind"] == "validation"
+        )
+        for name, subject in SUBJECTS.items()
+        if quantity in subject.budgets
+    }
+    parts = [f"{name}: {count:,.0f} points" for name, count in counts.items() if count]
+    without = [name for name, count in counts.items() if not count]
+    return "; ".join([*parts, f"{', '.join(without)}: {NO_DATA}"] if without else parts)
+
+
+def _row(subject: Subject, cases: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
+    measured = [_measured(case) for case in cases if case["kind"] == "validation"]
+    verified = [case["id"].replace("_", " ") for case in cases if case["kind"].endswith("verification")]
+    return (
+        subject.title,
+        "; ".join(measured) or NO_DATA,
+        ", ".join(verified) or "by tests alone",
+        subject.calibrated,
+        subject.assumed,
+    )
+
+
+def _measured(case: Mapping[str, Any]) -> str:
+    """Such as "smooth tubes: 536 points, 96.8 % within, bias -1.5 %, scatter 1.6 %"."""
+    name = case["id"].removeprefix("measured_").replace("_", " ")
+    if case["verdict"] == "not run":
+        return f"{name}: not run" + (" (a heavy case)" if case["cost"] == "heavy" else "")
+    numbers = case["numbers"]
+    parts = [f"{numbers['points']:.0f} points" if "points" in numbers else "a correlation of them"]
+    if "share_within" in numbers:
+        parts += [
+            f"{100 * numbers['share_within']:.1f} % within",
+            f"bias {100 * numbers['bias']:+.1f} %",
+            f"scatter {100 * numbers['standard_deviation']:.1f} %",
+        ]
+    return f"{name}: {', '.join(parts)}" + ("" if case["verdict"] == "confirmed" else f" ({case['verdict']})")

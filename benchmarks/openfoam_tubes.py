@@ -16,7 +16,7 @@ from openfoam_case import HexMesh, Run, extruded, field, last_number, run, sides
 
 from ringbalance.mesh.bent_tube import Segment, swept_tube
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.verification.navier_stokes.rotating_section import SectionMesh, section_mesh
+from ringbalance.verification.navier_stokes.rotating_section import SectionMesh
 
 _SLAB = 0.05
 _VELOCITY = "[0 1 -1 0 0 0 0]"
@@ -25,7 +25,7 @@ _PRESSURE = "[0 2 -2 0 0 0 0]"
 
 def section(*, around: int, across: int, wall_ratio: float) -> tuple[FloatArray, IntArray, Any]:
     """Vertices (n, 2) and quadrilaterals (m, 4) of the half section, and the mesh they come from."""
-    mesh = section_mesh(cells=SectionMesh(around=around, across=across, wall_ratio=wall_ratio))
+    mesh = SectionMesh(around=around, across=across, wall_ratio=wall_ratio).mesh()
     points = np.asarray(mesh.doflocs[:, : mesh.nvertices]).T
     quads = np.asarray(mesh.t[:4]).T
     corner = points[quads]

@@ -63,6 +63,7 @@ bench: ## timed comparisons, in an environment of their own with every extra (hu
 	$(BENCH_VENV)/bin/python benchmarks/tube_flow.py
 	$(BENCH_VENV)/bin/python benchmarks/closed_loop.py
 	$(BENCH_VENV)/bin/python benchmarks/moving_injection.py
+	$(BENCH_VENV)/bin/python benchmarks/closed_loop_moving.py
 	$(BENCH_VENV)/bin/python benchmarks/eccentric_mass.py
 
 bench-cfd: env ## the tube and the waves beside OpenFOAM, an hour or so; keeps the results

@@ -6,6 +6,7 @@ import cmath
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -14,6 +15,17 @@ from ringbalance.controller.algorithms.target_vector import components
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.scene.models import Scene
+
+
+class Carrier(Protocol):
+    """What carries one operation through."""
+
+    @property
+    def total(self) -> float:
+        """x_A + x_C."""
+
+    def operate(self, fill: float, duration: float) -> float:
+        """Fill of the driven chamber after a valve-open time, s."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,7 +104,7 @@ def by_the_law(scene: Scene, model: BalancerModel) -> Callable[[float], float]:
     return velocity
 
 
-def plain_run(scene: Scene, model: BalancerModel, plain: Plain, seed: int) -> tuple[complex, int]:
+def plain_run(scene: Scene, model: BalancerModel, plain: Carrier, seed: int) -> tuple[complex, int]:
     """One target-vector run as one would write it oneself.
 
     Args: `plain`: how an operation is carried through. `seed`: of the noise.
@@ -148,7 +160,7 @@ def _pid(
 
 
 def _gas(
-    scene: Scene, plain: Plain, fills: list[float], wanted: float, phase: float, remaining: float
+    scene: Scene, plain: Carrier, fills: list[float], wanted: float, phase: float, remaining: float
 ) -> float:
     """Drive the two chambers and return how long the gas was on."""
     settings, half, longest = scene.controller, len(fills), 0.0

@@ -46,6 +46,8 @@ DURATIONS = (0.03, 0.06, 0.2)
 TAIL = 0.5
 """s, until the next sample."""
 BATCH = 2000
+METHODS = ("RK45", "DOP853", "LSODA", "Radau")
+TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 Y = FloatArray
 
 
@@ -107,9 +109,9 @@ class Rival:
             (self.gas_flow(q, self.ambient) + q * flow) / ((0.5 + x) * volume),
         ]
 
-    def inject(self, duration: float, *, method: str, tolerance: float) -> float:
+    def inject(self, duration: float, *, method: str, tolerance: float, fill: float = 0.25) -> float:
         """Fill after an injection and its tail."""
-        y, moves, primed = np.array([0.25, 0.0, self.ambient, self.ambient]), False, False
+        y, moves, primed = np.array([fill, 0.0, self.ambient, self.ambient]), False, False
         for is_open, left in ((True, duration), (False, TAIL - (self.scene.gas.valve_lag or 0.0))):
             while left > 1e-12:
                 y, spent, moves, primed = self.phase(y, left, (is_open, moves, primed), method, tolerance)
@@ -147,19 +149,20 @@ class Rival:
 
 
 @compiled
-def _inject(plant, motion, duration: float, tail: float, count: int, w) -> float:  # type: ignore[no-untyped-def]
+def _inject(  # type: ignore[no-untyped-def]
+    plant, motion, fill: float, duration: float, tail: float, count: int, w
+) -> float:
     for _ in range(count):
-        begin(plant, motion, 0.25, 1.0)
+        begin(plant, motion, fill, 1.0, 0.0)
         command(plant, motion, 0, duration)
-        advance(plant, motion, duration, w)
-        advance(plant, motion, tail, w)
+        advance(plant, motion, duration + tail, w, 0, 0, w)
     return motion.state[0]  # type: ignore[no-any-return]
 
 
-def ours(dynamics: Dynamics, duration: float, *, error: float, count: int) -> float:
+def ours(dynamics: Dynamics, duration: float, *, error: float, count: int, fill: float = 0.25) -> float:
     """Fill after the same, `count` times over."""
     plant, motion = dynamics.plant(total=0.5, relative_error=error), np.zeros(1, dtype=MOTION)
-    return float(_inject(plant[0], motion[0], duration, TAIL, count, np.zeros(WORKSPACE)))
+    return float(_inject(plant[0], motion[0], fill, duration, TAIL, count, np.zeros(WORKSPACE)))
 
 
 def least(function: Callable[[], object], repeats: int) -> float:
@@ -175,8 +178,8 @@ def least(function: Callable[[], object], repeats: int) -> float:
 def rival_seconds(rival: Rival, duration: float, exact: float, repeats: int) -> tuple[float, str, float]:
     """Time of the fastest method at its loosest tolerance that is exact enough, its name, its tolerance."""
     best = (math.inf, "", 0.0)
-    for method in ("RK45", "DOP853", "LSODA", "Radau"):
-        for tolerance in (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8):
+    for method in METHODS:
+        for tolerance in TOLERANCES:
             if abs(rival.inject(duration, method=method, tolerance=tolerance) - exact) <= FILL_ERROR:
                 spent = least(
                     lambda m=method, t=tolerance: rival.inject(duration, method=m, tolerance=t),  # type: ignore[misc]
@@ -189,10 +192,15 @@ def rival_seconds(rival: Rival, duration: float, exact: float, repeats: int) -> 
     return best
 
 
+def piped_scene() -> Scene:
+    """The paper's disc with a gas line and valve of its own."""
+    scene = liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper")))
+    return replace(scene, gas=replace(scene.gas, conductance=1e-8, critical_ratio=0.3, valve_lag=5e-3))
+
+
 def rows(repeats: int) -> list[dict[str, object]]:
     """One row for each duration."""
-    scene = liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper")))
-    scene = replace(scene, gas=replace(scene.gas, conductance=1e-8, critical_ratio=0.3, valve_lag=5e-3))
+    scene = piped_scene()
     model = calibrate(scene).model
     dynamics = dynamics_of(scene=scene, model=model, modelled=(INERTIA, FILLING, LAG))
     assert dynamics is not None

@@ -20,6 +20,31 @@ _NUMBER: Final = re.compile(
 _OUTER: Final = re.compile("\\)\u202f×\u202f10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)")
 _RAISED: Final = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 _FACTORS: Final = frozenset({1.0, 100.0, 1e3, *(scale[1] for scales in SCALES.values() for scale in scales)})
+SAME: Final = (
+    ("operating_point.k", "calibration.operating_point.k", "calibration.budgets.drag_coefficient.value"),
+    (
+        *("operating_point.velocity_m_s", "calibration.budgets.velocity.value"),
+        *("fifty.liquids.0.velocity_m_s", "consequences.gain.-1.velocity_m_s"),
+    ),
+    (
+        *("operating_point.velocity_uncertainty", "calibration.budgets.velocity.total"),
+        "fifty.liquids.0.velocity_uncertainty",
+    ),
+    (
+        *("operating_point.k_uncertainty", "calibration.budgets.drag_coefficient.total"),
+        "fifty.liquids.0.k_uncertainty",
+    ),
+    ("calibration.chamber.wall_pressure_Pa.-1", "calibration.budgets.wall_pressure.value"),
+    (
+        *("calibration.lambda.per_transferred_mass_m", "calibration.budgets.lambda.value"),
+        "consequences.gain.-1.moment_per_transferred_mass_m",
+    ),
+    ("calibration.residual_liquid.usable_pair_moment_kg_m", "calibration.budgets.usable_moment.value"),
+    ("consequences.retuned_proportional_s_per_m", "summary.tuning.gain"),
+)
+"""Places of the evidence that hold the same quantity."""
+_APART: Final = 5e-3
+"""Two values of one quantity, relative; it is printed to three digits."""
 
 
 def traces(pages: Iterable[str]) -> list[tuple[str, str]]:
@@ -61,15 +86,32 @@ def untrue(pages: Iterable[str], evidence: Any) -> list[tuple[str, str]]:
     return [(path, text) for path, text in traces(pages) if not agrees(text, evidence_at(evidence, path))]
 
 
+def apart(evidence: Any) -> list[dict[str, float]]:
+    """Quantities that the evidence holds with two values, each by its places."""
+    groups = [{path: value for path in group if (value := _held(evidence, path))} for group in SAME]
+    return [held for held in groups if held and max(held.values()) > (1 + _APART) * min(held.values())]
+
+
+def _held(evidence: Any, path: str) -> float | None:
+    try:
+        found: float | None = evidence_at(evidence, path)
+    except (KeyError, IndexError):
+        return None
+    return found
+
+
 def main(folder: Path) -> int:
-    """Check a report's folder; exit code 1 when a number is not the evidence's."""
+    """Check a report's folder; exit code 1 when a number is not the evidence's, or one quantity has two."""
     pages = [(folder / name).read_text(encoding="utf-8") for name in ("report.html", "annex.html")]
     evidence = json.loads((folder / "evidence.json").read_bytes())
     wrong = untrue(pages, evidence)
     print(f"{len(traces(pages))} traced numbers, {len(wrong)} wrong")
     for path, text in wrong:
         print(f"{path}: printed {text}, evidence {evidence_at(evidence, path)}")
-    return bool(wrong)
+    twice = apart(evidence)
+    for held in twice:
+        print(f"one quantity, several values: {held}")
+    return bool(wrong or twice)
 
 
 if __name__ == "__main__":

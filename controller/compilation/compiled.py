@@ -11,12 +11,13 @@ import hashlib
 import os
 import re
 from collections.abc import Callable
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, Final, ParamSpec, TypeVar, cast
 
 import numba
-from numba.core import registry
+from numba.core import registry, sigutils, types
+from numba.core.compiler_lock import global_compiler_lock
 
 from ringbalance.controller.compilation.cache import KeptCode
 from ringbalance.controller.compilation.folders import folder_name
@@ -36,6 +37,8 @@ _MARK: Final = f"from {__name__} import".encode()
 
 # A private part of numba: without it, functions are compiled as numba does and signals are not deferred.
 _Dispatcher: Any = getattr(registry, "CPUDispatcher", object)
+_normalized: Any = sigutils.normalize_signature
+_unliteral: Any = types.unliteral
 
 
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
@@ -44,11 +47,19 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
     Compiled at the first call or taken from an earlier process; the plain function stays as `py_func`.
     Ctrl-C during a call acts when the call has ended.
     """
-    dispatcher = numba.njit(function, **_OPTIONS)
-    if _gives_records(function) and _Dispatcher is not object:
-        dispatcher = _Guarded(
-            py_func=function, locals=dispatcher.locals, targetoptions=dispatcher.targetoptions
-        )
+    return _dispatcher(function)
+
+
+def inlined(function: Callable[P, R]) -> Callable[P, R]:
+    """The same, as part of each compiled function that calls it: what that does not use costs nothing."""
+    return _dispatcher(function, forceinline=True)
+
+
+def _dispatcher(function: Callable[P, R], **options: Any) -> Callable[P, R]:
+    dispatcher = numba.njit(function, **_OPTIONS, **options)
+    if _Dispatcher is not object:
+        kind = _Guarded if _gives_records(function) else _Called
+        dispatcher = kind(py_func=function, locals=dispatcher.locals, targetoptions=dispatcher.targetoptions)
     try:
         dispatcher._cache = KeptCode(function, code_folder())
     except (AttributeError, TypeError, RuntimeError, OSError):
@@ -63,7 +74,55 @@ def _gives_records(function: Callable[..., Any]) -> bool:
     return not set(re.findall(r"\w+", told)) <= _PLAIN
 
 
-class _Guarded(_Dispatcher):  # type: ignore[misc]
+class _Called(_Dispatcher):  # type: ignore[misc]
+    """Numba's dispatcher of a function that Python calls; compiled code calls another one.
+
+    Most functions are called by compiled code alone, which needs neither a way in from Python nor a file of
+    its own: those of the outermost function hold them.  That saves a good part of the time.
+    """
+
+    @cached_property
+    def _inner(self) -> Any:
+        options = self.targetoptions | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+        return _Inner(py_func=self.py_func, locals=self.locals, targetoptions=options)
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """As numba's, of the inner one, and for the type of a constant argument, not for its value."""
+        return self._inner.get_call_template(tuple(_unliteral(one) for one in args), kws)
+
+    def get_overload(self, sig: Any) -> Any:
+        """As numba's, of the inner one."""
+        return self._inner.get_overload(sig)
+
+
+class _Inner(_Dispatcher):  # type: ignore[misc]
+    """Numba's dispatcher of a function that compiled code calls."""
+
+    def __init__(self, **given: Any) -> None:
+        super().__init__(**given)
+        self._compiler._customize_flags = _without_address
+
+    def compile(self, sig: Any) -> Any:
+        """Compile a signature for those that call it. Returns: what stands for its address."""
+        args, result = _normalized(sig)
+        if args not in self.overloads:
+            with global_compiler_lock, self._compiling_counter:
+                found = self._compiler.compile(args, result)._replace(entry_point=_NoAddress())
+                self.targetctx.insert_user_function(found.entry_point, found.fndesc, [found.library])
+                self.overloads[args] = found
+        return self.overloads[args].entry_point
+
+
+class _NoAddress:
+    """Tells compiled functions without an address apart."""
+
+
+def _without_address(flags: Any) -> Any:
+    flags.no_compile = True
+    return flags
+
+
+class _Guarded(_Called):
     """Numba's dispatcher, with signals deferred while a call from Python runs, but not while it compiles."""
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:

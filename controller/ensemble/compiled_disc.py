@@ -82,7 +82,7 @@ def _pair_at(shared: Record, run: Record, i: int, time: float) -> tuple[float, b
 def opening(shared: Record, run: Record, pair: int, first: bool, duration: float) -> float:
     """Longest valve-open time, at most `duration`, s, that leaves the driven chamber its residual fill."""
     fill = run.fill[pair] if first else shared.total - run.fill[pair]
-    wet, least = run.wet[pair] > 0.0, shared.residual_fill
+    wet, least = run.wet[pair] > 0.0, run.residual_fill
     if gas_on(shared, fill, wet, duration * run.speed)[0] >= least:
         return duration
     low, high = 0.0, duration
@@ -93,6 +93,26 @@ def opening(shared: Record, run: Record, pair: int, first: bool, duration: float
         else:
             high = middle
     return low
+
+
+@compiled
+def kept(shared: Record, run: Record, found: float, duration: float, chamber: int) -> float:
+    """Count a valve-open time, s, that was shortened; zero where it is below the chamber's least."""
+    if found == duration:
+        return duration
+    run.shortened += 1
+    return found if found >= shared.minimum_gas_time + shared.offset[chamber] else 0.0
+
+
+@compiled
+def leave_out(run: Record) -> None:
+    """Do without the valves that have no time left."""
+    if run.other_pair >= 0 and run.other_duration == 0.0:
+        run.other_pair = -1
+    if run.duration == 0.0:
+        run.pair, run.first, run.duration = run.other_pair, run.other_first, run.other_duration
+        run.other_pair = -1
+        run.idle += 1 if run.pair < 0 else 0
 
 
 @compiled

@@ -3,27 +3,35 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from ringbalance.controller.compilation.compiled import compiled
-from ringbalance.controller.ensemble.compiled_disc import vibration
+from ringbalance.controller.ensemble.compiled_disc import kept, leave_out, vibration
 from ringbalance.controller.ensemble.compiled_records import Record
-from ringbalance.controller.liquid_ring.compiled_march import advance, command, rests
-from ringbalance.controller.liquid_ring.compiled_step import gas_volume
+from ringbalance.controller.liquid_ring.compiled_gas import gas_volume
+from ringbalance.controller.liquid_ring.compiled_march import (
+    advance,
+    command,
+    least_later,
+    opening_within,
+    rests,
+)
 from ringbalance.controller.liquid_ring.records import P, X
 from ringbalance.scene.arrays import FloatArray
 
 
 @compiled
-def begin(plant: Record, motion: Record, fill: float, speed: float) -> None:
-    """A pair at rest, vented; `speed` is a factor on the velocity of the flow law."""
+def begin(plant: Record, motion: Record, fill: float, speed: float, residual: float) -> None:
+    """A pair at rest, vented; `speed` is a factor of the law's velocity, `residual` a fill ratio."""
     y = motion.state
-    y[:] = 0.0
+    for i in range(8):
+        y[i] = 0.0
     y[X], y[P], y[P + 1] = fill, plant.ambient_pressure, plant.ambient_pressure
     y[P + 2] = plant.ambient_pressure * gas_volume(plant, fill) / plant.temperature
     y[P + 3] = plant.ambient_pressure * gas_volume(plant, plant.total - fill) / plant.temperature
     motion.opens, motion.closes, motion.log_speed = math.inf, math.inf, math.log(speed)
     motion.length, motion.started, motion.ran_back = plant.first_step, fill, 0.0
-    motion.fill_before, motion.least_fill = fill, fill
+    motion.fill_before, motion.least_fill, motion.residual = fill, fill, residual
     motion.closing_pressure, motion.run_dry = 0.0, 0.0
     motion.primed, motion.valve_0, motion.valve_1, motion.direction = 0, 0, 0, 0
     motion.balanced, motion.stopped, motion.steps, motion.chamber = 0, 0, 0, 0
@@ -31,55 +39,121 @@ def begin(plant: Record, motion: Record, fill: float, speed: float) -> None:
 
 
 @compiled
-def open_valves(shared: Record, plant: Record, run: Record, motions: Record) -> None:
-    """Command the one or two valves of a member."""
-    for i in range(shared.chambers // 2):
-        run.fill_before[i] = run.fill[i]
-    command(plant, motions[run.pair], 0 if run.first else 1, run.duration)
+def inject(
+    shared: Record, plant: Record, run: Record, motions: Any, notes: FloatArray, w: FloatArray
+) -> None:
+    """Command the one or two valves of a member and let time pass until the next sample.
+
+    A valve-open time that would take its chamber below the residual fill is shortened or left out: the motion
+    is tried as commanded, and made again where that falls short.
+    """
+    half = shared.chambers // 2
+    for i in range(half):
+        motions[half + i] = motions[i]
+    if not _keeps_residual(shared, plant, run, motions, notes, w):
+        for i in range(half):
+            motions[i] = motions[half + i]
+        _shorten(shared, plant, run, motions, w)
+        _open_valves(plant, run, motions)
+        _pass(shared, plant, run, motions, notes, w)
+    _note(shared, plant, run, motions, notes)
+
+
+@compiled
+def _keeps_residual(
+    shared: Record, plant: Record, run: Record, motions: Any, notes: FloatArray, w: FloatArray
+) -> bool:
+    """Move as commanded. Returns: whether each driven chamber keeps its residual fill, tail included."""
+    half, least = shared.chambers // 2, run.residual_fill
+    if least > 0.0 and not (_driven(shared, run, False) > least and _driven(shared, run, True) > least):
+        return False
+    _open_valves(plant, run, motions)
+    _pass(shared, plant, run, motions, notes, w)
+    for other in range(2):
+        pair = run.other_pair if other else run.pair
+        if least > 0.0 and pair >= 0:
+            motions[2 * half] = motions[pair]
+            if least_later(plant, motions, 2 * half, w) < least:
+                return False
+    return True
+
+
+@compiled
+def _driven(shared: Record, run: Record, other: bool) -> float:
+    """Fill of a driven chamber; infinite without one."""
+    pair, first = (run.other_pair, run.other_first) if other else (run.pair, run.first)
+    if pair < 0:
+        return math.inf
+    return float(run.fill[pair] if first else shared.total - run.fill[pair])
+
+
+@compiled
+def _shorten(shared: Record, plant: Record, run: Record, motions: Any, w: FloatArray) -> None:
+    """Shorten the valve-open times to what leaves the residual fill; those below the minimum are left out."""
+    run.duration = _permitted(shared, plant, run, motions, w, False, run.duration)
+    if run.other_pair >= 0:
+        run.other_duration = _permitted(shared, plant, run, motions, w, True, run.other_duration)
+    leave_out(run)
+
+
+@compiled
+def _permitted(
+    shared: Record, plant: Record, run: Record, motions: Any, w: FloatArray, other: bool, duration: float
+) -> float:
+    """A valve-open time, s, that leaves the residual fill; zero where it would be below the minimum."""
+    pair, first = (run.other_pair, run.other_first) if other else (run.pair, run.first)
+    found = 0.0
+    if _driven(shared, run, other) > run.residual_fill:
+        chamber, spare = 0 if first else 1, shared.chambers // 2 * 2
+        found = opening_within(plant, motions, pair, spare, chamber, duration, w)
+    return kept(shared, run, found, duration, pair if first else pair + shared.chambers // 2)
+
+
+@compiled
+def _open_valves(plant: Record, run: Record, motions: Any) -> None:
+    if run.pair >= 0:
+        command(plant, motions[run.pair], 0 if run.first else 1, run.duration)
     if run.other_pair >= 0:
         command(plant, motions[run.other_pair], 0 if run.other_first else 1, run.other_duration)
 
 
 @compiled
-def pass_moving(
-    shared: Record, plant: Record, run: Record, motions: Record, w: FloatArray, length: float, points: int
-) -> None:
-    """Let a time pass, s, noting since when the amplitude is not above the limit where `simulate` records.
+def _pass(shared: Record, plant: Record, run: Record, motions: Any, notes: FloatArray, w: FloatArray) -> None:
+    """Carry all pairs to the next sample, with their fills where `simulate` records, in `notes`.
 
-    `run.time` is still the one before; while valves are commanded the earlier closing is recorded, too.
+    Those are equally spaced while a valve is commanded, the earlier closing, and equally spaced after it.
     """
-    half = shared.chambers // 2
-    for i in range(half):
+    length, closing, count = 0.0, math.inf, 0
+    if run.pair >= 0:
+        length = max(run.duration, run.other_duration) if run.other_pair >= 0 else run.duration
+        closing = min(run.duration, run.other_duration) if run.other_pair >= 0 else length
+        for k in range(1, shared.gas_points + 1):
+            early, late = length * (k - 1) / shared.gas_points, length * k / shared.gas_points
+            if early < closing < late:
+                notes[0, count], count = closing, count + 1
+            notes[0, count], count = late, count + 1
+    run.commanded = length
+    wait = max(min(shared.period, shared.time_limit - run.time - length), 0.0)
+    run.wait = wait
+    for k in range(1, shared.tail_points + 1):
+        notes[0, count], count = length + wait * k / shared.tail_points, count + 1
+    run.noted = count
+    for i in range(shared.chambers // 2):
         motions[i].steps, motions[i].ran_back = 0, 0.0
-    closing = length
-    if run.pair >= 0 and run.other_pair >= 0:
-        closing = min(run.duration, run.other_duration)
-    now = 0.0
-    for k in range(1, points + 1):
-        early, late = length * (k - 1) / points, length * k / points
-        if early < closing < late:
-            _advance(shared, plant, run, motions, w, closing - now)
-            _note(shared, run, run.time + closing)
-            now = closing
-        _advance(shared, plant, run, motions, w, late - now)
-        _note(shared, run, run.time + late)
-        now = late
+        advance(plant, motions[i], length + wait, notes, i + 1, count, w)
+
+
+@compiled
+def _note(shared: Record, plant: Record, run: Record, motions: Any, notes: FloatArray) -> None:
+    """Since when the amplitude is not above the limit, and the state at the next sample."""
+    half = shared.chambers // 2
+    for k in range(run.noted):
+        for i in range(half):
+            run.fill[i] = notes[i + 1, k]
+        run.real, run.imaginary = vibration(shared, run, False)
+        run.amplitude, run.stale = math.hypot(run.real, run.imaginary), 1
+        late = run.amplitude > shared.limit
+        run.since = math.inf if late else min(run.since, run.time + notes[0, k])
     for i in range(half):
         run.drift = max(run.drift, motions[i].ran_back)
-
-
-@compiled
-def _advance(
-    shared: Record, plant: Record, run: Record, motions: Record, w: FloatArray, duration: float
-) -> None:
-    for i in range(shared.chambers // 2):
-        advance(plant, motions[i], duration, w)
-        run.fill[i] = motions[i].state[X]
         run.wet[i] = 0.0 if rests(plant, motions[i]) else 1.0
-
-
-@compiled
-def _note(shared: Record, run: Record, time: float) -> None:
-    run.real, run.imaginary = vibration(shared, run, False)
-    run.amplitude, run.stale = math.hypot(run.real, run.imaginary), 1
-    run.since = math.inf if run.amplitude > shared.limit else min(run.since, time)

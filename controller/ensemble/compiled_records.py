@@ -40,7 +40,6 @@ _REAL: Final = (
     "derivative_time",  # s
     "minimum_gas_time",  # s
     "maximum_gas_time",  # s
-    "residual_fill",  # of a driven chamber, that no command goes below
 )
 _WHOLE: Final = (
     "linear",  # whether the law has a closed form
@@ -86,6 +85,7 @@ SHARED: Final = np.dtype(
 
 _RUN_REAL: Final = (
     "speed",  # factor of the flow's velocity
+    "residual_fill",  # of a driven chamber, that no command goes below
     "gain_real",  # vibration per balancing moment, m/(kg m)
     "gain_imaginary",
     "proportional",  # Kc, s/m
@@ -113,6 +113,8 @@ _RUN_REAL: Final = (
     "real_before",  # vibration before the last command, m
     "imaginary_before",
     "settling_time",  # s, infinite when not settled
+    "commanded",  # s, time for which a valve was commanded to be open before this wait
+    "wait",  # s, from then to the next sample
 )
 _RUN_WHOLE: Final = (
     "noise_sample",  # its number in the run
@@ -130,6 +132,7 @@ _RUN_WHOLE: Final = (
     "idle",
     "overshoots",
     "misadjustments",
+    "noted",  # instants at which the last injection and its wait were recorded
     "shortened",  # injections, to keep the residual fill
     "samples",
     "cause",

@@ -8,13 +8,15 @@ from typing import Any, Final
 from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.controller.ensemble.compiled_disc import (
     any_wet,
+    kept,
+    leave_out,
     move,
     note_settling,
     opening,
     reset,
     vibration,
 )
-from ringbalance.controller.ensemble.compiled_motion import begin, open_valves, pass_moving
+from ringbalance.controller.ensemble.compiled_motion import begin, inject
 from ringbalance.controller.ensemble.compiled_noise import noise_pair, uniform_radii
 from ringbalance.controller.ensemble.compiled_records import Record
 from ringbalance.controller.formulas.control_law import valve_time, vector_gas_time, vector_shares
@@ -30,7 +32,6 @@ from ringbalance.controller.formulas.stopping import (
     has_turned,
     stop_cause,
 )
-from ringbalance.controller.liquid_ring.compiled_march import opening_within
 from ringbalance.scene.arrays import FloatArray
 
 _CERTAIN: Final = 1 + 1e-9
@@ -45,10 +46,13 @@ _has_turned: Final = compiled(has_turned)
 
 
 @compiled
-def run_members(shared: Record, plant: Record, runs: Any, motions: Any, workspace: FloatArray) -> None:
+def run_members(
+    shared: Record, plant: Record, runs: Any, motions: Any, notes: FloatArray, workspace: FloatArray
+) -> None:
     """Run members one after the other; `runs`, of type `RUN`, holds what differs and is filled.
 
-    `motions`, of type `MOTION`, has room for every pair and one more; it counts where `shared.moving`.
+    Where `shared.moving`, `motions`, of type `MOTION`, has room for every pair twice and one more, and
+    `notes` for the instants of an injection and its tail and for the fills of every pair then.
     """
     for i in range(runs.size):
         run = runs[i]
@@ -59,11 +63,13 @@ def run_members(shared: Record, plant: Record, runs: Any, motions: Any, workspac
             if run.cause == NONE and run.samples < shared.most_samples:
                 run.samples += 1
                 _sample(shared, run)
-                if run.cause == NONE:
-                    _keep_residual(shared, plant, run, motions, workspace)
+                if run.cause == NONE and shared.moving:
+                    _inject(shared, plant, run, motions, notes, workspace)
+                elif run.cause == NONE:
+                    _keep_residual(shared, run)
                     if run.pair >= 0:
-                        _gas(shared, plant, run, motions, workspace)
-                    _wait(shared, plant, run, motions, workspace)
+                        _gas(shared, run)
+                    _wait(shared, run)
         _judge(shared, run)
 
 
@@ -108,7 +114,7 @@ def _start(shared: Record, plant: Record, run: Record, motions: Any) -> None:
     reset(shared, run)
     if shared.moving:
         for i in range(shared.chambers // 2):
-            begin(plant, motions[i], shared.initial_fill, run.speed)
+            begin(plant, motions[i], shared.initial_fill, run.speed, run.residual_fill)
     _forget(run)
     _look(shared, run)
     _expect(shared, run)
@@ -199,21 +205,44 @@ def _cause(shared: Record, run: Record) -> int:
 
 
 @compiled
-def _wait(shared: Record, plant: Record, run: Record, motions: Any, workspace: FloatArray) -> None:
+def _inject(
+    shared: Record, plant: Record, run: Record, motions: Any, notes: FloatArray, workspace: FloatArray
+) -> None:
+    """From a command, if any, to the next sample, with moving liquid."""
+    half, commanded = shared.chambers // 2, run.pair >= 0
+    for i in range(half):
+        run.fill_before[i] = run.fill[i]
+    run.real_before, run.imaginary_before = run.real, run.imaginary
+    if commanded or any_wet(shared, run):
+        inject(shared, plant, run, motions, notes, workspace)
+    else:
+        run.commanded, run.wait = 0.0, max(min(shared.period, shared.time_limit - run.time), 0.0)
+    run.cut = 1 if run.wait < shared.period else run.cut
+    run.time += run.commanded + run.wait
+    if run.pair >= 0:
+        run.operated = 1
+        _count_idle(shared, run, _working(run))
+    run.pair, run.other_pair = -1, -1
+    _finish(shared, run)
+
+
+@compiled
+def _wait(shared: Record, run: Record) -> None:
     """Until the next sample, or the end; liquid moves where a tube is full."""
     length = max(min(shared.period, shared.time_limit - run.time), 0.0)
-    working = _working(run)
     run.pair, run.other_pair = -1, -1
     run.cut = 1 if length < shared.period else run.cut
-    if shared.moving and any_wet(shared, run):
-        pass_moving(shared, plant, run, motions, workspace, length, shared.tail_points)
-    elif length > 0.0 and any_wet(shared, run):
+    if length > 0.0 and any_wet(shared, run):
         move(shared, run, length)
         _look(shared, run)
         note_settling(shared, run, length, shared.drift_points)
     run.time += length
-    if working >= 0 and shared.moving:
-        _count_idle(shared, run, working)
+    _finish(shared, run)
+
+
+@compiled
+def _finish(shared: Record, run: Record) -> None:
+    """Ready for the next sample."""
     if run.stale:
         _expect(shared, run)
     run.calm = 0 if run.operated or run.rises >= shared.rises_tolerated or any_wet(shared, run) else 1
@@ -228,18 +257,14 @@ def _working(run: Record) -> int:
 
 
 @compiled
-def _gas(shared: Record, plant: Record, run: Record, motions: Any, workspace: FloatArray) -> None:
+def _gas(shared: Record, run: Record) -> None:
     """All valves of a command open together; pairs flow in parallel."""
     length = max(run.duration, run.other_duration) if run.other_pair >= 0 else run.duration
     run.real_before, run.imaginary_before = run.real, run.imaginary
-    if shared.moving:
-        open_valves(shared, plant, run, motions)
-        pass_moving(shared, plant, run, motions, workspace, length, shared.gas_points)
-    else:
-        move(shared, run, length)
-        _look(shared, run)
-        note_settling(shared, run, length, shared.gas_points)
-        _count_idle(shared, run, _working(run))
+    move(shared, run, length)
+    _look(shared, run)
+    note_settling(shared, run, length, shared.gas_points)
+    _count_idle(shared, run, _working(run))
     run.time += length
     run.operated = 1
 
@@ -253,49 +278,22 @@ def _count_idle(shared: Record, run: Record, working: int) -> None:
 
 
 @compiled
-def _keep_residual(shared: Record, plant: Record, run: Record, motions: Any, workspace: FloatArray) -> None:
+def _keep_residual(shared: Record, run: Record) -> None:
     """Shorten the valve-open times that would take a chamber below its residual fill."""
-    if shared.residual_fill <= 0.0 or run.pair < 0:
+    if run.residual_fill <= 0.0 or run.pair < 0:
         return
-    run.duration = _permitted(shared, plant, run, motions, workspace, run.pair, run.first > 0, run.duration)
+    run.duration = _permitted(shared, run, run.pair, run.first > 0, run.duration)
     if run.other_pair >= 0:
-        run.other_duration = _permitted(
-            shared, plant, run, motions, workspace, run.other_pair, run.other_first > 0, run.other_duration
-        )
-        if run.other_duration == 0.0:
-            run.other_pair = -1
-    if run.duration == 0.0:
-        run.pair, run.first, run.duration = run.other_pair, run.other_first, run.other_duration
-        run.other_pair = -1
-        if run.pair < 0:
-            run.idle += 1
+        run.other_duration = _permitted(shared, run, run.other_pair, run.other_first > 0, run.other_duration)
+    leave_out(run)
 
 
 @compiled
-def _permitted(
-    shared: Record,
-    plant: Record,
-    run: Record,
-    motions: Any,
-    workspace: FloatArray,
-    pair: int,
-    first: bool,
-    duration: float,
-) -> float:
+def _permitted(shared: Record, run: Record, pair: int, first: bool, duration: float) -> float:
     """A valve-open time, s, that leaves the residual fill; zero where it would be below the minimum."""
     driven = run.fill[pair] if first else shared.total - run.fill[pair]
-    found = 0.0
-    if driven > shared.residual_fill:
-        if shared.moving:
-            spare, chamber = shared.chambers // 2, 0 if first else 1
-            found = opening_within(plant, motions, pair, spare, chamber, duration, workspace)
-        else:
-            found = opening(shared, run, pair, first, duration)
-    if found == duration:
-        return duration
-    run.shortened += 1
-    least = shared.minimum_gas_time + shared.offset[pair + (0 if first else shared.chambers // 2)]
-    return found if found >= least else 0.0
+    found = opening(shared, run, pair, first, duration) if driven > run.residual_fill else 0.0
+    return kept(shared, run, found, duration, pair if first else pair + shared.chambers // 2)
 
 
 @compiled

@@ -25,7 +25,6 @@ from ringbalance.controller.ensemble.transfer import PairTransfer, pair_transfer
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw, balancer_model
-from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.scene.arrays import IntArray
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.faults import SceneError
@@ -188,12 +187,7 @@ def ensemble_transfer(scene: Scene, model: BalancerModel) -> PairTransfer:
         model=model,
         total=2 * scene.disc.initial_fill,
         gas_pressure=scene.gas.pressure,
-        dynamics=dynamics_of(
-            scene=scene,
-            model=model,
-            modelled=modelled,
-            residual_fill=residual_fill_ratio(scene, law=model.flow),
-        ),
+        dynamics=dynamics_of(scene=scene, model=model, modelled=modelled),
     )
 
 

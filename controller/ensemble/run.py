@@ -22,11 +22,13 @@ from ringbalance.controller.loop import DRIFT_POINTS, GAS_POINTS, IDLE_OPERATION
 from ringbalance.controller.rotor import chamber_directions, initial_vibration
 from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.operating.residual import residual_fill_ratio
+from ringbalance.reduced_model.operating.residual import residual_by_velocity
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene
 
+NOTES: Final = GAS_POINTS + 1 + TAIL_POINTS
+"""Instants of an injection and its wait, with the earlier closing of two valves."""
 MOST_SAMPLES: Final = 100_000
 """Of one compiled run, which costs a thousandth of an interpreted one."""
 
@@ -61,6 +63,8 @@ class EnsemblePlan:
     loop: LoopFactor
     """Of a member with the scene's own values."""
     rotor: Rotor
+    residual: tuple[FloatArray, FloatArray]
+    """Factors of the velocity, and the residual fill with each."""
 
     def run(self, members: Members, *, seed: int, number: int = 0) -> MemberRuns:
         """Run some members; `number`, of the first of them in the ensemble, identifies its noise."""
@@ -69,11 +73,13 @@ class EnsemblePlan:
         runs["number"] = number + np.arange(runs.size)
         runs["speed"], runs["proportional"] = members.velocity_factor, members.proportional
         runs["gain_real"], runs["gain_imaginary"] = gain.real, gain.imag
+        runs["residual_fill"] = np.interp(members.velocity_factor, *self.residual)
         runs["stays"] = self._stay(members)
         shared = self.shared.copy()
         shared["key_0"], shared["key_1"] = noise_key(seed=seed)
-        motions = np.zeros(int(shared["chambers"][0]) // 2 + 1, dtype=MOTION)
-        run_members(shared[0], self.plant[0], runs, motions, np.zeros(WORKSPACE))
+        half = int(shared["chambers"][0]) // 2
+        motions, notes = np.zeros(2 * half + 1, dtype=MOTION), np.zeros((half + 1, NOTES))
+        run_members(shared[0], self.plant[0], runs, motions, notes, np.zeros(WORKSPACE))
         return MemberRuns(
             settled=runs["settled"] > 0,
             settling_time=runs["settling_time"],
@@ -106,8 +112,13 @@ def ensemble_plan(*, scene: Scene, model: BalancerModel, transfer: PairTransfer)
         shared[name] = value
     loop = loop_factor(scene, model, target_vector_of(scene))
     shared["offset"][0, :chambers] = scene.controller.offsets(chambers)
-    shared["residual_fill"] = residual_fill_ratio(scene, law=model.flow)
-    return EnsemblePlan(shared=shared, plant=transfer.plant, loop=loop, rotor=scene.rotor)
+    return EnsemblePlan(
+        shared=shared,
+        plant=transfer.plant,
+        loop=loop,
+        rotor=scene.rotor,
+        residual=residual_by_velocity(scene, law=model.flow),
+    )
 
 
 def _loop(scene: Scene) -> dict[str, float]:

@@ -23,30 +23,36 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from ringbalance.controller.compilation.compiled import compiled
+from ringbalance.controller.compilation.compiled import compiled, inlined
 from ringbalance.controller.liquid_ring.records import HEAD, HYDROSTATIC, RETURN_CREST, TO_CREST, Record
 from ringbalance.reduced_model.tube.regime import CLEARING
 
 _SLOWEST: Final = 1e-150
 """m/s, below which the tube's loss is neglected."""
 _NEWTON_STEPS: Final = 5
+_CONVERGED: Final = 1e-9
+"""Of a piece of a table: Newton's next change would be below round-off."""
 _SLOW_FROUDE: Final = CLEARING[0]
 _FAST_FROUDE: Final = CLEARING[1]
+_HALF_CLEARED: Final = (_SLOW_FROUDE + _FAST_FROUDE) / 2
+"""Froude number at which gas and cavity count the same."""
 
 
-@compiled
-def _table(plant: Record, which: int, x: float) -> float:
-    """Value of a table; it continues straight beyond its ends."""
-    place = (x - plant.table_start[which]) / plant.table_step[which]
+@inlined
+def table(plant: Record, which: int, x: float) -> tuple[float, float]:
+    """Value and slope of a table; it continues straight beyond its ends."""
+    place = (x - plant.table_start[which]) * plant.nodes_per[which]
     cell = min(max(math.floor(place), 0), plant.pieces[which] - 1)
     c = plant.cells[which, cell]
     t = place - cell
     held = min(max(t, 0.0), 1.0)
-    inside = c[0] + held * (c[1] + held * (c[2] + held * (c[3] + held * (c[4] + held * c[5]))))
-    if held == t:
-        return float(inside)
-    slope = c[1] + held * (2 * c[2] + held * (3 * c[3] + held * (4 * c[4] + held * 5 * c[5])))
-    return float(inside + (t - held) * slope)
+    # In halves, which a processor works out side by side.
+    square = held * held
+    inside = (c[0] + held * c[1]) + square * ((c[2] + held * c[3]) + square * (c[4] + held * c[5]))
+    slope = (c[1] + 2 * held * c[2]) + square * ((3 * c[3] + 4 * held * c[4]) + square * (5 * c[5]))
+    if t != held:
+        inside += (t - held) * slope
+    return inside, slope * plant.nodes_per[which]
 
 
 @compiled
@@ -62,16 +68,18 @@ def _inverse(plant: Record, which: int, y: float) -> float:
     c = plant.cells[which, low]
     rise = c[1] + c[2] + c[3] + c[4] + c[5]
     t = min(max((y - c[0]) / rise, 0.0), 1.0)
-    found, slope = c[0], c[1]
+    change = 0.0
     for step in range(_NEWTON_STEPS + 1):
+        t = min(max(t + change, 0.0), 1.0)
         found = c[0] + t * (c[1] + t * (c[2] + t * (c[3] + t * (c[4] + t * c[5]))))
         slope = c[1] + t * (2 * c[2] + t * (3 * c[3] + t * (4 * c[4] + t * 5 * c[5])))
-        if step < _NEWTON_STEPS:
-            t = min(max(t + (y - found) / slope, 0.0), 1.0)
-    return float(plant.table_start[which] + plant.table_step[which] * (low + t + (y - found) / slope))
+        change = (y - found) / slope
+        if step > 0 and abs(change) < _CONVERGED:
+            break
+    return float(plant.table_start[which] + (low + t + change) / plant.nodes_per[which])
 
 
-@compiled
+@inlined
 def _crest_table(direction: int) -> int:
     return TO_CREST if direction > 0 else RETURN_CREST
 
@@ -82,24 +90,41 @@ def _velocity(plant: Record, which: int, pressure: float, log_speed: float) -> f
     return math.exp(_inverse(plant, which, math.log(pressure / plant.density)) + log_speed)
 
 
-@compiled
-def _loss(plant: Record, which: int, log_velocity: float) -> float:
-    """Pressure that a velocity loses, m^2/s^2 times rho, over rho."""
-    return math.exp(_table(plant, which, log_velocity))
+@inlined
+def _loss(plant: Record, which: int, speed: float, log_speed: float) -> tuple[float, float]:
+    """Pressure that a velocity loses over rho, m^2/s^2, and its derivative by the velocity, m/s."""
+    if abs(speed) < _SLOWEST:
+        return 0.0, 0.0
+    value, slope = table(plant, which, math.log(abs(speed)) - log_speed)
+    loss = math.copysign(math.exp(value), speed)
+    return loss, loss * slope / speed
 
 
 @compiled
+def _exceeds(plant: Record, which: int, pressure: float, velocity: float, log_speed: float) -> bool:
+    """Whether the quasi-steady velocity under a pressure is above a given one."""
+    return bool(pressure / plant.density > _loss(plant, which, velocity, log_speed)[0])
+
+
+@inlined
+def hydrostatic(plant: Record, x: float) -> tuple[float, float]:
+    """P(x), not below zero, Pa, and its slope."""
+    value, slope = table(plant, HYDROSTATIC, x)
+    return max(value, 0.0), slope if value > 0.0 else 0.0
+
+
+@inlined
 def ends(
     plant: Record, x: float, opposite: float, p: float, q: float, direction: int
 ) -> tuple[float, float, float, float]:
     """Gas pressures and hydrostatic pressures upstream and downstream, Pa, from fills and gauge pressures."""
-    near, far = max(_table(plant, HYDROSTATIC, x), 0.0), max(_table(plant, HYDROSTATIC, opposite), 0.0)
+    near, far = hydrostatic(plant, x)[0], hydrostatic(plant, opposite)[0]
     if direction > 0:
         return plant.gas_factor * p, plant.gas_factor * q, near, far
     return plant.gas_factor * q, plant.gas_factor * p, far, near
 
 
-@compiled
+@inlined
 def _driving(plant: Record, at: tuple[float, float, float, float]) -> float:
     return float(at[0] - at[1] + at[2] - max(at[3], plant.port_pressure))
 
@@ -112,7 +137,7 @@ def _allowed(plant: Record, at: tuple[float, float, float, float], primed: bool)
     return bool(plant.crest or at[0] > plant.gas_off or (at[1] > plant.gas_off and primed))
 
 
-@compiled
+@inlined
 def _margins(plant: Record, at: tuple[float, float, float, float]) -> tuple[float, float]:
     """Crest pressure at rest less that of the cavity of a primed tube, and less that of gas there, Pa."""
     low = at[1] if at[3] < plant.port_pressure else plant.vapour_pressure
@@ -145,32 +170,42 @@ def holds_at_rest(plant: Record, at: tuple[float, float, float, float], primed: 
     return bool(covered and _driving(plant, at) == 0.0 and _margins(plant, at)[0] > 0.0)
 
 
-@compiled
-def _cleared(plant: Record, spill: float) -> float:
-    """Fraction of the way from gas to cavity pressure over the crest, by the spilling liquid's velocity."""
+@inlined
+def _cleared(plant: Record, spill: float) -> tuple[float, float]:
+    """Fraction of the way from gas to cavity pressure over the crest, by the spilling liquid's velocity.
+
+    And its derivative by that velocity.
+    """
     if plant.froude_velocity == 0.0:
-        return 1.0
+        return 1.0, 0.0
     part = (spill / plant.froude_velocity - _SLOW_FROUDE) / (_FAST_FROUDE - _SLOW_FROUDE)
     part = min(max(part, 0.0), 1.0)
-    return float(part * part * (3.0 - 2.0 * part))
+    slope = 6.0 * part * (1.0 - part) / ((_FAST_FROUDE - _SLOW_FROUDE) * plant.froude_velocity)
+    return part * part * (3.0 - 2.0 * part), slope
 
 
-@compiled
+@inlined
 def _crest_margin(
     plant: Record,
     at: tuple[float, float, float, float],
     direction: int,
     primed: bool,
     log_speed: float,
-) -> tuple[float, float]:
-    """What drives a separated column, Pa, and how far the gas over the crest is carried out."""
+) -> tuple[float, float, float]:
+    """What drives a separated column, Pa, how far the gas over the crest is carried out, and the derivative
+    of the former by the gas margin beyond 1 - the latter."""
     primed_margin, gas_margin = _margins(plant, at)
     if primed:
-        return primed_margin, 1.0
+        return primed_margin, 1.0, 0.0
     if gas_margin <= 0.0:
-        return gas_margin, 0.0
-    cleared = _cleared(plant, _velocity(plant, _crest_table(direction), gas_margin, log_speed))
-    return gas_margin + cleared * max(primed_margin - gas_margin, 0.0), cleared
+        return gas_margin, 0.0, 0.0
+    which = _crest_table(direction)
+    spill = _velocity(plant, which, gas_margin, log_speed)
+    cleared, slope = _cleared(plant, spill)
+    more = max(primed_margin - gas_margin, 0.0)
+    if slope > 0.0:
+        slope /= plant.density * _loss(plant, which, spill, log_speed)[1]
+    return gas_margin + cleared * more, cleared, slope * more
 
 
 @compiled
@@ -180,34 +215,69 @@ def _directed(
     direction: int,
     primed: bool,
     log_speed: float,
-) -> tuple[float, bool, bool]:
-    """Velocity, whether separated, and whether the tube then holds a column; for flow in one direction."""
+) -> tuple[float, bool]:
+    """Velocity of flow in one direction, and whether the column is separated."""
     if not can_flow(plant, at, primed):
-        return 0.0, False, holds_at_rest(plant, at, primed)
+        return 0.0, False
     full = _velocity(plant, HEAD, _driving(plant, at), log_speed)
     if not plant.crest:
-        return full, False, True
-    margin, cleared = _crest_margin(plant, at, direction, primed and not plant.one_way, log_speed)
+        return full, False
+    margin = _crest_margin(plant, at, direction, primed, log_speed)[0]
     broken = _velocity(plant, _crest_table(direction), margin, log_speed)
-    covered = at[3] >= plant.port_pressure
-    swept = cleared > 0.5 and _cleared(plant, full) > 0.5
-    keeps = (primed or swept) and (broken >= full or covered)
-    return min(broken, full), broken < full, keeps
+    return min(broken, full), broken < full
 
 
 @compiled
 def steady(
     plant: Record, x: float, opposite: float, p: float, q: float, primed: bool, log_speed: float
-) -> tuple[float, bool, bool]:
-    """Velocity without inertia, m/s out of chamber 0, whether separated, whether the tube holds a column."""
+) -> tuple[float, bool]:
+    """Velocity without inertia, m/s out of chamber 0, and whether the column is separated."""
     ahead = _directed(plant, ends(plant, x, opposite, p, q, 1), 1, primed, log_speed)
     if ahead[0] > 0.0:
         return ahead
     back = _directed(plant, ends(plant, x, opposite, p, q, -1), -1, primed, log_speed)
-    return (-back[0], back[1], back[2]) if back[0] > 0.0 else ahead
+    return -back[0], back[1]
 
 
 @compiled
+def holds(
+    plant: Record, x: float, opposite: float, p: float, q: float, primed: bool, log_speed: float
+) -> bool:
+    """Whether the tube holds a column after the flow without inertia, or at rest."""
+    at = ends(plant, x, opposite, p, q, 1)
+    if can_flow(plant, at, primed):
+        return _fills(plant, at, 1, primed, log_speed)
+    reverse = (at[1], at[0], at[3], at[2])
+    if can_flow(plant, reverse, primed):
+        return _fills(plant, reverse, -1, primed, log_speed)
+    return holds_at_rest(plant, at, primed)
+
+
+@compiled
+def _fills(
+    plant: Record,
+    at: tuple[float, float, float, float],
+    direction: int,
+    primed: bool,
+    log_speed: float,
+) -> bool:
+    """Whether a column that flows is a continuous one: gas carried out, no cavity open to the port."""
+    if not plant.crest:
+        return True
+    which, driving = _crest_table(direction), _driving(plant, at)
+    if not primed and plant.froude_velocity > 0.0:
+        half = _HALF_CLEARED * plant.froude_velocity
+        spills = _exceeds(plant, which, _margins(plant, at)[1], half, log_speed)
+        if not (spills and _exceeds(plant, HEAD, driving, half, log_speed)):
+            return False
+    if at[3] >= plant.port_pressure:
+        return True
+    margin = _crest_margin(plant, at, direction, primed, log_speed)[0]
+    broken = _velocity(plant, which, margin, log_speed)
+    return broken >= _velocity(plant, HEAD, driving, log_speed)
+
+
+@inlined
 def accelerations(
     plant: Record,
     at: tuple[float, float, float, float],
@@ -215,18 +285,43 @@ def accelerations(
     direction: int,
     primed: bool,
     log_speed: float,
-) -> tuple[float, float]:
-    """Of the full column and of the separated one, along their own direction, m/s^2; `speed` >= 0."""
-    slow = speed < _SLOWEST
-    log_velocity = 0.0 if slow else math.log(speed) - log_speed
-    loss = 0.0 if slow else _loss(plant, HEAD, log_velocity)
-    full = (_driving(plant, at) / plant.density - loss) / plant.length
+) -> tuple[float, float, float, float, float, float]:
+    """Of the full column and of the separated one, along their own direction, m/s^2.
+
+    The speed may be just below zero, within the step that brings the column to rest.
+    Returns: the two, then the derivatives of the smaller one by the speed, by the pressure upstream (of gas
+    or liquid), by the gas pressure downstream and by the liquid's pressure there.
+    """
+    loss, slope = _loss(plant, HEAD, speed, log_speed)
+    length, covered = plant.length, 1.0 if at[3] > plant.port_pressure else 0.0
+    per, each = 1.0 / length, 1.0 / (plant.density * length)
+    full = _driving(plant, at) * each - loss * per
     if not plant.crest:
-        return full, math.inf
+        return full, math.inf, -slope * per, each, -each, -each * covered
     fraction = plant.crest_end if direction > 0 else plant.return_crest_end
-    loss = 0.0 if slow else _loss(plant, _crest_table(direction), log_velocity)
-    margin = _crest_margin(plant, at, direction, primed, log_speed)[0]
-    return full, (margin / plant.density - loss) / (fraction * plant.length)
+    margin, cleared, more = _crest_margin(plant, at, direction, primed, log_speed)
+    upper_loss, upper_slope = _loss(plant, _crest_table(direction), speed, log_speed)
+    per_upper, each_upper = 1.0 / (fraction * length), 1.0 / (plant.density * fraction * length)
+    broken = margin * each_upper - upper_loss * per_upper
+    if full <= broken:
+        return full, broken, -slope * per, each, -each, -each * covered
+    by_cavity, by_gas, by_far = _crest_slopes(plant, at)
+    gas = 1.0 - cleared + more
+    by_down = -each_upper * (gas * by_gas + cleared * by_cavity)
+    by_up, by_liquid = each_upper * (gas + cleared), -each_upper * gas * by_far
+    return full, broken, -upper_slope * per_upper, by_up, by_down, by_liquid
+
+
+@inlined
+def _crest_slopes(plant: Record, at: tuple[float, float, float, float]) -> tuple[float, float, float]:
+    """Derivatives of the pressures over the crest: of a cavity and of gas by the gas pressure downstream, and
+    of gas by the liquid's pressure there."""
+    is_open = at[3] < plant.port_pressure
+    by_cavity = 1.0 if is_open else plant.released if at[1] > plant.vapour_pressure else 0.0
+    cavity_margin, gas_margin = _margins(plant, at)
+    if gas_margin == cavity_margin:
+        return by_cavity, by_cavity, 0.0
+    return by_cavity, 1.0, 0.0 if is_open or not plant.trapped else 1.0
 
 
 @compiled

@@ -1,4 +1,7 @@
-"""What ends a step of a pair of chambers, and what its liquid does at rest, in plain numbers."""
+"""What ends a step of a pair of chambers, and what its liquid does at rest, in plain numbers.
+
+A state is x of chamber 0, the velocity out of it and the absolute pressures of both gases.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ from ringbalance.controller.liquid_ring.compiled_column import (
     accelerations,
     can_flow,
     ends,
+    holds,
     holds_at_rest,
     open_to_gas,
     steady,
@@ -16,7 +20,6 @@ from ringbalance.controller.liquid_ring.compiled_column import (
 from ringbalance.controller.liquid_ring.records import EVENTS, P, Record, U, X
 from ringbalance.controller.liquid_ring.transfer import Event
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.scene.arrays import FloatArray
 
 NONE: Final = EVENTS.index(Event.NONE)
 STALLED: Final = EVENTS.index(Event.STALLED)
@@ -26,25 +29,38 @@ _SIPHON: Final = int(Regime.SIPHON)
 _SEPARATED: Final = int(Regime.SEPARATED)
 _REVERSE: Final = int(Regime.REVERSE)
 
-
-@compiled
-def gases(plant: Record, y: FloatArray) -> tuple[float, float]:
-    """Gauge pressures."""
-    return y[P] - plant.ambient_pressure, y[P + 1] - plant.ambient_pressure
+Four = tuple[float, float, float, float]
 
 
 @compiled
-def pair_ends(plant: Record, y: FloatArray, direction: int) -> tuple[float, float, float, float]:
+def now(motion: Record) -> Four:
+    """The present state."""
+    y = motion.state
+    return y[X], y[U], y[P], y[P + 1]
+
+
+@compiled
+def pair_ends(plant: Record, state: Four, direction: int) -> Four:
     """Pressures at the tube's ends in a state, as `compiled_column.ends`."""
-    p, q = gases(plant, y)
-    return ends(plant, y[X], plant.total - y[X], p, q, direction)
+    x, _, p, q = state
+    ambient = plant.ambient_pressure
+    return ends(plant, x, plant.total - x, p - ambient, q - ambient, direction)
 
 
 @compiled
-def pair_steady(plant: Record, motion: Record, y: FloatArray, primed: bool) -> tuple[float, bool, bool]:
+def pair_steady(plant: Record, motion: Record, state: Four) -> tuple[float, bool]:
     """Quasi-steady flow in a state, as `compiled_column.steady`."""
-    p, q = gases(plant, y)
-    return steady(plant, y[X], plant.total - y[X], p, q, primed, motion.log_speed)
+    x, _, p, q = state
+    ambient, primed = plant.ambient_pressure, motion.primed > 0
+    return steady(plant, x, plant.total - x, p - ambient, q - ambient, primed, motion.log_speed)
+
+
+@compiled
+def holds_column(plant: Record, motion: Record, state: Four) -> bool:
+    """Whether the tube holds a column by the law."""
+    x, _, p, q = state
+    ambient, primed = plant.ambient_pressure, motion.primed > 0
+    return holds(plant, x, plant.total - x, p - ambient, q - ambient, primed, motion.log_speed)
 
 
 @compiled
@@ -65,79 +81,72 @@ def limit_in_the_way(plant: Record, x: float, direction: int) -> int:
 
 
 @compiled
-def would_start(plant: Record, y: FloatArray, primed: bool) -> int:
+def would_start(plant: Record, state: Four, primed: bool) -> int:
     """Direction in which resting liquid would flow; zero for none."""
-    if can_flow(plant, pair_ends(plant, y, 1), primed):
+    at = pair_ends(plant, state, 1)
+    if can_flow(plant, at, primed):
         return 1
-    return -1 if can_flow(plant, pair_ends(plant, y, -1), primed) else 0
+    return -1 if can_flow(plant, (at[1], at[0], at[3], at[2]), primed) else 0
 
 
 @compiled
-def starts(plant: Record, motion: Record, y: FloatArray, primed: bool) -> int:
+def starts(plant: Record, motion: Record, state: Four) -> int:
     """Direction in which resting liquid does start to flow; zero for none."""
-    direction = would_start(plant, y, primed)
-    if direction == 0 or motion.balanced or limit_in_the_way(plant, y[X], direction) != NONE:
+    direction = would_start(plant, state, motion.primed > 0)
+    if direction == 0 or motion.balanced or limit_in_the_way(plant, state[0], direction) != NONE:
         return 0
-    return direction if not plant.inertia or _push(plant, motion, y, direction, primed) > 0.0 else 0
+    return direction if not plant.inertia or _push(plant, motion, state, direction) > 0.0 else 0
 
 
 @compiled
-def _push(plant: Record, motion: Record, y: FloatArray, direction: int, primed: bool) -> float:
+def _push(plant: Record, motion: Record, state: Four, direction: int) -> float:
     """Acceleration of a column at rest."""
-    at = pair_ends(plant, y, direction)
-    full, broken = accelerations(plant, at, 0.0, direction, primed, motion.log_speed)
-    return min(full, broken)
+    at = pair_ends(plant, state, direction)
+    found = accelerations(plant, at, 0.0, direction, motion.primed > 0, motion.log_speed)
+    return min(found[0], found[1])
 
 
 @compiled
-def separates(plant: Record, motion: Record, y: FloatArray) -> bool:
+def separates(plant: Record, motion: Record, state: Four) -> bool:
     """Whether a primed column at rest separates."""
-    if not motion.primed or would_start(plant, y, True) != 0:
+    if not motion.primed or would_start(plant, state, True) != 0:
         return False
-    return not holds_at_rest(plant, pair_ends(plant, y, 1), True)
+    return not holds_at_rest(plant, pair_ends(plant, state, 1), True)
 
 
 @compiled
-def flow_end(plant: Record, motion: Record, y: FloatArray) -> int:
+def flow_end(plant: Record, motion: Record, state: Four) -> int:
     """The event that ends the flow in the present direction; `NONE`: it continues."""
     direction = motion.direction
-    event = limit_in_the_way(plant, y[X], direction)
+    event = limit_in_the_way(plant, state[0], direction)
     if event != NONE:
         return event
-    if open_to_gas(plant, pair_ends(plant, y, direction)):
+    if open_to_gas(plant, pair_ends(plant, state, direction)):
         return STALLED
-    primed = motion.primed > 0
     if plant.inertia:
         # Round-off of a creeping column's velocity is no stall: it is still driven.
-        slow = y[U] * direction < 0.0
-        return STALLED if slow and _push(plant, motion, y, direction, primed) <= 0.0 else NONE
-    return NONE if would_start(plant, y, primed) == direction else STALLED
+        slow = state[1] * direction < 0.0
+        return STALLED if slow and _push(plant, motion, state, direction) <= 0.0 else NONE
+    return NONE if would_start(plant, state, motion.primed > 0) == direction else STALLED
 
 
 @compiled
-def changes(plant: Record, motion: Record, y: FloatArray) -> bool:
+def changes(plant: Record, motion: Record, state: Four) -> bool:
     """Whether an event lies between the last step and this state."""
     if motion.direction != 0:
-        filled = not motion.primed and primes(plant, motion, y)
-        return filled or flow_end(plant, motion, y) != NONE
-    return separates(plant, motion, y) or starts(plant, motion, y, motion.primed > 0) != 0
-
-
-@compiled
-def primes(plant: Record, motion: Record, y: FloatArray) -> bool:
-    """Whether the liquid that spills over the crest has filled the tube, by the law."""
-    return pair_steady(plant, motion, y, False)[2]
+        filled = not motion.primed and holds_column(plant, motion, state)
+        return filled or flow_end(plant, motion, state) != NONE
+    return separates(plant, motion, state) or starts(plant, motion, state) != 0
 
 
 @compiled
 def regime(plant: Record, motion: Record) -> int:
     """Value of `Regime` of moving liquid, seen from the chamber that was driven last."""
-    direction, y = motion.direction, motion.state
+    direction, state = motion.direction, now(motion)
     if direction != outward(motion):
         return _REVERSE
-    primed = motion.primed > 0
     if not plant.inertia:
-        return _SEPARATED if pair_steady(plant, motion, y, primed)[1] else _SIPHON
-    at, speed = pair_ends(plant, y, direction), max(y[U] * direction, 0.0)
-    full, broken = accelerations(plant, at, speed, direction, primed, motion.log_speed)
-    return _SEPARATED if broken < full else _SIPHON
+        return _SEPARATED if pair_steady(plant, motion, state)[1] else _SIPHON
+    at, speed = pair_ends(plant, state, direction), max(state[1] * direction, 0.0)
+    found = accelerations(plant, at, speed, direction, motion.primed > 0, motion.log_speed)
+    return _SEPARATED if found[1] < found[0] else _SIPHON

@@ -17,19 +17,20 @@ from ringbalance.controller.liquid_ring.compiled_events import (
     FULL,
     NONE,
     STALLED,
+    Four,
     changes,
     flow_end,
-    gases,
+    holds_column,
     limit_in_the_way,
+    now,
     outward,
     pair_ends,
-    pair_steady,
-    primes,
     regime,
     separates,
     starts,
     would_start,
 )
+from ringbalance.controller.liquid_ring.compiled_gas import end_pressure, near_end
 from ringbalance.controller.liquid_ring.compiled_step import (
     BETWEEN,
     END,
@@ -46,12 +47,12 @@ from ringbalance.scene.arrays import FloatArray
 _ROUND_OFF: Final = 1e-12
 """s, of the clock of a valve."""
 _BISECTIONS: Final = 40
+_REST_EVENT: Final = 0.01
+"""Of the instant of an event in a step at rest, which may be long, over the error allowed to a step."""
 _NOTHING_MOVED: Final = 1e-13
 """Fill ratio below which a start has come to nothing but round-off."""
 _LITTLE_MOVED: Final = 1e-9
 """Fill ratio below which a flow that ends was the last swing of a column about its balance."""
-_AT_REST: Final = 1e-6
-"""Relative distance of a gas from its end pressure that counts as there, with the liquid at rest."""
 _OPENINGS: Final = 40
 """Halvings of the valve-open time that leaves a chamber with its residual fill."""
 _BLOCKED: Final = EVENTS.index(Event.BLOCKED)
@@ -74,33 +75,39 @@ def command(plant: Record, motion: Record, chamber: int, duration: float) -> Non
 @compiled
 def rests(plant: Record, motion: Record) -> bool:
     """Whether nothing moves, no gas is under pressure, and no valve is open or about to move."""
-    waiting = min(motion.opens, motion.closes) < math.inf
-    p, q = gases(plant, motion.state)
-    still = motion.direction == 0 and p == 0.0 and q == 0.0
+    waiting, y = min(motion.opens, motion.closes) < math.inf, motion.state
+    still = motion.direction == 0 and y[P] == plant.ambient_pressure == y[P + 1]
     return bool(still and not (motion.primed or motion.valve_0 or motion.valve_1 or waiting))
 
 
 @compiled
-def advance(plant: Record, motion: Record, duration: float, w: FloatArray) -> None:
-    """Let a time pass, s, through the valves' movements on the way."""
-    left = duration
+def advance(
+    plant: Record, motion: Record, duration: float, notes: FloatArray, row: int, count: int, w: FloatArray
+) -> None:
+    """Let a time pass, s, through the valves' movements on the way.
+
+    The fill at the first `count` instants in row 0 of `notes`, s from now and ascending, goes to another row.
+    """
+    left, motion.now, motion.noted = duration, 0.0, 0
     # What is due at the end counts, whatever the clock has rounded off.
     while min(motion.opens, motion.closes) <= left + _ROUND_OFF:
         until = min(motion.opens, motion.closes, left)
-        _march(plant, motion, until, w)
+        _march(plant, motion, until, notes, row, count, w)
         left -= until
         _flip(plant, motion)
-    _march(plant, motion, left, w)
+    _march(plant, motion, left, notes, row, count, w)
     _settle(plant, motion)
     _note_regime(plant, motion)
     _pause(plant, motion)
+    for k in range(motion.noted, count):
+        notes[row, k] = motion.state[X]
 
 
 @compiled
 def _pause(plant: Record, motion: Record) -> None:
     """Liquid without mass has no motion of its own: the next instant finds it again."""
     if motion.direction != 0 and not plant.inertia:
-        motion.primed = 1 if pair_steady(plant, motion, motion.state, motion.primed > 0)[2] else 0
+        motion.primed = 1 if holds_column(plant, motion, now(motion)) else 0
         motion.direction = 0
 
 
@@ -112,12 +119,12 @@ def opening_within(
 
     `motions[spare]` is written to.  Returns: zero where the chamber is already there.
     """
-    if _least_after(plant, motions, pair, spare, chamber, duration, w) >= plant.residual:
+    if _least_after(plant, motions, pair, spare, chamber, duration, w) >= motions[pair].residual:
         return duration
     low, high = 0.0, duration
     for _ in range(_OPENINGS):
         middle = (low + high) / 2.0
-        if _least_after(plant, motions, pair, spare, chamber, middle, w) >= plant.residual:
+        if _least_after(plant, motions, pair, spare, chamber, middle, w) >= motions[pair].residual:
             low = middle
         else:
             high = middle
@@ -132,70 +139,108 @@ def _least_after(
 ) -> float:
     """Lowest fill of the driven chamber until an injection and its tail are over."""
     motions[spare] = motions[pair]
-    trial = motions[spare]
-    command(plant, trial, chamber, duration)
-    advance(plant, trial, plant.valve_lag + duration, w)
-    # The column stops, or runs back, while the gas vents.
-    for _ in range(100):
-        if trial.direction == 0 or trial.direction == (-1 if chamber == 0 else 1):
-            break
-        advance(plant, trial, 0.1, w)
-    return float(trial.least_fill)
+    command(plant, motions[spare], chamber, duration)
+    advance(plant, motions[spare], plant.valve_lag + duration, w, 0, 0, w)
+    return least_later(plant, motions, spare, w)
 
 
 @compiled
-def _march(plant: Record, motion: Record, duration: float, w: FloatArray) -> None:
+def least_later(plant: Record, motions: Record, pair: int, w: FloatArray) -> float:
+    """Lowest fill of the driven chamber once its column has stopped or runs back, while the gas vents."""
+    motion = motions[pair]
+    if motion.closes < math.inf:
+        advance(plant, motion, motion.closes, w, 0, 0, w)
+    for _ in range(100):
+        if motion.direction != outward(motion):
+            break
+        advance(plant, motion, 0.1, w, 0, 0, w)
+    return float(motion.least_fill)
+
+
+@compiled
+def _march(
+    plant: Record, motion: Record, duration: float, notes: FloatArray, row: int, count: int, w: FloatArray
+) -> None:
     """Steps and their events, with the valves as they are."""
     left = duration
     while left > 0.0:
         _settle(plant, motion)
         if motion.steps >= plant.most_steps:
             motion.event = _UNFINISHED
-            _pass(motion, left)
+            _pass(motion, left, notes, row, count)
             return
         if _quiet(plant, motion):
             _rest_gases(plant, motion)
-            _pass(motion, left)
+            _pass(motion, left, notes, row, count)
             return
-        h = _step(plant, motion, left, w)
-        _pass(motion, left if h >= left else h)
+        h = _step(plant, motion, left, notes, row, count, w)
+        _pass(motion, left if h >= left else h, notes, row, count)
         left = 0.0 if h >= left else left - h
 
 
 @compiled
-def _pass(motion: Record, time: float) -> None:
-    """The clock of the valves."""
+def _pass(motion: Record, time: float, notes: FloatArray, row: int, count: int) -> None:
+    """The clocks of the valves and of the interval; what is not noted yet has not moved."""
     motion.opens -= time
     motion.closes -= time
+    motion.now += time
+    while motion.noted < count and notes[0, motion.noted] < motion.now:
+        notes[row, motion.noted] = motion.state[X]
+        motion.noted += 1
 
 
 @compiled
-def _step(plant: Record, motion: Record, left: float, w: FloatArray) -> float:
+def _at(w: FloatArray, row: int) -> Four:
+    """State in a row of the workspace."""
+    return w[row, X], w[row, U], w[row, P], w[row, P + 1]
+
+
+@compiled
+def _step(
+    plant: Record, motion: Record, left: float, notes: FloatArray, row: int, count: int, w: FloatArray
+) -> float:
     """One accepted step, cut at the first event within it. Returns: its length, s."""
     h = take(plant, motion, left, w)
-    if changes(plant, motion, w[END]):
+    if changes(plant, motion, _at(w, END)):
+        h = _cut(plant, motion, h, w)
+    if motion.noted < count and notes[0, motion.noted] < motion.now + h:
         rates_at_end(plant, motion, w)
-        low, high = 0.0, 1.0
-        for _ in range(_BISECTIONS):
-            middle = (low + high) / 2.0
-            between(motion, h, middle, w)
-            if changes(plant, motion, w[BETWEEN]):
-                high = middle
-            else:
-                low = middle
-        if high < 1.0:
-            h *= high
-            shorten(plant, motion, h, w)
+        while motion.noted < count and notes[0, motion.noted] < motion.now + h:
+            between(plant, motion, h, (notes[0, motion.noted] - motion.now) / h, w)
+            notes[row, motion.noted] = w[BETWEEN, X]
+            motion.noted += 1
     before, y = motion.state[X], motion.state
     for i in range(8):
         y[i] = w[END, i]
     if motion.direction == -outward(motion) and not (motion.valve_0 or motion.valve_1):
         motion.ran_back += abs(y[X] - before)
     if motion.direction != 0 and plant.inertia and y[U] * motion.direction < 0.0:
-        y[U] = 0.0 if flow_end(plant, motion, y) == NONE else y[U]
+        y[U] = 0.0 if flow_end(plant, motion, now(motion)) == NONE else y[U]
     motion.least_fill = min(motion.least_fill, plant.total - y[X] if motion.chamber else y[X])
-    if motion.direction != 0 and not motion.primed and primes(plant, motion, y):
+    if motion.direction != 0 and not motion.primed and holds_column(plant, motion, now(motion)):
         motion.primed = 1
+    return h
+
+
+@compiled
+def _cut(plant: Record, motion: Record, h: float, w: FloatArray) -> float:
+    """End the step just taken at the first event. Returns: its length then, s."""
+    rates_at_end(plant, motion, w)
+    low, high, near = 0.0, 1.0, plant.relative_error
+    if motion.direction == 0:
+        near *= _REST_EVENT
+    for _ in range(_BISECTIONS):
+        middle = (low + high) / 2.0
+        between(plant, motion, h, middle, w)
+        if changes(plant, motion, _at(w, BETWEEN)):
+            high = middle
+        else:
+            low = middle
+        if high - low <= near:
+            break
+    if high < 1.0:
+        h *= high
+        shorten(plant, motion, h, w)
     return h
 
 
@@ -203,25 +248,31 @@ def _step(plant: Record, motion: Record, left: float, w: FloatArray) -> float:
 def _settle(plant: Record, motion: Record) -> None:
     """Let moving liquid come to rest, and resting liquid start, where it has to."""
     if motion.direction != 0:
-        event = flow_end(plant, motion, motion.state)
+        event = flow_end(plant, motion, now(motion))
         if event == NONE:
             return
         _stop(plant, motion, event)
-    y = motion.state
-    if separates(plant, motion, y):
+    state = now(motion)
+    if separates(plant, motion, state):
         motion.primed = 0
     primed = motion.primed > 0
-    wanted = would_start(plant, y, primed)
-    limit = limit_in_the_way(plant, y[X], wanted)
+    wanted = would_start(plant, state, primed)
+    limit = limit_in_the_way(plant, state[0], wanted)
     if wanted != 0 and limit != NONE:
         motion.primed = 1 if primed and limit != EMPTY else 0
         _note(plant, motion, limit, wanted)
-    direction = starts(plant, motion, y, primed)
+    direction = starts(plant, motion, state)
     if direction == 0:
         return
-    motion.primed = 1 if pair_steady(plant, motion, y, primed)[2] else 0
-    motion.direction, motion.length, motion.started = direction, plant.first_step, y[X]
+    motion.primed = 1 if holds_column(plant, motion, state) else 0
+    motion.direction, motion.length, motion.started = direction, _first(plant, motion), state[0]
     _note(plant, motion, NONE, direction)
+
+
+@compiled
+def _first(plant: Record, motion: Record) -> float:
+    """Length of the next step after a jump of the rates, s."""
+    return float(min(motion.length, plant.first_step))
 
 
 @compiled
@@ -236,9 +287,10 @@ def _stop(plant: Record, motion: Record, event: int) -> None:
     if event in (EMPTY, FULL):
         lowest, highest = max(0.0, plant.total - plant.max_fill_ratio), min(plant.total, plant.max_fill_ratio)
         y[X] = lowest if direction > 0 else highest
-    gone = event == EMPTY or open_to_gas(plant, pair_ends(plant, y, direction))
-    motion.primed = 1 if motion.primed and not gone and pair_steady(plant, motion, y, True)[2] else 0
-    y[U], motion.direction, motion.length = 0.0, 0, plant.first_step
+    state = now(motion)
+    gone = event == EMPTY or open_to_gas(plant, pair_ends(plant, state, direction))
+    motion.primed = 1 if motion.primed and not gone and holds_column(plant, motion, state) else 0
+    y[U], motion.direction, motion.length = 0.0, 0, _first(plant, motion)
 
 
 @compiled
@@ -261,13 +313,7 @@ def _flip(plant: Record, motion: Record) -> None:
         motion.valve_0 = 1 if opens else 0
     else:
         motion.valve_1 = 1 if opens else 0
-    motion.balanced, motion.stopped, motion.length = 0, 0, plant.first_step
-
-
-@compiled
-def _end_pressure(plant: Record, is_open: bool) -> float:
-    """Absolute, that a gas tends to, Pa."""
-    return float(plant.ambient_pressure + (plant.gas_pressure if is_open else 0.0))
+    motion.balanced, motion.stopped, motion.length = 0, 0, _first(plant, motion)
 
 
 @compiled
@@ -275,18 +321,15 @@ def _quiet(plant: Record, motion: Record) -> bool:
     """Whether nothing changes any more until a valve moves."""
     if motion.direction != 0:
         return False
-    y = motion.state
-    p, q = _end_pressure(plant, motion.valve_0 > 0), _end_pressure(plant, motion.valve_1 > 0)
-    near = abs(y[P] - p) <= _AT_REST * p and abs(y[P + 1] - q) <= _AT_REST * q
-    return not plant.line or near
+    return bool(not plant.line or (near_end(plant, motion, 0) and near_end(plant, motion, 1)))
 
 
 @compiled
 def _rest_gases(plant: Record, motion: Record) -> None:
     """The gases at the pressures that they tend to."""
     if plant.line:
-        motion.state[P] = _end_pressure(plant, motion.valve_0 > 0)
-        motion.state[P + 1] = _end_pressure(plant, motion.valve_1 > 0)
+        motion.state[P] = end_pressure(plant, motion.valve_0 > 0)
+        motion.state[P + 1] = end_pressure(plant, motion.valve_1 > 0)
 
 
 @compiled

@@ -13,9 +13,9 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.compilation.compiled import compiled
-from ringbalance.controller.formulas.gas_flow import flow_shape
-from ringbalance.controller.liquid_ring.compiled_column import accelerations, ends, steady
+from ringbalance.controller.compilation.compiled import compiled, inlined
+from ringbalance.controller.liquid_ring.compiled_column import accelerations, hydrostatic, steady
+from ringbalance.controller.liquid_ring.compiled_gas import gas_volume, line_rates, near_end, rest_after
 from ringbalance.controller.liquid_ring.records import WORK, P, Record, U, X
 from ringbalance.scene.arrays import FloatArray
 
@@ -42,16 +42,14 @@ _C: Final = np.array(
     ]
 )
 """Weights of earlier stages, over the length of the step, in the right-hand side of a stage."""
-_DIFFERENCE: Final = 1e-8
-"""Relative, of a state, for a column of the Jacobian."""
-_LEAST_GAS: Final = 1e-3
-"""Fraction of a chamber that liquid never takes from its gas."""
 _SHORTEST_STEP: Final = 1e-15
 """s, below which no error is looked at."""
+_REST_STEP: Final = 0.25
+"""In units of a gas's time constant, while both gases change."""
 _SAFETY: Final = 0.9
 _SHRINK: Final = 0.2
 _GROW: Final = 5.0
-# Rows of the workspace: stages, then these, then the matrix.
+# Rows of the workspace: stages, then these.
 _TRIAL: Final = 6
 _RATE: Final = 7
 END: Final = 8
@@ -59,159 +57,210 @@ END: Final = 8
 BETWEEN: Final = 9
 """Row that holds a state within a step."""
 _FIRST_RATE: Final = 10
-_JACOBIAN: Final = 11
-_MATRIX: Final = 17
-
-_flow_shape: Final = compiled(flow_shape)
-
-
-@compiled
-def gas_volume(plant: Record, x: float) -> float:
-    """Volume of the gas that belongs to a chamber of fill x: (1 - x) V and the dead volume, m^3."""
-    return float(max(1.0 - x, _LEAST_GAS) * plant.chamber_volume + plant.dead_volume)
+_COLUMN: Final = 11
+"""Row with the derivatives of the acceleration, or of the velocity without inertia, by u, x, p and q."""
+_GAS: Final = 12
+"""Rows with the derivatives of one gas each: of dp/dt by p, x, u, m R, and of d(m R)/dt by p, x, m R."""
 
 
-@compiled
-def line_rates(
-    plant: Record, pressure: float, content: float, volume: float, growth: float, is_open: bool
-) -> tuple[float, float]:
-    """dp/dt (Pa/s) and d(m R)/dt (W/K) of a chamber's gas that fills from the supply or vents.
+@inlined
+def _column(
+    plant: Record, motion: Record, x: float, u: float, p: float, q: float
+) -> tuple[float, float, float, float, float, float]:
+    """Velocity and acceleration of the liquid; derivatives of the latter by u, x, p and q.
 
-    `content` is m R = p V/T, J/K; `growth` is dV/dt.
-    Source: ISO 6358-1 for the mass flow, as in `physics.gas.supply`; first law for the chamber's gas.
+    Without inertia those of the velocity by x, p and q: they keep the balance of forces.
     """
-    outside = plant.ambient_pressure + (plant.gas_pressure if is_open else 0.0)
-    temperature, sign, up, down = plant.temperature, 1.0, outside, pressure
-    if outside < pressure:
-        sign, up, down = -1.0, pressure, outside
-        if plant.heat_capacity_ratio > 1.0:
-            # A trial step may empty a chamber of its gas; such a step is thrown away.
-            temperature = pressure * volume / max(content, 1e-9 * volume)
-    shape = _flow_shape(down / up, plant.critical_ratio)
-    flow = sign * plant.passing * math.sqrt(temperature) * up * shape
-    return plant.heat_capacity_ratio * (flow - pressure * growth) / volume, flow / temperature
+    direction, primed, ambient = motion.direction, motion.primed > 0, plant.ambient_pressure
+    if direction == 0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    p, q = p - ambient, q - ambient
+    own, other = hydrostatic(plant, x), hydrostatic(plant, plant.total - x)
+    f = plant.gas_factor
+    at = (f * p, f * q, own[0], other[0]) if direction > 0 else (f * q, f * p, other[0], own[0])
+    speed = u * direction
+    if not plant.inertia:
+        speed = max(steady(plant, x, plant.total - x, p, q, primed, motion.log_speed)[0] * direction, 0.0)
+    found = accelerations(plant, at, speed, direction, primed, motion.log_speed)
+    by_u, by_up, by_down, by_far = found[2], found[3] * direction, found[4] * direction, found[5] * direction
+    if direction > 0:
+        by_x, by_p, by_q = by_up * own[1] - by_far * other[1], f * by_up, f * by_down
+    else:
+        by_x, by_p, by_q = by_far * own[1] - by_up * other[1], f * by_down, f * by_up
+    if plant.inertia:
+        return speed * direction, min(found[0], found[1]) * direction, by_u, by_x, by_p, by_q
+    part = -1.0 / by_u if by_u < 0.0 else 0.0
+    return speed * direction, 0.0, 0.0, part * by_x, part * by_p, part * by_q
 
 
 @compiled
-def _rates(plant: Record, motion: Record, y: FloatArray, out: FloatArray) -> None:
+def _rates(plant: Record, motion: Record, w: FloatArray, row: int, out: int) -> None:
     """Rates of all states with the liquid at rest, or moving in one direction."""
-    x, p, q, direction = y[X], y[P], y[P + 1], motion.direction
-    opposite, ambient, primed = plant.total - x, plant.ambient_pressure, motion.primed > 0
-    speed, acceleration = 0.0, 0.0
-    if direction != 0 and plant.inertia:
-        speed = max(y[U] * direction, 0.0)
-        at = ends(plant, x, opposite, p - ambient, q - ambient, direction)
-        full, broken = accelerations(plant, at, speed, direction, primed, motion.log_speed)
-        acceleration = min(full, broken) * direction
-    elif direction != 0:
-        found = steady(plant, x, opposite, p - ambient, q - ambient, primed, motion.log_speed)
-        speed = max(found[0] * direction, 0.0)
-    flow = plant.tube_area * speed * direction
-    out[X], out[U] = -flow / plant.chamber_volume, acceleration
-    out[P], out[P + 1], out[P + 2], out[P + 3] = 0.0, 0.0, 0.0, 0.0
-    if plant.line:
-        first, second = gas_volume(plant, x), gas_volume(plant, opposite)
-        out[P], out[P + 2] = line_rates(plant, p, y[P + 2], first, flow, motion.valve_0 > 0)
-        out[P + 1], out[P + 3] = line_rates(plant, q, y[P + 3], second, -flow, motion.valve_1 > 0)
-    out[WORK], out[WORK + 1] = (p - ambient) * flow, -(q - ambient) * flow
+    x, p, q = w[row, X], w[row, P], w[row, P + 1]
+    velocity, acceleration = _column(plant, motion, x, w[row, U], p, q)[:2]
+    flow, ambient = plant.tube_area * velocity, plant.ambient_pressure
+    w[out, X], w[out, U] = -flow / plant.chamber_volume, acceleration
+    w[out, WORK], w[out, WORK + 1] = (p - ambient) * flow, -(q - ambient) * flow
+    for chamber in range(2):
+        w[out, P + chamber], w[out, P + 2 + chamber] = 0.0, 0.0
+        if plant.line:
+            found = _gas(plant, motion, w, row, chamber, flow)
+            w[out, P + chamber] = found[0]
+            w[out, P + 2 + chamber] = found[1] if plant.heat_capacity_ratio > 1.0 else 0.0
 
 
-@compiled
-def _active(plant: Record) -> int:
-    """States that the rates depend on: fill and velocity, pressures with a line, contents if adiabatic."""
-    if not plant.line:
-        return 2
-    return 6 if plant.heat_capacity_ratio > 1.0 else 4
+@inlined
+def _gas(
+    plant: Record, motion: Record, w: FloatArray, row: int, chamber: int, flow: float
+) -> tuple[float, float, float, float, float, float, float, float]:
+    """`line_rates` of one chamber."""
+    x = w[row, X] if chamber == 0 else plant.total - w[row, X]
+    growth, is_open = (flow, motion.valve_0 > 0) if chamber == 0 else (-flow, motion.valve_1 > 0)
+    volume = gas_volume(plant, x)
+    return line_rates(plant, w[row, P + chamber], w[row, P + 2 + chamber], volume, growth, is_open)
 
 
 @compiled
 def _linearize(plant: Record, motion: Record, w: FloatArray) -> None:
-    """Jacobian by differences, column j in row `_JACOBIAN` + j, and the rates themselves."""
-    y, trial, base = motion.state, w[_TRIAL], w[_FIRST_RATE]
-    _rates(plant, motion, y, base)
-    for j in range(_active(plant)):
-        column = w[_JACOBIAN + j]
-        if (motion.direction == 0 and j <= U) or (j == U and not plant.inertia):
-            column[:] = 0.0
-            continue
-        trial[:] = y
-        scale = 1.0 if j <= U else plant.ambient_pressure if j < P + 2 else abs(y[j])
-        change = _DIFFERENCE * max(abs(y[j]), 0.1 * scale)
-        # Along the flow: against it a column at rest would not move.
-        trial[j] += change * (motion.direction if j == U else 1)
-        change = trial[j] - y[j]
-        _rates(plant, motion, trial, column)
+    """The rates at the start of a step, and their derivatives."""
+    y, start = motion.state, w[_FIRST_RATE]
+    for i in range(8):
+        w[_TRIAL, i] = y[i]
+    x, p, q = y[X], y[P], y[P + 1]
+    velocity, acceleration, by_u, by_x, by_p, by_q = _column(plant, motion, x, y[U], p, q)
+    w[_COLUMN, 0], w[_COLUMN, 1], w[_COLUMN, 2], w[_COLUMN, 3] = by_u, by_x, by_p, by_q
+    flow, ambient, kappa = plant.tube_area * velocity, plant.ambient_pressure, plant.heat_capacity_ratio
+    start[X], start[U] = -flow / plant.chamber_volume, acceleration
+    start[WORK], start[WORK + 1] = (p - ambient) * flow, -(q - ambient) * flow
+    for chamber in range(2):
+        row, sign = _GAS + chamber, 1.0 - 2.0 * chamber
+        start[P + chamber], start[P + 2 + chamber] = 0.0, 0.0
         for i in range(8):
-            column[i] = (column[i] - base[i]) / change
+            w[row, i] = 0.0
+        if plant.line:
+            found = _gas(plant, motion, w, _TRIAL, chamber, flow)
+            grows = -sign * plant.chamber_volume
+            volume = gas_volume(plant, x if chamber == 0 else plant.total - x)
+            start[P + chamber] = found[0]
+            w[row, 0], w[row, 1] = found[2], grows * found[3]
+            w[row, 2] = -sign * kappa * y[P + chamber] * plant.tube_area / volume
+            if kappa > 1.0:
+                start[P + 2 + chamber] = found[1]
+                w[row, 3], w[row, 4], w[row, 5], w[row, 6] = found[4], found[5], grows * found[6], found[7]
 
 
-@compiled
-def _eliminate(n: int, diagonal: float, w: FloatArray) -> None:
-    """Triangular factors of diagonal - J for the first n states; small steps make the diagonal dominate."""
-    for i in range(n):
-        for j in range(n):
-            w[_MATRIX + i, j] = (diagonal if i == j else 0.0) - w[_JACOBIAN + j, i]
-    for k in range(n):
-        for i in range(k + 1, n):
-            factor = w[_MATRIX + i, k] / w[_MATRIX + k, k]
-            w[_MATRIX + i, k] = factor
-            for j in range(k + 1, n):
-                w[_MATRIX + i, j] -= factor * w[_MATRIX + k, j]
+@inlined
+def _factor(w: FloatArray, row: int, d: float, moves: float) -> float:
+    """Prepare a gas's two equations; (d - J) k = r. Returns: change of its pressure with the velocity's."""
+    free, own = d - w[row, 6], w[row, 2] - w[row, 1] * moves / d
+    w[row, 7] = 1.0 / ((d - w[row, 0]) * free - w[row, 3] * w[row, 4])
+    return float((own * free - w[row, 3] * w[row, 5] * moves / d) * w[row, 7])
 
 
-@compiled
-def _solve(n: int, diagonal: float, w: FloatArray, k: FloatArray) -> None:
-    """Solve (diagonal - J) k = k; beyond the first n states J has these columns alone."""
-    for i in range(n):
-        for j in range(i):
-            k[i] -= w[_MATRIX + i, j] * k[j]
-    for back in range(n):
-        i = n - 1 - back
-        for j in range(i + 1, n):
-            k[i] -= w[_MATRIX + i, j] * k[j]
-        k[i] /= w[_MATRIX + i, i]
-    for i in range(n, 8):
-        for j in range(n):
-            k[i] += w[_JACOBIAN + j, i] * k[j]
-        k[i] /= diagonal
+@inlined
+def _part(w: FloatArray, row: int, stage: int, place: int, d: float, x: float) -> float:
+    """Change of a gas pressure with the velocity's change left out."""
+    pressure, content = w[stage, place] + w[row, 1] * x, w[stage, place + 2] + w[row, 5] * x
+    return float((pressure * (d - w[row, 6]) + w[row, 3] * content) * w[row, 7])
+
+
+@inlined
+def _solve(
+    plant: Record,
+    motion: Record,
+    w: FloatArray,
+    stage: int,
+    d: float,
+    per_pivot: float,
+    first: float,
+    second: float,
+) -> None:
+    """Solve (d - J) k = k in the row of a stage.
+
+    Given the change of the velocity, the fill and both gases follow from their own rows, which leaves one
+    equation; `first` and `second` are what `_factor` gives for the gases.
+    """
+    y, moves, per = motion.state, _moves(plant, motion), 1.0 / d
+    x = w[stage, X] * per
+    p, q = _part(w, _GAS, stage, P, d, x), _part(w, _GAS + 1, stage, P + 1, d, x)
+    change = w[stage, U] + w[_COLUMN, 1] * x + w[_COLUMN, 2] * p + w[_COLUMN, 3] * q
+    change *= per_pivot
+    x, p, q = x - moves * change * per, p + first * change, q + second * change
+    if plant.heat_capacity_ratio > 1.0:
+        for chamber in range(2):
+            row, k = _GAS + chamber, p if chamber == 0 else q
+            content = w[stage, P + 2 + chamber] + w[row, 5] * x + w[row, 4] * k
+            w[stage, P + 2 + chamber] = content / (d - w[row, 6])
+    w[stage, X], w[stage, U] = x, change if plant.inertia else 0.0
+    w[stage, P], w[stage, P + 1] = p, q
+    area, flow = moves * plant.chamber_volume, -w[_FIRST_RATE, X] * plant.chamber_volume
+    ambient = plant.ambient_pressure
+    w[stage, WORK] = (w[stage, WORK] + area * (y[P] - ambient) * change + flow * p) * per
+    w[stage, WORK + 1] = (w[stage, WORK + 1] - area * (y[P + 1] - ambient) * change - flow * q) * per
+
+
+@inlined
+def _moves(plant: Record, motion: Record) -> float:
+    """Fill ratio that leaves chamber 0 per metre of flow, 1/m; zero at rest."""
+    return plant.tube_area / plant.chamber_volume if motion.direction != 0 else 0.0
+
+
+@inlined
+def _look(w: FloatArray, stage: int, y: FloatArray) -> None:
+    """States of a stage: `_A` of all earlier ones, and the last stage adds the one before to its states."""
+    if stage == 5:
+        for i in range(8):
+            w[_TRIAL, i] += w[4, i]
+        return
+    for i in range(8):
+        w[_TRIAL, i] = y[i]
+    for j in range(stage):
+        for i in range(8):
+            w[_TRIAL, i] += _A[stage, j] * w[j, i]
+
+
+@inlined
+def _carry(w: FloatArray, stage: int, per: float) -> None:
+    """What earlier stages add to the right-hand side of a stage; `per`: over the length of the step."""
+    for j in range(stage):
+        for i in range(8):
+            w[stage, i] += _C[stage, j] * per * w[j, i]
 
 
 @compiled
 def _rosenbrock(plant: Record, motion: Record, h: float, w: FloatArray) -> float:
     """One step of length h into row `END`. Returns: error over the allowed one."""
-    n, y, trial, rate = _active(plant), motion.state, w[_TRIAL], w[_RATE]
-    diagonal = 1.0 / (h * _GAMMA)
-    _eliminate(n, diagonal, w)
+    y, d = motion.state, 1.0 / (h * _GAMMA)
+    moves = _moves(plant, motion)
+    first, second = _factor(w, _GAS, d, moves), _factor(w, _GAS + 1, d, moves)
+    pivot = (d - w[_COLUMN, 0] if plant.inertia else 1.0) + w[_COLUMN, 1] * moves / d
+    per_pivot = 1.0 / (pivot - w[_COLUMN, 2] * first - w[_COLUMN, 3] * second)
     for stage in range(_STAGES):
-        if stage < 5:
-            for i in range(8):
-                trial[i] = y[i]
-                for j in range(min(stage, 4)):
-                    trial[i] += _A[stage, j] * w[j, i]
-        else:
-            for i in range(8):
-                trial[i] += w[4, i]
         if stage == 0:
-            rate[:] = w[_FIRST_RATE]
+            for i in range(8):
+                w[0, i] = w[_FIRST_RATE, i]
         else:
-            _rates(plant, motion, trial, rate)
-        for i in range(8):
-            w[stage, i] = rate[i]
-            for j in range(stage):
-                w[stage, i] += _C[stage, j] / h * w[j, i]
-        _solve(n, diagonal, w, w[stage])
+            _look(w, stage, y)
+            _rates(plant, motion, w, _TRIAL, stage)
+            _carry(w, stage, 1.0 / h)
+        if not plant.inertia:
+            w[stage, U] = 0.0
+        _solve(plant, motion, w, stage, d, per_pivot, first, second)
     for i in range(8):
-        w[END, i] = trial[i] + w[5, i]
-    return _error(plant, y, w[5])
+        w[END, i] = w[_TRIAL, i] + w[5, i]
+    if plant.line and plant.heat_capacity_ratio == 1.0:
+        w[END, P + 2] = w[END, P] * gas_volume(plant, w[END, X]) / plant.temperature
+        w[END, P + 3] = w[END, P + 1] * gas_volume(plant, plant.total - w[END, X]) / plant.temperature
+    return _error(plant, y, w)
 
 
 @compiled
-def _error(plant: Record, y: FloatArray, estimate: FloatArray) -> float:
+def _error(plant: Record, y: FloatArray, w: FloatArray) -> float:
     """Largest error of a state over the allowed one; the works are integrals and allow any."""
     worst, part, supply = 0.0, 0.1 * plant.relative_error, plant.gas_pressure + plant.ambient_pressure
     for i in range(WORK):
         scale = part * (1.0 if i == X else 100.0 if i == U else supply if i < P + 2 else y[i])
-        error = abs(estimate[i]) / (scale + plant.relative_error * abs(y[i]))
+        error = abs(w[5, i]) / (scale + plant.relative_error * abs(y[i]))
         worst = error if error > worst or math.isnan(error) else worst
     return worst
 
@@ -219,6 +268,8 @@ def _error(plant: Record, y: FloatArray, estimate: FloatArray) -> float:
 @compiled
 def take(plant: Record, motion: Record, left: float, w: FloatArray) -> float:
     """One accepted step that does not pass `left`, s, into row `END`. Returns: its length, s."""
+    if motion.direction == 0 and plant.line and plant.heat_capacity_ratio == 1.0:
+        return _rest(plant, motion, left, w)
     _linearize(plant, motion, w)
     while True:
         motion.steps += 1
@@ -235,14 +286,35 @@ def take(plant: Record, motion: Record, left: float, w: FloatArray) -> float:
 
 
 @compiled
-def shorten(plant: Record, motion: Record, h: float, w: FloatArray) -> None:
-    """The step just taken again, with another length."""
-    _rosenbrock(plant, motion, h, w)
+def _rest(plant: Record, motion: Record, left: float, w: FloatArray) -> float:
+    """A step with the liquid at rest, in closed form.
+
+    While both gases change their difference may have an extreme, so the step is then a short one.
+    """
+    y, h = motion.state, left
+    if not (near_end(plant, motion, 0) or near_end(plant, motion, 1)):
+        fastest = min(gas_volume(plant, y[X]), gas_volume(plant, plant.total - y[X]))
+        h = min(left, _REST_STEP * fastest / plant.passing)
+    motion.steps += 1
+    rest_after(plant, motion, h, w, END)
+    return float(h)
 
 
 @compiled
-def between(motion: Record, h: float, part: float, w: FloatArray) -> None:
+def shorten(plant: Record, motion: Record, h: float, w: FloatArray) -> None:
+    """The step just taken again, with another length."""
+    if motion.direction == 0 and plant.line and plant.heat_capacity_ratio == 1.0:
+        rest_after(plant, motion, h, w, END)
+    else:
+        _rosenbrock(plant, motion, h, w)
+
+
+@compiled
+def between(plant: Record, motion: Record, h: float, part: float, w: FloatArray) -> None:
     """State after a part of the step into row `BETWEEN`, cubic by the rates at both ends (row `_RATE`)."""
+    if motion.direction == 0 and plant.line and plant.heat_capacity_ratio == 1.0:
+        rest_after(plant, motion, h * part, w, BETWEEN)
+        return
     for i in range(WORK):
         rise = w[END, i] - motion.state[i]
         d0, d1 = h * w[_FIRST_RATE, i], h * w[_RATE, i]
@@ -254,4 +326,4 @@ def between(motion: Record, h: float, part: float, w: FloatArray) -> None:
 @compiled
 def rates_at_end(plant: Record, motion: Record, w: FloatArray) -> None:
     """Rates at the end of a step, for `between`."""
-    _rates(plant, motion, w[END], w[_RATE])
+    _rates(plant, motion, w, END, _RATE)

@@ -40,13 +40,11 @@ def pass_time(
     """
     plant = dynamics.kept_plant(total=total)
     state = packed(plant, fill=fill, primed=primed, motion=motion)
-    fills, workspace, now = np.empty(instants.shape), np.zeros(WORKSPACE), 0.0
-    for place, instant in enumerate(instants.tolist()):
-        advance(plant[0], state[0], instant - now, workspace)
-        fills[place], now = state["state"][0, X], instant
+    notes = np.stack([instants, instants])
+    advance(plant[0], state[0], float(instants[-1]), notes, 1, instants.size, np.zeros(WORKSPACE))
     lowest, highest = max(0.0, total - dynamics.max_fill_ratio), min(total, dynamics.max_fill_ratio)
     return Passage(
-        fills=np.clip(fills, lowest, highest),
+        fills=np.clip(notes[1], lowest, highest),
         fill=float(state["state"][0, X]),
         primed=bool(state["primed"][0]),
         motion=unpacked(plant, state),

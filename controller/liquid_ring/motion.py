@@ -27,8 +27,8 @@ RELATIVE_ERROR: Final = 1e-9
 """Of each state, allowed to one step of a single run."""
 MOST_STEPS: Final = 200_000
 """Within one interval of time."""
-_FIRST_STEP: Final = 1e-6
-"""s, after a jump of the rates, at `RELATIVE_ERROR`; it grows as the method's order lets it."""
+_FIRST_STEP: Final = 1e-4
+"""s, at the most after a jump of the rates, at `RELATIVE_ERROR`; it grows as the method's order lets it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,7 +155,7 @@ def _filled(dynamics: Dynamics, total: float, relative_error: float) -> npt.NDAr
             raise ValueError(f"a table of the law has {len(pieces)} pieces, at most {PIECES} can be compiled")
         plant["cells"][0, which, : len(pieces)] = pieces
         plant["pieces"][0, which] = len(pieces)
-        plant["table_start"][0, which], plant["table_step"][0, which] = table.start, table.step
+        plant["table_start"][0, which], plant["nodes_per"][0, which] = table.start, 1.0 / table.step
     return plant
 
 
@@ -163,8 +163,9 @@ def _fill_line(plant: npt.NDArray[np.void], line: GasLine | None) -> None:
     plant["temperature"], plant["heat_capacity_ratio"] = 1.0, 1.0
     if line is not None:
         plant["line"], plant["temperature"] = True, line.temperature
+        warm = math.sqrt(line.temperature / REFERENCE_TEMPERATURE)
         plant["critical_ratio"] = line.critical_ratio
-        plant["passing"] = line.conductance * REFERENCE_PRESSURE / math.sqrt(REFERENCE_TEMPERATURE)
+        plant["passing"] = line.conductance * REFERENCE_PRESSURE * warm
         plant["heat_capacity_ratio"] = 1.0 if line.process == "isothermal" else HEAT_CAPACITY_RATIO
 
 
@@ -191,6 +192,7 @@ def packed(
         "started": fill,
         "fill_before": record.fill,
         "least_fill": total - fill if chamber else fill,
+        "residual": known["residual"],
         "closing_pressure": record.closing_pressure,
         "run_dry": record.run_dry,
         "primed": primed,

@@ -38,7 +38,7 @@ _PLANT_REAL: Final = (
     "gas_pressure",  # of the supply, gauge, Pa
     "ambient_pressure",  # absolute, Pa
     "temperature",  # of supply and surroundings, K
-    "passing",  # C p_0 sqrt(1/T_0) of the line, m^3/(s K^(1/2))
+    "passing",  # C p_0 sqrt(T/T_0) of the line with gas of that temperature, m^3/s
     "critical_ratio",
     "heat_capacity_ratio",  # exponent of the gas: 1 isothermal, gamma adiabatic
     "dead_volume",  # m^3
@@ -46,7 +46,7 @@ _PLANT_REAL: Final = (
     "chamber_volume",  # V, m^3
     "max_fill_ratio",
     "total",  # x_A + x_C
-    "residual",  # fill of a driven chamber that no command goes below
+    "residual",  # of a single run, as below
     "relative_error",  # allowed to one step
     "first_step",  # s, after a jump of the rates
 )
@@ -63,7 +63,7 @@ PLANT: Final = np.dtype(
     + [(name, np.int64) for name in _PLANT_WHOLE]
     + [
         ("table_start", np.float64, (4,)),
-        ("table_step", np.float64, (4,)),
+        ("nodes_per", np.float64, (4,)),  # unit of the argument
         ("pieces", np.int64, (4,)),
         ("cells", np.float64, (4, PIECES, 6)),
     ]
@@ -80,10 +80,12 @@ _MOTION_REAL: Final = (
     "closes",
     "log_speed",  # of the factor on the law's velocity
     "length",  # of the next step, s
+    "now",  # s since the interval began
     "started",  # x at the last start
     "ran_back",  # change of x by flow out of the chamber not driven last, both valves closed
     "fill_before",  # of the driven chamber at the command
     "least_fill",  # of the driven chamber since
+    "residual",  # fill of a driven chamber that no command goes below
     "closing_pressure",  # of the driven chamber's gas when its valve closed, gauge, Pa
     "run_dry",  # time for which its valve stays open to the empty chamber, s
 )
@@ -95,6 +97,7 @@ _MOTION_WHOLE: Final = (
     "balanced",  # whether a further start would be round-off
     "stopped",  # direction of the last flow that ended
     "steps",
+    "noted",  # instants of the interval that are over
     "chamber",  # 0 or 1: the one driven last
     "regime_start",  # values of `Regime`
     "regime_end",
@@ -108,5 +111,5 @@ MOTION: Final = np.dtype(
 """One pair of chambers; x of chamber 1 is total - x, here as everywhere, so liquid is conserved."""
 EVENTS: Final = tuple(Event)
 """Events by number."""
-WORKSPACE: Final = (24, 8)
+WORKSPACE: Final = (14, 8)
 """Shape of the array that a step of a pair works in."""

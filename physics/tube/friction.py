@@ -89,7 +89,7 @@ def _branch_gap(
     bounded = np.clip(re, 1000.0, 1e12)
     turbulent = 8 * np.asarray(turbulent_ratio) * _log_power(bounded, relative_roughness) ** -0.125
     # Where rotation has raised the laminar branch above the turbulent one there is no jump to be early or
-    # late for: friction follows the laminar branch, as measured in rotating ducts.
+    # late for: what was measured in rotating ducts lies at the laminar branch or above it.
     return np.maximum(turbulent - 64 * np.asarray(laminar_ratio, dtype=np.float64) / re, 0.0)
 
 

@@ -19,6 +19,8 @@ _SAMPLES: Final = 201
 """Fills at which gas in the port is looked for before the root is refined."""
 _PIECES: Final = 32
 """Of an interval that holds the root, per refinement."""
+_FACTORS: Final = 201
+"""Nodes of a table over factors of the velocity."""
 _REFINEMENTS: Final = 2
 """Leave 2e-6 of the range, within which a straight line is good to 1e-9."""
 
@@ -56,6 +58,12 @@ def residual_fill_ratio(scene: Scene, *, law: FlowLaw) -> float:
     Raises: ValueError: a disc at rest.
     """
     return float(_residual(scene, law, np.ones(1))[0])
+
+
+def residual_by_velocity(scene: Scene, *, law: FlowLaw) -> tuple[FloatArray, FloatArray]:
+    """Factors of a law's velocity from 0 to 2, and the same with each: the depth goes with its power 2/5."""
+    factors = np.linspace(0.0, 2.0, _FACTORS)
+    return factors, _residual(scene, law, factors**0.4)
 
 
 def residual_liquid(scene: Scene, *, law: CalibratedLaw) -> ResidualLiquid:

@@ -39,7 +39,7 @@ def _collect(work: Work) -> Record:
         "contours": {
             name: _contour(found, apparent=apparent) for name, apparent in (("k", False), ("apparent", True))
         },
-        "liquids": _liquid_records(verdicts),
+        "liquids": _with_budget(_liquid_records(verdicts), work.calibration),
         "apparent": _apparent(work.calibration),
     }
 
@@ -103,6 +103,16 @@ def _liquid_records(verdicts: LiquidVerdicts) -> list[Record]:
             }
         )
     return found
+
+
+def _with_budget(liquids: list[Record], calibration: Calibration) -> list[Record]:
+    """The scene's own liquid, the first, with the uncertainties that every other table gives its point."""
+    first, *others = liquids
+    if first["starts_at_scene_pressure"] and calibration.scene.tube.drag_coefficient is None:
+        budgets = calibration.budgets
+        names = {"velocity_uncertainty": "velocity", "k_uncertainty": "drag_coefficient"}
+        first = first | {key: budgets[name].total for key, name in names.items() if name in budgets}
+    return [first, *others]
 
 
 def _point_record(point: DragPoint, i: int) -> Record:

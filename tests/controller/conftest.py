@@ -211,7 +211,8 @@ class Forces:
     ) -> tuple[float, bool, bool]:
         """Velocity out of chamber 0, whether separated, whether the tube holds a column."""
         known = self.dynamics.kept_plant(total=0.5)[0]
-        return compiled_column.steady(known, *fills, *gases, primed, 0.0)
+        given = (known, *fills, *gases, primed, 0.0)
+        return *compiled_column.steady(*given), compiled_column.holds(*given)
 
     def accelerations(
         self, fills: tuple[float, float], gases: tuple[float, float], *, speed: float, primed: bool = True
@@ -219,7 +220,7 @@ class Forces:
         """Of a full and of a separated column that flows out of chamber 0."""
         known = self.dynamics.kept_plant(total=0.5)[0]
         at = compiled_column.ends(known, *fills, *gases, 1)
-        return compiled_column.accelerations(known, at, speed, 1, primed, 0.0)
+        return compiled_column.accelerations(known, at, speed, 1, primed, 0.0)[:2]
 
 
 @pytest.fixture(scope="session")

@@ -13,7 +13,8 @@ import pytest
 from scipy.integrate import quad
 
 from ringbalance.controller.formulas.gas_flow import flow_shape
-from ringbalance.controller.liquid_ring.compiled_step import line_rates
+from ringbalance.controller.liquid_ring import compiled_column
+from ringbalance.controller.liquid_ring.compiled_gas import line_rates
 from ringbalance.controller.liquid_ring.interval import Passage, pass_time
 from ringbalance.controller.liquid_ring.motion import Dynamics, Motion
 from ringbalance.physics.gas.supply import GasLine
@@ -22,6 +23,7 @@ from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
 Plant = Callable[..., Dynamics]
@@ -75,6 +77,34 @@ def test_the_accelerations_vanish_at_the_laws_velocity(
         at = ((x, 0.5 - x), (pressure, 0.0))
         started = min(column.accelerations(*at, speed=0.0))
         assert abs(min(column.accelerations(*at, speed=u))) < 1e-8 * started
+
+
+@pytest.mark.parametrize("primed", [True, False])
+@pytest.mark.parametrize("hump", ["vented", "trapped"])
+def test_the_derivatives_of_the_column_are_those_of_its_acceleration(
+    scene: Scene, hump: Any, primed: bool, plant_of: Plant
+) -> None:
+    own = replace(scene, tube=replace(scene.tube, hump_gas=hump))
+    known = plant_of(own, calibrate(own).model, "tube inertia").kept_plant(total=0.5)[0]
+    random, seen = np.random.default_rng(3), set()
+    for _ in range(60):
+        at = np.array([*random.uniform([2e5, 0.0], [9e5, 2e5]), *random.uniform(2e5, 1e6, 2)])
+        speed = float(random.uniform(0.5, 20.0))
+
+        def smaller(speed: float, at: FloatArray) -> float:
+            return min(compiled_column.accelerations(known, tuple(at), speed, 1, primed, 0.0)[:2])
+
+        found = compiled_column.accelerations(known, tuple(at), speed, 1, primed, 0.0)
+        seen.add(found[0] < found[1])
+        slopes = [(smaller(speed * (1 + 1e-6), at) - smaller(speed * (1 - 1e-6), at)) / (2e-6 * speed)]
+        for place in (0, 2, 1, 3):
+            step = np.eye(4)[place]
+            slopes.append((smaller(speed, at + step) - smaller(speed, at - step)) / 2.0)
+        assert slopes[1] == pytest.approx(slopes[2], rel=1e-4)
+        scale = abs(found[3])
+        assert found[2] == pytest.approx(slopes[0], rel=1e-3)
+        assert [*found[3:]] == pytest.approx([slopes[1], *slopes[3:]], rel=1e-4, abs=1e-4 * scale)
+    assert seen == {True, False}
 
 
 def test_the_column_separates_where_the_hump_would_cavitate(
@@ -178,8 +208,31 @@ def test_the_flow_shape_is_that_of_the_standard(calibrated: BalancerModel, plant
     assert below == pytest.approx(above, rel=1e-6)
     # 1 l/(s bar) at 8 bar absolute passes 8 l/s of free air: 1.19 kg/m^3 of it, into 1 l.
     own = plant(calibrated, "gas filling", pressure=8e5 - AMBIENT, temperature=293.15, **PIPED)
-    _, content = line_rates(own.kept_plant(total=0.5)[0], 1e5, 1.0, 1e-3, 0.0, True)
+    content = line_rates(own.kept_plant(total=0.5)[0], 1e5, 1.0, 1e-3, 0.0, True)[1]
     assert content / 287.06 == pytest.approx(8e-3 * 1.188, rel=1e-3)
+
+
+@pytest.mark.parametrize("is_open", [True, False])
+@pytest.mark.parametrize("process", ["isothermal", "adiabatic"])
+def test_the_derivatives_of_the_gas_are_those_of_its_rates(
+    calibrated: BalancerModel, plant: Plant, process: str, is_open: bool
+) -> None:
+    known = plant(calibrated, "gas filling", process=process, **PIPED).kept_plant(total=0.5)[0]
+    for pressure in (1.1e5, 3e5, 6e5):
+        start = np.array([pressure, 5e-5, pressure * 5e-5 / 300.0])
+
+        def rates(state: FloatArray) -> tuple[float, float]:
+            p, volume, content = state.tolist()
+            found = line_rates(known, p, content, volume, 3e-5, is_open)
+            return found[0], found[1]
+
+        p, volume, content = start.tolist()
+        found = line_rates(known, p, content, volume, 3e-5, is_open)
+        for place, size in enumerate(start):
+            step = np.eye(3)[place] * 1e-6 * size
+            slope = (np.array(rates(start + step)) - rates(start - step)) / (2e-6 * size)
+            scale = np.abs(np.array(rates(start))) / size
+            assert np.all(np.abs(slope - [found[2 + place], found[5 + place]]) <= 1e-6 * scale)
 
 
 @pytest.mark.parametrize("filling", [True, False])

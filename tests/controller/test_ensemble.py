@@ -40,7 +40,7 @@ from ringbalance.controller.simulation import Outcome
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw, PaperMoment, paper_model
-from ringbalance.reduced_model.operating.residual import residual_fill_ratio
+from ringbalance.reduced_model.operating.residual import residual_by_velocity, residual_fill_ratio
 from ringbalance.scene.models import Scene
 
 EXACT = MemberUncertainty(velocity=0.0, moment=0.0, influence_coefficient=0.0, lag_angle=0.0)
@@ -118,14 +118,16 @@ def test_every_member_is_the_scalar_run(scene: Scene, chambers: int, noise: bool
         asked = replace(asked, sensor=scene.sensor)
     model = paper_model(asked)
     members = various(asked, size=size)
-    # An ensemble keeps to the residual fill of the scene's own values.
-    residual = residual_fill_ratio(asked, law=model.flow)
+    residuals = np.interp(members.velocity_factor, *residual_by_velocity(asked, law=model.flow))
     found = simulate_members(asked, model, members=members, seed=4)
     outcomes = []
     for member in range(size):
         own_scene, own_model = alone(asked, model, members, member)
         sensor = sensor_of(asked, seed=4, member=member) if noise else None
+        residual = float(residuals[member])
+        assert residual == pytest.approx(residual_fill_ratio(own_scene, law=own_model.flow), abs=1e-6)
         run = simulate(own_scene, own_model, sensor=sensor, residual_fill=residual)
+        assert found.shortened[member] == run.shortened
         outcomes.append(run.outcome)
         assert found.settled[member] == run.settled
         assert found.overshoots[member] == run.overshoots

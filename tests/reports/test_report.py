@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from check_traces import traces, untrue
+from check_traces import apart, traces, untrue
 from keep_evidence import kept_document
 
 from ringbalance.reports import cli
@@ -92,6 +92,7 @@ def test_the_page_comes_from_the_evidence_file_alone(first: Report) -> None:
     for name, page in render(evidence).items():
         assert (first.page.parent / name).read_text() == page
     assert untrue(render(evidence).values(), evidence) == []
+    assert apart(evidence) == []
     assert len(traces(render(evidence).values())) > 100
 
 

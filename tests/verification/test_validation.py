@@ -149,6 +149,12 @@ def test_all_errors_of_a_file_are_reported_together_with_row_and_column() -> Non
         (_HEAD + "friction_factor\n0.02\n", "reynolds"),
         (_HEAD + "reynolds,friction_factor,colour\n1000,0.02,3\n", "colour"),
         (_HEAD + "reynolds,friction_factor\n1000,0\n", "friction_factor"),
+        (_HEAD + "reynolds,friction_factor\n1e-320,0.02\n", "line 5"),
+        (_HEAD + "reynolds,friction_factor,aspect_ratio\n1000,0.02,0.2\n", "aspect_ratio"),
+        (
+            _HEAD.replace("friction", "wave_frequency") + "depth_over_width,frequency_ratio\n1000,2\n",
+            "depth_over_width",
+        ),
     ],
 )
 def test_what_cannot_be_predicted_is_refused_by_name(text: str, named: str) -> None:

@@ -28,6 +28,7 @@ _UNITS: Final[Mapping[str, Unit]] = {
     name: unit for kind in DIMENSIONS.values() for name, unit in kind.units.items()
 }
 _MOST_SHOWN: Final = 20
+_SIZES: Final = (1e-15, 1e15)
 _ENOUGH: Final = {"kind", "source", "uncertainty"}
 
 
@@ -164,18 +165,20 @@ def _row_faults(heads: Sequence[str], rows: Iterable[Sequence[str]], places: Seq
             faults.append(f"line {at} has {len(row)} values, the columns are {len(heads)}")
             continue
         faults += [
-            f'line {at}, column "{head}": "{text}" is not a finite number'
+            f'line {at}, column "{head}": "{text}" is no number of a size that is measured'
             for head, text in zip(heads, row, strict=True)
-            if head != SERIES and not _finite(text)
+            if head != SERIES and not _is_measured(text)
         ]
     return faults
 
 
-def _finite(text: str) -> bool:
+def _is_measured(text: str) -> bool:
+    """Whether it is zero, or a number within `_SIZES` of either sign."""
     try:
-        return math.isfinite(float(text))
+        size = abs(float(text))
     except ValueError:
         return False
+    return size == 0 or _SIZES[0] <= size <= _SIZES[1]
 
 
 def _in_si(head: str, column: Sequence[str]) -> tuple[str, FloatArray]:

@@ -15,8 +15,11 @@ from ringbalance.verification.navier_stokes.rotating_section import (
     solve_section_without_inertia,
 )
 from ringbalance.verification.validation.kinds import Kind, Prediction
-from ringbalance.verification.validation.measurements import Measurements, measurements
+from ringbalance.verification.validation.measurements import Measurements, MeasurementsError, measurements
 from ringbalance.verification.validation.model_bias import ModelStatistics, model_statistics
+
+_WIDEST: Final = 20
+"""Long over short side of a duct whose section is meshed."""
 
 
 class Formula(Protocol):
@@ -108,6 +111,9 @@ def _laminar_ratio(aspect_ratio: FloatArray) -> FloatArray:
 
 
 def _predict(data: Measurements) -> Prediction:
+    aspect = data.columns.get("aspect_ratio", np.zeros(len(data)))
+    if not np.all((aspect == 0) | ((aspect >= 1) & (aspect <= _WIDEST))):
+        raise MeasurementsError(f"aspect_ratio must be 0 or from 1 to {_WIDEST} in every row")
     points = _points_of(data)
     return Prediction(value=points.predicted(), stated=points.stated())
 

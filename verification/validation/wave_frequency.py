@@ -15,17 +15,21 @@ from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY
 from ringbalance.physics.sloshing.system import sloshing_system
 from ringbalance.scene.models import Disc
 from ringbalance.verification.validation.kinds import Kind, Prediction
-from ringbalance.verification.validation.measurements import Measurements
+from ringbalance.verification.validation.measurements import Measurements, MeasurementsError
 
 CALIBRATING: Final = ("tank 1", "tank 3", "tank 5", "tank 7")
 """Tanks of Addington whose points gave the uncertainty that the program states, and are not judged."""
 _RADIUS: Final = 1e4
 """Of the chamber, in widths of the tank."""
+_DEPTHS: Final = (0.01, 10.0)
 _CELLS: Final = (8, 16)
 
 
 def _predict(data: Measurements) -> Prediction:
-    depths, place = np.unique(data.columns["depth_over_width"], return_inverse=True)
+    given = data.columns["depth_over_width"]
+    if not np.all((given >= _DEPTHS[0]) & (given <= _DEPTHS[1])):
+        raise MeasurementsError(f"depth_over_width must lie from {_DEPTHS[0]} to {_DEPTHS[1]} in every row")
+    depths, place = np.unique(given, return_inverse=True)
     found = np.array([tank_frequency(float(depth)) for depth in depths])[place]
     return Prediction(value=found, stated=FREQUENCY_UNCERTAINTY * found)
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ringbalance.reduced_model.budget import rounded
+
 _TITLES = {
     "tube": "Straight turning tube, laminar",
     "bend": "Turning tube with two bends, laminar, three dimensions",
@@ -13,8 +15,8 @@ _TITLES = {
 }
 _NOTES = {
     "tube": """\
-SRFSimpleFoam on one slab of cells with cyclic ends. Here: the table of friction ratios that the tube
-law reads.""",
+SRFSimpleFoam on one slab of cells with cyclic ends. Here: the section solved on one mesh, with the
+uncertainty of the table that the tube law reads.""",
     "bend": """\
 SRFSimpleFoam, with developed inflow from its own straight tube. Here: the kept solution of the case
 `bent_tube_3d`.""",
@@ -24,16 +26,17 @@ knows the secondary flow that the Coriolis force drives, not what rotation does 
 second opinion, not a measurement. Here: the tube law's friction with its uncertainty.""",
     "waves": """\
 pimpleFoam on a mesh that moves with the surface; kinematic viscosity 1e-5 of omega R2^2, gravity 0.005
-of omega^2 R2. Here: linear theory without viscosity, with the uncertainty of its cells alone. With
-plates the surface meets the wall at an angle and its tracking fails after a few turns: waves in
-chambers with plates are verified by a second calculation only.""",
+of omega^2 R2. Here: linear theory without viscosity; its uncertainty is that of its cells and the
+square of the waves' height over the depth. With plates the surface meets the wall at an angle and its
+tracking fails after a few turns: waves in chambers with plates are verified by a second calculation only.""",
 }
 _HEAD = """# Beside OpenFOAM
 
 What the program computes, beside an independent code that shares nothing with it but the cells of the
 tube's section. OpenFOAM {openfoam} of Debian, run on {date} by `make bench-cfd`. The uncertainty of
 OpenFOAM is that of its cells (grid convergence index on three meshes, 95 %), that of the program is
-what it states for the quantity. The two agree when their difference is within both.
+what it states for the quantity. The two agree when their difference is within both. Times are of one
+processor core, on the finest mesh.
 """
 
 
@@ -57,10 +60,15 @@ def _line(row: Mapping[str, Any]) -> str:
     theirs, ours = row["openfoam"], row["ringbalance"]
     cells = (
         row["quantity"],
-        f"{theirs:.4g} ± {row['openfoam_half_width']:.1g}",
-        f"{ours:.4g} ± {row['ringbalance_half_width']:.1g}",
+        _with_half_width(theirs, row["openfoam_half_width"]),
+        _with_half_width(ours, row["ringbalance_half_width"]),
         f"{theirs / ours - 1:+.2%}".replace("%", " %"),
         "yes" if row["agrees"] else "no",
-        f"{row['seconds']:.0f} s",
+        f"{row['seconds']:.2g} s",
+        f"{row['ringbalance_seconds']:.2g} s",
     )
     return "| " + " | ".join(cells) + " |"
+
+
+def _with_half_width(value: float, half_width: float) -> str:
+    return f"{rounded(value, half_width)} ± {rounded(half_width, half_width)}"

@@ -19,7 +19,7 @@ from ringbalance.scene.arrays import FloatArray, IntArray
 
 _VISCOSITY = 1e-5
 """Over omega R2^2: thin layers, whose damping is outside the comparison."""
-_GRAVITY = 0.005
+GRAVITY = 0.005
 """g over omega^2 R2: small waves."""
 _SLIP = {"type": "slip"}
 _EMPTY = {"type": "empty"}
@@ -256,7 +256,7 @@ def turning_gravity(*, ramp: float) -> Force:
 
     def force(time: FloatArray) -> FloatArray:
         share = np.clip(time / (ramp * _TURN), 0.0, 1.0)
-        size = _GRAVITY * share**3 * (10 - 15 * share + 6 * share**2)
+        size = GRAVITY * share**3 * (10 - 15 * share + 6 * share**2)
         return np.stack([size * np.cos(time), -size * np.sin(time)], axis=1)
 
     return force
@@ -267,7 +267,7 @@ def push(*, duration: float) -> Force:
 
     def force(time: FloatArray) -> FloatArray:
         inside = time < duration * _TURN
-        size = np.where(inside, _GRAVITY * np.sin(np.pi * time / (duration * _TURN)) ** 2, 0.0)
+        size = np.where(inside, GRAVITY * np.sin(np.pi * time / (duration * _TURN)) ** 2, 0.0)
         return np.stack([0.8 * size, -0.6 * size], axis=1)
 
     return force
@@ -293,7 +293,7 @@ def quasi_static(chamber: Chamber) -> tuple[float, float]:
     # Along the chamber's middle and across it; the liquid's moment loses eta a where the surface moves out.
     along = a**2 * 2 * half * (square - mean**2)
     across = a**2 * 2 * half * (1 - square)
-    return _GRAVITY * float(np.hypot(along, across)), _GRAVITY * mean * (1 - a)
+    return GRAVITY * float(np.hypot(along, across)), GRAVITY * mean * (1 - a)
 
 
 def frequencies(time: FloatArray, values: FloatArray, *, after: float, count: int) -> FloatArray:

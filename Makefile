@@ -16,7 +16,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 
-.PHONY: help env report test test-faults test-heavy test-short test-versions lint format bench lock clean
+.PHONY: help env report test test-faults test-heavy test-short test-versions lint format bench bench-cfd lock clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1\t\2/p' Makefile | expand -t 18
@@ -65,6 +65,10 @@ bench: ## timed comparisons, in an environment of their own with every extra (hu
 	$(BENCH_VENV)/bin/python benchmarks/moving_injection.py
 	$(BENCH_VENV)/bin/python benchmarks/closed_loop_moving.py
 	$(BENCH_VENV)/bin/python benchmarks/eccentric_mass.py
+
+bench-cfd: env ## the tube and the waves beside OpenFOAM, an hour or so; keeps the results
+	@sh tools/make_openfoam.sh
+	$(PYTHON_IN_VENV) benchmarks/openfoam.py --keep
 
 lock: env ## rewrite the lock files from pyproject.toml (a change of dependencies only)
 	sh tools/make_lock.sh $(VENV)/bin/uv

@@ -46,7 +46,7 @@ _DEVELOPED: Final = (5.0, 1.0)
 reference = dict.fromkeys(("straight", "explained"), Reference(value=1.0))
 
 
-def _path(scene: Scene, refinement: float) -> tuple[Segment, ...]:
+def path_over_crest(scene: Scene, refinement: float) -> tuple[Segment, ...]:
     """Leg, bend to the right, over the crest, bend to the right, leg; lengths over the bore.
 
     Args: `refinement`: cells along the path over those of the coarsest mesh.
@@ -87,7 +87,7 @@ def _solve(scene: Scene, *, mesh: tuple[int, int, float], coriolis_factor: float
     """
     around, across, along = mesh
     flow = bent_tube_flow(
-        segments=_path(scene, along),
+        segments=path_over_crest(scene, along),
         cells=SectionMesh(around=around, across=across, wall_ratio=3.0),
         reynolds=REYNOLDS,
         rotation_reynolds=_rotation(scene),
@@ -201,7 +201,7 @@ def _sizes(scene: Scene, meshes: Sequence[tuple[int, int, float]]) -> list[float
     counts = []
     for around, across, along in meshes:
         section = 2 * around**2 + 4 * around * across
-        counts.append(section * sum(segment.cells for segment in _path(scene, along)))
+        counts.append(section * sum(segment.cells for segment in path_over_crest(scene, along)))
     return [count ** (-1 / 3) for count in counts]
 
 

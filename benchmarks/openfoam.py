@@ -1,0 +1,330 @@
+"""The program beside OpenFOAM: the turning tube, straight and bent, and waves on the ring.
+
+    python benchmarks/openfoam.py [--out out/openfoam] [--only tube bend turbulent waves] [--keep]
+
+Needs Debian's package `openfoam` (1912), which nothing else does.  Every quantity is computed on three
+meshes; its uncertainty is that of the grid convergence index, and the two agree when their difference is
+within both uncertainties.  `--keep` writes the results, dated, to benchmarks/openfoam.json and
+docs/beside-openfoam.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import platform
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from openfoam_page import page
+from openfoam_tubes import bent_tube, straight_tube
+from openfoam_waves import (
+    GRAVITY,
+    Chamber,
+    Record,
+    frequencies,
+    push,
+    quasi_static,
+    swing,
+    track,
+    turning_gravity,
+)
+
+from ringbalance.mesh.bent_tube import Segment
+from ringbalance.mesh.geometry import surface_radius
+from ringbalance.physics.convergence.grid import gci
+from ringbalance.physics.sloshing.modes import sloshing_modes
+from ringbalance.physics.sloshing.response import sloshing_response
+from ringbalance.physics.tube.numbers import rotation_reynolds_number
+from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
+from ringbalance.physics.tube.state import tube_state_at
+from ringbalance.physics.tube.uncertainty import model_parts
+from ringbalance.reports.saved import PACKAGED
+from ringbalance.scene import write_whole
+from ringbalance.scene.loader import bundled_scene, load_scene
+from ringbalance.scene.models import Disc, Scene
+from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.verification.cases.bent_tube_3d.case import REYNOLDS, VISCOSITY, path_over_crest
+from ringbalance.verification.navier_stokes.rotating_section import (
+    SectionMesh,
+    developed_section,
+    friction_ratio,
+)
+from ringbalance.verification.reference.bent_tube import bent_tube_flow
+
+HERE = Path(__file__).resolve().parent
+KEPT = HERE / "openfoam.json"
+PAGE = HERE.parent / "docs" / "beside-openfoam.md"
+FORMAL_ORDER = 2.0
+LAMINAR = ((1e4, 0.5), (1e5, 0.5))
+"""Kl = R Re and S = R/Re."""
+TURBULENT = ((1e4, 0.0), (1e4, 2356.0), (2e4, 2356.0))
+"""Re and R; 2356 is water in the paper's tube."""
+FILLS = (0.25, 0.45)
+STEPS, WRITES, RAMP, TURNS, PUSH = 150, 25, 9.0, 14.0, 0.4
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answer:
+    """What the program says: a value with its half-width (95 %), and the processor time for it, s."""
+
+    value: float
+    half_width: float
+    seconds: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """One quantity by both programs."""
+
+    quantity: str
+    openfoam: float
+    openfoam_half_width: float
+    """95 %, of the cells alone."""
+    ringbalance: float
+    ringbalance_half_width: float
+    """95 %, of all that is uncertain in the program's answer."""
+    seconds: float
+    """Processor time of OpenFOAM's finest mesh."""
+    ringbalance_seconds: float
+    """Processor time of the program's answer."""
+    cells: tuple[int, ...]
+    """Along one length, coarse to fine: around a quarter of the section, or around the chamber."""
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the difference lies within both uncertainties."""
+        both = float(np.hypot(self.openfoam_half_width, self.ringbalance_half_width))
+        return abs(self.openfoam - self.ringbalance) <= both
+
+
+def row(
+    *, quantity: str, values: Sequence[float], cells: Sequence[int], ours: Answer,
+    seconds: float,
+) -> Row:  # fmt: skip
+    """From the values of three meshes, coarse to fine, with numbers of cells along one length."""
+    sizes = [1 / count for count in cells[::-1]]
+    found = gci(values=list(values)[::-1], sizes=sizes, formal_order=FORMAL_ORDER, round_off=1e-6)
+    return Row(
+        quantity=quantity, openfoam=values[-1], openfoam_half_width=float(found.uncertainty),
+        ringbalance=ours.value, ringbalance_half_width=ours.half_width, seconds=seconds,
+        ringbalance_seconds=ours.seconds,
+        cells=tuple(cells),
+    )  # fmt: skip
+
+
+def tube(_: Scene, out: Path) -> Iterator[Row]:
+    """Laminar friction of the straight turning tube over that at rest."""
+    for kl, s in LAMINAR:
+        reynolds = (kl / s) ** 0.5
+        rotation = s * reynolds
+        around = (8, 12, 16)
+        runs = [
+            straight_tube(
+                folder=out / f"tube-{n}", reynolds=reynolds, rotation_reynolds=rotation,
+                cells=(n, 3 * n // 2, 3.0), turbulent=False,
+            )
+            for n in around
+        ]  # fmt: skip
+        yield row(
+            quantity=f"laminar friction over that at rest, Re {reynolds:.0f}, R {rotation:.0f}",
+            values=[f * reynolds / 64 for f, _ in runs], cells=around,
+            ours=_solved_section(reynolds, rotation), seconds=runs[-1][1].seconds,
+        )  # fmt: skip
+
+
+def _solved_section(reynolds: float, rotation: float) -> Answer:
+    table = rotating_friction_ratio(reynolds=reynolds, rotation_reynolds=rotation)
+    begin = time.process_time()
+    system = SectionMesh(around=8, across=12, wall_ratio=15.0).system()
+    solved = developed_section(system=system, kl=reynolds * rotation, s=rotation / reynolds)
+    seconds = time.process_time() - begin
+    return Answer(value=friction_ratio(solved), half_width=float(table.uncertainty), seconds=seconds)
+
+
+def bend(scene: Scene, out: Path) -> Iterator[Row]:
+    """Loss over two bends of a turning tube, against the kept solution in three dimensions."""
+    start, end = 2.0, 20.0
+    rotation = rotation_reynolds_number(
+        angular_velocity=scene.rotor.speed, bore=scene.tube.bore, kinematic_viscosity=VISCOSITY
+    )
+    around = (4, 6, 8)
+    runs = [
+        bent_tube(
+            folder=out / f"bend-{n}", segments=_refined(path_over_crest(scene, 2.0), n / 4),
+            cells=(n, 3 * n // 2, 3.0), reynolds=REYNOLDS, rotation_reynolds=rotation,
+        )
+        for n in around
+    ]  # fmt: skip
+    yield row(
+        quantity=f"loss coefficient, {end - start:g} bores and two bends, Re {REYNOLDS:g}, R {rotation:.0f}",
+        values=[found.loss(start, end) for found in runs], cells=around,
+        ours=_kept_loss(start, end, seconds=_time_of_a_solve(scene, rotation)), seconds=runs[-1].seconds,
+    )  # fmt: skip
+
+
+def _refined(segments: Sequence[Segment], factor: float) -> list[Segment]:
+    return [replace(segment, cells=round(segment.cells * factor)) for segment in segments]
+
+
+def _time_of_a_solve(scene: Scene, rotation: float) -> float:
+    """On the second of the three kept meshes, which errs by 0.4 %: about as OpenFOAM's finest does."""
+    begin = time.process_time()
+    bent_tube_flow(
+        segments=path_over_crest(scene, 1.5), cells=SectionMesh(around=2, across=3, wall_ratio=3.0),
+        reynolds=REYNOLDS, rotation_reynolds=rotation,
+    )  # fmt: skip
+    return time.process_time() - begin
+
+
+def _kept_loss(start: float, end: float, *, seconds: float) -> Answer:
+    """Of the heavy case bent_tube_3d: loss between two places, and its share of the whole's uncertainty."""
+    kept = json.loads((HERE.parent / "reports/data" / PACKAGED).read_text(encoding="utf-8"))
+    case = next(case for case in kept["verification"] if case["id"] == "bent_tube_3d")
+    series = case["series"][0]
+    at, beyond = np.array(series["x"]["values"]), np.array(series["y"][0]["values"])
+    whole = case["numbers"]["k"]
+    straight = (whole - beyond[-1]) / at[-1] * (end - start)
+    loss = straight + np.interp(end, at, beyond) - np.interp(start, at, beyond)
+    half = float(case["numbers"]["half_width"] * loss / whole)
+    return Answer(value=float(loss), half_width=half, seconds=seconds)
+
+
+def turbulent(scene: Scene, out: Path) -> Iterator[Row]:
+    """Turbulent friction by the k-omega SST model, which was not made for a turning frame."""
+    smooth = replace(scene.tube, roughness=0.0, bends=())
+    for reynolds, rotation in TURBULENT:
+        around = (6, 8, 10)
+        runs = [
+            straight_tube(
+                folder=out / f"turbulent-{n}", reynolds=reynolds, rotation_reynolds=rotation,
+                cells=(n, 3 * n, 60.0), turbulent=True,
+            )
+            for n in around
+        ]  # fmt: skip
+        begin = time.process_time()
+        state = tube_state_at(tube=smooth, reynolds=[reynolds], rotation_reynolds=rotation)
+        parts = model_parts(tube=smooth, state=state)
+        half = np.hypot(parts["friction correlation"][0], parts["rotation model"][0])
+        ours = Answer(
+            value=float(state.rotating_friction[0]), half_width=float(half) * smooth.bore / smooth.length,
+            seconds=time.process_time() - begin,
+        )  # fmt: skip
+        yield row(
+            quantity=f"turbulent friction factor, Re {reynolds:.0f}, R {rotation:.0f}",
+            values=[f for f, _ in runs], cells=around,
+            ours=ours, seconds=runs[-1][1].seconds,
+        )  # fmt: skip
+
+
+def waves(scene: Scene, out: Path) -> Iterator[Row]:
+    """Answer to gravity once a turn, and the lowest free frequencies, without plates."""
+    disc = replace(scene.disc, plate_thickness=0.0)
+    cells = ((6, 36), (8, 48), (12, 72))
+    for fill in FILLS:
+        chambers = [
+            Chamber(
+                central_angle=disc.central_angle, cells=count,
+                surface_radius=float(surface_radius(disc=disc, fill_ratio=fill)) / disc.outer_radius,
+            )
+            for count in cells
+        ]  # fmt: skip
+        found = [_answers(chamber, out / f"waves-{chamber.cells[0]}") for chamber in chambers]
+        for name, ours in _theory(disc, fill).items():
+            yield row(
+                quantity=f"{name}, fill {fill:g}", values=[values[name] for values in found],
+                cells=[around for _, around in cells], ours=ours, seconds=found[-1]["seconds"],
+            )  # fmt: skip
+
+
+def _answers(chamber: Chamber, folder: Path) -> dict[str, float]:
+    def follow(force: Any, turns: float, writes: int) -> Record:
+        return track(folder=folder, chamber=chamber, force=force, turns=turns, steps=STEPS, writes=writes)
+
+    forced = follow(turning_gravity(ramp=RAMP), TURNS, WRITES)
+    free = follow(push(duration=PUSH), TURNS, 1)
+    moment, pressure = quasi_static(chamber)
+    along, across = (abs(swing(forced.moment_time, column, turns=3)) for column in forced.moment.T)
+    wall = abs(swing(forced.time, forced.wall, turns=3))
+    first, second = frequencies(free.time, free.side, after=PUSH, count=2)
+    return {
+        "swing of the moment over quasi-static": float(np.hypot(along, across)) / moment,
+        "swing of the wall pressure over quasi-static": wall / pressure,
+        "first free frequency over the speed": float(first),
+        "second free frequency over the speed": float(second),
+        "seconds": forced.seconds + free.seconds,
+    }  # fmt: skip
+
+
+def _theory(disc: Disc, fill: float) -> dict[str, Answer]:
+    """Linear theory; neglected are terms of the second order in the waves' height over the depth."""
+    begin = time.process_time()
+    swung = sloshing_response(
+        disc=disc, fill_ratio=[fill], angular_velocity=1.0, kinematic_viscosity=0.0,
+        gravity=GRAVITY * disc.outer_radius,
+    )  # fmt: skip
+    free = sloshing_modes(disc=disc, fill_ratio=[fill], modes=2).frequency_ratio
+    seconds = time.process_time() - begin
+    depth = disc.outer_radius - float(swung.surface_radius[0])
+    second_order = (float(swung.surface_amplitude.value[0]) / depth) ** 2
+    pairs = {
+        "swing of the moment over quasi-static": (swung.amplification, 0),
+        "swing of the wall pressure over quasi-static": (swung.pressure_amplification, 0),
+        "first free frequency over the speed": (free, 0),
+        "second free frequency over the speed": (free, 1),
+    }
+    found = {}
+    for name, (estimate, i) in pairs.items():
+        value, cells = float(np.ravel(estimate.value)[i]), float(np.ravel(estimate.uncertainty)[i])
+        half = float(np.hypot(cells, second_order * value))
+        found[name] = Answer(value=value, half_width=half, seconds=seconds)
+    return found
+
+
+STUDIES: dict[str, Callable[[Scene, Path], Iterator[Row]]] = {
+    "tube": tube,
+    "bend": bend,
+    "turbulent": turbulent,
+    "waves": waves,
+}
+
+
+def _said(found: Row) -> str:
+    theirs = f"{found.openfoam:.5g} +- {found.openfoam_half_width:.2g}"
+    ours = f"{found.ringbalance:.5g} +- {found.ringbalance_half_width:.2g}"
+    return (
+        f"{found.quantity}: {theirs}, here {ours}; {found.seconds:.3g} and {found.ringbalance_seconds:.3g} s"
+    )
+
+
+def main() -> int:
+    """Run the studies, print a line for each quantity, and keep them if asked to."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--out", type=Path, default=Path("out/openfoam"))
+    parser.add_argument("--only", nargs="+", choices=list(STUDIES), default=list(STUDIES))
+    parser.add_argument("--keep", action="store_true")
+    asked = parser.parse_args()
+    scene = liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper")))
+    document = {"date": date.today().isoformat(), "openfoam": "1912", "machine": platform.machine()}
+    rows = json.loads(KEPT.read_text(encoding="utf-8"))["rows"] if KEPT.exists() else {}
+    for name in asked.only:
+        rows[name] = []
+        for found in STUDIES[name](scene, asked.out):
+            rows[name].append({**asdict(found), "agrees": found.agrees})
+            print(_said(found), flush=True)
+        if asked.keep:
+            write_whole(KEPT, json.dumps({**document, "rows": rows}, indent=1) + "\n")
+            write_whole(PAGE, page({**document, "rows": rows}))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

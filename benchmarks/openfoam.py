@@ -101,7 +101,7 @@ class Row:
     def agrees(self) -> bool:
         """Whether the difference lies within both uncertainties."""
         both = float(np.hypot(self.openfoam_half_width, self.ringbalance_half_width))
-        return abs(self.openfoam - self.ringbalance) <= both
+        return bool(abs(self.openfoam - self.ringbalance) <= both)
 
 
 def row(

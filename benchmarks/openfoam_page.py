@@ -48,10 +48,8 @@ def page(document: Mapping[str, Any]) -> str:
 
 def _section(name: str, rows: list[Mapping[str, Any]]) -> str:
     lines = [f"\n## {_TITLES[name]}\n", f"{_NOTES[name]}\n"]
-    lines += [
-        "| quantity | OpenFOAM | here | difference | agree | OpenFOAM's time |",
-        "|---|---|---|---|---|---|",
-    ]
+    heads = ("quantity", "OpenFOAM", "here", "difference", "agree", "time, OpenFOAM", "time, here")
+    lines += ["| " + " | ".join(heads) + " |", "|---" * len(heads) + "|"]
     lines += [_line(row) for row in rows]
     return "\n".join(lines) + "\n"
 
@@ -64,11 +62,15 @@ def _line(row: Mapping[str, Any]) -> str:
         _with_half_width(ours, row["ringbalance_half_width"]),
         f"{theirs / ours - 1:+.2%}".replace("%", " %"),
         "yes" if row["agrees"] else "no",
-        f"{row['seconds']:.2g} s",
-        f"{row['ringbalance_seconds']:.2g} s",
+        _seconds(row["seconds"]),
+        _seconds(row["ringbalance_seconds"]),
     )
     return "| " + " | ".join(cells) + " |"
 
 
 def _with_half_width(value: float, half_width: float) -> str:
     return f"{rounded(value, half_width)} ± {rounded(half_width, half_width)}"
+
+
+def _seconds(value: float) -> str:
+    return f"{value:.0f} s" if value >= 10 else f"{value:.1g} s"

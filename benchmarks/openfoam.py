@@ -85,6 +85,9 @@ class Row:
 
     quantity: str
     openfoam: float
+    """On the finest mesh."""
+    on_meshes: tuple[float, ...]
+    """Coarse to fine."""
     openfoam_half_width: float
     """95 %, of the cells alone."""
     ringbalance: float
@@ -112,7 +115,8 @@ def row(
     sizes = [1 / count for count in cells[::-1]]
     found = gci(values=list(values)[::-1], sizes=sizes, formal_order=FORMAL_ORDER, round_off=1e-6)
     return Row(
-        quantity=quantity, openfoam=values[-1], openfoam_half_width=float(found.uncertainty),
+        quantity=quantity, openfoam=values[-1], on_meshes=tuple(values),
+        openfoam_half_width=float(found.uncertainty),
         ringbalance=ours.value, ringbalance_half_width=ours.half_width, seconds=seconds,
         ringbalance_seconds=ours.seconds,
         cells=tuple(cells),
@@ -252,7 +256,7 @@ def _answers(chamber: Chamber, folder: Path) -> dict[str, float]:
     moment, pressure = quasi_static(chamber)
     along, across = (abs(swing(forced.moment_time, column, turns=3)) for column in forced.moment.T)
     wall = abs(swing(forced.time, forced.wall, turns=3))
-    first, second = frequencies(free.time, free.side, after=PUSH, count=2)
+    first, second = frequencies(free.time, free.wall, after=PUSH, count=2)
     return {
         "swing of the moment over quasi-static": float(np.hypot(along, across)) / moment,
         "swing of the wall pressure over quasi-static": wall / pressure,

@@ -26,6 +26,8 @@ _EMPTY = {"type": "empty"}
 _NAMES = ("wall", "surface", "left", "right")
 _TURN = 2 * np.pi
 _THICKNESS = 0.05
+_PUSH = 0.3 * GRAVITY
+"""A frequency depends on the waves' height; these are a third as high."""
 _EVERY = 5
 """Steps between the samples of which frequencies are made: thirty a turn."""
 _NOISE = 1e-2
@@ -46,11 +48,10 @@ class Chamber:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Record:
-    """A run: mean pressure on the outer wall and on one side by time, and the moment of the liquid."""
+    """A run: mean pressure on the outer wall by time, and the moment of the liquid."""
 
     time: FloatArray
     wall: FloatArray
-    side: FloatArray
     moment_time: FloatArray
     moment: FloatArray
     """Integral of (x, y) over the liquid, shape (n, 2)."""
@@ -124,7 +125,7 @@ def _control(*, turns: float, steps: int, writes: int) -> dict[str, Any]:
         "startTime": 0, "stopAt": "endTime", "endTime": turns * _TURN, "deltaT": _TURN / steps,
         "writeControl": "timeStep", "writeInterval": steps // writes, "purgeWrite": 0, "writeFormat": "ascii",
         "writePrecision": 12, "timePrecision": 10,
-        "functions": {"wallPressure": _mean_pressure("wall"), "sidePressure": _mean_pressure("left")},
+        "functions": {"wallPressure": _mean_pressure("wall")},
     }  # fmt: skip
 
 
@@ -216,10 +217,9 @@ def track(*, folder: Path, chamber: Chamber, force: Force, turns: float, steps: 
     run("makeFaMesh", folder=folder)
     done = run("pimpleFoam", folder=folder)
     time, wall = _history(folder / "postProcessing/wallPressure/0/surfaceFieldValue.dat")
-    _, side = _history(folder / "postProcessing/sidePressure/0/surfaceFieldValue.dat")
     at, moment = _moments(folder, quads)
     return Record(
-        time=time, wall=wall, side=side, moment_time=at, moment=moment, seconds=done.seconds
+        time=time, wall=wall, moment_time=at, moment=moment, seconds=done.seconds
     )  # fmt: skip
 
 
@@ -267,7 +267,7 @@ def push(*, duration: float) -> Force:
 
     def force(time: FloatArray) -> FloatArray:
         inside = time < duration * _TURN
-        size = np.where(inside, GRAVITY * np.sin(np.pi * time / (duration * _TURN)) ** 2, 0.0)
+        size = np.where(inside, _PUSH * np.sin(np.pi * time / (duration * _TURN)) ** 2, 0.0)
         return np.stack([0.8 * size, -0.6 * size], axis=1)
 
     return force

@@ -198,10 +198,11 @@ def line_warning(answers: tuple[LineAnswer, ...]) -> str:
     if not above:
         return _standing_warning(answers[0])
     which = "" if above[0].end == "given" else " over its default range" if len(above) > 1 else " if slow"
+    shown = "" if above[0].end == "given" else ", and runs of a scene without a line do not show it"
     return (
         f"the smallest correction that the gas line can deliver{which}, {_sizes(above)} um, is "
-        f"above the limit of {1e6 * above[0].limit:.2g} um: no run is sure to settle; take a faster valve, "
-        "less dead volume or a higher limit"
+        f"above the limit of {1e6 * above[0].limit:.2g} um: no run is sure to settle{shown}; take a faster "
+        "valve, less dead volume or a higher limit"
     )
 
 

@@ -154,6 +154,11 @@ def test_a_full_disk_is_no_obstacle(tmp_path: Path) -> None:
         subprocess.run(["umount", str(disk)], check=True)
 
 
+def _interruptible() -> None:
+    """A shell's background job is started with interrupts ignored, and its children inherit that."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def test_ctrl_c_between_compiled_calls_is_an_interruption(tmp_path: Path) -> None:
     for attempt in range(3):
         with subprocess.Popen(
@@ -162,6 +167,7 @@ def test_ctrl_c_between_compiled_calls_is_an_interruption(tmp_path: Path) -> Non
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             text=True,
+            preexec_fn=_interruptible,
         ) as running:
             assert running.stdout is not None
             while running.stdout.readline() not in {"ready\n", ""}:
@@ -194,7 +200,9 @@ def test_a_real_run_survives_a_damaged_cache_and_ctrl_c(tmp_path: Path) -> None:
     # Without friction nothing ever rests, and every instant has to be integrated: some 15 s of computing.
     slow = text.replace('time_limit = "30 s"', 'time_limit = "200 s"')
     scene.write_text(slow.replace('friction_arm = ["60 um", "60 um"]', 'friction_arm = ["0 um", "0 um"]'))
-    running = subprocess.Popen([*command, str(scene)], env=environment, stderr=subprocess.DEVNULL)
+    running = subprocess.Popen(
+        [*command, str(scene)], env=environment, stderr=subprocess.DEVNULL, preexec_fn=_interruptible
+    )
     time.sleep(5)
     running.send_signal(signal.SIGINT)
     assert running.wait(timeout=60) == 130

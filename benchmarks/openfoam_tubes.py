@@ -81,6 +81,25 @@ _SOLVERS = {
 }
 
 
+def _schemes() -> dict[str, Any]:
+    bounded = "bounded Gauss linearUpwind grad(Urel)"
+    return {
+        "ddtSchemes": {"default": "steadyState"},
+        "gradSchemes": {"default": "Gauss linear"},
+        "divSchemes": {
+            "default": "none",
+            "div(phi,Urel)": "Gauss linear",
+            "div(phi,k)": bounded.replace("grad(Urel)", "grad(k)"),
+            "div(phi,omega)": bounded.replace("grad(Urel)", "grad(omega)"),
+            "div((nuEff*dev2(T(grad(Urel)))))": "Gauss linear",
+        },
+        "laplacianSchemes": {"default": "Gauss linear corrected"},
+        "interpolationSchemes": {"default": "linear"},
+        "snGradSchemes": {"default": "corrected"},
+        "wallDist": {"method": "meshWave"},
+    }
+
+
 def _common(
     *, omega: float, viscosity: float, steps: int, residual: float, turbulent: bool
 ) -> dict[str, Any]:
@@ -88,28 +107,13 @@ def _common(
         "simulationType": "RAS",
         "RAS": {"RASModel": "kOmegaSST", "turbulence": "on", "printCoeffs": "off"},
     }
-    bounded = "bounded Gauss linearUpwind grad(Urel)"
     return {
         "system/controlDict": {
             "application": "SRFSimpleFoam", "startFrom": "startTime", "startTime": 0, "stopAt": "endTime",
             "endTime": steps, "deltaT": 1, "writeControl": "timeStep", "writeInterval": steps,
             "purgeWrite": 1, "writeFormat": "ascii", "writePrecision": 12,
         },
-        "system/fvSchemes": {
-            "ddtSchemes": {"default": "steadyState"},
-            "gradSchemes": {"default": "Gauss linear"},
-            "divSchemes": {
-                "default": "none",
-                "div(phi,Urel)": "Gauss linear",
-                "div(phi,k)": bounded.replace("grad(Urel)", "grad(k)"),
-                "div(phi,omega)": bounded.replace("grad(Urel)", "grad(omega)"),
-                "div((nuEff*dev2(T(grad(Urel)))))": "Gauss linear",
-            },
-            "laplacianSchemes": {"default": "Gauss linear corrected"},
-            "interpolationSchemes": {"default": "linear"},
-            "snGradSchemes": {"default": "corrected"},
-            "wallDist": {"method": "meshWave"},
-        },
+        "system/fvSchemes": _schemes(),
         "system/fvSolution": {
             "solvers": _SOLVERS,
             "SIMPLE": {

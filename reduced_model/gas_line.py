@@ -16,7 +16,13 @@ from typing import Any, Final
 
 from ringbalance.physics.gas.supply import GasLine, line_with
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.short_injection import Fills, ShortInjection, accelerated_part, edges_of
+from ringbalance.reduced_model.short_injection import (
+    Edges,
+    Fills,
+    ShortInjection,
+    accelerated_part,
+    edges_of,
+)
 from ringbalance.scene.models import Gas, Scene
 
 DEFAULT_CONDUCTANCES: Final = (0.2e-8, 1e-8)
@@ -97,7 +103,11 @@ def line_answers(scene: Scene, model: BalancerModel, *, inertia: bool = True) ->
     """
     fill = model.flow.max_fill_ratio / 2
     fills = Fills(model=model, driven=fill, opposite=fill)
-    return tuple(_answer(scene, end, fills, inertia=inertia) for end in line_ends(scene))
+    ends, edges = line_ends(scene), edges_of(fills, scene.gas.pressure)
+    if edges is None:
+        return tuple(_answer(scene, end, fills, None) for end in ends)
+    built = (_injection(scene, end, fills, edges, inertia=inertia) for end in ends)
+    return tuple(_answer(scene, end, fills, one) for end, one in zip(ends, built, strict=True))
 
 
 def short_injection(
@@ -105,8 +115,10 @@ def short_injection(
 ) -> ShortInjection | None:
     """Injections by one gas line; None where the gas starts no flow."""
     edges = edges_of(fills, scene.gas.pressure)
-    if edges is None:
-        return None
+    return None if edges is None else _injection(scene, end, fills, edges, inertia=inertia)
+
+
+def _injection(scene: Scene, end: LineEnd, fills: Fills, edges: Edges, *, inertia: bool) -> ShortInjection:
     model = fills.model
     return ShortInjection(
         fills=fills,
@@ -154,10 +166,9 @@ def largest_standing(times: Sequence[float]) -> float:
     return max(abs(one + other * turn) for one, other in zip(times, [*times[1:], times[0]], strict=True))
 
 
-def _answer(scene: Scene, end: LineEnd, fills: Fills, *, inertia: bool) -> LineAnswer:
+def _answer(scene: Scene, end: LineEnd, fills: Fills, injection: ShortInjection | None) -> LineAnswer:
     line, limit, volume = end.line, scene.controller.limit, _gas_volume(scene, fills)
     opening = correction = dead = standing = None
-    injection = short_injection(scene, end, fills, inertia=inertia)
     if injection is not None:
         shortest = injection.shortest(end.valve_lag)
         opening, correction = shortest.time, _vibration(scene, fills, shortest.metres)

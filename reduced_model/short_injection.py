@@ -36,9 +36,9 @@ from ringbalance.reduced_model.tube.path import crest_span
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Tube
 
-_PRESSURES: Final = 65
-"""Per refinement of a threshold."""
-_REFINEMENTS: Final = 4
+_PRESSURES: Final = 257
+"""Per refinement of a threshold: few calls of the law with many pressures cost least."""
+_REFINEMENTS: Final = 3
 _SLOWEST_RISE: Final = 100.0
 """Times longer than without liquid that a pressure may take to rise."""
 _STEPS: Final = 33

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
 from ringbalance.controller.eccentric_mass.plant.speed import profile_arrays, speed_at
 from ringbalance.controller.eccentric_mass.plant.whirl import influence as rotor_influence
-from ringbalance.controller.rotor import influence, initial_vibration, wrapped
+from ringbalance.controller.rotor import influence, initial_unbalance, wrapped
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.scene.eccentric_models import EccentricRotor, EccentricScene, SpeedPoint
 from ringbalance.scene.faults import Fault, SceneError
@@ -71,12 +71,11 @@ def rotor_of(scene: AnyScene) -> OneRotor:
 
 def _liquid_rotor(scene: Scene) -> OneRotor:
     rotor = scene.rotor
-    alpha = influence(coefficient=rotor.influence_coefficient, lag_angle=rotor.lag_angle)
     return OneRotor(
         source=scene.source,
         speed=rotor.speed,
-        influence=alpha,
-        unbalance=initial_vibration(rotor=rotor) / alpha,
+        influence=influence(coefficient=rotor.influence_coefficient, lag_angle=rotor.lag_angle),
+        unbalance=initial_unbalance(rotor=rotor),
         mass=None,
         noise=scene.sensor.amplitude_noise,
         limit=scene.controller.limit,

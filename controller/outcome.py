@@ -11,12 +11,13 @@ from ringbalance.controller.formulas.stopping import NOTICEABLE, Cause, has_grow
 from ringbalance.controller.judgement import NOISE_DEVIATIONS
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.liquid_ring.reach import (
+    BEYOND_CAPACITY,
     largest_pair_moment,
     starting_pressure,
-    unreachable_moment,
+    unreachable_vibration,
 )
 from ringbalance.controller.liquid_ring.transfer import Event
-from ringbalance.controller.rotor import influence, initial_vibration
+from ringbalance.controller.rotor import initial_unbalance
 from ringbalance.controller.simulation import Injection, Outcome, Sample, Verdict
 from ringbalance.controller.tuning.dead_time import standing_remedy
 from ringbalance.controller.tuning.loop_factor import STAYING_DEVIATIONS, LoopFactor
@@ -69,17 +70,9 @@ class Facts:
     """Letters of the driven chambers of those in the last command."""
 
     @property
-    def wanted_moment(self) -> complex:
-        """Moment that would cancel the initial vibration, kg m."""
-        rotor = self.scene.rotor
-        k = influence(coefficient=rotor.influence_coefficient, lag_angle=rotor.lag_angle)
-        return -initial_vibration(rotor=rotor) / k
-
-    @property
     def unreachable_amplitude(self) -> float:
         """Vibration that remains with the liquid at its best, m."""
-        missing = unreachable_moment(plant=self.plant, state=self.state, wanted=self.wanted_moment)
-        return missing * self.scene.rotor.influence_coefficient
+        return unreachable_vibration(plant=self.plant, state=self.state, rotor=self.scene.rotor)
 
     @property
     def settling_time(self) -> float | None:
@@ -274,12 +267,12 @@ def _stalled(facts: Facts) -> str:
 
 
 def _capacity(facts: Facts) -> str:
-    needed = abs(facts.wanted_moment) / GRAM_MILLIMETRE
+    needed = abs(initial_unbalance(rotor=facts.scene.rotor)) / GRAM_MILLIMETRE
     pair = largest_pair_moment(plant=facts.plant, state=facts.state) / GRAM_MILLIMETRE
     return (
         f"{_not_settled(facts)}; capacity exceeded: the unbalance is {needed:.4g} g mm, one pair of chambers "
         f"can form {pair:.4g} g mm along its axis, so at best {_um(facts.unreachable_amplitude)} remain: "
-        "balance the rotor first, use a denser liquid, or a larger or differently clocked disc"
+        f"{BEYOND_CAPACITY}"
     )
 
 

@@ -72,6 +72,12 @@ def initial_vibration(*, rotor: Rotor) -> complex:
     return complex(rotor.initial_amplitude * np.exp(1j * rotor.initial_phase))
 
 
+def initial_unbalance(*, rotor: Rotor) -> complex:
+    """Moment that the initial vibration answers to, V0/K, kg m; the disc cancels it with its negative."""
+    k = influence(coefficient=rotor.influence_coefficient, lag_angle=rotor.lag_angle)
+    return initial_vibration(rotor=rotor) / k
+
+
 def vibration(*, rotor: Rotor, moment: npt.ArrayLike) -> ComplexArray:
     """Vibration of the rotor with the disc's moment U, V1 = V0 + K U, m zero-to-peak.
 

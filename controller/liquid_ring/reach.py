@@ -7,11 +7,16 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
-from ringbalance.controller.rotor import chamber_directions
+from ringbalance.controller.rotor import chamber_directions, initial_unbalance
 from ringbalance.reduced_model.law.flow_law import FlowLaw
+from ringbalance.scene.loop_models import Rotor
 
 _MAX_DOUBLINGS: Final = 40
 _BISECTIONS: Final = 50
+BEYOND_CAPACITY: Final = (
+    "balance the rotor first, use a denser liquid, or a larger or differently clocked disc"
+)
+"""What to do about an unbalance that the disc cannot cancel."""
 
 
 def largest_pair_moment(*, plant: LiquidRing, state: DiscState) -> float:
@@ -42,6 +47,12 @@ def unreachable_moment(*, plant: LiquidRing, state: DiscState, wanted: complex) 
         return 0.0
     along = np.clip((edges.conj() * offset).real / np.maximum(np.abs(edges) ** 2, 1e-300), 0.0, 1.0)
     return float(np.min(np.abs(offset - along * edges)))
+
+
+def unreachable_vibration(*, plant: LiquidRing, state: DiscState, rotor: Rotor) -> float:
+    """Vibration that remains with the liquid at its best, m; zero within capacity."""
+    wanted = -initial_unbalance(rotor=rotor)
+    return unreachable_moment(plant=plant, state=state, wanted=wanted) * rotor.influence_coefficient
 
 
 def starting_pressure(

@@ -22,7 +22,7 @@ from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.algorithms.law_based import LawBased
 from ringbalance.controller.algorithms.law_based_times import fill_for_moment, pair_changes
 from ringbalance.controller.algorithms.target_vector import TargetVector
-from ringbalance.controller.rotor import influence, initial_vibration
+from ringbalance.controller.rotor import initial_unbalance
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
@@ -113,14 +113,14 @@ def _noise_at_limit(scene: Scene) -> float:
 
 def balanced_fills(scene: Scene, model: BalancerModel) -> FloatArray:
     """Fills of the positive chambers with which the disc cancels the unbalance, or comes nearest to it."""
-    rotor, total = scene.rotor, 2.0 * scene.disc.initial_fill
+    total = 2.0 * scene.disc.initial_fill
     lowest, highest = _range(scene, model)
     ends = np.array([scene.disc.initial_fill, lowest, highest])
     now, low, high = model.moment.pair_moment(fill_ratio=ends, opposite_fill_ratio=total - ends)
-    k = influence(coefficient=rotor.influence_coefficient, lag_angle=rotor.lag_angle)
     pairs = scene.disc.chambers // 2
     changes = pair_changes(
-        wanted=-initial_vibration(rotor=rotor) / k, bounds=[(float(low - now), float(high - now))] * pairs
+        wanted=-initial_unbalance(rotor=scene.rotor),
+        bounds=[(float(low - now), float(high - now))] * pairs,
     )
     fills = [
         fill_for_moment(

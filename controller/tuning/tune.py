@@ -11,8 +11,7 @@ import numpy as np
 from ringbalance.controller.algorithms.by_name import controller_of, law_based_of, target_vector_of
 from ringbalance.controller.checks import check_settings
 from ringbalance.controller.liquid_ring.plant import initial_state
-from ringbalance.controller.liquid_ring.reach import unreachable_moment
-from ringbalance.controller.rotor import influence, initial_vibration
+from ringbalance.controller.liquid_ring.reach import BEYOND_CAPACITY, unreachable_vibration
 from ringbalance.controller.terms import run_models
 from ringbalance.controller.tuning.dead_time import dead_times, dead_zone
 from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor, vibration_rates
@@ -164,12 +163,8 @@ def _judged(
 
 
 def _beyond_capacity(scene: Scene, model: BalancerModel) -> float:
-    """Vibration that remains with the liquid at its best, m; zero within capacity."""
-    rotor, plant = scene.rotor, law_based_of(scene, model).ring
-    k = influence(coefficient=rotor.influence_coefficient, lag_angle=rotor.lag_angle)
-    wanted = -initial_vibration(rotor=rotor) / k
-    missing = unreachable_moment(plant=plant, state=initial_state(disc=scene.disc), wanted=wanted)
-    return missing * rotor.influence_coefficient
+    plant, state = law_based_of(scene, model).ring, initial_state(disc=scene.disc)
+    return unreachable_vibration(plant=plant, state=state, rotor=scene.rotor)
 
 
 def _line_reaches(lines: tuple[LineAnswer, ...]) -> bool | None:
@@ -204,8 +199,7 @@ def _over_capacity(scene: Scene, beyond: float) -> str:
         return ""
     return (
         f"capacity exceeded: with the liquid at its best {beyond * um:.4g} um remain of {start * um:.4g} um, "
-        f"limit {limit * um:.4g} um: balance the rotor first, use a denser liquid, or a larger or "
-        "differently clocked disc"
+        f"limit {limit * um:.4g} um: {BEYOND_CAPACITY}"
     )
 
 

@@ -265,10 +265,16 @@ def _error(plant: Record, y: FloatArray, w: FloatArray) -> float:
     return worst
 
 
+@inlined
+def _in_closed_form(plant: Record, motion: Record) -> bool:
+    """Whether isothermal gases alone change, while the liquid rests."""
+    return bool(motion.direction == 0 and plant.line and plant.heat_capacity_ratio == 1.0)
+
+
 @compiled
 def take(plant: Record, motion: Record, left: float, w: FloatArray) -> float:
     """One accepted step that does not pass `left`, s, into row `END`. Returns: its length, s."""
-    if motion.direction == 0 and plant.line and plant.heat_capacity_ratio == 1.0:
+    if _in_closed_form(plant, motion):
         return _rest(plant, motion, left, w)
     _linearize(plant, motion, w)
     while True:
@@ -303,7 +309,7 @@ def _rest(plant: Record, motion: Record, left: float, w: FloatArray) -> float:
 @compiled
 def shorten(plant: Record, motion: Record, h: float, w: FloatArray) -> None:
     """The step just taken again, with another length."""
-    if motion.direction == 0 and plant.line and plant.heat_capacity_ratio == 1.0:
+    if _in_closed_form(plant, motion):
         rest_after(plant, motion, h, w, END)
     else:
         _rosenbrock(plant, motion, h, w)
@@ -312,7 +318,7 @@ def shorten(plant: Record, motion: Record, h: float, w: FloatArray) -> None:
 @compiled
 def between(plant: Record, motion: Record, h: float, part: float, w: FloatArray) -> None:
     """State after a part of the step into row `BETWEEN`, cubic by the rates at both ends (row `_RATE`)."""
-    if motion.direction == 0 and plant.line and plant.heat_capacity_ratio == 1.0:
+    if _in_closed_form(plant, motion):
         rest_after(plant, motion, h * part, w, BETWEEN)
         return
     for i in range(WORK):

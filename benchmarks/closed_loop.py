@@ -23,6 +23,7 @@ import math
 import os
 from collections.abc import Sequence
 from dataclasses import asdict, replace
+from functools import partial
 
 from closed_loop_growth import Growth, compile_seconds, consequences_seconds, growth, order_of_growth
 from closed_loop_lines import FILL_ERROR, Line, Rivals, ensemble_lines, loosest, operation_lines, run_lines
@@ -30,6 +31,7 @@ from closed_loop_plain import by_the_law, in_numbers
 from rich.console import Console
 from rich.table import Table
 
+from ringbalance.controller.ensemble.monte_carlo import simulate_ensemble
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.loader import bundled_scene, load_scene
@@ -135,7 +137,9 @@ def main() -> None:
     told = Console(stderr=True)
     scene = liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper")))
     lines, rivals = compare(scene, repeats=asked.repeats, members=asked.members, console=told)
-    sizes = growth(scene, asked.largest, told)
+    model = paper_model(scene)
+    ensemble = partial(simulate_ensemble, scene, model, seed=0)
+    sizes = growth(ensemble, first=1000, largest=asked.largest, factor=10, console=told)
     told.print("consequences, and the first calls of fresh processes")
     first, later = compile_seconds()
     others = {

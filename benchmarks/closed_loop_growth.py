@@ -9,14 +9,12 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from rich.console import Console
 
-from ringbalance.controller.ensemble.monte_carlo import simulate_ensemble
 from ringbalance.reduced_model.calibration import calibrate
-from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reports.studies.consequences import find_consequences
 from ringbalance.scene.models import Scene
 
@@ -42,17 +40,19 @@ class Growth:
     peak_memory_MiB: float  # noqa: N815 - the unit's own spelling
 
 
-def growth(scene: Scene, largest: int, console: Console) -> list[Growth]:
-    """Ensembles by tens up to the largest.
+def growth(
+    ensemble: Callable[[int], object], *, first: int, largest: int, factor: int, console: Console
+) -> list[Growth]:
+    """Ensembles of growing size.
 
-    Args: `largest`: members. `console`: for progress.
+    Args: `ensemble`: runs so many members. `factor`: from one size to the next. `console`: for progress.
     Returns: One entry per size, smallest first.
     """
-    model, found, size = paper_model(scene), [], 1000
+    found, size = [], first
     while size <= largest:
         console.print(f"{size} members")
         start, used = time.perf_counter(), time.process_time()
-        simulate_ensemble(scene, model, size, 0)
+        ensemble(size)
         found.append(
             Growth(
                 members=size,
@@ -61,7 +61,7 @@ def growth(scene: Scene, largest: int, console: Console) -> list[Growth]:
                 peak_memory_MiB=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
             )
         )
-        size *= 10
+        size *= factor
     return found
 
 

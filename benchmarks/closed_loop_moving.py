@@ -17,14 +17,14 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import resource
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 
 import numpy as np
+from closed_loop_growth import growth
 from closed_loop_plain import plain_run
 from moving_injection import FILL_ERROR, METHODS, TOLERANCES, WANTED, Rival, least, ours, piped_scene
+from rich.console import Console
 
 from ringbalance.controller.ensemble.monte_carlo import ensemble_transfer, simulate_ensemble, simulate_members
 from ringbalance.controller.ensemble.transfer import RELATIVE_ERROR
@@ -127,6 +127,7 @@ def compare(repeats: int, members: int, largest: int) -> dict[str, object]:
     simulate_ensemble(scene, model, 1, 0)
     one = partial(simulate_ensemble, scene, model, seed=0, workers=1)
     own = least(lambda: one(members), repeats) / members
+    sizes = growth(one, first=largest // 8, largest=largest, factor=2, console=Console(stderr=True))
     return {
         "solve_ivp_s": theirs,
         "method": carried.method,
@@ -136,19 +137,8 @@ def compare(repeats: int, members: int, largest: int) -> dict[str, object]:
         "fill_error": error,
         "ratio": theirs / own,
         "wanted": WANTED,
-        "growth": growth(one, largest),
+        "growth": [asdict(size) for size in sizes],
     }
-
-
-def growth(one: Callable[[int], object], largest: int) -> list[dict[str, float]]:
-    """Time and peak memory of ensembles by doubling, up to the largest."""
-    found, size = [], largest // 8
-    while size <= largest:
-        spent = least(partial(one, size), 1)
-        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-        found.append({"members": size, "processor_s": spent, "peak_memory_MiB": peak})
-        size *= 2
-    return found
 
 
 def main() -> None:

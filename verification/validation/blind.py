@@ -10,6 +10,7 @@ import numpy as np
 
 from ringbalance.verification.validation.comparison import PROMISED, Comparison, compare, kind_of
 from ringbalance.verification.validation.measurements import MeasurementsError, read_measurements
+from ringbalance.verification.validation.model_bias import bias, within
 
 _FEWEST: Final = 2
 """Points from which a scatter can be had."""
@@ -53,4 +54,9 @@ def data_document(path: Path) -> dict[str, Any]:
 
 def _of_series(comparison: Comparison, name: str) -> Mapping[str, float]:
     one = comparison.where(comparison.series == name)
-    return {"points": one.measured.size, "bias": one.bias, "share_within": float(np.mean(one.within))}
+    held = within(one.predicted, one.measured, one.stated, one.uncertainty)
+    return {
+        "points": one.measured.size,
+        "bias": bias(one.predicted, one.measured),
+        "share_within": float(np.mean(held)),
+    }

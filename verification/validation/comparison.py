@@ -14,6 +14,7 @@ from ringbalance.verification.evidence import Curve, Evidence, Found, Series, fi
 from ringbalance.verification.validation.kinds import Kind
 from ringbalance.verification.validation.measurements import Measurements, MeasurementsError
 from ringbalance.verification.validation.model_bias import (
+    MUTATIONS,
     ModelStatistics,
     model_statistics,
     statistics_numbers,
@@ -29,10 +30,6 @@ KINDS: Final[Mapping[str, Kind]] = MappingProxyType(
 """Kinds of data that the program can predict."""
 PROMISED: Final = 0.93
 """Fraction of the points that both 95 % uncertainties must hold: 0.95, less the chance of a small sample."""
-_FACTORS: Final[Mapping[str | None, float]] = MappingProxyType(
-    {"ten_per_cent_high": 1.1, "ten_per_cent_low": 0.9}
-)
-"""Mutations that every comparison must notice."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,17 +47,6 @@ class Comparison:
     def where(self, chosen: BoolArray) -> Comparison:
         """Some of the points."""
         return Comparison(**{name: column[chosen] for name, column in vars(self).items()})
-
-    @property
-    def within(self) -> BoolArray:
-        """Whether a point's deviation lies within both 95 % uncertainties."""
-        allowed = np.hypot(self.stated, self.uncertainty * self.measured)
-        return np.asarray(np.abs(self.predicted - self.measured) <= allowed)
-
-    @property
-    def bias(self) -> float:
-        """Geometric mean of predicted over measured, less one."""
-        return float(np.expm1(np.mean(np.log(self.predicted / self.measured))))
 
     @property
     def statistics(self) -> ModelStatistics:
@@ -107,10 +93,9 @@ def compare(*sets: Measurements, mutation: str | None = None) -> Comparison:
     for each in sets:
         _check(each, kind)
     predictions = [kind.predict(each) for each in sets]
-    factor = _FACTORS.get(mutation, 1.0)
     return Comparison(
         measured=np.concatenate([each.columns[kind.measured] for each in sets]),
-        predicted=factor * np.concatenate([one.value for one in predictions]),
+        predicted=MUTATIONS[mutation] * np.concatenate([one.value for one in predictions]),
         stated=np.concatenate([one.stated for one in predictions]),
         uncertainty=np.concatenate([each.uncertainty for each in sets]),
         series=np.concatenate([each.series for each in sets]),

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 from scipy import special
 
-from ringbalance.scene.arrays import FloatArray, StringArray
+from ringbalance.scene.arrays import BoolArray, FloatArray, StringArray
 
 _FEWEST_SERIES: Final = 3
+MUTATIONS: Final[Mapping[str | None, float]] = MappingProxyType(
+    {None: 1.0, "ten_per_cent_high": 1.1, "ten_per_cent_low": 0.9}
+)
+"""Factors on what is predicted; every comparison with measurements must notice the last two."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,18 +54,31 @@ def model_statistics(
     Source: McGrattan and Toman, Metrologia 48 (2011) 173, for the split of the scatter.
     """
     ratio = np.log(predicted / measured)
+    held = within(predicted, measured, stated, measurement_uncertainty)
     names = np.unique(series)
     means = np.array([np.mean(ratio[series == name]) for name in names])
     unexplained = float(np.var(ratio, ddof=1) - np.mean((measurement_uncertainty / 2) ** 2))
-    allowed = np.hypot(stated, measurement_uncertainty * measured)
     return ModelStatistics(
         points=ratio.size,
         series=names.size,
-        bias=math.expm1(float(np.mean(ratio))),
+        bias=bias(predicted, measured),
         bias_uncertainty=_mean_uncertainty(means, float(np.mean(measurement_uncertainty))),
         standard_deviation=math.sqrt(max(unexplained, 0.0)),
-        share_within=float(np.mean(np.abs(predicted - measured) <= allowed)),
+        share_within=float(np.mean(held)),
     )
+
+
+def bias(predicted: FloatArray, measured: FloatArray) -> float:
+    """Geometric mean of predicted over measured, less one."""
+    return math.expm1(float(np.mean(np.log(predicted / measured))))
+
+
+def within(
+    predicted: FloatArray, measured: FloatArray, stated: FloatArray, measurement_uncertainty: FloatArray
+) -> BoolArray:
+    """Whether each deviation lies within both 95 % uncertainties; the last is relative."""
+    allowed = np.hypot(stated, measurement_uncertainty * measured)
+    return np.asarray(np.abs(predicted - measured) <= allowed)
 
 
 def _mean_uncertainty(means: FloatArray, measurement_uncertainty: float) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ringbalance.physics.tube.friction import friction_factor, friction_uncertainty
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, StringArray
+from ringbalance.verification.evidence import Curve, Series, figure
 from ringbalance.verification.navier_stokes.rotating_section import (
     DuctMesh,
     friction_ratio,
@@ -68,6 +69,16 @@ class FrictionPoints:
             )
         return found
 
+    def figure(self, of: str, predicted: FloatArray) -> Series:
+        """Predicted friction factors with their stated uncertainty, and the measured ones."""
+        return figure(
+            f"friction factor of {of}, measured and predicted",
+            ("Reynolds number", "1", self.reynolds),
+            Curve("predicted", "1", predicted, uncertainty=self.stated()),
+            Curve("measured", "1", self.friction, style="points"),
+            log=True,
+        )
+
     def statistics(self, predicted: FloatArray) -> ModelStatistics:
         """How predicted friction factors stand to the measured ones."""
         return model_statistics(
@@ -81,11 +92,15 @@ class FrictionPoints:
 
 def friction_points(*names: str) -> FrictionPoints:
     """The points of data sets, in ascending order of the Reynolds number."""
-    sets = [_points_of(measurements(name), prefix=f"{name}: ") for name in names]
-    joined = FrictionPoints(
-        **{key: np.concatenate([getattr(each, key) for each in sets]) for key in vars(sets[0])}
+    return joined(*(_points_of(measurements(name), prefix=f"{name}: ") for name in names))
+
+
+def joined(*parts: FrictionPoints) -> FrictionPoints:
+    """All points, in ascending order of the Reynolds number."""
+    every = FrictionPoints(
+        **{key: np.concatenate([getattr(part, key) for part in parts]) for key in vars(parts[0])}
     )
-    return joined.where(np.argsort(joined.reynolds, kind="stable"))
+    return every.where(np.argsort(every.reynolds, kind="stable"))
 
 
 def _points_of(data: Measurements, *, prefix: str = "") -> FrictionPoints:

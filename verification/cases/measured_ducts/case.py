@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
-from ringbalance.verification.validation.model_bias import ModelStatistics, statistics_numbers
+from ringbalance.verification.evidence import Evidence, Found, Level
+from ringbalance.verification.validation.model_bias import MUTATIONS, ModelStatistics, statistics_numbers
 from ringbalance.verification.validation.tube_friction import FrictionPoints, friction_points
 
 _LAMINAR: Final = 1800.0
@@ -18,9 +18,10 @@ _TURBULENT: Final = 4000.0
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     points = friction_points("cornish_1928", "huebscher_1947_ducts")
-    factor = 1.1 if defect == "ten_per_cent_high" else 1.0
+    factor = MUTATIONS.get(defect, 1.0)
     wide = np.char.find(points.series, "8:1") >= 0
     narrow = points.where(~wide)
+    cornish = narrow.where(np.char.find(narrow.series, "cornish") >= 0)
     whole, laminar, turbulent, wide_duct = (
         _statistics(part, factor, defect)
         for part in (
@@ -46,7 +47,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "wide_bias": wide_duct.bias,
             "wide_share": wide_duct.share_within,
         },
-        series=(_figure(narrow.where(np.char.find(narrow.series, "cornish") >= 0), factor),),
+        series=(cornish.figure("a rectangular duct (2.9 to 1)", factor * cornish.predicted()),),
     )
 
 
@@ -54,13 +55,3 @@ def _statistics(points: FrictionPoints, factor: float, defect: str | None) -> Mo
     if defect == "circular_section":
         points = replace(points, laminar_ratio=np.ones_like(points.reynolds))
     return points.statistics(factor * points.predicted())
-
-
-def _figure(points: FrictionPoints, factor: float) -> Series:
-    return figure(
-        "friction factor of a rectangular duct (2.9 to 1), measured and predicted",
-        ("Reynolds number", "1", points.reynolds),
-        Curve("predicted", "1", factor * points.predicted(), uncertainty=points.stated()),
-        Curve("measured", "1", points.friction, style="points"),
-        log=True,
-    )

@@ -14,6 +14,7 @@ from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, figure
 from ringbalance.verification.validation.measurements import Measurements, measurements
+from ringbalance.verification.validation.model_bias import MUTATIONS
 
 _WASHER: Final = 12.4e-6
 """Unbalance of a washer, kg m."""
@@ -25,8 +26,9 @@ _PREDICTED: Final = (3, 4)
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     run = measurements("rodrigues_2011")
     rotor = _calibrated(scene.rotor, [_amplitude(run, "plain", count) for count in (0, 1, 2)])
-    if defect == "ten_per_cent_high":
-        rotor = dataclasses.replace(rotor, influence_coefficient=1.1 * rotor.influence_coefficient)
+    rotor = dataclasses.replace(
+        rotor, influence_coefficient=MUTATIONS.get(defect, 1.0) * rotor.influence_coefficient
+    )
     predicted = np.abs(vibration(rotor=rotor, moment=_WASHER * np.arange(5)))
     spread = rotor.influence_coefficient * _WASHER_UNCERTAINTY / 2
     return Evidence(

@@ -9,8 +9,8 @@ import numpy as np
 
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
-from ringbalance.verification.validation.model_bias import statistics_numbers
+from ringbalance.verification.evidence import Evidence, Found, Level, Series
+from ringbalance.verification.validation.model_bias import MUTATIONS, statistics_numbers
 from ringbalance.verification.validation.tube_friction import FrictionPoints, friction_points
 
 _FULLY_ROUGH: Final = 70.0
@@ -45,16 +45,9 @@ def _predicted(points: FrictionPoints, defect: str | None) -> FloatArray:
     if defect == "roughness_ignored":
         smooth = np.zeros_like(points.relative_roughness)
         return dataclasses.replace(points, relative_roughness=smooth).predicted()
-    return (1.1 if defect == "ten_per_cent_high" else 1.0) * points.predicted()
+    return MUTATIONS[defect] * points.predicted()
 
 
 def _figure(points: FrictionPoints, predicted: FloatArray, wall: float) -> Series:
     here = points.relative_roughness == wall
-    one = points.where(here)
-    return figure(
-        f"friction factor of a tube with ks/d = {wall:.2g}, measured and predicted",
-        ("Reynolds number", "1", one.reynolds),
-        Curve("predicted", "1", predicted[here], uncertainty=one.stated()),
-        Curve("measured", "1", one.friction, style="points"),
-        log=True,
-    )
+    return points.where(here).figure(f"a tube with ks/d = {wall:.2g}", predicted[here])

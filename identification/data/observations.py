@@ -14,6 +14,8 @@ class Observations:
 
     kind: str
     file: str
+    source: str = ""
+    """Rig, run and date, as the file's first lines have them."""
     lines: IntArray
     """Line of each row in the file, from 1."""
     series: StringArray

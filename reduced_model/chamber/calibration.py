@@ -179,9 +179,7 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
     )
 
 
-def _as_measured(
-    scene: Scene, ring: RingValues, effect: GravityEffect
-) -> tuple[RingValues, GravityEffect]:
+def _as_measured(scene: Scene, ring: RingValues, effect: GravityEffect) -> tuple[RingValues, GravityEffect]:
     """Moments times the scene's measured factor; finite elements check the geometry, so before it."""
     factor = scene.disc.moment_factor
     moment, slope = (

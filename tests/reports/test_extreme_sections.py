@@ -14,7 +14,8 @@ from ringbalance.reports.pages import extremes, extremes_cli, sloshing
 from ringbalance.reports.section import Work
 from ringbalance.scene import Scene, liquid_ring_scene
 from ringbalance.scene.loader import scene_from
-from ringbalance.verification.extremes.axes import places_of, toml_bytes, varied
+from ringbalance.scene.toml_writing import toml_bytes
+from ringbalance.verification.extremes.axes import places_of, varied
 
 Record = dict[str, Any]
 

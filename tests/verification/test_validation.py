@@ -12,16 +12,13 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
+from ringbalance.identification.data.measurements import MeasurementsError, parse_measurements
 from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.scene.models import Scene
 from ringbalance.verification.catalogue import case_code
 from ringbalance.verification.validation.comparison import KINDS, compare
-from ringbalance.verification.validation.measurements import (
-    MeasurementsError,
-    measurements,
-    parse_measurements,
-)
+from ringbalance.verification.validation.measurements import measurements
 from ringbalance.verification.validation.model_bias import ModelStatistics, model_statistics
 from ringbalance.verification.validation.tube_friction import friction_points
 from ringbalance.verification.validation.wave_frequency import CALIBRATING, tank_frequency
@@ -136,10 +133,10 @@ def test_all_errors_of_a_file_are_reported_together_with_row_and_column() -> Non
     assert len(lines) == 6
     with pytest.raises(MeasurementsError) as error:
         parse_measurements(_HEAD + "reynolds,friction_factor\n100,nan\n\n200\n300,x\n", file="bad.csv")
-    assert [line.split(":")[1] for line in str(error.value).splitlines()] == [
-        ' line 5, column "friction_factor"',
-        " line 7 has 1 values, the columns are 2",
-        ' line 8, column "friction_factor"',
+    assert [line.split(": ")[1] for line in str(error.value).splitlines()] == [
+        'line 5, column "friction_factor" = "nan"',
+        "line 7",
+        'line 8, column "friction_factor" = "x"',
     ]
 
 

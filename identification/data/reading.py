@@ -137,6 +137,8 @@ def _header_faults(table: Table, kind: DataKind) -> list[Fault]:
         *header_faults(table.header, known=(*SOURCE_KEYS, *convention), needed=_NEEDED, file=table.file),
         *text_faults(table.header, texts_only, file=table.file),
     ]
+    if not str(table.header.get("source", "-")).strip():
+        faults.append(data_fault(table.file, "source", "it is empty", allowed="rig, run and date"))
     stated = table.header.get(AMPLITUDE)
     if kind.has_amplitudes and not (isinstance(stated, str) and stated in AMPLITUDES):
         allowed = " or ".join(f'amplitude = "{word}"' for word in AMPLITUDES)
@@ -181,17 +183,13 @@ def _missing(table: Table, kind: DataKind, names: set[str]) -> Iterator[Fault]:
     needed = [column for column in kind.columns if not column.optional and column.name not in kind.one_of]
     for column in needed:
         if column.name not in names:
-            yield data_fault(table.file, place, f'the column "{_shown(column)}" is missing: {column.meaning}')
+            yield data_fault(table.file, place, f'the column "{column.head}" is missing: {column.meaning}')
     if kind.has_chamber and "chamber" not in names:
         yield data_fault(table.file, place, 'the column "chamber" is missing: letter of the driven chamber')
     given = [name for name in kind.one_of if name in names]
     if kind.one_of and len(given) != 1:
-        choice = " or ".join(f'"{_shown(c)}"' for c in kind.columns if c.name in kind.one_of)
+        choice = " or ".join(f'"{c.head}"' for c in kind.columns if c.name in kind.one_of)
         yield data_fault(table.file, place, f"{len(given)} of the columns {choice}, and one is needed")
-
-
-def _shown(column: Column) -> str:
-    return f"{column.name} [{column.unit}]" if column.unit else column.name
 
 
 def _columns(table: Table, kind: DataKind) -> tuple[dict[str, FloatArray], list[Fault]]:

@@ -104,6 +104,22 @@ class Disc:
         ),
         shown("fill ratio at the start"),
     ]
+    lambda_factor: Annotated[
+        float | None,
+        number(POSITIVE),
+        unused(
+            "lambda and the moments are those of the geometry",
+            "measured lambda over that of the geometry, which every chamber's moment is multiplied by; "
+            "`ringbalance fit` writes it",
+        ),
+        UNCERTAIN,
+        shown("measured factor on lambda"),
+    ] = None
+
+    @property
+    def moment_factor(self) -> float:
+        """Moment of a chamber over that of its geometry: `lambda_factor`, or 1 where nothing is measured."""
+        return 1.0 if self.lambda_factor is None else self.lambda_factor
 
 
 @dataclass(frozen=True, kw_only=True)

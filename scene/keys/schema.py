@@ -18,6 +18,7 @@ from ringbalance.scene.keys.declaration import (
     unused,
 )
 from ringbalance.scene.keys.fields import Bounds, Reader, choice, half_width, share, text
+from ringbalance.scene.measured import Measured
 from ringbalance.scene.origins import Origin
 
 Balancer = Literal["liquid_ring", "eccentric_mass"]
@@ -156,6 +157,9 @@ _TOLERANCE = Key(
 RUN = {
     "run": table_of(loop_models.RunSettings, "a simulation's seed and end"),
     "accuracy": Table(text="what is asked of the result", keys={"tolerance": _TOLERANCE}),
+    "measured": table_of(
+        Measured, "the measurements that `ringbalance fit` has fitted the scene to; `fit --save` writes it"
+    ),
 }
 _LIQUID_RING = {
     "disc": table_of(models.Disc, "the balancing disc"),

@@ -67,6 +67,7 @@ def test_the_band_of_an_unbiased_model_holds_what_it_promises() -> None:
     found = _synthetic(np.random.default_rng(2), bias=0.0, scatter=0.03)
     inside = round(found.share_within * found.points)
     assert binomtest(inside, found.points, 0.954).pvalue > 1e-3
+    assert found.width_needed == pytest.approx(1.96 / 2, rel=0.03)
 
 
 def test_scatter_that_the_measurements_explain_is_not_the_models() -> None:
@@ -172,9 +173,8 @@ def test_a_comparison_is_confirmed_by_its_own_predictions_and_refuted_by_others(
 def test_the_uncertainty_of_wave_frequencies_comes_from_tanks_that_are_not_judged() -> None:
     data = measurements("addington_1960")
     taught = np.isin(data.series, CALIBRATING)
-    deviation = compare(data.where(taught))
-    ratio = np.log(deviation.predicted / deviation.measured)
-    width = math.hypot(float(ratio.mean()), 2 * float(ratio.std(ddof=1)))
+    found = compare(data.where(taught)).statistics
+    width = math.hypot(found.bias, 2 * found.standard_deviation)
     assert round(width, 2) == FREQUENCY_UNCERTAINTY
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -24,11 +26,12 @@ from ringbalance.identification.data.stated import stated_uncertainty
 from ringbalance.identification.data.tables import (
     Table,
     data_fault,
+    decoded,
     file_name,
     header_faults,
     in_order,
     parse_table,
-    read_text,
+    read_content,
 )
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import Fault, SceneError, did_you_mean, toml_text
@@ -49,13 +52,11 @@ def read_observations(paths: Iterable[Path], *, scene: AnyScene) -> tuple[Observ
     faults: list[Fault] = []
     found = []
     for path in paths:
-        text, unreadable = read_text(path)
-        file = file_name(path)
-        observations, wrong = (
-            (None, unreadable) if unreadable else parse_observations(text, file=file, scene=scene)
-        )
+        content, wrong = read_content(path)
+        if not wrong:
+            observations, wrong = observations_of(content, file=file_name(path), scene=scene)
+            found += [observations] if observations else []
         faults += in_order(wrong)
-        found += [observations] if observations else []
     faults += _given_twice(found)
     if faults:
         raise SceneError(faults)
@@ -63,18 +64,20 @@ def read_observations(paths: Iterable[Path], *, scene: AnyScene) -> tuple[Observ
 
 
 def _given_twice(found: Iterable[Observations]) -> Iterator[Fault]:
-    first: dict[bytes, str] = {}
+    first: dict[str, str] = {}
     for each in found:
-        content = b"".join(each.columns[name].tobytes() for name in sorted(each.columns))
-        if content in first:
-            yield data_fault(each.file, "", f"it has the same measurements as {first[content]}; give it once")
-        first.setdefault(content, each.file)
+        if each.sha256 in first:
+            yield data_fault(each.file, "", f"it has the same content as {first[each.sha256]}; give it once")
+        first.setdefault(each.sha256, each.file)
 
 
-def parse_observations(
-    text: str, *, file: str, scene: AnyScene
+def observations_of(
+    content: bytes, *, file: str, scene: AnyScene
 ) -> tuple[Observations | None, tuple[Fault, ...]]:
-    """The observations of a file's text, or all that is wrong with it."""
+    """The observations of a file's bytes, or all that is wrong with it."""
+    text, undecoded = decoded(content, file=file)
+    if undecoded:
+        return None, undecoded
     table, faults = parse_table(text, file=file)
     if table is None:
         return None, faults
@@ -92,7 +95,8 @@ def parse_observations(
     wrong += [*stated_faults, *_repeated(table)]
     if faults or wrong:
         return None, (*faults, *wrong)
-    return _observations(table, kind, columns, uncertainty), ()
+    found = _observations(table, kind, columns, uncertainty)
+    return replace(found, sha256=hashlib.sha256(content).hexdigest()), ()
 
 
 def _observations(

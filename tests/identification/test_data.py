@@ -14,7 +14,7 @@ import ringbalance as rb
 from ringbalance.identification.data import tables
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.data.reading import parse_observations, read_observations
+from ringbalance.identification.data.reading import observations_of, read_observations
 from ringbalance.identification.data.template import template
 from ringbalance.scene import AnyScene, SceneError
 from ringbalance.scene.models import Scene
@@ -28,7 +28,7 @@ def scenes(paper_scene: Scene) -> Mapping[str, AnyScene]:
 
 
 def read(text: str, scene: AnyScene) -> Observations:
-    found, faults = parse_observations(text, file="x.csv", scene=scene)
+    found, faults = observations_of(text.encode(), file="x.csv", scene=scene)
     assert [str(fault) for fault in faults] == []
     assert found is not None
     return found
@@ -36,7 +36,7 @@ def read(text: str, scene: AnyScene) -> Observations:
 
 def refused(text: str, scene: AnyScene) -> list[str]:
     """Lines of the message, in the order of the file."""
-    found, faults = parse_observations(text, file="x.csv", scene=scene)
+    found, faults = observations_of(text.encode(), file="x.csv", scene=scene)
     assert found is None
     return [str(fault) for fault in tables.in_order(faults)]
 
@@ -231,7 +231,7 @@ def test_the_same_file_counts_once(
 ) -> None:
     for name in ("a.csv", "b.csv"):
         (tmp_path / name).write_text(sound_files["flow"])
-    with pytest.raises(SceneError, match=r"b\.csv: it has the same measurements as .*a\.csv"):
+    with pytest.raises(SceneError, match=r"b\.csv: it has the same content as .*a\.csv"):
         read_observations([tmp_path / "a.csv", tmp_path / "b.csv"], scene=paper_scene)
 
 

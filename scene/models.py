@@ -29,7 +29,7 @@ from ringbalance.scene.keys.quantities import (
     Temperature,
     Time,
 )
-from ringbalance.scene.loop_models import ControllerSettings, Requirement, Rotor, Sensor
+from ringbalance.scene.loop_models import ControllerSettings, Environment, Requirement, Rotor, Sensor
 from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.tube_models import FINEST_MODELS, TubeModels
 
@@ -38,7 +38,6 @@ HumpShape = Literal["arc", "point"]
 DissolvedGas = Literal["none", "saturated"]
 PressurePlace = Literal["chamber", "shaft"]
 Entrance = Literal["sharp", "rounded", "projecting"]
-Shaft = Literal["horizontal", "vertical"]
 GasProcess = Literal["isothermal", "adiabatic"]
 
 
@@ -357,21 +356,6 @@ class Gas:
             "matters with conductance only",
         ),
         shown("gas in the chambers", note="matters with a conductance only"),
-    ]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Environment:
-    """Gravity and how the shaft lies in it."""
-
-    shaft: Annotated[
-        Shaft, standard("horizontal", "how the shaft lies in the field of gravity"), shown("shaft")
-    ]
-    gravity: Annotated[
-        float,
-        quantity("acceleration", NOT_NEGATIVE),
-        standard("9.80665 m/s^2", "acceleration of gravity; zero for none"),
-        shown("gravity", "m/s^2"),
     ]
 
 

@@ -103,6 +103,12 @@ def format_quantity(value: float, dimension: str, unit: str, *, digits: int = 6)
     return f"{number:.{digits}g} {unit}"
 
 
+def unit_of(text: str) -> str:
+    """The unit of a quantity such as "44.5 mm", as `DIMENSIONS` names it; empty for any other text."""
+    match = _NUMBER.fullmatch(_respelled(text))
+    return "" if match is None else _canonical(match[2])
+
+
 def _split(text: object, kind: Dimension) -> tuple[str, str]:
     if isinstance(text, bool) or not isinstance(text, int | float | str):
         raise FieldError("it is not text with a number and a unit", _allowed(kind))

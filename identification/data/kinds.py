@@ -40,6 +40,11 @@ class Column:
     highest: float = math.inf
     above_zero: bool = False
 
+    @property
+    def head(self) -> str:
+        """Name with unit, as it stands over the column."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
     def check(self, value: float) -> None:
         """Raises: FieldError: a value, SI, that the column cannot have."""
         if self.above_zero and not value > 0:
@@ -149,7 +154,7 @@ def _fill(meaning: str, *, optional: bool = False) -> Column:
     )
 
 
-_PHASE: Final = "phase of the vibration, positive with the rotation, from the mark of the rotor"
+_PHASE: Final = "of that vibration, positive with the rotation, from the mark of the rotor"
 _GAS: Final = "gas pressure in the driven chamber, gauge"
 _OPEN: Final = "valve-open time"
 
@@ -201,7 +206,7 @@ _TRANSFER: Final = DataKind(
             name="volume",
             dimension="volume",
             unit="ml",
-            meaning="moved, in place of a mass",
+            meaning="moved, measured by volume",
             measured=True,
             lowest=0.0,
         ),
@@ -224,7 +229,7 @@ _PRESSURE: Final = DataKind(
     columns=(
         _positive("radius", "length", "mm", "of the place where the pressure is measured"),
         _fill("fill ratio of the chamber"),
-        _positive("surface_radius", "length", "mm", "of the free surface, in place of a fill ratio"),
+        _positive("surface_radius", "length", "mm", "of the free surface"),
         Column(
             name="speed",
             dimension="speed",

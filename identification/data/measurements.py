@@ -25,11 +25,12 @@ from ringbalance.identification.data.columns import (
 from ringbalance.identification.data.tables import (
     Table,
     data_fault,
+    decoded,
     file_name,
     header_faults,
     in_order,
     parse_table,
-    read_text,
+    read_content,
 )
 from ringbalance.scene.arrays import BoolArray, FloatArray, StringArray
 from ringbalance.scene.faults import Fault, toml_text
@@ -98,9 +99,10 @@ class Measurements:
 
 def read_measurements(path: Path) -> Measurements:
     """The data set of a file. Raises: MeasurementsError: no such file, or not a data set."""
-    text, faults = read_text(path)
-    if faults:
-        raise _error(faults)
+    content, unreadable = read_content(path)
+    text, faults = decoded(content, file=file_name(path))
+    if unreadable or faults:
+        raise _error(unreadable or faults)
     return parse_measurements(text, file=file_name(path))
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -24,11 +26,12 @@ from ringbalance.identification.data.stated import stated_uncertainty
 from ringbalance.identification.data.tables import (
     Table,
     data_fault,
+    decoded,
     file_name,
     header_faults,
     in_order,
     parse_table,
-    read_text,
+    read_content,
 )
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import Fault, SceneError, did_you_mean, toml_text
@@ -49,13 +52,11 @@ def read_observations(paths: Iterable[Path], *, scene: AnyScene) -> tuple[Observ
     faults: list[Fault] = []
     found = []
     for path in paths:
-        text, unreadable = read_text(path)
-        file = file_name(path)
-        observations, wrong = (
-            (None, unreadable) if unreadable else parse_observations(text, file=file, scene=scene)
-        )
+        content, wrong = read_content(path)
+        if not wrong:
+            observations, wrong = observations_of(content, file=file_name(path), scene=scene)
+            found += [observations] if observations else []
         faults += in_order(wrong)
-        found += [observations] if observations else []
     faults += _given_twice(found)
     if faults:
         raise SceneError(faults)
@@ -63,18 +64,20 @@ def read_observations(paths: Iterable[Path], *, scene: AnyScene) -> tuple[Observ
 
 
 def _given_twice(found: Iterable[Observations]) -> Iterator[Fault]:
-    first: dict[bytes, str] = {}
+    first: dict[str, str] = {}
     for each in found:
-        content = b"".join(each.columns[name].tobytes() for name in sorted(each.columns))
-        if content in first:
-            yield data_fault(each.file, "", f"it has the same measurements as {first[content]}; give it once")
-        first.setdefault(content, each.file)
+        if each.sha256 in first:
+            yield data_fault(each.file, "", f"it has the same content as {first[each.sha256]}; give it once")
+        first.setdefault(each.sha256, each.file)
 
 
-def parse_observations(
-    text: str, *, file: str, scene: AnyScene
+def observations_of(
+    content: bytes, *, file: str, scene: AnyScene
 ) -> tuple[Observations | None, tuple[Fault, ...]]:
-    """The observations of a file's text, or all that is wrong with it."""
+    """The observations of a file's bytes, or all that is wrong with it."""
+    text, undecoded = decoded(content, file=file)
+    if undecoded:
+        return None, undecoded
     table, faults = parse_table(text, file=file)
     if table is None:
         return None, faults
@@ -92,7 +95,8 @@ def parse_observations(
     wrong += [*stated_faults, *_repeated(table)]
     if faults or wrong:
         return None, (*faults, *wrong)
-    return _observations(table, kind, columns, uncertainty), ()
+    found = _observations(table, kind, columns, uncertainty)
+    return replace(found, sha256=hashlib.sha256(content).hexdigest()), ()
 
 
 def _observations(
@@ -137,6 +141,8 @@ def _header_faults(table: Table, kind: DataKind) -> list[Fault]:
         *header_faults(table.header, known=(*SOURCE_KEYS, *convention), needed=_NEEDED, file=table.file),
         *text_faults(table.header, texts_only, file=table.file),
     ]
+    if not str(table.header.get("source", "-")).strip():
+        faults.append(data_fault(table.file, "source", "it is empty", allowed="rig, run and date"))
     stated = table.header.get(AMPLITUDE)
     if kind.has_amplitudes and not (isinstance(stated, str) and stated in AMPLITUDES):
         allowed = " or ".join(f'amplitude = "{word}"' for word in AMPLITUDES)
@@ -181,17 +187,13 @@ def _missing(table: Table, kind: DataKind, names: set[str]) -> Iterator[Fault]:
     needed = [column for column in kind.columns if not column.optional and column.name not in kind.one_of]
     for column in needed:
         if column.name not in names:
-            yield data_fault(table.file, place, f'the column "{_shown(column)}" is missing: {column.meaning}')
+            yield data_fault(table.file, place, f'the column "{column.head}" is missing: {column.meaning}')
     if kind.has_chamber and "chamber" not in names:
         yield data_fault(table.file, place, 'the column "chamber" is missing: letter of the driven chamber')
     given = [name for name in kind.one_of if name in names]
     if kind.one_of and len(given) != 1:
-        choice = " or ".join(f'"{_shown(c)}"' for c in kind.columns if c.name in kind.one_of)
+        choice = " or ".join(f'"{c.head}"' for c in kind.columns if c.name in kind.one_of)
         yield data_fault(table.file, place, f"{len(given)} of the columns {choice}, and one is needed")
-
-
-def _shown(column: Column) -> str:
-    return f"{column.name} [{column.unit}]" if column.unit else column.name
 
 
 def _columns(table: Table, kind: DataKind) -> tuple[dict[str, FloatArray], list[Fault]]:

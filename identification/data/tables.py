@@ -58,18 +58,17 @@ def file_name(path: Path) -> str:
     return name if name.isprintable() else toml_text(name)
 
 
-def read_text(path: Path) -> tuple[str, tuple[Fault, ...]]:
-    """The text of a file of measurements, or why there is none."""
+def read_content(path: Path) -> tuple[bytes, tuple[Fault, ...]]:
+    """The bytes of a file, no more than are read in any case, or why there are none."""
     file = file_name(path)
     try:
         with open(path, "rb") as stream:
-            content = stream.read(LARGEST_FILE + 1)
+            return stream.read(LARGEST_FILE + 1), ()
     except IsADirectoryError:
-        return "", (data_fault(file, "", "this is a folder, not a file of measurements"),)
+        return b"", (data_fault(file, "", "this is a folder, not a file of measurements"),)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        return "", (data_fault(file, "", f"the file cannot be read: {reason}"),)
-    return decoded(content, file=file)
+        return b"", (data_fault(file, "", f"the file cannot be read: {reason}"),)
 
 
 def decoded(content: bytes, *, file: str) -> tuple[str, tuple[Fault, ...]]:

@@ -166,7 +166,7 @@ _LIQUID_RING = {
     "liquid": table_of(models.Liquid, "the balancing liquid"),
     "tube": table_of(models.Tube, "the tube that connects two opposite chambers"),
     "gas": table_of(models.Gas, "the gas that drives the liquid"),
-    "environment": table_of(models.Environment, "gravity and how the shaft lies in it"),
+    "environment": table_of(loop_models.Environment, "gravity and how the shaft lies in it"),
     "rotor": _rotor(),
     "sensor": table_of(loop_models.Sensor, "the vibration sensor; exact when left out"),
     "controller": table_of(loop_models.ControllerSettings, "the control algorithm"),

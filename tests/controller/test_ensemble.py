@@ -37,12 +37,11 @@ from ringbalance.controller.liquid_ring.transfer import Drive
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.sensor import Sensor
 from ringbalance.controller.simulation import Outcome
-from ringbalance.reduced_model.calibration import calibrated_model
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw, PaperMoment, paper_model
 from ringbalance.reduced_model.operating.residual import residual_by_velocity, residual_fill_ratio
-from ringbalance.scene.models import InputUncertainty, Scene
+from ringbalance.scene.models import Scene
 
 EXACT = MemberUncertainty(velocity=0.0, moment=0.0, influence_coefficient=0.0, lag_angle=0.0)
 
@@ -356,19 +355,6 @@ def test_the_spread_says_where_it_comes_from(scene: Scene, model: BalancerModel)
     # k = 50 within 10 %: (k + 1) within 5/51, the velocity within half of that.
     assert found.velocity == pytest.approx(5 / 51 / 2)
     assert all("assumed" in source for source in found.sources[2:])
-
-
-def test_the_moment_is_as_uncertain_as_the_measured_factor(paper_scene: Scene) -> None:
-    model = calibrated_model(paper_scene)
-    measured = replace(
-        paper_scene,
-        disc=replace(paper_scene.disc, lambda_factor=0.8),
-        uncertainty=(InputUncertainty(quantity="lambda_factor", half_width=0.04, relative=False),),
-    )
-    known = replace(measured, uncertainty=())
-    with_factor, without = (member_uncertainty(asked, model) for asked in (measured, known))
-    assert with_factor.moment == pytest.approx(np.hypot(without.moment, 0.05))
-    assert "lambda's factor" in with_factor.sources[1]
 
 
 def test_a_share_has_its_interval() -> None:

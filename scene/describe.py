@@ -93,6 +93,12 @@ def _lines_of(parts: tuple[str, ...]) -> Iterator[_Line]:
     return (_LINES[path] for path in dict.fromkeys(paths))
 
 
+def usual_unit(path: str) -> str:
+    """Unit in which a value of a scene with a liquid ring is described; empty without one."""
+    line = _LINES.get(path)
+    return line.shown.unit if line is not None else ""
+
+
 def scene_fault(*, scene: Scene, table: str, key: str, problem: str, allowed: str) -> Fault:
     """The error about a value of a loaded scene that only a later room finds; raise `SceneError` with it."""
     path = f"{table}.{key}"

@@ -143,4 +143,8 @@ def _moment(scene: Scene, model: BalancerModel) -> tuple[float, str]:
     top = model.flow.max_fill_ratio
     ends = model.moment.half_width(np.array([0.0, top]))
     pair = float(model.moment.pair_moment(fill_ratio=top, opposite_fill_ratio=0.0))
-    return math.hypot(float(np.hypot(*ends)) / pair, density), "the law's own, and the density"
+    own = math.hypot(float(np.hypot(*ends)) / pair, density)
+    factor = _stated(scene, "lambda_factor")
+    if factor is None:
+        return own, "the law's own, and the density"
+    return math.hypot(own, factor / scene.disc.moment_factor), "the law's own, density and lambda's factor"

@@ -14,6 +14,10 @@ class Observations:
 
     kind: str
     file: str
+    source: str = ""
+    """Rig, run and date, as the file's first lines have them."""
+    sha256: str = ""
+    """Of the file's bytes."""
     lines: IntArray
     """Line of each row in the file, from 1."""
     series: StringArray

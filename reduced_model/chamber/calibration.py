@@ -104,7 +104,7 @@ class ChamberCalibration:
     statistics: Statistics
 
 
-def _fill_nodes(*, largest: float) -> tuple[FloatArray, FloatArray]:
+def fill_nodes(*, largest: float) -> tuple[FloatArray, FloatArray]:
     """Fill ratios of the tables and of the report.
 
     Args: `largest`: max_fill_ratio.
@@ -128,7 +128,7 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
         measured factor.
     """
     modelled = mean_gravity(scene) > scene.tolerance
-    nodes, reported = _fill_nodes(largest=scene.disc.max_fill_ratio)
+    nodes, reported = fill_nodes(largest=scene.disc.max_fill_ratio)
     fills = np.append(nodes, [x for x in reported if np.min(np.abs(nodes - x)) > 1e-12])
     effect = gravity_effect(scene, fill_ratio=fills)
     ring = ring_values(scene, fill_ratio=fills, gravity=modelled)

@@ -9,10 +9,10 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.identification.data.measurements import Measurements, MeasurementsError
 from ringbalance.scene.arrays import BoolArray, FloatArray, StringArray
 from ringbalance.verification.evidence import Curve, Evidence, Found, Series, figure
 from ringbalance.verification.validation.kinds import Kind
-from ringbalance.verification.validation.measurements import Measurements, MeasurementsError
 from ringbalance.verification.validation.model_bias import (
     MUTATIONS,
     ModelStatistics,

@@ -1,0 +1,122 @@
+"""A fit as a person reads it in a terminal: what was found, how sure it is, and what to look at."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+import numpy as np
+from rich.box import SIMPLE_HEAD
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.documents import path_of
+from ringbalance.identification.identifiability import Verdict
+from ringbalance.identification.result import FitResult, FittedParameter, Noise
+from ringbalance.reduced_model.budget import rounded
+from ringbalance.scene.describe import in_usual_unit, usual_name, usual_unit
+
+_STRONG: Final = 0.9
+"""Correlation from which two parameters are named together."""
+_MOST_LINES: Final = 10
+_FAR: Final = 3.0
+"""Normalised residual of a row that is named."""
+
+
+def fit_view(result: FitResult, *, data: Sequence[Observations]) -> RenderableType:
+    """Parameters, then what else the data say, for a rich console."""
+    return Group(_heading(result, data), _parameters(result), *_remarks(result))
+
+
+def _heading(result: FitResult, data: Sequence[Observations]) -> RenderableType:
+    rows = sum(len(each) for each in data)
+    files = "one file" if len(data) == 1 else f"{len(data)} files"
+    name = result.optimum.residuals.problem.scene.name
+    return Text(f"{name}, fitted to {rows} measurements of {files}", style="bold")
+
+
+def _parameters(result: FitResult) -> Table:
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, header_style="bold")
+    for name in ("quantity", "fitted", "95 % interval", "before", "verdict"):
+        table.add_column(name)
+    for each in result.parameters:
+        style = "green" if each.verdict is Verdict.IDENTIFIED else "yellow"
+        table.add_row(usual_name(path_of(each.name)), *_numbers(each), Text(each.verdict.value, style=style))
+    return table
+
+
+def _numbers(found: FittedParameter) -> tuple[str, str, str]:
+    """Value, interval and what was known before, in the usual unit."""
+    path = path_of(found.name)
+    unit = usual_unit(path)
+    low, high = (in_usual_unit(path, end) if math.isfinite(end) else end for end in found.interval)
+    value, before = (in_usual_unit(path, number) for number in (found.value, found.before))
+    width = (high - low) / 2 if math.isfinite(high - low) else abs(value)
+    interval = " to ".join(
+        f"{rounded(end, width)}{' (bound)' if bound else ''}" if math.isfinite(end) else "?"
+        for end, bound in zip((low, high), found.at_bound, strict=True)
+    )
+    known = f"{before:.4g} {unit}".rstrip()
+    if found.before_interval is not None:
+        ends = [in_usual_unit(path, end) for end in found.before_interval]
+        known = f"{before:.4g} ± {(ends[1] - ends[0]) / 2:.2g} {unit}".rstrip()
+    return f"{rounded(value, width)} {unit}".rstrip(), interval, known
+
+
+def _remarks(result: FitResult) -> Iterator[Text]:
+    for each in result.parameters:
+        if each.verdict is not Verdict.IDENTIFIED:
+            yield Text(f"{usual_name(path_of(each.name))}: {each.text}.", style="yellow")
+    for found in result.combinations:
+        yield Text(
+            f"The data identify {found.text} to {found.relative_uncertainty:.2g} of its value (95 %): "
+            f"{found.value:.4g} with the parameters in SI units."
+        )
+    yield from (Text(_noise(each)) for each in result.noise)
+    yield from map(Text, _pairs(result))
+    yield from _rows(result)
+    if result.held:
+        held = ", ".join(result.held)
+        yield Text(f"Held at the scene's values, with their [uncertainty] in all intervals: {held}.", "dim")
+
+
+def _noise(noise: Noise) -> str:
+    if not noise.estimated or noise.standard_deviation is None:
+        return f"Noise of {noise.group}: as the file states it."
+    return (
+        f"Noise of {noise.group}, estimated: standard deviation {noise.standard_deviation:.3g} in SI units"
+        f" ({noise.freedom:.3g} degrees of freedom)."
+    )
+
+
+def _pairs(result: FitResult) -> Iterator[str]:
+    """Parameters whose errors go together."""
+    names = [each.name for each in result.parameters]
+    for i, first in enumerate(names):
+        for j in range(i + 1, len(names)):
+            correlation = float(result.correlations[i, j])
+            if abs(correlation) >= _STRONG:
+                yield f"The errors of {first} and {names[j]} go together: correlation {correlation:+.3f}."
+
+
+def _rows(result: FitResult) -> Iterator[Text]:
+    """Rows that lie far off, and those that a robust loss counts less."""
+    for each in result.residuals:
+        size = np.max(np.abs(each.normalised), axis=1)
+        far = each.lines[size > _FAR]
+        if far.size:
+            lines = _listed(far.tolist())
+            text = f"{each.file}: {lines} more than {_FAR:g} standard deviations from the fit"
+            yield Text(f"{text}; look at what was written down there.", style="yellow")
+        if np.any(each.down_weighted):
+            lines = _listed(each.lines[each.down_weighted].tolist())
+            yield Text(f"{each.file}: {lines} counted less than half by the robust loss.", style="yellow")
+
+
+def _listed(lines: Sequence[int]) -> str:
+    shown = ", ".join(map(str, lines[:_MOST_LINES]))
+    more = f" and {len(lines) - _MOST_LINES} more" if len(lines) > _MOST_LINES else ""
+    return f"line {shown} is" if len(lines) == 1 else f"lines {shown}{more} are"

@@ -80,7 +80,6 @@ def _names(text: str) -> list[str]:
     names = [name.strip() for name in text.split(",")]
     if not all(names) or len(set(names)) < len(names):
         problem = "it is not a list of different names with commas between"
-        raise option_error(
-            option="--parameters", value=text, problem=problem, allowed='such as "bore,extra_loss"'
-        )
+        allowed = 'such as "bore,extra_loss"'
+        raise option_error(option="--parameters", value=text, problem=problem, allowed=allowed)
     return names

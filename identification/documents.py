@@ -9,12 +9,24 @@ from typing import Any
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.identifiability import Combination
 from ringbalance.identification.result import FileResiduals, FitResult, FittedParameter, Noise
-from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
+from ringbalance.reduced_model.chamber.inputs import half_widths
+from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, nominal_value
 
 
 def path_of(name: str) -> str:
     """Place in the scene of a fitted quantity, such as "tube.bore"."""
     return f"{UNCERTAIN_QUANTITIES[name]}.{name}" if name in UNCERTAIN_QUANTITIES else name
+
+
+def exact_inputs(result: FitResult) -> list[str]:
+    """Quantities of the scene that are neither fitted nor stated as uncertain."""
+    scene = result.optimum.residuals.problem.scene
+    known = {*half_widths(scene), *(parameter.name for parameter in result.parameters)}
+    return [
+        name
+        for name in UNCERTAIN_QUANTITIES
+        if name not in known and nominal_value(scene=scene, quantity=name) is not None
+    ]
 
 
 def fit_document(result: FitResult, *, data: Sequence[Observations]) -> dict[str, Any]:
@@ -30,6 +42,7 @@ def fit_document(result: FitResult, *, data: Sequence[Observations]) -> dict[str
         "noise": [_noise(each) for each in result.noise],
         "residuals": [_residuals(each) for each in result.residuals],
         "held": dict(result.held),
+        "exact": exact_inputs(result),
         "loss": result.loss,
         "starts": result.starts,
         "evaluations": result.evaluations,

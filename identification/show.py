@@ -12,16 +12,23 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.documents import path_of
+from ringbalance.identification.documents import exact_inputs, path_of
 from ringbalance.identification.identifiability import Verdict
 from ringbalance.identification.result import FitResult, FittedParameter, Noise
 from ringbalance.reduced_model.budget import rounded
-from ringbalance.scene.describe import in_usual_unit, usual_name, usual_unit
+from ringbalance.scene.describe import in_usual_unit, usual_unit
+from ringbalance.scene.units import format_quantity
 
 _STRONG: Final = 0.9
 """Correlation from which two parameters are named together."""
 _MOST_LINES: Final = 10
+_WORDS: Final = {
+    Verdict.IDENTIFIED: ("yes", "green"),
+    Verdict.PRACTICALLY: ("hardly", "yellow"),
+    Verdict.STRUCTURALLY: ("no", "yellow"),
+}
 _FAR: Final = 3.0
 """Normalised residual of a row that is named."""
 
@@ -40,36 +47,33 @@ def _heading(result: FitResult, data: Sequence[Observations]) -> RenderableType:
 
 def _parameters(result: FitResult) -> Table:
     table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, header_style="bold")
-    for name in ("quantity", "fitted", "95 % interval", "before", "verdict"):
-        table.add_column(name)
+    for name in ("quantity", "fitted", "from", "to (95 %)", "unit", "before", "identified"):
+        table.add_column(name, justify="left" if name in ("quantity", "unit", "identified") else "right")
     for each in result.parameters:
-        style = "green" if each.verdict is Verdict.IDENTIFIED else "yellow"
-        table.add_row(usual_name(path_of(each.name)), *_numbers(each), Text(each.verdict.value, style=style))
+        word, style = _WORDS[each.verdict]
+        table.add_row(each.name, *_numbers(each), Text(word, style=style))
     return table
 
 
-def _numbers(found: FittedParameter) -> tuple[str, str, str]:
-    """Value, interval and what was known before, in the usual unit."""
+def _numbers(found: FittedParameter) -> tuple[str, str, str, str, str]:
+    """Value, ends of its interval, unit, and what was known before, in the usual unit."""
     path = path_of(found.name)
-    unit = usual_unit(path)
     low, high = (in_usual_unit(path, end) if math.isfinite(end) else end for end in found.interval)
     value, before = (in_usual_unit(path, number) for number in (found.value, found.before))
     width = (high - low) / 2 if math.isfinite(high - low) else abs(value)
-    interval = " to ".join(
-        f"{rounded(end, width)}{' (bound)' if bound else ''}" if math.isfinite(end) else "?"
-        for end, bound in zip((low, high), found.at_bound, strict=True)
-    )
-    known = f"{before:.4g} {unit}".rstrip()
+    ends = [rounded(end, width) if math.isfinite(end) else "?" for end in (low, high)]
+    known = f"{before:.4g}"
     if found.before_interval is not None:
-        ends = [in_usual_unit(path, end) for end in found.before_interval]
-        known = f"{before:.4g} ± {(ends[1] - ends[0]) / 2:.2g} {unit}".rstrip()
-    return f"{rounded(value, width)} {unit}".rstrip(), interval, known
+        far = in_usual_unit(path, found.before_interval[1])
+        known = f"{before:.4g} ± {far - before:.2g}"
+    return rounded(value, width), ends[0], ends[1], usual_unit(path), known
 
 
 def _remarks(result: FitResult) -> Iterator[Text]:
     for each in result.parameters:
         if each.verdict is not Verdict.IDENTIFIED:
-            yield Text(f"{usual_name(path_of(each.name))}: {each.text}.", style="yellow")
+            yield Text(f"{each.name}: {each.text}.", style="yellow")
+        yield from _bounds(each)
     for found in result.combinations:
         yield Text(
             f"The data identify {found.text} to {found.relative_uncertainty:.2g} of its value (95 %): "
@@ -80,16 +84,29 @@ def _remarks(result: FitResult) -> Iterator[Text]:
     yield from _rows(result)
     if result.held:
         held = ", ".join(result.held)
-        yield Text(f"Held at the scene's values, with their [uncertainty] in all intervals: {held}.", "dim")
+        yield Text(f"Not fitted, their [uncertainty] is in all intervals: {held}.", "dim")
+    if exact := exact_inputs(result):
+        yield Text(f"Not fitted and without [uncertainty], so taken as exact: {', '.join(exact)}.", "dim")
+
+
+def _bounds(found: FittedParameter) -> Iterator[Text]:
+    """Ends of an interval that the data did not set."""
+    for end, bound, word in zip(found.interval, found.at_bound, ("lower", "upper"), strict=True):
+        if bound and math.isfinite(end):
+            text = f"{found.name}: its interval has no {word} end; it stops where the scene's rules do."
+            yield Text(text, style="yellow")
 
 
 def _noise(noise: Noise) -> str:
+    kind, name = noise.group.split(" ")
     if not noise.estimated or noise.standard_deviation is None:
-        return f"Noise of {noise.group}: as the file states it."
-    return (
-        f"Noise of {noise.group}, estimated: standard deviation {noise.standard_deviation:.3g} in SI units"
-        f" ({noise.freedom:.3g} degrees of freedom)."
-    )
+        return f"Noise of {name} ({kind}): as the file states it."
+    column = KINDS[kind].column(name)
+    size = f"{noise.standard_deviation:.3g}"
+    if column is not None and column.dimension is not None:
+        size = format_quantity(noise.standard_deviation, column.dimension, column.unit, digits=3)
+    freedom = f"{noise.freedom:.0f} degrees of freedom"
+    return f"Noise of {name} ({kind}), estimated: {size} standard deviation, {freedom}."
 
 
 def _pairs(result: FitResult) -> Iterator[str]:

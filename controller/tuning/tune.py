@@ -26,7 +26,7 @@ from ringbalance.controller.tuning.settling import MEMBERS, RUNS, Progress, Sett
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.gas_line import LineAnswer, line_answers, line_document
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.selection.registry import ModelUsed
+from ringbalance.reduced_model.selection.registry import ModelUsed, neglected_in_injections
 from ringbalance.scene.models import Scene
 
 
@@ -290,6 +290,7 @@ def tuning_document(tuning: Tuning) -> dict[str, Any]:
         "fraction_settled_95": None if settling is None else [settling.settled.low, settling.settled.high],
         "runs": 0 if settling is None else settling.runs,
         "left_out": [],
+        "neglected": asdict(neglected_in_injections(tuning.models_used)),
         "models_used": [asdict(used) for used in tuning.models_used],
     }
 

@@ -28,6 +28,7 @@ PAGES = (
     "docs/how-it-works.md",
     "docs/is-k-50-right.md",
     "docs/how-to-choose.md",
+    "docs/fit.md",
     "docs/commands.md",
     "docs/eccentric-masses.md",
     "docs/scene-file.md",

@@ -17,7 +17,7 @@ from ringbalance.cli import main
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.reading import observations_of
 from ringbalance.identification.data.template import template
-from ringbalance.scene import bundled_scene
+from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import nominal_value
 
@@ -105,6 +105,29 @@ def test_text_names_what_an_engineer_must_know(run: Run) -> None:
     assert "extra_loss" in text.split("taken as exact")[1]
 
 
+def test_a_fitted_scene_is_saved_and_not_fitted_to_the_same_file_again(run: Run, tmp_path: Path) -> None:
+    code, out, err = run(PAPER, EXAMPLES["trial_weight"], "--save", tmp_path / "built.toml", "--json")
+    assert (code, err) == (0, f"scene written to {tmp_path / 'built.toml'}\n")
+    found = {each["name"]: each for each in json.loads(out)["parameters"]}
+    scene = liquid_ring_scene(load_scene(tmp_path / "built.toml"))
+    assert scene.rotor.lag_angle == pytest.approx(found["lag_angle"]["value"], rel=1e-8)
+    assert scene.origin_of("rotor.lag_angle") == "measured"
+    code, _, err = run(tmp_path / "built.toml", EXAMPLES["trial_weight"], "--json")
+    assert code == 2
+    assert "was fitted to this file already" in err
+
+
+def test_a_fit_that_does_not_describe_the_data_is_exit_code_1(run: Run, tmp_path: Path) -> None:
+    """Flow that grows faster with the pressure than through any tube."""
+    rows = [f"{p},{2.8 * (p / 10) ** 0.9:.4g},a" for p in (1, 2, 5, 10, 20, 50, 100, 200, 500)]
+    text = Path(EXAMPLES["flow"]).read_text(encoding="utf-8")
+    head = text.split("series\n")[0] + "series\n"
+    (tmp_path / "odd.csv").write_text(head + "\n".join(rows) + "\n", encoding="utf-8")
+    code, out, _ = run(PAPER, tmp_path / "odd.csv", "--parameters", "bore")
+    assert code == 1
+    assert "does not describe the data" in " ".join(out.split())
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_template_is_printed_and_nothing_else(kind: str, run: Run) -> None:
     assert run("--template", kind) == (0, template(kind), "")
@@ -122,6 +145,8 @@ def test_a_template_is_printed_and_nothing_else(kind: str, run: Run) -> None:
         ([PAPER, EXAMPLES["flow"], "--parameters", "bor"], '"bor"'),
         ([PAPER, EXAMPLES["flow"], "--parameters", ""], '--parameters = ""'),
         ([PAPER, EXAMPLES["flow"], "--loss", "huber"], "huber"),
+        ([PAPER, EXAMPLES["trial_weight"], "--next", "lag_angel"], 'did you mean "lag_angle"'),
+        ([PAPER, EXAMPLES["trial_weight"], "--save", str(ROOT / "docs")], "docs is a folder"),
         (["--template", "flwo"], 'did you mean "flow"'),
         ([EXAMPLES["flow"], PAPER], "flow.csv: this is not TOML"),
         ([PAPER, PAPER], "liquid_ring_paper.toml:"),

@@ -22,16 +22,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGES = (
     "README.md",
     "CONTRIBUTING.md",
-    "docs/README.md",
-    "docs/glossary.md",
-    "docs/where-things-go.md",
-    "docs/how-it-works.md",
-    "docs/is-k-50-right.md",
-    "docs/how-to-choose.md",
-    "docs/fit.md",
-    "docs/commands.md",
-    "docs/eccentric-masses.md",
-    "docs/scene-file.md",
+    *(f"docs/{page.name}" for page in sorted((ROOT / "docs").glob("*.md"))),
 )
 LINK = re.compile(r"\]\(([^)#:]+)(?:#[^)]*)?\)")
 FENCE = re.compile(r"```(\w+)\n(.*?)```", re.DOTALL)

@@ -15,11 +15,6 @@ from ringbalance.reduced_model.chamber.inputs import half_widths
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, nominal_value
 
 
-def path_of(name: str) -> str:
-    """Place in the scene of a fitted quantity, such as "tube.bore"."""
-    return f"{UNCERTAIN_QUANTITIES[name]}.{name}" if name in UNCERTAIN_QUANTITIES else name
-
-
 def exact_inputs(result: FitResult) -> list[str]:
     """Quantities of the scene that are neither fitted nor stated as uncertain."""
     scene = result.optimum.residuals.problem.scene
@@ -107,7 +102,7 @@ def _file(data: Observations) -> dict[str, Any]:
 def _parameter(found: FittedParameter) -> dict[str, Any]:
     return {
         "name": found.name,
-        "path": path_of(found.name),
+        "path": found.path,
         "value": found.value,
         "interval": [_finite(end) for end in found.interval],
         "at_bound": list(found.at_bound),

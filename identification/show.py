@@ -14,7 +14,7 @@ from rich.text import Text
 
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.documents import exact_inputs, path_of
+from ringbalance.identification.documents import exact_inputs
 from ringbalance.identification.identifiability import Verdict
 from ringbalance.identification.next_measurement import NextMeasurement
 from ringbalance.identification.result import FitResult, FittedParameter, Noise
@@ -72,7 +72,7 @@ def _parameters(result: FitResult) -> Table:
 
 def _numbers(found: FittedParameter) -> tuple[str, str, str, str, str]:
     """Value, ends of its interval, unit, and what was known before, in the usual unit."""
-    path = path_of(found.name)
+    path = found.path
     low, high = (in_usual_unit(path, end) if math.isfinite(end) else end for end in found.interval)
     value, before = (in_usual_unit(path, number) for number in (found.value, found.before))
     width = (high - low) / 2 if math.isfinite(high - low) else abs(value)

@@ -158,7 +158,9 @@ def test_the_fitted_scene_is_written_and_taken(run: Run, tmp_path: Path) -> None
         "rotor.influence_coefficient",
         "rotor.lag_angle",
     ]
-    assert run(target, EXAMPLES["trial_weight"])[0] == 0
+    code, _, err = run(target, EXAMPLES["trial_weight"])
+    assert code == 2
+    assert "was fitted to this file already" in err
 
 
 def test_a_file_that_cannot_be_written_is_refused_before_the_work(run: Run, tmp_path: Path) -> None:

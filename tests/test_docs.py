@@ -61,6 +61,19 @@ def test_links_lead_somewhere(page: str) -> None:
     assert [target for target in targets if not (ROOT / page).parent.joinpath(target).exists()] == []
 
 
+@pytest.mark.parametrize("page", PAGES)
+def test_links_into_a_page_lead_to_a_heading(page: str) -> None:
+    for target, anchor in re.findall(r"\]\(([^)#:]*)#([^)]+)\)", text(page)):
+        headings = re.findall(
+            r"^#+ (.*)$",
+            ((ROOT / page).parent / target).read_text(encoding="utf-8") if target else text(page),
+            re.MULTILINE,
+        )
+        assert anchor in {
+            re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings
+        }, anchor
+
+
 @pytest.mark.parametrize("page", ["README.md", "docs/commands.md"])
 def test_the_commands_are_those_registered(page: str) -> None:
     told = re.findall(r"^\| `ringbalance (\w+)", text(page), re.MULTILINE)

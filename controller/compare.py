@@ -12,7 +12,7 @@ import numpy as np
 from ringbalance.controller.algorithms.by_name import target_vector_of
 from ringbalance.controller.compare_rotor import OneRotor, own_scene, rotor_of, scene_on
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
-from ringbalance.controller.eccentric_mass.sampled_loops import recommended_gains
+from ringbalance.controller.eccentric_mass.sampled_loops import advised
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import chamber_letters
 from ringbalance.controller.tuning.dead_time import compensated
@@ -212,16 +212,7 @@ def _liquid_side(scene: Scene, model: BalancerModel, *, span: float, runs: int, 
 def _driven_side(rotor: OneRotor, scene: EccentricScene, *, span: float, runs: int, tuned: bool) -> Side:
     start = scene.supervisor.start
     ready = replace(scene, run=replace(scene.run, time_limit=span + start))
-    changes: dict[str, float] = {}
-    if tuned:
-        advice = recommended_gains(ready)
-        changes = {loop.key: loop.recommended for loop in advice.loops if loop.value > loop.recommended}
-        if advice.drive_speed > ready.friction_filter.drive_speed:
-            changes["friction_filter.drive_speed"] = advice.drive_speed
-        for key, value in changes.items():
-            table, name = key.split(".")
-            changed: dict[str, Any] = {table: replace(getattr(ready, table), **{name: value})}
-            ready = replace(ready, **changed)
+    ready, changes = advised(ready) if tuned else (ready, {})
     results = []
     for i in range(runs):
         run = simulate_eccentric(replace(ready, run=replace(ready.run, seed=ready.run.seed + i)))

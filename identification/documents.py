@@ -8,14 +8,11 @@ from typing import Any
 
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.identifiability import Combination
+from ringbalance.identification.next_measurement import NextMeasurement
 from ringbalance.identification.result import FileResiduals, FitResult, FittedParameter, Noise
+from ringbalance.identification.review import Review
 from ringbalance.reduced_model.chamber.inputs import half_widths
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, nominal_value
-
-
-def path_of(name: str) -> str:
-    """Place in the scene of a fitted quantity, such as "tube.bore"."""
-    return f"{UNCERTAIN_QUANTITIES[name]}.{name}" if name in UNCERTAIN_QUANTITIES else name
 
 
 def exact_inputs(result: FitResult) -> list[str]:
@@ -29,7 +26,9 @@ def exact_inputs(result: FitResult) -> list[str]:
     ]
 
 
-def fit_document(result: FitResult, *, data: Sequence[Observations]) -> dict[str, Any]:
+def fit_document(
+    result: FitResult, *, data: Sequence[Observations], told: Review, following: NextMeasurement | None
+) -> dict[str, Any]:
     """What `ringbalance fit --json` prints."""
     scene = result.optimum.residuals.problem.scene
     names = [parameter.name for parameter in result.parameters]
@@ -47,6 +46,45 @@ def fit_document(result: FitResult, *, data: Sequence[Observations]) -> dict[str
         "starts": result.starts,
         "evaluations": result.evaluations,
         "log_likelihood": result.log_likelihood,
+        "criticism": _criticism(told),
+        "next_measurement": None if following is None else _following(following),
+    }
+
+
+def _criticism(told: Review) -> dict[str, Any]:
+    return {
+        "describes": told.criticism.describes,
+        "text": told.criticism.text,
+        "findings": [
+            {
+                "test": each.test,
+                "residuals_of": each.block,
+                "against": each.against,
+                "p_value": each.p_value,
+                "corrected_p_value": each.corrected,
+                "fails": each.fails,
+            }
+            for each in told.criticism.findings
+        ],
+        "laws": [
+            {
+                "other_law": each.other,
+                "separation": each.separation,
+                "preference": each.preference,
+                "text": each.text,
+            }
+            for each in told.laws
+        ],
+    }
+
+
+def _following(found: NextMeasurement) -> dict[str, Any]:
+    return {
+        "parameter": found.parameter,
+        "text": found.text,
+        "candidates": [
+            {"measurement": each.candidate, "expected_width_ratio": each.ratio} for each in found.gains
+        ],
     }
 
 
@@ -64,7 +102,7 @@ def _file(data: Observations) -> dict[str, Any]:
 def _parameter(found: FittedParameter) -> dict[str, Any]:
     return {
         "name": found.name,
-        "path": path_of(found.name),
+        "path": found.path,
         "value": found.value,
         "interval": [_finite(end) for end in found.interval],
         "at_bound": list(found.at_bound),

@@ -142,7 +142,9 @@ def combinations(
     _, s, vt = np.linalg.svd(flat * allowed, full_matrices=False)
     # A row is the gradient of a product's logarithm; one that has a single parameter is a verdict.
     root = data_root(flat)
-    rows = [_simple(row, root) for row in _echelon(vt[s > factor] / allowed)]
+    # A profile is never wider than its prior, so that a direction counts from a root of two, as above.
+    strong = vt[s > math.sqrt(2) * factor]
+    rows = [_simple(row, root) for row in _echelon(strong / allowed)]
     rows = [row for row in rows if np.count_nonzero(row) > 1 and np.any(row[weak] != 0)]
     # What rounding of the exponents lets in of directions that are not seen at all is no width.
     seen = data_root(slopes, unseen=math.inf)

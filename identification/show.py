@@ -14,9 +14,11 @@ from rich.text import Text
 
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.documents import exact_inputs, path_of
+from ringbalance.identification.documents import exact_inputs
 from ringbalance.identification.identifiability import Verdict
+from ringbalance.identification.next_measurement import NextMeasurement
 from ringbalance.identification.result import FitResult, FittedParameter, Noise
+from ringbalance.identification.review import Review
 from ringbalance.reduced_model.budget import rounded
 from ringbalance.scene.describe import in_usual_unit, usual_unit
 from ringbalance.scene.units import format_quantity
@@ -33,9 +35,22 @@ _FAR: Final = 3.0
 """Normalised residual of a row that is named."""
 
 
-def fit_view(result: FitResult, *, data: Sequence[Observations]) -> RenderableType:
-    """Parameters, then what else the data say, for a rich console."""
-    return Group(_heading(result, data), _parameters(result), *_remarks(result))
+def fit_view(
+    result: FitResult, *, data: Sequence[Observations], told: Review, following: NextMeasurement | None
+) -> RenderableType:
+    """Parameters, whether the fit holds, and what else the data say, for a rich console."""
+    more = [] if following is None else [Text(_sentence(following.text))]
+    remarks = [*_review(told), *_remarks(result), *more]
+    return Group(_heading(result, data), _parameters(result), *remarks)
+
+
+def _review(told: Review) -> Iterator[Text]:
+    yield Text(_sentence(told.criticism.text), "" if told.criticism.describes else "bold red")
+    yield from (Text(_sentence(each.text)) for each in told.laws)
+
+
+def _sentence(text: str) -> str:
+    return f"{text[0].upper()}{text[1:]}."
 
 
 def _heading(result: FitResult, data: Sequence[Observations]) -> RenderableType:
@@ -57,7 +72,7 @@ def _parameters(result: FitResult) -> Table:
 
 def _numbers(found: FittedParameter) -> tuple[str, str, str, str, str]:
     """Value, ends of its interval, unit, and what was known before, in the usual unit."""
-    path = path_of(found.name)
+    path = found.path
     low, high = (in_usual_unit(path, end) if math.isfinite(end) else end for end in found.interval)
     value, before = (in_usual_unit(path, number) for number in (found.value, found.before))
     width = (high - low) / 2 if math.isfinite(high - low) else abs(value)

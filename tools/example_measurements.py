@@ -129,7 +129,7 @@ def _transfer() -> tuple[Observations, str]:
 
 
 def _flow() -> tuple[Observations, str]:
-    columns = {"pressure_difference": [1e4, 2e4, 5e4, 1e5, 2e5, 3e5, 5e5, 7e5]}
+    columns = {"pressure_difference": [1e3, 2e3, 5e3, 1e4, 2e4, 5e4, 1e5, 2e5, 3e5, 5e5, 7e5]}
     return _observations("flow", columns, []), "0.02"
 
 

@@ -115,7 +115,7 @@ def _stated(scene: Scene, quantity: str) -> float | None:
     for entry in scene.uncertainty:
         if entry.quantity == quantity:
             value = nominal_value(scene=scene, quantity=quantity)
-            return entry.half_width * (abs(value) if entry.relative and value is not None else 1.0)
+            return entry.half_width if value is None else entry.absolute(value)
     return None
 
 

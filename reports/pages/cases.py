@@ -18,11 +18,10 @@ from ringbalance.reports.numbers import (
     shown,
     with_unit,
 )
-from ringbalance.reports.pages.requirements import input_name
+from ringbalance.reports.origins import input_name
 from ringbalance.reports.section import Record, Table
 from ringbalance.reports.tables import FOLDER, is_long, table_file
 from ringbalance.reports.traces import traced
-from ringbalance.verification.catalogue import load_cases
 
 _NOTHING: Final = 1e-3
 """Fraction of a range below which one of its ends is zero."""
@@ -44,12 +43,6 @@ _RELATIVE_METRICS: Final = ("relative", "validation", "within_uncertainty")
 def anchor(case: Record) -> str:
     """Place of a case on the page."""
     return f"case-{str(case['id']).replace('_', '-')}"
-
-
-def typeset_equations() -> None:
-    """Set the equations of every case once, which takes seconds, before a page asks for them."""
-    for definition in load_cases():
-        _equations({"id": definition.id, "equations": definition.equations})
 
 
 def _sentence(value: Any) -> str:
@@ -226,11 +219,12 @@ def _in_brief(case: Record) -> Record:
 
 
 def _brief_value(quantity: Record) -> str:
-    """A found number without its half-width: two digits where that leaves none standing."""
-    value, own = quantity.get("value"), quantity.get("value_uncertainty")
-    if value and own and own > abs(value) / 2:
+    """A found number with the digits that the comparison leaves standing, at least two."""
+    value = quantity.get("value")
+    width = max(quantity.get("value_uncertainty") or 0.0, quantity.get("uncertainty") or 0.0)
+    if value and width > abs(value) / 2:
         return given(value, quantity.get("unit") or "1", digits=2)
-    return _without_half_width(_value(quantity, own))
+    return _without_half_width(_value(quantity, width or None))
 
 
 def _width(quantity: Record) -> str:

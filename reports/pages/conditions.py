@@ -8,14 +8,14 @@ from typing import Final
 from ringbalance.reports.figures.operation import tornado
 from ringbalance.reports.figures.style import Drawing
 from ringbalance.reports.numbers import MISSING, display_unit, fixed, given, number, percent, shown
-from ringbalance.reports.pages.requirements import named_with_origin
+from ringbalance.reports.origins import named_with_origin
 from ringbalance.reports.section import Cells, Record, Section, Table
 from ringbalance.reports.traces import read, traced
 from ringbalance.verification.standing import budget_standing
 
 _NAMES: Final = {
     "lambda": "Lever arm λ, moment per transferred mass",
-    "drag_coefficient": "Drag coefficient k",
+    "drag_coefficient": "Loss coefficient k of the tube",
     "velocity": "Velocity in the tube at equal fills",
     "wall_pressure": "Wall pressure at the largest fill",
     "moment": "Moment of one chamber at the largest fill",
@@ -78,7 +78,7 @@ def _tornado(evidence: Record) -> Drawing | None:
 
 def _row(evidence: Record, name: str) -> Cells:
     path, budget = f"calibration.budgets.{name}", evidence["calibration"]["budgets"][name]
-    unit = display_unit(budget["unit"], budget["value"])
+    unit = display_unit(budget["unit"], budget["value"], budget["total"])
     parts = [
         _part(budget[part] * unit.factor, budget["total"] * unit.factor, f"{path}.{part}")
         for part in ("numerical", "input", "model")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from ringbalance.controller.loop import simulate
@@ -10,18 +10,17 @@ from ringbalance.controller.tuning.tune import tuning_document
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.chamber.inputs import half_widths
 from ringbalance.reports.numbers import THIN_SPACE, given, number, percent, shown
+from ringbalance.reports.origins import named_with_origin
 from ringbalance.reports.pages.requirements import (
-    MISSED,
-    OPEN,
     Requirement,
     decision,
-    named_with_origin,
     requirement_figure,
     requirement_record,
     requirement_table,
     requirements,
 )
 from ringbalance.reports.section import Record, Section, Work
+from ringbalance.reports.summary import MISSED, OPEN
 from ringbalance.reports.traces import traced
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.verification.assumptions import assumptions_of
@@ -36,9 +35,11 @@ _VALVE: Final = {
     OPEN: "Choose the valve before anything else is built, and put its conductance, critical ratio and lag "
     "into the scene: only a fast one can reach the limit.",
     MISSED: "Find a valve and gas line whose smallest correction is within the limit, or raise the limit: "
-    "with a valve as assumed the last corrections are larger than the limit, whatever the gain.",
+    "with {valve} the last corrections are larger than the limit, whatever the gain.",
 }
 """What to do about a valve that may not, or cannot, reach the limit."""
+_LIKELY: Final = 0.95
+"""Fraction of runs that must settle before a gain is recommended for use."""
 _DOMINANT: Final = 3
 _MAIN: Final = {
     "velocity": "flow velocity",
@@ -153,6 +154,8 @@ def loop_sentences(evidence: Record) -> list[str]:
     if tuned is not None:
         gain, own = (shown(r, "s/m", digits=2) for r in _gains(evidence, tuned))
         told.append(f"Recommended gain: {gain} (the scene has {own}). With it this run {_ending(tuned)}.")
+        change = ((evidence.get("summary") or {}).get("tuning") or {}).get("change")
+        told += [f"Recommended beside it, but not part of this run: {change}."] if change else []
     paper = evidence["closed_loop"].get("paper")
     if paper is not None:
         told.append(f"Under the paper’s law, with the scene’s gain, it {_ending(paper)}.")
@@ -253,12 +256,8 @@ def _chamber(evidence: Record) -> list[str]:
 
 def _actions(evidence: Record, rows: Sequence[Requirement]) -> list[str]:
     """What to do next, the most urgent first."""
-    told, tuned = [], retuned(evidence)
     verdicts = {row.name.split(" with ")[0]: row.verdict for row in reversed(rows)}
-    if tuned is not None and verdicts.get("Loop factor") == MISSED:
-        told.append(f"Set the proportional gain to {shown(tuned['proportional_s_per_m'], 's/m', digits=2)}.")
-    if valve := _VALVE.get(verdicts.get("Smallest correction that the valve can give", "")):
-        told.append(valve)
+    told = _valve_and_gain(evidence, verdicts)
     if verdicts.get("Correction capacity of one pair") in {MISSED, OPEN}:
         told.append("Balance the rotor better by hand, or take a larger disc: the capacity has no reserve.")
     if any("siphon crest radius" in row.rests for row in rows):
@@ -273,6 +272,32 @@ def _actions(evidence: Record, rows: Sequence[Requirement]) -> list[str]:
             "Measure the flow through the tube at three gas pressures; every velocity and gain rests on the "
             "bore."
         )
+    return told
+
+
+def _valve_and_gain(evidence: Record, verdicts: Mapping[str, str]) -> list[str]:
+    """The valve first: a gain holds for the valve that it was found with, and only where runs settle."""
+    line = evidence["calibration"].get("gas_line") or {"given": True}
+    valve = _VALVE.get(verdicts.get("Smallest correction that the valve can give", ""))
+    valve_named = "the scene’s valve" if line["given"] else "any valve of the default range"
+    told = [valve.format(valve=valve_named)] if valve else []
+    tuned, tuning = retuned(evidence), (evidence.get("summary") or {}).get("tuning") or {}
+    if tuned is None:
+        return told
+    gain = shown(tuned["proportional_s_per_m"], "s/m", digits=2)
+    if tuning.get("fraction_settled") is not None and tuning["fraction_settled"] < _LIKELY:
+        reached = tuning.get("reachable_limit_m")
+        lowest = f"; a limit of {shown(reached, 'm', digits=2)} is reached" if reached else ""
+        return [
+            *told,
+            f"Do not expect a gain to make this loop settle: none that was tried does{lowest}. The run with "
+            f"the scene’s gain: {evidence['closed_loop']['calibrated']['status'].rstrip('.')}.",
+        ]
+    change = tuning.get("change")
+    if verdicts.get("Loop factor") == MISSED or change:
+        later = " for a valve that acts at once, and tune again for the valve chosen"
+        beside = f", and {change}" if change else ""
+        told.append(f"Set the proportional gain to {gain}{'' if line['given'] else later}{beside}.")
     return told
 
 

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from openfoam_case import missing
 from openfoam_page import page
 from openfoam_tubes import bent_tube, straight_tube
 from openfoam_waves import (
@@ -316,6 +317,9 @@ def main() -> int:
     parser.add_argument("--only", nargs="+", choices=list(STUDIES), default=list(STUDIES))
     parser.add_argument("--keep", action="store_true")
     asked = parser.parse_args()
+    if needed := missing():
+        print(needed, file=sys.stderr)
+        return 1
     scene = liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper")))
     document = {"date": date.today().isoformat(), "openfoam": "1912", "machine": platform.machine()}
     rows = json.loads(KEPT.read_text(encoding="utf-8"))["rows"] if KEPT.exists() else {}

@@ -20,6 +20,7 @@ import numpy as np
 
 from ringbalance.scene.arrays import FloatArray, IntArray
 
+PROGRAMS = ("SRFSimpleFoam", "pimpleFoam", "makeFaMesh")
 _DEBIAN = "/usr/share/openfoam"
 """Where Debian's package keeps what OpenFOAM's own shell setup would name."""
 
@@ -148,6 +149,17 @@ def field(
         "internalField": f"uniform {value}",
         "boundaryField": boundary,
     }
+
+
+def missing() -> str:
+    """What to do where OpenFOAM is not on the path; empty where it is."""
+    absent = [program for program in PROGRAMS if shutil.which(program) is None]
+    if not absent:
+        return ""
+    return (
+        f"OpenFOAM is missing (no {', '.join(absent)} on the path): install Debian's package openfoam "
+        "(1912), or run `make bench-cfd` as root, which does it."
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -37,6 +37,13 @@ def dynamics_of(
 ) -> Dynamics | None:
     """The plant's terms; None when none is modelled. `residual_fill` is that of a driven chamber."""
     _check(scene, model, modelled)
+    return known_dynamics(scene=scene, model=model, modelled=modelled, residual_fill=residual_fill)
+
+
+def known_dynamics(
+    *, scene: Scene, model: BalancerModel, modelled: Collection[str], residual_fill: float = 0.0
+) -> Dynamics | None:
+    """`dynamics_of` terms that are known to have numbers, for the many scenes that differ in values alone."""
     line = gas_line(scene.gas) if FILLING in modelled else None
     gas_off = 0.0 if line is None else VENTED * scene.gas.ambient_pressure
     column = column_of(law=model.flow, tube=scene.tube, gas_off=gas_off)

@@ -12,7 +12,7 @@ import numpy as np
 from ringbalance.mesh.geometry import chamber_volume, liquid_area
 from ringbalance.physics.gas.column import pressure_factor
 from ringbalance.physics.tube.draw_down import draw_down_depth
-from ringbalance.reduced_model.chamber.inputs import chamber_closed_forms
+from ringbalance.reduced_model.chamber.inputs import measured_closed_forms
 from ringbalance.reduced_model.law.building import tube_path
 from ringbalance.reduced_model.tube.heads import log_heads
 from ringbalance.reduced_model.tube.regime import ColumnFlow, TubeEnds, TubePath, column_flow
@@ -59,7 +59,7 @@ class Device:
         """The quantities of an uncertainty budget, SI; those of a flow only where there is one."""
         disc = self.scene.disc
         fills = np.array([0.0, disc.max_fill_ratio / 2, disc.max_fill_ratio])
-        pressure, moment, ratio = chamber_closed_forms(scene=self.scene, fill_ratio=fills)
+        pressure, moment, ratio = measured_closed_forms(scene=self.scene, fill_ratio=fills)
         empty, half, full = (float(p) for p in pressure)
         equal, uneven = self._ends(half, half), self._ends(empty, full)
         found = {
@@ -127,13 +127,13 @@ class Device:
         acceleration = self.scene.rotor.speed**2 * self.scene.tube.port_radius
         section, x = math.pi / 4 * self.scene.tube.bore**2, self.near_fill
         for _ in range(_ROUNDS):
-            pressure, _, _ = chamber_closed_forms(scene=self.scene, fill_ratio=np.array([x, top - x]))
+            pressure, _, _ = measured_closed_forms(scene=self.scene, fill_ratio=np.array([x, top - x]))
             u = self._flow(self._ends(float(pressure[0]), float(pressure[1])), primed=True).velocity
             depth = float(draw_down_depth(flow_rate=section * u, acceleration=acceleration))
             level = min(max(self.scene.tube.port_radius - depth, disc.inner_radius), disc.outer_radius)
             x = min(float(liquid_area(disc=disc, surface_radius=level)) / area, top)
         rest = min(x, top / 2)
-        _, moment, _ = chamber_closed_forms(scene=self.scene, fill_ratio=np.array([top - rest, rest]))
+        _, moment, _ = measured_closed_forms(scene=self.scene, fill_ratio=np.array([top - rest, rest]))
         return float(moment[0] - moment[1])
 
 

@@ -24,7 +24,7 @@ from ringbalance.scene.rules.check import failed_checks
 from ringbalance.scene.working_liquid import with_liquid
 
 _LARGEST_FILE = 2**20
-_DECIDE_NOTHING = ("requirement.", "rotor.mass", "liquid.source")
+_DECIDE_NOTHING = ("requirement.", "measured.", "rotor.mass", "liquid.source")
 """Values that no result depends on."""
 
 

@@ -1,11 +1,11 @@
-"""Records of the rotor, its sensor, the controller and the run, as `models` has those of the balancer."""
+"""Records of the rotor, where it stands, its sensor, the controller and the run, beside those of `models`."""
 
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from ringbalance.scene.keys.declaration import UNCERTAIN, derived, needed, shown, standard, unused
 from ringbalance.scene.keys.derivations import trial_sequence
-from ringbalance.scene.keys.fields import POSITIVE, chamber_letters, quantity, whole
+from ringbalance.scene.keys.fields import NOT_NEGATIVE, POSITIVE, chamber_letters, quantity, whole
 from ringbalance.scene.keys.quantities import (
     Angle,
     Influence,
@@ -20,12 +20,28 @@ from ringbalance.scene.keys.quantities import (
     Turn,
 )
 
+Shaft = Literal["horizontal", "vertical"]
 ControllerKind = Literal["target_vector", "trial", "law_based"]
 
 
 def _hold_time(period: float) -> float:
     """Of samples below a limit half of the time by chance, ten in a row are so once in a thousand."""
     return 10 * period
+
+
+@dataclass(frozen=True, kw_only=True)
+class Environment:
+    """Gravity and how the shaft lies in it."""
+
+    shaft: Annotated[
+        Shaft, standard("horizontal", "how the shaft lies in the field of gravity"), shown("shaft")
+    ]
+    gravity: Annotated[
+        float,
+        quantity("acceleration", NOT_NEGATIVE),
+        standard("9.80665 m/s^2", "acceleration of gravity; zero for none"),
+        shown("gravity", "m/s^2"),
+    ]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -29,7 +29,7 @@ from ringbalance.scene.keys.quantities import (
     Temperature,
     Time,
 )
-from ringbalance.scene.loop_models import ControllerSettings, Requirement, Rotor, Sensor
+from ringbalance.scene.loop_models import ControllerSettings, Environment, Requirement, Rotor, Sensor
 from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.tube_models import FINEST_MODELS, TubeModels
 
@@ -38,7 +38,6 @@ HumpShape = Literal["arc", "point"]
 DissolvedGas = Literal["none", "saturated"]
 PressurePlace = Literal["chamber", "shaft"]
 Entrance = Literal["sharp", "rounded", "projecting"]
-Shaft = Literal["horizontal", "vertical"]
 GasProcess = Literal["isothermal", "adiabatic"]
 
 
@@ -104,6 +103,22 @@ class Disc:
         ),
         shown("fill ratio at the start"),
     ]
+    lambda_factor: Annotated[
+        float | None,
+        number(POSITIVE),
+        unused(
+            "lambda and the moments are those of the geometry",
+            "measured lambda over that of the geometry, which every chamber's moment is multiplied by; "
+            "`ringbalance fit` writes it",
+        ),
+        UNCERTAIN,
+        shown("measured factor on lambda"),
+    ] = None
+
+    @property
+    def moment_factor(self) -> float:
+        """Moment of a chamber over that of its geometry: `lambda_factor`, or 1 where nothing is measured."""
+        return 1.0 if self.lambda_factor is None else self.lambda_factor
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -345,21 +360,6 @@ class Gas:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Environment:
-    """Gravity and how the shaft lies in it."""
-
-    shaft: Annotated[
-        Shaft, standard("horizontal", "how the shaft lies in the field of gravity"), shown("shaft")
-    ]
-    gravity: Annotated[
-        float,
-        quantity("acceleration", NOT_NEGATIVE),
-        standard("9.80665 m/s^2", "acceleration of gravity; zero for none"),
-        shown("gravity", "m/s^2"),
-    ]
-
-
-@dataclass(frozen=True, kw_only=True)
 class InputUncertainty:
     """Expanded uncertainty (95 %) of one scene quantity."""
 
@@ -368,6 +368,10 @@ class InputUncertainty:
     half_width: float
     """Relative when `relative`, else SI."""
     relative: bool
+
+    def absolute(self, value: float) -> float:
+        """Half-width in the unit of the quantity, whose value is given in SI."""
+        return self.half_width * (abs(value) if self.relative else 1.0)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 
 from ringbalance.scene.keys.declaration import shown
 from ringbalance.scene.loop_models import RunSettings
+from ringbalance.scene.measured import Measured
 
 Origin = Literal["given", "inferred", "assumed", "measured"]
 """In the documents of the machine; concluded from other values; chosen, as nothing is known; measured."""
@@ -34,6 +35,7 @@ class SceneFile:
     """Of the values that decide results, defaults included; not of remarks, names and origins."""
     defaulted: tuple[str, ...] = ()
     """Paths such as "rotor.lag_angle" whose value is a default, because the file does not give it."""
+    measured: Measured = field(default_factory=Measured)
     origins: tuple[tuple[str, Origin | Literal["default"]], ...] = ()
     """Origin of each key by path; empty for a scene that was not read from a file."""
 

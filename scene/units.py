@@ -78,11 +78,35 @@ def parse_quantity(text: object, dimension: str) -> float:
     return value
 
 
+def parse_number(text: str) -> float:
+    """Read a number that stands without a unit, such as a cell of a table.
+
+    Returns: Finite. Raises: FieldError: anything else; the error says what to write instead.
+    """
+    spelled = _respelled(text.strip())
+    match = _NUMBER.fullmatch(spelled)
+    if match is not None and not match[2] and math.isfinite(value := float(match[1])):
+        return value
+    if match is not None and match[2]:
+        problem = "it is not a number alone"
+    elif not spelled:
+        problem = "nothing stands there"
+    else:
+        problem = _not_a_number(spelled).removesuffix(" followed by a unit")
+    raise FieldError(problem, "a number with a decimal point, such as 0.25 or 2.5e-1")
+
+
 def format_quantity(value: float, dimension: str, unit: str, *, digits: int = 6) -> str:
     """An SI value in a unit of its dimension, for people, such as "44.5 mm"."""
     entry = DIMENSIONS[dimension].units[unit]
     number = value / float(entry.factor) / (math.pi if entry.pi else 1.0) - float(entry.offset)
     return f"{number:.{digits}g} {unit}"
+
+
+def unit_of(text: str) -> str:
+    """The unit of a quantity such as "44.5 mm", as `DIMENSIONS` names it; empty for any other text."""
+    match = _NUMBER.fullmatch(_respelled(text))
+    return "" if match is None else _canonical(match[2])
 
 
 def _split(text: object, kind: Dimension) -> tuple[str, str]:

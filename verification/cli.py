@@ -13,6 +13,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from ringbalance.identification.data.measurements import MeasurementsError
 from ringbalance.scene import load_scene
 from ringbalance.scene.platform.progress import Activity, activity
 from ringbalance.scene.platform.terminal import messages_console, results_console
@@ -23,7 +24,6 @@ from ringbalance.verification.evidence import Level
 from ringbalance.verification.result import CaseResult, QuantityResult
 from ringbalance.verification.runner import paper_scene, run_cases
 from ringbalance.verification.validation.blind import data_document
-from ringbalance.verification.validation.measurements import MeasurementsError
 from ringbalance.verification.verdicts import Verdict
 
 DONE: Final = 0

@@ -27,7 +27,8 @@ from ringbalance.physics.pressure.ring_samples import (
 from ringbalance.physics.pressure.solve import RotatingLiquid
 from ringbalance.physics.results import Estimate, Statistics, Status
 from ringbalance.scene.arrays import BoolArray, FloatArray
-from ringbalance.scene.models import Disc, Shaft
+from ringbalance.scene.loop_models import Shaft
+from ringbalance.scene.models import Disc
 
 FORMAL_ORDER = 4.0
 """Of integrals on quadratic geometry: twice the order of the elements, and that of an arc's drawing."""

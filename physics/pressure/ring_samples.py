@@ -13,7 +13,8 @@ from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid,
 from ringbalance.physics.pressure.surface import refined_surface, solve_with_gravity
 from ringbalance.physics.results import Status
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import Disc, Shaft
+from ringbalance.scene.loop_models import Shaft
+from ringbalance.scene.models import Disc
 
 QUANTITIES = ("liquid_volume", "wall_pressure", "moment", "moment_per_volume", "resultant_force")
 """In the order of `Sample.values`."""

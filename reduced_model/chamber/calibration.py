@@ -104,7 +104,7 @@ class ChamberCalibration:
     statistics: Statistics
 
 
-def _fill_nodes(*, largest: float) -> tuple[FloatArray, FloatArray]:
+def fill_nodes(*, largest: float) -> tuple[FloatArray, FloatArray]:
     """Fill ratios of the tables and of the report.
 
     Args: `largest`: max_fill_ratio.
@@ -124,16 +124,18 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
     Gravity is modelled when its effect exceeds the scene's tolerance at some fill; otherwise the effect goes
     into the uncertainties. A ring must exist.
     Raises: SceneError: as `scene_ring`.
-    Source: Eqs. 2 to 12 of the liquid-ring paper with exact plates.
+    Source: Eqs. 2 to 12 of the liquid-ring paper with exact plates; moments and lambda times the scene's
+        measured factor.
     """
     modelled = mean_gravity(scene) > scene.tolerance
-    nodes, reported = _fill_nodes(largest=scene.disc.max_fill_ratio)
+    nodes, reported = fill_nodes(largest=scene.disc.max_fill_ratio)
     fills = np.append(nodes, [x for x in reported if np.min(np.abs(nodes - x)) > 1e-12])
     effect = gravity_effect(scene, fill_ratio=fills)
     ring = ring_values(scene, fill_ratio=fills, gravity=modelled)
     check = element_check(scene, values=ring, gravity=modelled)
     unmodelled = unmodelled_fractions(scene, fills)
     effects = input_effects(scene=scene, fill_ratio=fills)
+    ring, effect = _as_measured(scene, ring, effect)
     status = next((s for s in (ring.status, check.status) if not s.ok), chamber_status(scene))
     scale = 0.0 if modelled else SAFETY
     pressure, moment = (scale * np.abs(e) for e in (effect.wall_pressure, effect.moment))
@@ -174,6 +176,19 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
         gravity_modelled=modelled,
         status=status,
         statistics=check.elements.statistics,
+    )
+
+
+def _as_measured(scene: Scene, ring: RingValues, effect: GravityEffect) -> tuple[RingValues, GravityEffect]:
+    """Moments times the scene's measured factor; finite elements check the geometry, so before it."""
+    factor = scene.disc.moment_factor
+    moment, slope = (
+        replace(each, value=factor * each.value, uncertainty=factor * each.uncertainty)
+        for each in (ring.moment, ring.moment_per_volume)
+    )
+    return (
+        replace(ring, moment=moment, moment_per_volume=slope),
+        replace(effect, moment=factor * effect.moment),
     )
 
 

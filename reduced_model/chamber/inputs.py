@@ -14,7 +14,7 @@ from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_first_m
 from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
 from ringbalance.physics.tube.uncertainty import ASSUMED_ROUGHNESS_UNCERTAINTY
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import InputUncertainty, Scene
+from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import nominal_value, with_value
 
 CHAMBER_INPUTS: Final = (
@@ -25,6 +25,7 @@ CHAMBER_INPUTS: Final = (
     "plate_thickness",
     "density",
     "speed",
+    "lambda_factor",
 )
 
 
@@ -54,17 +55,10 @@ def half_widths(scene: Scene) -> Mapping[str, float]:
         "kinematic_viscosity": liquid.viscosity_uncertainty * liquid.kinematic_viscosity,
     }
     for stated in scene.uncertainty:
-        width = _absolute(scene, stated)
-        if width is not None:
-            found[stated.quantity] = width
+        value = nominal_value(scene=scene, quantity=stated.quantity)
+        if value is not None:
+            found[stated.quantity] = stated.absolute(value)
     return {name: width for name, width in found.items() if width > 0}
-
-
-def _absolute(scene: Scene, stated: InputUncertainty) -> float | None:
-    value = nominal_value(scene=scene, quantity=stated.quantity)
-    if value is None:
-        return None
-    return stated.half_width * (abs(value) if stated.relative else 1.0)
 
 
 def input_effects(*, scene: Scene, fill_ratio: FloatArray) -> Mapping[str, InputEffect]:
@@ -81,7 +75,7 @@ def input_effects(*, scene: Scene, fill_ratio: FloatArray) -> Mapping[str, Input
 def _effect(scene: Scene, fill_ratio: FloatArray, quantity: str, width: float) -> InputEffect:
     fills = np.append(fill_ratio, scene.disc.max_fill_ratio / 2)
     here, *sides = (
-        (*chamber_closed_forms(scene=s, fill_ratio=fills), chamber_volume(disc=s.disc))
+        (*measured_closed_forms(scene=s, fill_ratio=fills), chamber_volume(disc=s.disc))
         for s in (scene, *(shifted(scene=scene, quantity=quantity, change=c) for c in (-width, width)))
     )
     pressure, moment, ratio, volume = (
@@ -136,3 +130,16 @@ def chamber_closed_forms(
         rho * disc.axial_width * liquid_first_moment(disc=disc, surface_radius=a),
         np.asarray(2 * a * np.sin(alpha) / alpha, dtype=np.float64),
     )
+
+
+def measured_closed_forms(
+    *, scene: Scene, fill_ratio: npt.ArrayLike
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The same with moment and lambda as a measured factor corrects them.
+
+    U and lambda times `Disc.moment_factor`; P as the geometry has it.
+    Returns: P, Pa, U, kg m, and lambda, m, the shape of `fill_ratio`.
+    """
+    pressure, moment, ratio = chamber_closed_forms(scene=scene, fill_ratio=fill_ratio)
+    factor = scene.disc.moment_factor
+    return pressure, factor * moment, factor * ratio

@@ -16,7 +16,8 @@ import numpy as np
 
 from ringbalance.mesh.geometry import half_angle, liquid_area, liquid_first_moment, surface_radius
 from ringbalance.scene.arrays import BoolArray, FloatArray
-from ringbalance.scene.models import Disc, Shaft
+from ringbalance.scene.loop_models import Shaft
+from ringbalance.scene.models import Disc
 
 POINTS: Final = 20
 """Gauss points along the angle or the axis."""

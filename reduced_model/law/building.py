@@ -7,14 +7,18 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.physics.gas.column import pressure_factor
 from ringbalance.physics.pressure.hydrostatics import Radius, hydrostatic_pressure
-from ringbalance.reduced_model.chamber.calibration import ChamberCalibration
+from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes
 from ringbalance.reduced_model.chamber.inputs import half_widths
 from ringbalance.reduced_model.chamber.moment import CalibratedMoment
+from ringbalance.reduced_model.chamber.ring_values import ring_values
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.tables.fit import flat_table, table_from_samples
+from ringbalance.reduced_model.tables.hermite import HermiteTable
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
-from ringbalance.reduced_model.tube.heads import TubeHeads
+from ringbalance.reduced_model.tube.heads import TubeHeads, nominal_heads
 from ringbalance.reduced_model.tube.regime import RELEASED, TubePath
 from ringbalance.scene.models import Scene
 
@@ -30,21 +34,66 @@ def calibrated_law(*, scene: Scene, chamber: ChamberCalibration, heads: TubeHead
     own = [e.wall_pressure for name, e in chamber.input_effects.items() if name not in _SHARED]
     inputs = np.sqrt(sum((e**2 for e in own), start=np.zeros_like(chamber.fill_ratio)))
     no_inputs = np.zeros_like(chamber.fill_ratio)
+    return _put_together(
+        scene,
+        heads=heads,
+        wall_pressure=chamber.wall_pressure.table,
+        wall_pressure_uncertainty=chamber.wall_pressure.uncertainty_table(inputs=inputs),
+        inputs=_drive_uncertainty(scene),
+        moment=CalibratedMoment(
+            chamber_moment=chamber.moment.table, half_width=chamber.moment.uncertainty_table(inputs=no_inputs)
+        ),
+    )
+
+
+def nominal_law(scene: Scene, *, gravity: bool) -> CalibratedLaw:
+    """The calibrated law without finite elements and without uncertainties, in a few milliseconds.
+
+    Its velocities are within 1e-4 of those of `calibrated_law`, by fewer nodes of the heads; half-widths are
+    zero.  For the many scenes that differ from a calibrated one in their values, such as those of a fit.
+    Args: `gravity`: whether the chamber's values hold gravity, as `calibrate` decides for the scene.
+    Raises: ValueError: bends that do not fit into the tube.
+    Source: Eqs. 13 to 18 of the liquid-ring paper; `ring_values`, `nominal_heads`.
+    """
+    fills = fill_nodes(largest=scene.disc.max_fill_ratio)[0]
+    ends = {"start": 0.0, "stop": float(fills[-1])}
+    ring = ring_values(scene, fill_ratio=fills, gravity=gravity)
+    exact = flat_table(**ends)
+    return _put_together(
+        scene,
+        heads=nominal_heads(scene),
+        wall_pressure=table_from_samples(value=ring.wall_pressure.value, **ends),
+        wall_pressure_uncertainty=exact,
+        inputs=DriveUncertainty(),
+        moment=CalibratedMoment(
+            chamber_moment=table_from_samples(value=scene.disc.moment_factor * ring.moment.value, **ends),
+            half_width=exact,
+        ),
+    )
+
+
+def _put_together(
+    scene: Scene,
+    *,
+    heads: TubeHeads,
+    wall_pressure: HermiteTable,
+    wall_pressure_uncertainty: HermiteTable,
+    inputs: DriveUncertainty,
+    moment: CalibratedMoment,
+) -> CalibratedLaw:
     return CalibratedLaw(
         name="calibrated",
         max_fill_ratio=scene.disc.max_fill_ratio,
         ambient_pressure=scene.gas.ambient_pressure,
-        chamber_volume=chamber.volume,
+        chamber_volume=chamber_volume(disc=scene.disc),
         tube_area=math.pi / 4 * scene.tube.bore**2,
-        wall_pressure=chamber.wall_pressure.table,
-        wall_pressure_uncertainty=chamber.wall_pressure.uncertainty_table(inputs=inputs),
+        wall_pressure=wall_pressure,
+        wall_pressure_uncertainty=wall_pressure_uncertainty,
         path=tube_path(scene),
         heads=heads,
-        inputs=_drive_uncertainty(scene),
+        inputs=inputs,
         gas_factor=pressure_factor(scene),
-        moment=CalibratedMoment(
-            chamber_moment=chamber.moment.table, half_width=chamber.moment.uncertainty_table(inputs=no_inputs)
-        ),
+        moment=moment,
     )
 
 

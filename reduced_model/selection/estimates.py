@@ -286,7 +286,8 @@ def injection_time(scene: Scene) -> float:
     equal = by_closed_form(scene, scene.disc.max_fill_ratio / 2)
     area = np.pi / 4 * scene.tube.bore**2
     flow = scene.liquid.density * area * equal_velocity(steady(scene))
-    return deciding_gas_time(scene, rate=scene.rotor.influence_coefficient * equal.moment_per_mass * flow)
+    arm = scene.disc.moment_factor * equal.moment_per_mass
+    return deciding_gas_time(scene, rate=scene.rotor.influence_coefficient * arm * flow)
 
 
 def _inertia(scene: Scene, flow: RangeFlow, deciding: float, within: str) -> Row:

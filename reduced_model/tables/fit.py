@@ -91,6 +91,12 @@ def level_table(*, start: float, stop: float, value: npt.ArrayLike) -> HermiteTa
     return HermiteTable(start=start, step=step, value=y, slope=slope / step, curvature=np.zeros_like(y))
 
 
+def flat_table(*, start: float, stop: float, value: float = 0.0) -> HermiteTable:
+    """One value everywhere, such as an uncertainty that is left out."""
+    level, none = np.full(2, value), np.zeros(2)
+    return HermiteTable(start=start, step=stop - start, value=level, slope=none, curvature=none)
+
+
 def refined_table(
     *,
     function: Callable[[FloatArray], FloatArray],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -13,7 +14,7 @@ import numpy.typing as npt
 from ringbalance.physics.tube.state import TubeState, finest_state, tube_state
 from ringbalance.physics.tube.uncertainty import SIMPLER, model_parts, uncertainty_parts
 from ringbalance.reduced_model.chamber.inputs import half_widths
-from ringbalance.reduced_model.tables.fit import level_table, refined_table
+from ringbalance.reduced_model.tables.fit import flat_table, level_table, refined_table
 from ringbalance.reduced_model.tables.hermite import HermiteTable
 from ringbalance.reduced_model.tube.path import (
     crest_end_uncertainty,
@@ -30,6 +31,7 @@ TABLE_VELOCITIES: Final = (1e-5, 1e3)
 TABLE_ERROR: Final = 1e-9
 """Aimed at, relative, between the nodes."""
 _UNCERTAINTY_NODES: Final = 513
+_NOMINAL_NODES: Final = 257
 
 LogHead = Callable[[FloatArray], FloatArray]
 
@@ -80,6 +82,32 @@ def tube_heads(scene: Scene) -> TubeHeads:
         return_hump_head=tables[2] if len(tables) > 1 else None,
         interpolation_error=max(errors),
         **widths,
+    )
+
+
+def nominal_heads(scene: Scene) -> TubeHeads:
+    """The heads on few nodes and without uncertainties, in a tenth of the time of `tube_heads`.
+
+    The nodes do not depend on the scene, so that the error, below 1e-4 of a head, is smooth in its values.
+    Raises: ValueError: as `tube_heads`.
+    """
+    start, stop = (float(v) for v in np.log(TABLE_VELOCITIES))
+    tables, errors = zip(
+        *(
+            _head_table(head, start, stop, tolerance=math.inf, first=_NOMINAL_NODES)
+            for head in log_heads(scene)[:3]
+        ),
+        strict=True,
+    )
+    exact = flat_table(start=start, stop=stop)
+    return TubeHeads(
+        head=tables[0],
+        hump_head=tables[1] if len(tables) > 1 else None,
+        return_hump_head=tables[2] if len(tables) > 1 else None,
+        uncertainty=exact,
+        hump_uncertainty=exact,
+        fraction_uncertainty=exact,
+        interpolation_error=max(errors),
     )
 
 
@@ -188,8 +216,10 @@ def crest_head(
     return np.asarray(fall + head_behind_crest(tube=tube, along=along, square=scene.rotor.speed**2))
 
 
-def _head_table(log_head: LogHead, start: float, stop: float) -> tuple[HermiteTable, float]:
-    table, error = refined_table(function=log_head, start=start, stop=stop, tolerance=TABLE_ERROR)
+def _head_table(
+    log_head: LogHead, start: float, stop: float, *, tolerance: float = TABLE_ERROR, first: int = 129
+) -> tuple[HermiteTable, float]:
+    table, error = refined_table(function=log_head, start=start, stop=stop, tolerance=tolerance, first=first)
     if np.any(np.diff(table.value) <= 0):
         raise ValueError("the tube's head does not grow with the velocity: its loss terms are inconsistent")
     return table, error

@@ -114,7 +114,7 @@ def share(bounds: Bounds, *, example: float) -> Reader:
 
 def number(bounds: Bounds) -> Reader:
     """Reader of a bare number that has no unit."""
-    allowed = f"a bare number {bounds}".replace("number at", "number of at")
+    allowed = f"a bare number {bounds}".replace("number at", "number of at").strip()
 
     def read(value: object) -> float:
         plain = _number(value, allowed)

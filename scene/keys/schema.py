@@ -18,6 +18,7 @@ from ringbalance.scene.keys.declaration import (
     unused,
 )
 from ringbalance.scene.keys.fields import Bounds, Reader, choice, half_width, share, text
+from ringbalance.scene.measured import Measured
 from ringbalance.scene.origins import Origin
 
 Balancer = Literal["liquid_ring", "eccentric_mass"]
@@ -156,13 +157,16 @@ _TOLERANCE = Key(
 RUN = {
     "run": table_of(loop_models.RunSettings, "a simulation's seed and end"),
     "accuracy": Table(text="what is asked of the result", keys={"tolerance": _TOLERANCE}),
+    "measured": table_of(
+        Measured, "the measurements that `ringbalance fit` has fitted the scene to; `fit --save` writes it"
+    ),
 }
 _LIQUID_RING = {
     "disc": table_of(models.Disc, "the balancing disc"),
     "liquid": table_of(models.Liquid, "the balancing liquid"),
     "tube": table_of(models.Tube, "the tube that connects two opposite chambers"),
     "gas": table_of(models.Gas, "the gas that drives the liquid"),
-    "environment": table_of(models.Environment, "gravity and how the shaft lies in it"),
+    "environment": table_of(loop_models.Environment, "gravity and how the shaft lies in it"),
     "rotor": _rotor(),
     "sensor": table_of(loop_models.Sensor, "the vibration sensor; exact when left out"),
     "controller": table_of(loop_models.ControllerSettings, "the control algorithm"),

@@ -9,7 +9,16 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-ROOM_ORDER = ("scene", "mesh", "physics", "reduced_model", "controller", "verification", "reports")
+ROOM_ORDER = (
+    "scene",
+    "mesh",
+    "physics",
+    "reduced_model",
+    "controller",
+    "identification",
+    "verification",
+    "reports",
+)
 
 
 @pytest.fixture(scope="session")

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ringbalance.controller.ensemble.samples import member_uncertainty
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Drive, Event
 from ringbalance.controller.loop import simulate
@@ -14,7 +15,7 @@ from ringbalance.controller.simulation import Outcome
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.scene.models import Scene
+from ringbalance.scene.models import InputUncertainty, Scene
 from ringbalance.verification.reference.adaptive_ode import adaptive_ode
 
 
@@ -95,3 +96,17 @@ def test_a_slow_rotor_siphons_its_correction_away(paper_scene: Scene) -> None:
     run = simulate(slow, calibrate(slow).model)
     assert run.outcome is Outcome.DRIFTING
     assert "run back" in run.status
+
+
+def test_the_moment_is_as_uncertain_as_the_measured_factor(
+    paper_scene: Scene, calibrated: BalancerModel
+) -> None:
+    measured = replace(
+        paper_scene,
+        disc=replace(paper_scene.disc, lambda_factor=0.8),
+        uncertainty=(InputUncertainty(quantity="lambda_factor", half_width=0.04, relative=False),),
+    )
+    known = replace(measured, uncertainty=())
+    with_factor, without = (member_uncertainty(asked, calibrated) for asked in (measured, known))
+    assert with_factor.moment == pytest.approx(np.hypot(without.moment, 0.05))
+    assert "lambda's factor" in with_factor.sources[1]

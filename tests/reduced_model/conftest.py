@@ -93,7 +93,7 @@ def table_1_scene() -> models.Scene:
         liquid=LIQUID,
         tube=TUBE,
         gas=GAS,
-        environment=models.Environment(shaft="horizontal", gravity=9.80665),
+        environment=loop_models.Environment(shaft="horizontal", gravity=9.80665),
         rotor=ROTOR,
         sensor=loop_models.Sensor(amplitude_noise=0.0, phase_noise=0.0),
         controller=CONTROLLER,

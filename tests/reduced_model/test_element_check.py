@@ -11,7 +11,8 @@ from ringbalance.physics.results import StatusCode
 from ringbalance.reduced_model.calibration import Calibration, calibrate
 from ringbalance.reduced_model.chamber.element_check import element_check
 from ringbalance.reduced_model.chamber.ring_values import ring_values
-from ringbalance.scene.models import Scene, Shaft
+from ringbalance.scene.loop_models import Shaft
+from ringbalance.scene.models import Scene
 
 
 def test_the_closed_forms_are_checked_at_both_ends_of_the_range(table_1_calibration: Calibration) -> None:

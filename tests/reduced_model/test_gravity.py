@@ -15,7 +15,8 @@ from ringbalance.reduced_model.chamber.gravity import GravityEffect, check_ring,
 from ringbalance.reduced_model.chamber.tilted_ring import tilted_ring
 from ringbalance.scene import SceneError
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import Scene, Shaft
+from ringbalance.scene.loop_models import Shaft
+from ringbalance.scene.models import Scene
 
 
 def turning(scene: Scene, omega: float, shaft: Shaft = "horizontal", plates: float | None = None) -> Scene:

@@ -30,7 +30,7 @@ from ringbalance.reduced_model.selection.loss_models import (
     velocity_under_head,
 )
 from ringbalance.reduced_model.tube.path import to_crest_end
-from ringbalance.scene import models
+from ringbalance.scene import loop_models
 from ringbalance.scene.accuracy import with_tolerance
 from ringbalance.scene.models import Scene
 from ringbalance.verification.selection_studies.chamber_elements import by_elements
@@ -214,7 +214,7 @@ def test_numbers_by_hand(table_1_scene: Scene) -> None:
 
 
 def test_a_scene_without_gravity_has_no_number_for_it(table_1_scene: Scene) -> None:
-    still = models.Environment(shaft="horizontal", gravity=0.0)
+    still = loop_models.Environment(shaft="horizontal", gravity=0.0)
     scene = dataclasses.replace(table_1_scene, environment=still)
     found = {n.name: n.value for n in scene_numbers(scene)}
     assert found["omega^2 a/g"] is None

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_first_moment, surface_radius
 from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing, tilted_ring
-from ringbalance.scene import models
+from ringbalance.scene import loop_models, models
 
 
 def by_grid(
@@ -44,7 +44,7 @@ def by_grid(
 
 
 def ring(
-    disc: models.Disc, *, tilt: float, fills: list[float], shaft: models.Shaft = "horizontal"
+    disc: models.Disc, *, tilt: float, fills: list[float], shaft: loop_models.Shaft = "horizontal"
 ) -> TiltedRing:
     return tilted_ring(
         disc=disc,

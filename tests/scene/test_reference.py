@@ -14,6 +14,7 @@ import scene_reference
 from ringbalance.scene import Scene, loop_models, models
 from ringbalance.scene.keys.eccentric_schema import ECCENTRIC_MASS
 from ringbalance.scene.keys.schema import LIQUID_RING, ORIGIN, Schema
+from ringbalance.scene.measured import Measured
 from ringbalance.scene.rules import eccentric, shape, working
 from ringbalance.scene.rules.check import Check
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
@@ -31,7 +32,7 @@ def test_document_holds_the_reference() -> None:
     assert scene_reference.fresh(page) == page, "run tools/scene_reference.py --write"
 
 
-@pytest.mark.parametrize(("schema", "inside_lists"), [(LIQUID_RING, 4), (ECCENTRIC_MASS, 2)])
+@pytest.mark.parametrize(("schema", "inside_lists"), [(LIQUID_RING, 19), (ECCENTRIC_MASS, 17)])
 def test_every_key_has_a_meaning(schema: Schema, inside_lists: int) -> None:
     reference = scene_reference.key_reference(schema, "title")
     rows = [line for line in reference.splitlines() if line.startswith("| `")]
@@ -62,12 +63,13 @@ def test_example_in_the_document_loads(load: Callable[[Mapping[str, Any]], Scene
         ("liquid", models.Liquid, {"density_uncertainty", "viscosity_uncertainty", "source"}),
         ("tube", models.Tube, {"models"}),
         ("gas", models.Gas, set()),
-        ("environment", models.Environment, set()),
+        ("environment", loop_models.Environment, set()),
         ("rotor", loop_models.Rotor, {"initial_vibration", "initial_amplitude", "initial_phase"}),
         ("sensor", loop_models.Sensor, set()),
         ("controller", loop_models.ControllerSettings, set()),
         ("requirement", loop_models.Requirement, set()),
         ("run", loop_models.RunSettings, set()),
+        ("measured", Measured, set()),
     ],
 )
 def test_keys_are_fields(table: str, record: Any, differences: set[str]) -> None:
@@ -138,3 +140,19 @@ def test_keys_of_the_device_as_built(
         ("hump_position", 0.1, False)
     ]
     assert not paths & set(given.defaulted)
+
+
+def test_what_stands_above_is_only_named() -> None:
+    alone = scene_reference.key_reference(ECCENTRIC_MASS, "title")
+    below = scene_reference.key_reference(ECCENTRIC_MASS, "title", above=LIQUID_RING)
+    assert "`time_limit`" in alone
+    assert "`time_limit`" not in below
+    assert "### [run], [accuracy], [measured]" in below
+    # Of one name, but with other keys.
+    assert "`speed_profile`" in below
+
+
+def test_units_over_units_are_listed_once_each() -> None:
+    names = [f"{over}/{under}" for over in ("m", "mm", "um") for under in ("kg", "g", "mg")]
+    assert scene_reference._units(names) == "`m`, `mm`, `um` over `kg`, `g`, `mg`"
+    assert scene_reference._units(names[1:]) == ", ".join(f"`{name}`" for name in names[1:])

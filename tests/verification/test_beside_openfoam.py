@@ -100,3 +100,13 @@ def test_the_page_shows_what_was_kept(modules: dict[str, ModuleType]) -> None:
     for row in (row for rows in document["rows"].values() for row in rows):
         both = np.hypot(row["openfoam_half_width"], row["ringbalance_half_width"])
         assert row["agrees"] == (abs(row["openfoam"] - row["ringbalance"]) <= both)
+
+
+def test_a_machine_without_openfoam_is_told_what_to_install(
+    modules: dict[str, ModuleType], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert "Debian's package openfoam" in modules["case"].missing()
+    for program in modules["case"].PROGRAMS:
+        (tmp_path / program).touch(mode=0o755)
+    assert modules["case"].missing() == ""

@@ -19,9 +19,10 @@ from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.scene import bundled_scene
 from ringbalance.scene.loader import scene_from
 from ringbalance.scene.models import Scene
+from ringbalance.scene.toml_writing import toml_bytes
 from ringbalance.verification.extremes import design as extremes_design
 from ringbalance.verification.extremes import point as extremes_point
-from ringbalance.verification.extremes.axes import AXES, axis_of, fitted, toml_bytes, varied
+from ringbalance.verification.extremes.axes import AXES, axis_of, fitted, varied
 from ringbalance.verification.extremes.design import CHUNK, Base, Point, design
 from ringbalance.verification.extremes.maps import Sweep
 from ringbalance.verification.extremes.numerics import at_aspect, at_step

@@ -24,6 +24,8 @@ def test_measurements_show_their_points_and_what_was_found() -> None:
     assert _cell(_case(verdict="refuted")).endswith("(refuted)")
     assert _cell(_case(verdict="not run", cost="heavy", numbers={})) == "tubes: not run (a heavy case)"
     assert _cell(_case(), subject="crest") == NO_DATA
+    wide = {**_case()["numbers"], "share_within": 1.0, "width_needed": 0.77}
+    assert "100.0 % within (77 % of its width would hold 95 %), bias" in _cell(_case(numbers=wide))
 
 
 def test_verification_is_no_validation() -> None:

@@ -12,16 +12,14 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
+from ringbalance.identification.data.measurements import MeasurementsError, parse_measurements
 from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.scene.models import Scene
 from ringbalance.verification.catalogue import case_code
+from ringbalance.verification.validation import tube_at_rest
 from ringbalance.verification.validation.comparison import KINDS, compare
-from ringbalance.verification.validation.measurements import (
-    MeasurementsError,
-    measurements,
-    parse_measurements,
-)
+from ringbalance.verification.validation.measurements import measurements
 from ringbalance.verification.validation.model_bias import ModelStatistics, model_statistics
 from ringbalance.verification.validation.tube_friction import friction_points
 from ringbalance.verification.validation.wave_frequency import CALIBRATING, tank_frequency
@@ -70,6 +68,7 @@ def test_the_band_of_an_unbiased_model_holds_what_it_promises() -> None:
     found = _synthetic(np.random.default_rng(2), bias=0.0, scatter=0.03)
     inside = round(found.share_within * found.points)
     assert binomtest(inside, found.points, 0.954).pvalue > 1e-3
+    assert found.width_needed == pytest.approx(1.96 / 2, rel=0.03)
 
 
 def test_scatter_that_the_measurements_explain_is_not_the_models() -> None:
@@ -135,10 +134,10 @@ def test_all_errors_of_a_file_are_reported_together_with_row_and_column() -> Non
     assert len(lines) == 6
     with pytest.raises(MeasurementsError) as error:
         parse_measurements(_HEAD + "reynolds,friction_factor\n100,nan\n\n200\n300,x\n", file="bad.csv")
-    assert [line.split(":")[1] for line in str(error.value).splitlines()] == [
-        ' line 5, column "friction_factor"',
-        " line 7 has 1 values, the columns are 2",
-        ' line 8, column "friction_factor"',
+    assert [line.split(": ")[1] for line in str(error.value).splitlines()] == [
+        'line 5, column "friction_factor" = "nan"',
+        "line 7",
+        'line 8, column "friction_factor" = "x"',
     ]
 
 
@@ -175,10 +174,28 @@ def test_a_comparison_is_confirmed_by_its_own_predictions_and_refuted_by_others(
 def test_the_uncertainty_of_wave_frequencies_comes_from_tanks_that_are_not_judged() -> None:
     data = measurements("addington_1960")
     taught = np.isin(data.series, CALIBRATING)
-    deviation = compare(data.where(taught))
-    ratio = np.log(deviation.predicted / deviation.measured)
-    width = math.hypot(float(ratio.mean()), 2 * float(ratio.std(ddof=1)))
+    found = compare(data.where(taught)).statistics
+    width = math.hypot(found.bias, 2 * found.standard_deviation)
     assert round(width, 2) == FREQUENCY_UNCERTAINTY
+
+
+def test_the_bore_of_a_tube_comes_from_a_point_that_is_not_judged() -> None:
+    data = measurements("eisenklam_1958")
+    taught = compare(data.where(np.isin(data.series, tube_at_rest.CALIBRATING)))
+    assert taught.predicted == pytest.approx(taught.measured, rel=1e-3)
+    assert taught.measured.size == len(tube_at_rest.CALIBRATING)
+
+
+def test_end_losses_that_are_left_out_are_noticed() -> None:
+    data = measurements("eisenklam_1958")
+    long = data.where(np.char.startswith(data.series, "tube"))
+    reynolds, slenderness = tube_at_rest.tube_numbers(long)
+    friction = slenderness * 64 / reynolds
+    found = compare(long)
+    pairs = zip(slenderness, reynolds, strict=True)
+    dynamic = found.predicted / (1 + np.array([tube_at_rest.tube_loss(*pair, 100.0)[0] for pair in pairs]))
+    assert np.max(np.abs(found.predicted / found.measured - 1)) < 0.04
+    assert np.min(dynamic * (1 + friction) / found.measured) < 0.8
 
 
 @pytest.mark.parametrize("depth", [0.06, 0.3, 1.5])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from copy import deepcopy
@@ -169,24 +168,6 @@ def _capacity(scene: Scene) -> float:
         scene.liquid.density * scene.disc.axial_width * liquid_first_moment(disc=scene.disc, surface_radius=a)
     )
     return float(scene.rotor.influence_coefficient * moment)
-
-
-def toml_bytes(document: Mapping[str, Any]) -> bytes:
-    """A document of texts, numbers, truth values, lists and small tables as a scene file."""
-    top = {key: value for key, value in document.items() if not isinstance(value, dict)}
-    lines = [f"{key} = {_toml(value)}" for key, value in top.items()]
-    for name, table in document.items():
-        if isinstance(table, dict):
-            lines += ["", f"[{name}]", *(f"{key} = {_toml(value)}" for key, value in table.items())]
-    return ("\n".join(lines) + "\n").encode()
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + " }"
-    if isinstance(value, list):
-        return "[" + ", ".join(_toml(item) for item in value) + "]"
-    return json.dumps(value, ensure_ascii=False)
 
 
 def _set_fill(document: Document, value: float, _: Scene, __: Values) -> None:

@@ -21,7 +21,8 @@ from ringbalance.mesh.geometry import half_angle, liquid_area, surface_radius
 from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid
 from ringbalance.physics.pressure.surface import solve_with_gravity
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import Disc, Scene, Shaft
+from ringbalance.scene.loop_models import Shaft
+from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Evidence, Found
 from ringbalance.verification.orders import field_error, order_figure, order_study, orders_found
 from ringbalance.verification.reference.mutated_pressure import mutated_pressure

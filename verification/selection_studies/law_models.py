@@ -117,7 +117,7 @@ def _level_tables(scene: Scene, level: str) -> tuple[HermiteTable, HermiteTable]
         pressure, moment = _thin_film(scene, fills, pressure), _thin_film(scene, fills, moment, moment=True)
     return (
         table_from_samples(start=0.0, stop=largest, value=pressure),
-        table_from_samples(start=0.0, stop=largest, value=moment),
+        table_from_samples(start=0.0, stop=largest, value=scene.disc.moment_factor * moment),
     )
 
 

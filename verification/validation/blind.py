@@ -8,8 +8,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from ringbalance.identification.data.measurements import MeasurementsError, read_measurements
 from ringbalance.verification.validation.comparison import PROMISED, Comparison, compare, kind_of
-from ringbalance.verification.validation.measurements import MeasurementsError, read_measurements
 from ringbalance.verification.validation.model_bias import bias, within
 
 _FEWEST: Final = 2

@@ -9,23 +9,29 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.identification.data.measurements import Measurements, MeasurementsError
 from ringbalance.scene.arrays import BoolArray, FloatArray, StringArray
 from ringbalance.verification.evidence import Curve, Evidence, Found, Series, figure
 from ringbalance.verification.validation.kinds import Kind
-from ringbalance.verification.validation.measurements import Measurements, MeasurementsError
 from ringbalance.verification.validation.model_bias import (
     MUTATIONS,
     ModelStatistics,
     model_statistics,
     statistics_numbers,
 )
+from ringbalance.verification.validation.tube_at_rest import TUBE_AT_REST
 from ringbalance.verification.validation.tube_friction import FRICTION
 from ringbalance.verification.validation.vessel import VESSEL
 from ringbalance.verification.validation.wave_frequency import WAVE_FREQUENCY
 from ringbalance.verification.verdicts import Verdict, judge_quantity
 
 KINDS: Final[Mapping[str, Kind]] = MappingProxyType(
-    {"friction": FRICTION, "vessel": VESSEL, "wave_frequency": WAVE_FREQUENCY}
+    {
+        "friction": FRICTION,
+        "tube_at_rest": TUBE_AT_REST,
+        "vessel": VESSEL,
+        "wave_frequency": WAVE_FREQUENCY,
+    }
 )
 """Kinds of data that the program can predict."""
 PROMISED: Final = 0.93

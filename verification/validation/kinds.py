@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from ringbalance.identification.data.measurements import Measurements
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.verification.validation.measurements import Measurements
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,6 +14,7 @@ from scipy import special
 from ringbalance.scene.arrays import BoolArray, FloatArray, StringArray
 
 _FEWEST_SERIES: Final = 3
+_PROMISED: Final = 0.95
 MUTATIONS: Final[Mapping[str | None, float]] = MappingProxyType(
     {None: 1.0, "ten_per_cent_high": 1.1, "ten_per_cent_low": 0.9}
 )
@@ -34,6 +35,8 @@ class ModelStatistics:
     """Of the model alone: the scatter less the measurements' own."""
     share_within: float
     """Of the points whose deviation lies within both 95 % uncertainties, the model's stated one and U_D."""
+    width_needed: float
+    """Factor on both uncertainties at which they hold 95 % of the points."""
 
 
 def model_statistics(
@@ -54,7 +57,7 @@ def model_statistics(
     Source: McGrattan and Toman, Metrologia 48 (2011) 173, for the split of the scatter.
     """
     ratio = np.log(predicted / measured)
-    held = within(predicted, measured, stated, measurement_uncertainty)
+    used = _used(predicted, measured, stated, measurement_uncertainty)
     names = np.unique(series)
     means = np.array([np.mean(ratio[series == name]) for name in names])
     unexplained = float(np.var(ratio, ddof=1) - np.mean((measurement_uncertainty / 2) ** 2))
@@ -64,7 +67,8 @@ def model_statistics(
         bias=bias(predicted, measured),
         bias_uncertainty=_mean_uncertainty(means, float(np.mean(measurement_uncertainty))),
         standard_deviation=math.sqrt(max(unexplained, 0.0)),
-        share_within=float(np.mean(held)),
+        share_within=float(np.mean(used <= 1)),
+        width_needed=float(np.quantile(used, _PROMISED)),
     )
 
 
@@ -77,8 +81,14 @@ def within(
     predicted: FloatArray, measured: FloatArray, stated: FloatArray, measurement_uncertainty: FloatArray
 ) -> BoolArray:
     """Whether each deviation lies within both 95 % uncertainties; the last is relative."""
-    allowed = np.hypot(stated, measurement_uncertainty * measured)
-    return np.asarray(np.abs(predicted - measured) <= allowed)
+    return np.asarray(_used(predicted, measured, stated, measurement_uncertainty) <= 1)
+
+
+def _used(
+    predicted: FloatArray, measured: FloatArray, stated: FloatArray, measurement_uncertainty: FloatArray
+) -> FloatArray:
+    """Size of each deviation over what both uncertainties allow."""
+    return np.asarray(np.abs(predicted - measured) / np.hypot(stated, measurement_uncertainty * measured))
 
 
 def _mean_uncertainty(means: FloatArray, measurement_uncertainty: float) -> float:

@@ -7,6 +7,7 @@ from typing import Final, Protocol
 
 import numpy as np
 
+from ringbalance.identification.data.measurements import Measurements, MeasurementsError
 from ringbalance.physics.tube.friction import friction_factor, friction_uncertainty
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, StringArray
 from ringbalance.verification.evidence import Curve, Series, figure
@@ -16,7 +17,7 @@ from ringbalance.verification.navier_stokes.rotating_section import (
     solve_section_without_inertia,
 )
 from ringbalance.verification.validation.kinds import Kind, Prediction
-from ringbalance.verification.validation.measurements import Measurements, MeasurementsError, measurements
+from ringbalance.verification.validation.measurements import measurements
 from ringbalance.verification.validation.model_bias import ModelStatistics, model_statistics
 
 _WIDEST: Final = 20

@@ -11,10 +11,10 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.identification.data.measurements import Measurements, MeasurementsError
 from ringbalance.physics.gas.supply import HEAT_CAPACITY_RATIO, GasLine
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.validation.kinds import Kind, Prediction
-from ringbalance.verification.validation.measurements import Measurements, MeasurementsError
 
 CONDUCTANCE_UNCERTAINTY: Final = 0.1
 """U (95 %), relative, of a conductance computed from an opening's area: its discharge coefficient."""

@@ -11,11 +11,11 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.identification.data.measurements import Measurements, MeasurementsError
 from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY
 from ringbalance.physics.sloshing.system import sloshing_system
 from ringbalance.scene.models import Disc
 from ringbalance.verification.validation.kinds import Kind, Prediction
-from ringbalance.verification.validation.measurements import Measurements, MeasurementsError
 
 CALIBRATING: Final = ("tank 1", "tank 3", "tank 5", "tank 7")
 """Tanks of Addington whose points gave the uncertainty that the program states, and are not judged."""

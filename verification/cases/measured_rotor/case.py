@@ -9,11 +9,12 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.rotor import vibration
+from ringbalance.identification.data.measurements import Measurements
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, figure
-from ringbalance.verification.validation.measurements import Measurements, measurements
+from ringbalance.verification.validation.measurements import measurements
 from ringbalance.verification.validation.model_bias import MUTATIONS
 
 _WASHER: Final = 12.4e-6

@@ -1,0 +1,10 @@
+"""Calibration from measurements: parameters of a built disc, fitted to what a test rig recorded.
+
+`data/` reads the files of measurements; `predict/` has one module per kind that predicts them through the
+program's own laws; likelihood, intervals, verdicts and criticism of the model stand beside them.
+"""
+
+if not __name__.startswith("ringbalance."):
+    raise ImportError(
+        f"import ringbalance.{__name__}, not {__name__}: under two names each class exists twice"
+    )

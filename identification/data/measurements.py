@@ -1,0 +1,169 @@
+"""Data sets of measurements: the numbers, where they come from, and what they support.
+
+A file is CSV in long form, one row a measurement. Its first lines, marked #, are TOML and fill `Source`. A
+column is a name with its unit in brackets, such as "pressure [kPa]", or a name alone for a number without
+unit; `series` holds text. docs/measurements.md says which columns each kind of data has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from ringbalance.identification.data.columns import (
+    column_values,
+    dimension_of,
+    head_fault,
+    name_faults,
+    split_head,
+    texts,
+)
+from ringbalance.identification.data.tables import (
+    Table,
+    data_fault,
+    decoded,
+    file_name,
+    header_faults,
+    in_order,
+    parse_table,
+    read_content,
+)
+from ringbalance.scene.arrays import BoolArray, FloatArray, StringArray
+from ringbalance.scene.faults import Fault, toml_text
+
+SERIES: Final = "series"
+_MOST_SHOWN: Final = 20
+_ENOUGH: Final = ("kind", "source", "uncertainty")
+
+
+class MeasurementsError(ValueError):
+    """A file of measurements that cannot be used; the text has all errors, each with row and column."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Source:
+    """Where a data set comes from."""
+
+    kind: str
+    """Kind of data, a key of `KINDS`."""
+    source: str
+    uncertainty: float
+    """U_D, expanded (95 %), relative to the measured value."""
+    uncertainty_from: str = ""
+    where: str = ""
+    doi: str = ""
+    """Empty where there is none."""
+    licence: str = ""
+    """Of the numbers as they stand in the file."""
+    read: str = ""
+    """Tables of the publication, somebody else's copy of them (a transcription), or points read from a
+    figure."""
+    conditions: str = ""
+    supports: str = ""
+    does_not_support: str = ""
+
+
+SOURCE_KEYS: Final = tuple(field.name for field in fields(Source))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measurements:
+    """One data set, one row a point."""
+
+    source: Source
+    series: StringArray
+    """Tube, run or rig that a point belongs to: its points share their systematic errors."""
+    columns: Mapping[str, FloatArray]
+    """SI, by name."""
+
+    def __len__(self) -> int:
+        return int(self.series.size)
+
+    @property
+    def uncertainty(self) -> FloatArray:
+        """U_D of each point, expanded (95 %), relative: a column of that name, or the source's."""
+        return self.columns.get("uncertainty", np.full(len(self), self.source.uncertainty))
+
+    def where(self, chosen: BoolArray) -> Measurements:
+        """Some of the points."""
+        return Measurements(
+            source=self.source,
+            series=self.series[chosen],
+            columns={name: column[chosen] for name, column in self.columns.items()},
+        )
+
+
+def read_measurements(path: Path) -> Measurements:
+    """The data set of a file. Raises: MeasurementsError: no such file, or not a data set."""
+    content, unreadable = read_content(path)
+    text, faults = decoded(content, file=file_name(path))
+    if unreadable or faults:
+        raise _error(unreadable or faults)
+    return parse_measurements(text, file=file_name(path))
+
+
+def parse_measurements(text: str, *, file: str) -> Measurements:
+    """The data set of a text. Args: `file`: its name in messages. Raises: MeasurementsError: all errors."""
+    table, faults = parse_table(text, file=file)
+    if table is None:
+        raise _error(faults)
+    wrong = [*faults, *source_faults(table.header, file=file), *name_faults(table), *_unit_faults(table)]
+    heads_are_right = len(wrong) == len(faults)
+    columns = dict(_columns(table, wrong)) if heads_are_right else {}
+    if wrong:
+        raise _error(wrong)
+    return Measurements(
+        source=Source(**table.header),  # type: ignore[arg-type]
+        series=series_of(table),
+        columns=columns,
+    )
+
+
+def series_of(table: Table) -> StringArray:
+    """The column of series, or one series for all rows."""
+    return np.array(texts(table, SERIES) if SERIES in table.heads else ("one",) * len(table.rows))
+
+
+def source_faults(header: Mapping[str, object], *, file: str) -> Iterator[Fault]:
+    """What is wrong with the first lines of a data set."""
+    yield from header_faults(header, known=SOURCE_KEYS, needed=_ENOUGH, file=file)
+    yield from text_faults(header, [key for key in SOURCE_KEYS if key != "uncertainty"], file=file)
+    width = header.get("uncertainty", 0.0)
+    if isinstance(width, bool) or not isinstance(width, int | float) or not 0 <= width < 1:
+        problem = "it is not a number from 0 to below 1: 95 %, relative to the measured value"
+        yield data_fault(file, "uncertainty", problem, value=toml_text(width))
+
+
+def text_faults(header: Mapping[str, object], keys: Iterable[str], *, file: str) -> Iterator[Fault]:
+    """Values of keys that must be text, and are not."""
+    for key in keys:
+        value = header.get(key, "")
+        if not isinstance(value, str):
+            yield data_fault(file, key, "it is not text", value=toml_text(value), allowed='"..."')
+
+
+def _unit_faults(table: Table) -> Iterator[Fault]:
+    for head in table.heads:
+        _, unit = split_head(head) or ("", "")
+        if unit and dimension_of(unit) is None:
+            yield head_fault(table, head, "the unit is not known; docs/scene-file.md has them")
+
+
+def _columns(table: Table, wrong: list[Fault]) -> Iterator[tuple[str, FloatArray]]:
+    for head in table.heads:
+        name, unit = split_head(head) or ("", "")
+        if name != SERIES:
+            values, faults = column_values(table, head, unit, dimension_of(unit) if unit else None)
+            wrong += faults
+            yield name, values
+
+
+def _error(faults: Iterable[Fault]) -> MeasurementsError:
+    lines = [str(fault) for fault in in_order(faults)]
+    more = len(lines) - _MOST_SHOWN
+    shown = [*lines[:_MOST_SHOWN], f"and {more} more; correct these first"] if more > 0 else lines
+    return MeasurementsError("\n".join(shown))

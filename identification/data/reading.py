@@ -1,0 +1,260 @@
+"""From files of measurements to observations that a fit can use, or everything that is wrong with them."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from ringbalance.identification.data.columns import (
+    check_unit,
+    column_values,
+    head_fault,
+    name_faults,
+    split_head,
+    texts,
+)
+from ringbalance.identification.data.kinds import AMPLITUDES, KINDS, Column, DataKind, unknown_kind
+from ringbalance.identification.data.measurements import SOURCE_KEYS, series_of, text_faults
+from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.stated import stated_uncertainty
+from ringbalance.identification.data.tables import (
+    Table,
+    data_fault,
+    decoded,
+    file_name,
+    header_faults,
+    in_order,
+    parse_table,
+    read_content,
+)
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.faults import Fault, SceneError, did_you_mean, toml_text
+from ringbalance.scene.keys.fields import LETTERS
+from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import AnyScene
+from ringbalance.scene.units import FieldError
+
+AMPLITUDE: Final = "amplitude"
+_NEEDED: Final = ("kind", "source")
+
+
+def read_observations(paths: Iterable[Path], *, scene: AnyScene) -> tuple[Observations, ...]:
+    """The observations of each file, for a scene.
+
+    Raises: SceneError: all that is wrong with any of the files, each error with line and column.
+    """
+    faults: list[Fault] = []
+    found = []
+    for path in paths:
+        content, wrong = read_content(path)
+        if not wrong:
+            observations, wrong = observations_of(content, file=file_name(path), scene=scene)
+            found += [observations] if observations else []
+        faults += in_order(wrong)
+    faults += [*_given_twice(found), *_known_already(found, scene)]
+    if faults:
+        raise SceneError(faults)
+    return tuple(found)
+
+
+def _given_twice(found: Iterable[Observations]) -> Iterator[Fault]:
+    first: dict[str, str] = {}
+    for each in found:
+        if each.sha256 in first:
+            yield data_fault(each.file, "", f"it has the same content as {first[each.sha256]}; give it once")
+        first.setdefault(each.sha256, each.file)
+
+
+def _known_already(found: Iterable[Observations], scene: AnyScene) -> Iterator[Fault]:
+    """Files that the scene was fitted to: its [uncertainty] has what they say."""
+    known = {each.sha256 for each in scene.measured.files}
+    for each in found:
+        if each.sha256 in known:
+            problem = f"{scene.file} was fitted to this file already, so that it would count twice"
+            allowed = "the scene as it was before, with all files together"
+            yield data_fault(each.file, "", problem, allowed=allowed)
+
+
+def observations_of(
+    content: bytes, *, file: str, scene: AnyScene
+) -> tuple[Observations | None, tuple[Fault, ...]]:
+    """The observations of a file's bytes, or all that is wrong with it."""
+    text, undecoded = decoded(content, file=file)
+    if undecoded:
+        return None, undecoded
+    table, faults = parse_table(text, file=file)
+    if table is None:
+        return None, faults
+    kind, wrong = _kind(table, scene)
+    if kind is None:
+        return None, (*faults, *wrong)
+    wrong += _header_faults(table, kind)
+    heads = list(_head_faults(table, kind))
+    if heads:
+        return None, (*faults, *wrong, *heads)
+    columns, cell_faults = _columns(table, kind)
+    wrong += cell_faults
+    wrong += _chamber_faults(table, scene) if kind.has_chamber else []
+    uncertainty, stated_faults = stated_uncertainty(table, kind, columns)
+    wrong += [*stated_faults, *_repeated(table)]
+    if faults or wrong:
+        return None, (*faults, *wrong)
+    found = _observations(table, kind, columns, uncertainty)
+    return replace(found, sha256=hashlib.sha256(content).hexdigest()), ()
+
+
+def _observations(
+    table: Table, kind: DataKind, columns: Mapping[str, FloatArray], uncertainty: Mapping[str, FloatArray]
+) -> Observations:
+    """Amplitudes as the file's convention has them become zero to peak."""
+    factor = AMPLITUDES[str(table.header.get(AMPLITUDE, "zero_to_peak"))]
+    letters = texts(table, "chamber") if kind.has_chamber else ("",) * len(table.rows)
+    used = {column.name: columns[column.name] for column in kind.columns if column.name in columns}
+    return Observations(
+        kind=str(table.header["kind"]),
+        file=table.file,
+        source=str(table.header["source"]),
+        lines=np.array(table.lines, dtype=np.int64),
+        series=series_of(table),
+        chamber=np.array(letters, dtype=np.str_),
+        columns=_zero_to_peak(used, kind, factor),
+        uncertainty=_zero_to_peak(uncertainty, kind, factor),
+    )
+
+
+def _kind(table: Table, scene: AnyScene) -> tuple[DataKind | None, list[Fault]]:
+    word = table.header.get("kind")
+    if word is None:
+        problem = 'the key "kind" is missing in the first lines, marked #'
+        return None, [data_fault(table.file, "", problem, allowed=f'kind = "..." of {", ".join(KINDS)}')]
+    if not isinstance(word, str) or word not in KINDS:
+        problem, value = unknown_kind(str(word)), toml_text(word)
+        return None, [data_fault(table.file, "kind", problem, value=value, allowed=", ".join(KINDS))]
+    kind = KINDS[word]
+    if kind.balancer == scene.balancer:
+        return kind, []
+    own = ", ".join(name for name, each in KINDS.items() if each.balancer == scene.balancer)
+    problem = f'the balancer of {scene.file} is "{scene.balancer}", and these data belong to another'
+    return None, [data_fault(table.file, "kind", problem, value=toml_text(word), allowed=own)]
+
+
+def _header_faults(table: Table, kind: DataKind) -> list[Fault]:
+    convention = (AMPLITUDE,) if kind.has_amplitudes else ()
+    texts_only = [key for key in SOURCE_KEYS if key != "uncertainty"]
+    faults = [
+        *header_faults(table.header, known=(*SOURCE_KEYS, *convention), needed=_NEEDED, file=table.file),
+        *text_faults(table.header, texts_only, file=table.file),
+    ]
+    if not str(table.header.get("source", "-")).strip():
+        faults.append(data_fault(table.file, "source", "it is empty", allowed="rig, run and date"))
+    stated = table.header.get(AMPLITUDE)
+    if kind.has_amplitudes and not (isinstance(stated, str) and stated in AMPLITUDES):
+        allowed = " or ".join(f'amplitude = "{word}"' for word in AMPLITUDES)
+        problem = "the first lines must say how amplitudes are counted"
+        value = "missing" if stated is None else toml_text(stated)
+        faults.append(data_fault(table.file, AMPLITUDE, problem, value=value, allowed=allowed))
+    return faults
+
+
+def _head_faults(table: Table, kind: DataKind) -> Iterator[Fault]:
+    known = [column.name for column in (*kind.columns, *kind.uncertainties())] + [*kind.texts]
+    yield from name_faults(table, known)
+    for head in table.heads:
+        name, unit = split_head(head) or ("", "")
+        yield from _one_head(table, head, name, unit, kind, known)
+    names = {(split_head(head) or ("", ""))[0] for head in table.heads}
+    yield from _missing(table, kind, names)
+
+
+def _one_head(
+    table: Table, head: str, name: str, unit: str, kind: DataKind, known: Iterable[str]
+) -> Iterator[Fault]:
+    column = kind.column(name)
+    if column is None:
+        if name not in kind.texts and name.replace("_", "").islower():
+            problem = f"a file of this kind has no such column{did_you_mean(name, known)}"
+            yield head_fault(table, head, problem, ", ".join(known))
+        elif name in kind.texts and unit:
+            yield head_fault(table, head, "a column of text has no unit", name)
+        return
+    try:
+        if column.dimension is not None:
+            check_unit(unit, column.dimension)
+        elif unit and unit != "%":
+            raise FieldError("this column has no unit", f"{name}, or {name} [%]")
+    except FieldError as error:
+        yield head_fault(table, head, error.problem, error.allowed)
+
+
+def _missing(table: Table, kind: DataKind, names: set[str]) -> Iterator[Fault]:
+    place = f"line {table.head_line}"
+    needed = [column for column in kind.columns if not column.optional and column.name not in kind.one_of]
+    for column in needed:
+        if column.name not in names:
+            yield data_fault(table.file, place, f'the column "{column.head}" is missing: {column.meaning}')
+    if kind.has_chamber and "chamber" not in names:
+        yield data_fault(table.file, place, 'the column "chamber" is missing: letter of the driven chamber')
+    given = [name for name in kind.one_of if name in names]
+    if kind.one_of and len(given) != 1:
+        choice = " or ".join(f'"{c.head}"' for c in kind.columns if c.name in kind.one_of)
+        yield data_fault(table.file, place, f"{len(given)} of the columns {choice}, and one is needed")
+
+
+def _columns(table: Table, kind: DataKind) -> tuple[dict[str, FloatArray], list[Fault]]:
+    """Every column of numbers, SI, and the errors of its cells."""
+    columns: dict[str, FloatArray] = {}
+    faults: list[Fault] = []
+    for head in table.heads:
+        name, unit = split_head(head) or ("", "")
+        column = kind.column(name)
+        if column is None:
+            continue
+        dimension = "share" if unit == "%" and column.dimension is None else column.dimension
+        columns[name], wrong = column_values(table, head, unit, dimension)
+        bad = {fault.key for fault in wrong}
+        faults += wrong + [
+            fault for fault in _range_faults(table, head, column, columns[name]) if fault.key not in bad
+        ]
+    return columns, faults
+
+
+def _range_faults(table: Table, head: str, column: Column, values: FloatArray) -> Iterator[Fault]:
+    cells = texts(table, head)
+    for line, cell, value in zip(table.lines, cells, values.tolist(), strict=True):
+        try:
+            column.check(value)
+        except FieldError as error:
+            yield table.fault(line, head, cell, error.problem, error.allowed)
+
+
+def _chamber_faults(table: Table, scene: AnyScene) -> Iterator[Fault]:
+    assert isinstance(scene, Scene)
+    letters = LETTERS[: scene.disc.chambers]
+    for line, cell in zip(table.lines, texts(table, "chamber"), strict=True):
+        if len(cell) != 1 or cell not in letters:
+            problem = f"the disc has no chamber of that name{did_you_mean(cell, letters)}"
+            yield table.fault(line, "chamber", cell, problem, ", ".join(letters))
+
+
+def _repeated(table: Table) -> Iterator[Fault]:
+    """Rows that stand twice: as evidence they would count twice."""
+    counted = Counter(table.rows)
+    first: dict[tuple[str, ...], int] = {}
+    for line, row in zip(table.lines, table.rows, strict=True):
+        if counted[row] > 1 and first.setdefault(row, line) != line:
+            problem = (
+                f"the row is the same as line {first[row]}; remove it, or tell the two apart in a column "
+                '"note" where it was measured again'
+            )
+            yield data_fault(table.file, f"line {line}", problem)
+
+
+def _zero_to_peak(columns: Mapping[str, FloatArray], kind: DataKind, factor: float) -> dict[str, FloatArray]:
+    counted = {column.name for column in kind.columns if column.amplitude}
+    return {name: values * (factor if name in counted else 1.0) for name, values in columns.items()}

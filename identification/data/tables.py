@@ -1,0 +1,217 @@
+"""Files of measurements as tables of text: TOML in the first lines, marked #, then rows below named columns.
+
+What a spreadsheet does to such a file is undone where that is unambiguous: a byte order mark, Windows line
+ends, a line "sep=;", semicolons or tabs between cells, first lines in quotation marks or with empty cells
+behind them. A decimal comma is refused: in a table it could as well part thousands.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+import tomllib
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from ringbalance.scene.faults import Fault, did_you_mean, toml_text
+
+LARGEST_FILE: Final = 8 * 2**20
+MOST_ROWS: Final = 10_000
+"""A row is a measurement. More of them are a recording, which is averaged or thinned out first."""
+_MARK: Final = "#"
+_SEPARATORS: Final = ";\t,"
+_NAMED_SEPARATOR: Final = re.compile(r'"?sep=.{0,2}"?[,;\t]*', re.IGNORECASE)
+_LINE: Final = re.compile(r"line (\d+)")
+_WORKBOOKS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
+"""First bytes of .xlsx or .ods, and of .xls."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """A file's header and its cells, as text; `lines` and `rows` are of one length."""
+
+    file: str
+    header: Mapping[str, object]
+    head_line: int
+    heads: tuple[str, ...]
+    lines: tuple[int, ...]
+    """Line of each row in the file, from 1."""
+    rows: tuple[tuple[str, ...], ...]
+
+    def fault(self, line: int, head: str, cell: str, problem: str, allowed: str = "") -> Fault:
+        """One error of a cell."""
+        return data_fault(
+            self.file, f'line {line}, column "{head}"', problem, value=toml_text(cell), allowed=allowed
+        )
+
+
+def data_fault(file: str, place: str, problem: str, *, value: str = "", allowed: str = "") -> Fault:
+    """One error of a file of measurements. Args: `place`: such as 'line 3' or 'kind'; may be empty."""
+    return Fault(file=file, table="", key=place, value=value, problem=problem, allowed=allowed)
+
+
+def file_name(path: Path) -> str:
+    """A path as messages show it, printable and on one line."""
+    name = str(path)
+    return name if name.isprintable() else toml_text(name)
+
+
+def read_content(path: Path) -> tuple[bytes, tuple[Fault, ...]]:
+    """The bytes of a file, no more than are read in any case, or why there are none."""
+    file = file_name(path)
+    try:
+        with open(path, "rb") as stream:
+            return stream.read(LARGEST_FILE + 1), ()
+    except IsADirectoryError:
+        return b"", (data_fault(file, "", "this is a folder, not a file of measurements"),)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        return b"", (data_fault(file, "", f"the file cannot be read: {reason}"),)
+
+
+def decoded(content: bytes, *, file: str) -> tuple[str, tuple[Fault, ...]]:
+    """The text of a file's bytes, or why it is none."""
+    if len(content) > LARGEST_FILE:
+        problem = "the file is larger than any list of measurements; average or thin out a recording"
+        return "", (data_fault(file, "", problem, allowed=f"up to {LARGEST_FILE // 2**20} MiB"),)
+    if content.startswith(_WORKBOOKS):
+        problem = 'this is a workbook, not text; save the sheet as "CSV UTF-8"'
+        return "", (data_fault(file, "", problem),)
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line, column = _place(content, error.start)
+        problem = 'this is not UTF-8 text; save the file as "CSV UTF-8"'
+        return "", (data_fault(file, f"line {line}, character {column}", problem),)
+    if "\0" in text:
+        line, column = _place(content, content.index(b"\0"))
+        problem = 'this is not text but binary data; save the file as "CSV UTF-8"'
+        return "", (data_fault(file, f"line {line}, character {column}", problem),)
+    return text, ()
+
+
+def _place(content: bytes, at: int) -> tuple[int, int]:
+    """Line and character of a byte, both from 1."""
+    before = content[:at]
+    start = before.rfind(b"\n") + 1
+    return before.count(b"\n") + 1, len(before[start:].decode("utf-8-sig", "replace")) + 1
+
+
+def parse_table(text: str, *, file: str) -> tuple[Table | None, tuple[Fault, ...]]:
+    """The table of a text, or all that is wrong with its form."""
+    numbered = list(enumerate(re.split(r"\r\n|\r|\n", text), 1))
+    head_at = next((at for at, line in numbered if _is_data(line)), len(numbered) + 1)
+    header, faults = _header(numbered[: head_at - 1], file)
+    data = [(at, line) for at, line in numbered[head_at - 1 :] if _is_data(line)]
+    if len(data) < 2:
+        problem = "there is no row of data below the names of the columns"
+        if not data:
+            problem = "the file has no line with the names of the columns"
+        return None, (*faults, data_fault(file, "", problem))
+    if len(data) - 1 > MOST_ROWS:
+        problem = f"{len(data) - 1} rows; a row is one measurement, so average or thin out a recording"
+        return None, (*faults, data_fault(file, "", problem, allowed=f"up to {MOST_ROWS} rows"))
+    if header is None:
+        return None, faults
+    separator = _separator(data[0][1])
+    try:
+        heads = _without_empty_end(_cells(data[0][1], separator))
+    except csv.Error as error:
+        return None, (*faults, _quotation_fault(head_at, error, file))
+    rows, bad_rows = _rows(data[1:], len(heads), separator, file)
+    table = Table(
+        file=file,
+        header=header,
+        head_line=head_at,
+        heads=heads,
+        lines=tuple(rows),
+        rows=tuple(rows.values()),
+    )
+    return table, (*faults, *bad_rows)
+
+
+def _is_data(line: str) -> bool:
+    """Neither empty, nor marked, nor a spreadsheet's line that names the separator."""
+    start = line.lstrip(f'" {_SEPARATORS}')
+    return bool(start) and not start.startswith(_MARK) and not _NAMED_SEPARATOR.fullmatch(line.strip())
+
+
+def _header(
+    lines: Sequence[tuple[int, str]], file: str
+) -> tuple[Mapping[str, object] | None, tuple[Fault, ...]]:
+    """The TOML of the first lines; the mark becomes a space, so that its errors have the file's places."""
+    try:
+        return tomllib.loads("\n".join(_unmarked(line) for _, line in lines)), ()
+    except (ValueError, csv.Error, RecursionError) as error:
+        reason = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
+        problem = f"the first lines, marked #, are not TOML: {' '.join(reason.split())}"
+        return None, (data_fault(file, "", problem),)
+
+
+def _unmarked(line: str) -> str:
+    line = line.strip()
+    if line.startswith(f'"{_MARK}'):
+        separator = line[-1] if line[-1] in _SEPARATORS else _separator(line)
+        line = separator.join(next(csv.reader([line], delimiter=separator), []))
+    return " " + line[1:].rstrip(f" {_SEPARATORS}") if line.startswith(_MARK) else ""
+
+
+def _separator(head: str) -> str:
+    """The first of semicolon, tab and comma that stands in the line of names, none of which has one."""
+    return next((each for each in _SEPARATORS if each in head), ",")
+
+
+def _cells(line: str, separator: str) -> tuple[str, ...]:
+    return tuple(cell.strip() for cell in next(csv.reader([line], delimiter=separator, strict=True)))
+
+
+def _quotation_fault(line: int, error: csv.Error, file: str) -> Fault:
+    return data_fault(file, f"line {line}", f"the quotation marks are wrong ({error})")
+
+
+def _without_empty_end(row: tuple[str, ...]) -> tuple[str, ...]:
+    """A line of names without the empty cells that a spreadsheet adds behind it."""
+    while len(row) > 1 and not row[-1]:
+        row = row[:-1]
+    return row
+
+
+def _rows(
+    data: Sequence[tuple[int, str]], length: int, separator: str, file: str
+) -> tuple[dict[int, tuple[str, ...]], list[Fault]]:
+    """The rows of the right length by line, and the errors of the others."""
+    rows, faults = {}, []
+    for at, line in data:
+        try:
+            cells = _cells(line, separator)
+        except csv.Error as error:
+            faults.append(_quotation_fault(at, error, file))
+            continue
+        if len(cells) < length or any(cells[length:]):
+            problem = f"{len(cells)} values, and the columns are {length}"
+            if len(cells) > length and separator == ",":
+                problem += "; a decimal comma would do this: write points"
+            faults.append(data_fault(file, f"line {at}", problem))
+        else:
+            rows[at] = cells[:length]
+    return rows, faults
+
+
+def in_order(faults: Iterable[Fault]) -> list[Fault]:
+    """Errors of one file in the order of its lines, those of the whole file first."""
+    return sorted(faults, key=lambda fault: int(found[1]) if (found := _LINE.match(fault.key)) else 0)
+
+
+def header_faults(
+    header: Mapping[str, object], *, known: Collection[str], needed: Collection[str], file: str
+) -> Iterator[Fault]:
+    """Keys of a header that are not known, and those that are missing."""
+    for key in header:
+        if key not in known:
+            problem = f"this key of the first lines is not known{did_you_mean(key, known)}"
+            yield data_fault(file, toml_text(key), problem, allowed=", ".join(known))
+    for key in needed:
+        if key not in header:
+            yield data_fault(file, "", f'the key "{key}" is missing in the first lines, marked #')

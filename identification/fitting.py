@@ -1,0 +1,207 @@
+"""The fit of a scene's parameters to measurements: maximum likelihood, profiles, verdicts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+
+from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.identifiability import Combination, Verdict, combinations, verdicts
+from ringbalance.identification.intervals import Profile, covariance, profile, student
+from ringbalance.identification.likelihood import Problem, block_of, held_effects
+from ringbalance.identification.optimisation import Optimum, optimum
+from ringbalance.identification.parameters import (
+    FitError,
+    Parameter,
+    held_inputs,
+    scene_parameters,
+)
+from ringbalance.identification.predict.device import models_of
+from ringbalance.identification.predict.kinds import PREDICTED, rows_of
+from ringbalance.identification.predict.vibration import STANDARD
+from ringbalance.identification.result import FileResiduals, FitResult, FittedParameter, Noise
+from ringbalance.reduced_model.chamber.inputs import shifted
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Scene
+
+Loss = Literal["linear", "soft_l1"]
+STARTS: Final = 3
+_NO_EFFECT: Final = 1e-3
+"""Of a standard deviation of the data, in all, below which a held input is left out."""
+_HALF: Final = 0.5
+
+
+def fit(
+    scene: Scene,
+    *,
+    data: Sequence[Observations],
+    parameters: Sequence[str] | None = None,
+    loss: Loss = "linear",
+    starts: int = STARTS,
+) -> FitResult:
+    """Fit parameters of a scene to measurements.
+
+    Args: `parameters`: names; None: those that the kinds of data inform. `loss`: "linear" (normal noise) or
+        "soft_l1" (outliers count less). `starts`: searches from the scene and from around it.
+    Raises: FitError: data or parameters that cannot be fitted. ValueError: data that do not fit the scene.
+    Source: `likelihood`, `optimisation`, `intervals`, `identifiability`.
+    """
+    problem = problem_of(scene, data, parameters)
+    names = [p.name for p in problem.parameters]
+    held = held_inputs(scene, names)
+    nothing = np.zeros((problem.measured.size, 0))
+    first = optimum(problem, nothing, loss=loss, starts=starts)
+    effects = _effects(problem, first.t, held)
+    counts = np.linalg.norm(first.residuals.scale[:, None] * effects, axis=0) > _NO_EFFECT
+    best = optimum(problem, effects[:, counts], loss=loss, starts=starts, before=first)
+    kept = {name: sd for (name, sd), one in zip(held.items(), counts, strict=True) if one}
+    return _result(best, kept, loss)
+
+
+def problem_of(
+    scene: Scene, data: Sequence[Observations], parameters: Sequence[str] | None = None
+) -> Problem:
+    """The problem that `fit` solves. Raises: FitError: as `fit`."""
+    if not data:
+        raise FitError("give at least one file of measurements")
+    for each in data:
+        if each.kind not in PREDICTED:
+            raise FitError(f"{each.file}: data of kind {each.kind} do not belong to this balancer")
+    informed = dict.fromkeys(name for each in data for name in PREDICTED[each.kind].informs)
+    names = list(informed) if parameters is None else list(parameters)
+    return Problem(
+        scene=scene,
+        models=models_of(scene),
+        parameters=scene_parameters(scene, names),
+        blocks=tuple(block_of(each) for each in data),
+    )
+
+
+def _effects(problem: Problem, t: FloatArray, held: dict[str, float]) -> FloatArray:
+    changes = [
+        tuple(shifted(scene=problem.scene, quantity=name, change=sign * sd) for sign in (-1, 1))
+        for name, sd in held.items()
+    ]
+    return held_effects(problem, t, changes)  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Findings:
+    profiles: tuple[Profile, ...]
+    verdicts: tuple[Verdict, ...]
+    combinations: tuple[Combination, ...]
+    spread: FloatArray
+
+
+def _findings(best: Optimum) -> _Findings:
+    spread, factors = covariance(best.slopes), student(best)
+    parameters = best.residuals.problem.parameters
+    data = best.slopes[: best.slopes.shape[0] - int(np.count_nonzero(best.residuals.problem.with_prior))]
+    profiles = tuple(profile(best, i, float(f), spread) for i, f in enumerate(factors))
+    found = verdicts(parameters, best.t, data, profiles)
+    return _Findings(
+        profiles=profiles,
+        verdicts=found,
+        combinations=combinations(parameters, best.t, data, found, profiles),
+        spread=spread,
+    )
+
+
+def _result(best: Optimum, held: dict[str, float], loss: str) -> FitResult:
+    problem, found = best.residuals.problem, _findings(best)
+    size = np.sqrt(np.diag(found.spread))
+    return FitResult(
+        parameters=tuple(_fitted(best, i, found) for i in range(best.t.size)),
+        correlations=found.spread / np.outer(size, size),
+        combinations=found.combinations,
+        noise=_noises(best),
+        residuals=_residuals(best),
+        held=held,
+        loss=loss,
+        starts=best.starts,
+        evaluations=best.evaluations + sum(p.evaluations for p in found.profiles),
+        log_likelihood=_log_likelihood(best),
+        scene=problem.scene_at(best.t),
+        optimum=best,
+    )
+
+
+def _fitted(best: Optimum, i: int, found: _Findings) -> FittedParameter:
+    parameter, profile_, verdict = best.residuals.problem.parameters[i], found.profiles[i], found.verdicts[i]
+    before = None
+    if parameter.prior:
+        width = STANDARD * parameter.prior
+        before = parameter.start - width, parameter.start + width
+    return FittedParameter(
+        name=parameter.name,
+        value=parameter.value(float(best.t[i])),
+        interval=(parameter.value(profile_.low), parameter.value(profile_.high)),
+        at_bound=(profile_.low_bound, profile_.high_bound),
+        before=parameter.start,
+        before_interval=before,
+        verdict=verdict,
+        text=_verdict_text(parameter, verdict, found.combinations),
+        profile=profile_,
+    )
+
+
+def _verdict_text(parameter: Parameter, verdict: Verdict, found: Sequence[Combination]) -> str:
+    if verdict is Verdict.IDENTIFIED:
+        return "identified by the data"
+    within = [c.text for c in found if parameter.name in c.names]
+    only = f"; the data identify {' and '.join(within)}" if within else ""
+    rest = (
+        "its interval is that of the scene's [uncertainty]"
+        if parameter.prior
+        else "nothing else is known of it"
+    )
+    reason = {
+        Verdict.STRUCTURALLY: "no data of these kinds can tell it apart",
+        Verdict.PRACTICALLY: "these data hardly narrow it down",
+    }[verdict]
+    return f"{verdict}: {reason}{only}; {rest}"
+
+
+def _noises(best: Optimum) -> tuple[Noise, ...]:
+    problem = best.residuals.problem
+    estimated = problem.estimated_groups
+    given = dict.fromkeys(b.group for b in problem.blocks if not b.estimated)
+    rows = [
+        Noise(group=name, standard_deviation=float(s), estimated=True, freedom=float(f))
+        for name, s, f in zip(estimated, best.residuals.noise, best.freedom, strict=True)
+    ]
+    return (
+        *rows,
+        *(Noise(group=name, standard_deviation=None, estimated=False, freedom=None) for name in given),
+    )
+
+
+def _residuals(best: Optimum) -> tuple[FileResiduals, ...]:
+    """Normalised after what is no parameter has taken up its part."""
+    problem, residuals = best.residuals.problem, best.residuals
+    whole = best.at[: problem.measured.size] / np.sqrt(residuals.weights)
+    found, at = [], 0
+    for block in problem.blocks:
+        mine = slice(at, at + block.measured.size)
+        at += block.measured.size
+        weights = rows_of(block.observations, residuals.weights[mine])
+        found.append(
+            FileResiduals(
+                file=block.observations.file,
+                kind=block.observations.kind,
+                lines=block.observations.lines,
+                normalised=rows_of(block.observations, whole[mine]),
+                down_weighted=np.asarray(np.min(weights, axis=1) < _HALF),
+            )
+        )
+    return tuple(found)
+
+
+def _log_likelihood(best: Optimum) -> float:
+    problem = best.residuals.problem
+    logs = [np.sum(np.log(np.diag(b.whiten))) for b in problem.blocks]
+    noise = np.sum(np.log(best.residuals.noise[problem.group[problem.group >= 0]]))
+    return float(sum(logs) - noise - np.sum(best.at**2) / 2)

@@ -1,0 +1,227 @@
+"""What the data alone, without priors on the parameters, can tell, from their Fisher information.
+
+In the parameters' own scales t, ln x or ln(k + 1), F = J'J with J = d(residuals)/dt.
+
+- **Structurally not identified**: J has no column for the parameter, or its columns are linearly dependent.
+- **Practically not identified**: the interval that the data alone give, by F, is wider than the scene's
+  prior, or than a factor of two where there is none; or the profile is that wide in spite of F.
+- **Identified**: otherwise.
+
+Where a parameter is not identified, products of powers may be: the directions in which F is strong, measured
+by those widths.  They are reduced to as few parameters as possible, and their exponents to whole numbers
+where those serve as well.
+Source: Raue et al., Bioinformatics 25 (2009) 1923 (both kinds of non-identifiability); Rothenberg,
+Econometrica 39 (1971) 577 (rank of the information).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+import numpy as np
+
+from ringbalance.identification.intervals import Profile
+from ringbalance.identification.parameters import Parameter
+from ringbalance.identification.predict.vibration import STANDARD
+from ringbalance.scene.arrays import BoolArray, FloatArray
+
+DEPENDENT: Final = 3e-5
+"""Singular value of the normalised columns of J below which they count as dependent: above the error of
+differences, and below what thousands of measurements could make up for."""
+FACTOR: Final = math.log(2)
+"""Half-width of t up to which a parameter without a prior is identified."""
+_ALIKE: Final = 2.0
+"""Ratio of standard deviations up to which whole exponents serve as well as the best ones."""
+_ROUNDED: Final = 0.05
+"""Part of the largest exponent by which whole ones may differ: that of a velocity also falls as liquid
+starts to move, and as the fills change."""
+_UNSEEN: Final = 1e-9
+"""In place of a singular value or a norm of zero."""
+_WHOLE: Final = 3
+"""Largest whole exponent looked for."""
+
+
+class Verdict(StrEnum):
+    """Whether data identify a parameter."""
+
+    IDENTIFIED = "identified"
+    PRACTICALLY = "practically not identified"
+    STRUCTURALLY = "structurally not identified"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Combination:
+    """A product of powers of parameters that the data identify."""
+
+    names: tuple[str, ...]
+    exponents: tuple[float, ...]
+    text: str
+    """Such as "lambda^2/(k + 1)"."""
+    value: float
+    """With the parameters in SI, k + 1 for a loss coefficient."""
+    relative_uncertainty: float
+    """Expanded (95 %), by the data alone: of its logarithm."""
+
+
+def rank(slopes: FloatArray) -> int:
+    """Number of independent directions that the data see. Args: `slopes`: J, without priors."""
+    return int(np.count_nonzero(_normalised(slopes)[1] > DEPENDENT))
+
+
+def _normalised(slopes: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Norms of the columns, singular values of the columns of norm one, and right singular vectors."""
+    norms = np.linalg.norm(slopes, axis=0)
+    unit = slopes / np.where(norms > 0, norms, 1.0)
+    _, s, vt = np.linalg.svd(unit, full_matrices=True)
+    padded = np.zeros(slopes.shape[1])
+    padded[: s.size] = s[: slopes.shape[1]]
+    return norms, padded, vt
+
+
+def allowed_widths(parameters: Sequence[Parameter], t: FloatArray) -> FloatArray:
+    """Half-width (95 %) of each t above which data say less than is known beforehand, or than a factor of
+    two."""
+    return np.array(
+        [
+            STANDARD * p.prior / p.slope(x) if p.prior else FACTOR
+            for p, x in zip(parameters, t.tolist(), strict=True)
+        ]
+    )
+
+
+def verdicts(
+    parameters: Sequence[Parameter], t: FloatArray, slopes: FloatArray, profiles: Sequence[Profile]
+) -> tuple[Verdict, ...]:
+    """Verdict of each parameter. Args: `slopes`: d(residuals of the data)/dt, without priors."""
+    _, s, vt = _normalised(slopes)
+    null = vt[s <= DEPENDENT]
+    lost = np.any(np.abs(null) > 1e-2, axis=0) if null.size else np.zeros(t.size, dtype=np.bool_)
+    alone = np.linalg.norm(data_root(slopes), axis=1)
+    allowed = allowed_widths(parameters, t)
+    found = []
+    for i, (parameter, profile) in enumerate(zip(parameters, profiles, strict=True)):
+        reach = max(profile.high - float(t[i]), float(t[i]) - profile.low)
+        # Prior and data of equal weight leave the prior's width over the root of two.
+        wide = reach > allowed[i] / (math.sqrt(2) if parameter.prior else 1.0)
+        weak = wide or profile.factor * alone[i] > allowed[i]
+        found.append(Verdict.STRUCTURALLY if lost[i] else Verdict.PRACTICALLY if weak else Verdict.IDENTIFIED)
+    return tuple(found)
+
+
+def data_root(slopes: FloatArray, *, unseen: float = _UNSEEN) -> FloatArray:
+    """H of the covariance H H' of t by the data alone.
+
+    Args: `unseen`: singular value along what they do not see: small, or infinite to leave that out.
+    """
+    norms, s, vt = _normalised(slopes)
+    seen = np.where(s > DEPENDENT, s, unseen)
+    size = np.where(norms > 0, norms, unseen)
+    return np.asarray((vt.T / seen) / size[:, None])
+
+
+def combinations(
+    parameters: Sequence[Parameter],
+    t: FloatArray,
+    slopes: FloatArray,
+    found: Sequence[Verdict],
+    profiles: Sequence[Profile],
+) -> tuple[Combination, ...]:
+    """Products of powers that the data identify, where they do not identify each parameter.
+
+    Args: `slopes`: as of `verdicts`.
+    """
+    if all(verdict is Verdict.IDENTIFIED for verdict in found):
+        return ()
+    factor, allowed = max(p.factor for p in profiles), allowed_widths(parameters, t)
+    weak = np.array([verdict is not Verdict.IDENTIFIED for verdict in found])
+    flat = _flattened(slopes, t, allowed, [p for p, one in zip(profiles, weak, strict=True) if one])
+    _, s, vt = np.linalg.svd(flat * allowed, full_matrices=False)
+    # A row is the gradient of a product's logarithm; one that has a single parameter is a verdict.
+    root = data_root(flat)
+    # A profile is never wider than its prior, so that a direction counts from a root of two, as above.
+    strong = vt[s > math.sqrt(2) * factor]
+    rows = [_simple(row, root) for row in _echelon(strong / allowed)]
+    rows = [row for row in rows if np.count_nonzero(row) > 1 and np.any(row[weak] != 0)]
+    # What rounding of the exponents lets in of directions that are not seen at all is no width.
+    seen = data_root(slopes, unseen=math.inf)
+    widths = [factor * float(np.linalg.norm(row @ seen)) for row in rows]
+    return tuple(_combination(parameters, t, row, width) for row, width in zip(rows, widths, strict=True))
+
+
+def _flattened(
+    slopes: FloatArray, t: FloatArray, allowed: FloatArray, profiles: Sequence[Profile]
+) -> FloatArray:
+    """J with no more information along the way to the ends of wide profiles than these show."""
+    for profile in profiles:
+        for end in profile.ends:
+            way = (np.array(end) - t) / allowed
+            length = float(np.linalg.norm(way))
+            if length > 1 / math.sqrt(2):
+                along = way / length
+                scaled = slopes * allowed
+                without = scaled - np.outer(scaled @ along, along)
+                slopes = np.concatenate([without, (profile.factor / length) * along[None, :]]) / allowed
+    return slopes
+
+
+def _echelon(rows: FloatArray) -> FloatArray:
+    """The same space of directions with as many zeros as possible: reduced by Gauss and Jordan."""
+    rows = rows.copy()
+    pivots: list[int] = []
+    for i in range(rows.shape[0]):
+        free = np.abs(rows[i:]).copy()
+        free[:, pivots] = 0.0
+        row, column = np.unravel_index(int(np.argmax(free)), free.shape)
+        rows[[i, i + int(row)]] = rows[[i + int(row), i]]
+        rows[i] /= rows[i, column]
+        pivots.append(int(column))
+        for j in range(rows.shape[0]):
+            if j != i:
+                rows[j] -= rows[j, column] * rows[i]
+    return rows
+
+
+def _simple(row: FloatArray, root: FloatArray) -> FloatArray:
+    """Whole exponents where they are near or the data identify them as well, else two decimals."""
+    best, row = _width(row, root), row / np.max(np.abs(row))
+    row = row * np.sign(row[np.flatnonzero(np.abs(row) > _ROUNDED)[0]])
+    for largest in range(1, _WHOLE + 1):
+        whole = np.round(row * largest)
+        near = bool(np.max(np.abs(whole / largest - row)) < _ROUNDED)
+        if near or _width(whole, root) <= _ALIKE * best:
+            return np.asarray(whole / np.gcd.reduce(whole.astype(np.int64)))
+    return np.asarray(np.round(row, 2))
+
+
+def _width(row: FloatArray, root: FloatArray) -> float:
+    """Standard deviation along a direction, per unit of length."""
+    return float(np.linalg.norm(row @ root) / np.linalg.norm(row))
+
+
+def _combination(
+    parameters: Sequence[Parameter], t: FloatArray, row: FloatArray, width: float
+) -> Combination:
+    used: BoolArray = row != 0
+    return Combination(
+        names=tuple(p.name for p, one in zip(parameters, used, strict=True) if one),
+        exponents=tuple(float(x) for x in row[used]),
+        text=power_text([p.symbol for p, one in zip(parameters, used, strict=True) if one], row[used]),
+        value=math.exp(float(row @ t)),
+        relative_uncertainty=width,
+    )
+
+
+def power_text(symbols: Sequence[str], exponents: FloatArray) -> str:
+    """Product of powers, such as "lambda^2/(k + 1)"."""
+    above = [_power(s, e) for s, e in zip(symbols, exponents, strict=True) if e > 0]
+    below = [_power(s, -e) for s, e in zip(symbols, exponents, strict=True) if e < 0]
+    under = "" if not below else "/" + (below[0] if len(below) == 1 else f"({' '.join(below)})")
+    return (" ".join(above) or "1") + under
+
+
+def _power(symbol: str, exponent: float) -> str:
+    return symbol if exponent == 1 else f"{symbol}^{exponent:g}"

@@ -1,0 +1,145 @@
+"""Intervals (95 %) of fitted parameters by profile likelihood.
+
+A value x_i belongs to the interval while the sum of squares S, minimised over all other parameters with x_i
+held, is within q = t^2 of its least value; t is Student's for the degrees of freedom behind the noise, normal
+where the noise is given.  Several noises count as Welch and Satterthwaite have it,
+nu = (sum c_g)^2/sum(c_g^2/nu_g), c_g the part of group g in the parameter's variance.
+An end that the threshold does not reach within the scene's rules is the bound.
+Source: Bates and Watts, "Nonlinear Regression Analysis" (1988), section 6.1; Satterthwaite, Biometrics
+Bull. 2 (1946) 110.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.special import stdtrit
+
+from ringbalance.identification.optimisation import Optimum, constrained
+from ringbalance.scene.arrays import FloatArray
+
+_CLOSE: Final = 0.01
+"""Relative, of the root of S at an end of the interval."""
+_TRIALS: Final = 16
+_LONGEST: Final = 0.7
+"""In t, of a step beyond what is known."""
+_LARGEST_STEP: Final = 3.0
+"""Factor by which a trial may go beyond what the curvature at the optimum says."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Profile:
+    """Profile of one parameter."""
+
+    low: float
+    """t at the lower end."""
+    high: float
+    low_bound: bool
+    """Whether the lower end is a bound and not a threshold."""
+    high_bound: bool
+    factor: float
+    """Student's t."""
+    ends: tuple[tuple[float, ...], tuple[float, ...]]
+    """All parameters' t at both ends."""
+    points: tuple[tuple[float, float], ...]
+    """t and the rise of S above its least, ascending in t."""
+    evaluations: int
+
+
+def covariance(slopes: FloatArray) -> FloatArray:
+    """(A'A)^-1 of d(residuals)/dt, with infinite variance along directions that A does not see."""
+    _, s, vt = np.linalg.svd(slopes, full_matrices=False)
+    weak = s <= 1e-10 * np.max(s, initial=1e-300)
+    scaled = vt.T / np.where(weak, 1e-10 * np.max(s, initial=1e-300), s)
+    return np.asarray(scaled @ scaled.T)
+
+
+def student(optimum: Optimum) -> FloatArray:
+    """t(0.975) of each parameter."""
+    problem, slopes = optimum.residuals.problem, optimum.slopes
+    inverse = np.linalg.pinv(slopes, rcond=1e-10)
+    n = problem.measured.size
+    parts = inverse**2
+    total = np.sum(parts, axis=1)
+    by_group = [np.sum(parts[:, :n][:, problem.group == g], axis=1) for g in range(optimum.freedom.size)]
+    below = sum(
+        (c**2 / nu for c, nu in zip(by_group, optimum.freedom, strict=True)), start=np.zeros(total.size)
+    )
+    freedom = np.divide(total**2, below, out=np.full(total.size, np.inf), where=below > 1e-9 * total**2)
+    return np.asarray(stdtrit(np.minimum(np.maximum(freedom, 1.0), 1e9), 0.975), dtype=np.float64)
+
+
+def profile(optimum: Optimum, which: int, factor: float, spread: FloatArray) -> Profile:
+    """Interval of one parameter.
+
+    Args: `factor`: Student's t. `spread`: `covariance` at the optimum.
+    """
+    least = float(np.sum(optimum.at**2))
+    low, high = (_end(optimum, which, sign, factor, spread, least) for sign in (-1.0, 1.0))
+    points = sorted([*low.points, (float(optimum.t[which]), 0.0), *high.points])
+    return Profile(
+        low=low.place,
+        high=high.place,
+        low_bound=low.bound,
+        high_bound=high.bound,
+        factor=factor,
+        ends=(tuple(low.t.tolist()), tuple(high.t.tolist())),
+        points=tuple(points),
+        evaluations=low.evaluations + high.evaluations,
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _End:
+    place: float
+    bound: bool
+    t: FloatArray
+    points: list[tuple[float, float]]
+    evaluations: int
+
+
+def _end(optimum: Optimum, which: int, sign: float, factor: float, spread: FloatArray, least: float) -> _End:
+    """Where the root of S - S0, nearly linear in t, is `factor`: by the secant, in steps."""
+    bounds = optimum.residuals.problem.bounds
+    bound, here = float(bounds[0 if sign < 0 else 1][which]), float(optimum.t[which])
+    wide = math.sqrt(float(spread[which, which]))
+    along = spread[:, which] / max(float(spread[which, which]), 1e-300)
+    inside, outside = (0.0, 0.0), (math.inf, math.inf)
+    start, slopes, evaluations = optimum.t, optimum.slopes, 0
+    points: list[tuple[float, float]] = []
+    distance = min(factor * wide, _LONGEST)
+    for _ in range(_TRIALS):
+        place = here + sign * distance
+        if (place - bound) * sign >= 0:
+            place, distance = bound, abs(bound - here)
+        begin = np.clip(start + along * (place - start[which]), *bounds)
+        begin[which] = place
+        end, cost, slopes, used = constrained(optimum.residuals, begin, slopes, which)
+        evaluations += used
+        root = math.sqrt(max(cost - least, 0.0))
+        points.append((place, cost - least))
+        at_bound = root < factor and place == bound
+        if at_bound or abs(root - factor) <= _CLOSE * factor:
+            return _End(place=place, bound=at_bound, t=end, points=points, evaluations=evaluations)
+        if root < factor:
+            inside, start = (distance, root), end
+            if len(points) > 1:
+                along = (end - optimum.t) / (place - here)
+        else:
+            outside = (distance, root)
+        distance = _next(inside, outside, factor, wide)
+    place = here + sign * (inside[0] if math.isinf(outside[0]) else outside[0])
+    return _End(place=place, bound=False, t=end, points=points, evaluations=evaluations)
+
+
+def _next(inside: tuple[float, float], outside: tuple[float, float], factor: float, wide: float) -> float:
+    """Distance of the next trial from those within and beyond the end."""
+    reach, root = inside
+    if math.isinf(outside[0]):
+        slope = root / reach if reach > 0 else 1 / wide
+        return min(factor / max(slope, 1e-300), reach + _LONGEST, _LARGEST_STEP * max(reach, factor * wide))
+    part = (factor - root) / (outside[1] - root)
+    return reach + min(max(part, 0.05), 0.95) * (outside[0] - reach)

@@ -1,0 +1,63 @@
+"""Whether data can tell one law from another, after each has been fitted to them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+from scipy import stats
+
+from ringbalance.identification.linear_fit import LinearFit
+from ringbalance.scene.arrays import FloatArray
+
+POWER: Final = 0.9
+"""Chance to see the difference that is asked for before laws count as told apart."""
+_LEVEL: Final = 0.05
+Verdict = Literal["told apart", "cannot be told apart"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LawComparison:
+    """The fitted law against another one."""
+
+    other: str
+    separation: float
+    """Square of what separates their predictions beyond all parameters, in variances of the data."""
+    preference: float
+    """Sum of squares of the other law's residuals, its parameters fitted too, less that of the fitted law."""
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether the data could show the difference."""
+        return "told apart" if self.separation >= needed_separation() else "cannot be told apart"
+
+    @property
+    def text(self) -> str:
+        """What the data say."""
+        if self.verdict == "cannot be told apart":
+            return f"these data cannot tell the fitted law from {self.other}"
+        threshold = float(stats.chi2.isf(_LEVEL, 1))
+        if abs(self.preference) < threshold:
+            return f"the data lie between the fitted law and {self.other}"
+        better, worse = ("the fitted law", self.other)[:: 1 if self.preference > 0 else -1]
+        return f"the data prefer {better} to {worse}"
+
+
+def needed_separation() -> float:
+    """Separation at which a difference is seen with `POWER` at the 5 % level, by a normal statistic."""
+    return float((stats.norm.isf(_LEVEL / 2) + stats.norm.ppf(POWER)) ** 2)
+
+
+def compare_laws(fit: LinearFit, *, other: str, residuals: FloatArray) -> LawComparison:
+    """Compare by linear re-fits from the solution.
+
+    Args: `other`: the other law in words. `residuals`: with its predictions at the fitted parameters, over
+        sigma, shape (n,).
+    """
+    own, others = fit.beyond_parameters(fit.residuals), fit.beyond_parameters(residuals)
+    return LawComparison(
+        other=other,
+        separation=float(np.sum((others - own) ** 2)),
+        preference=float(others @ others - own @ own),
+    )

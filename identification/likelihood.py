@@ -1,0 +1,255 @@
+"""Residuals of a fit in units of their standard deviation, and what makes them: data, priors, held inputs.
+
+With y the measured numbers, f(t) their prediction, L L' the covariance that the data state (up to a factor
+s^2 for each group whose noise is estimated), the model is
+
+    y = f(t) + B b + J n + s L e,   e, n independent standard normal,
+
+b unknowns that are no parameters (the vibration without trial weight), n the uncertain inputs of the scene
+that are held, each in units of its standard deviation with effect J.  b and n are linear and eliminated by
+projection, so minus two log likelihood is, but for constants,
+
+    |(1 - Q Q') [L^-1 (y - f(t))/s; 0]|^2 + sum ((x - x0)/sigma_x)^2 + 2 sum ln s,
+
+Q an orthonormal base of [[L^-1 B/s, L^-1 J/s], [0, 1]]; each prior counts once.
+Source: variable projection, Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973) 413.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+
+from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.parameters import Parameter
+from ringbalance.identification.predict.kinds import PREDICTED, PredictedKind
+from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
+
+STEP: Final = 1e-3
+"""In t, of central differences; their error is STEP^2/6 times a third derivative of order one."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Block:
+    """One file of measurements, its errors made independent."""
+
+    observations: Observations
+    kind: PredictedKind
+    measured: FloatArray
+    """y, shape (n,)."""
+    whiten: FloatArray
+    """L^-1, shape (n, n)."""
+    free: FloatArray
+    """B, shape (n, m)."""
+
+    @property
+    def group(self) -> str:
+        """Kind and column whose noise is one number."""
+        return f"{self.observations.kind} {self.kind.column(self.observations)}"
+
+    @property
+    def estimated(self) -> bool:
+        """Whether its noise is estimated from the residuals."""
+        return not self.kind.noise_given(self.observations)
+
+
+def block_of(observations: Observations) -> Block:
+    """A data set with its whitening."""
+    kind = PREDICTED[observations.kind]
+    lower = np.linalg.cholesky(kind.covariance(observations))
+    return Block(
+        observations=observations,
+        kind=kind,
+        measured=kind.measured(observations),
+        whiten=np.linalg.inv(lower),
+        free=kind.free(observations),
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Problem:
+    """What is fitted to what."""
+
+    scene: Any
+    models: Any
+    """What predictions of this scene take, fixed during the fit."""
+    parameters: tuple[Parameter, ...]
+    blocks: tuple[Block, ...]
+
+    def scene_at(self, t: FloatArray) -> Any:
+        """The scene with the parameters' values."""
+        scene = self.scene
+        for parameter, inner in zip(self.parameters, t.tolist(), strict=True):
+            scene = parameter.change(scene, parameter.value(inner))
+        return scene
+
+    def predicted(self, scene: Any) -> FloatArray:
+        """L^-1 f of all blocks."""
+        return np.concatenate(
+            [b.whiten @ b.kind.predict(scene, b.observations, self.models) for b in self.blocks]
+        )
+
+    def at(self, t: FloatArray) -> FloatArray:
+        """L^-1 f at t."""
+        return self.predicted(self.scene_at(t))
+
+    def slopes(self, t: FloatArray, *, step: float = STEP) -> FloatArray:
+        """d(L^-1 f)/dt by central differences, one-sided where a bound is nearer, shape (n, parameters)."""
+        low, high = self.bounds
+        columns = []
+        for i in range(t.size):
+            ends = np.clip([t[i] - step, t[i] + step], low[i], high[i])
+            sides = [self.at(np.where(np.arange(t.size) == i, end, t)) for end in ends]
+            columns.append((sides[1] - sides[0]) / (ends[1] - ends[0]))
+        return np.stack(columns, axis=1)
+
+    @cached_property
+    def measured(self) -> FloatArray:
+        """L^-1 y."""
+        return np.concatenate([b.whiten @ b.measured for b in self.blocks])
+
+    @cached_property
+    def free(self) -> FloatArray:
+        """L^-1 B."""
+        parts = [b.whiten @ b.free for b in self.blocks]
+        full, row, column = np.zeros((self.measured.size, sum(p.shape[1] for p in parts))), 0, 0
+        for part in parts:
+            full[row : row + part.shape[0], column : column + part.shape[1]] = part
+            row, column = row + part.shape[0], column + part.shape[1]
+        return full
+
+    @cached_property
+    def group(self) -> IntArray:
+        """Index into `estimated_groups` of every number; -1 where its noise is given."""
+        names = self.estimated_groups
+        return np.concatenate(
+            [np.full(b.measured.size, names.index(b.group) if b.estimated else -1) for b in self.blocks]
+        ).astype(np.int64)
+
+    @cached_property
+    def estimated_groups(self) -> tuple[str, ...]:
+        """Groups whose noise is estimated."""
+        return tuple(dict.fromkeys(b.group for b in self.blocks if b.estimated))
+
+    @cached_property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Of t."""
+        low, high = (
+            np.array([p.inner(end) for p, end in zip(self.parameters, ends, strict=True)])
+            for ends in zip(*((p.lowest, p.highest) for p in self.parameters), strict=True)
+        )
+        return low, high
+
+    @property
+    def start(self) -> FloatArray:
+        """t of the scene, within the bounds."""
+        low, high = self.bounds
+        inner = np.array([p.inner(p.start) for p in self.parameters])
+        return np.asarray(np.clip(inner, low, high), dtype=np.float64)
+
+    def priors(self, t: FloatArray) -> FloatArray:
+        """(x - x0)/sigma_x of the parameters that have a prior."""
+        return np.array(
+            [
+                (p.value(x) - p.start) / p.prior
+                for p, x in zip(self.parameters, t.tolist(), strict=True)
+                if p.prior
+            ]
+        )
+
+    def prior_slopes(self, t: FloatArray) -> FloatArray:
+        """d(priors)/dt, shape (priors, parameters)."""
+        rows = np.diag(
+            [
+                p.slope(x) / p.prior if p.prior else 0.0
+                for p, x in zip(self.parameters, t.tolist(), strict=True)
+            ]
+        )
+        return np.asarray(rows[self.with_prior])
+
+    @cached_property
+    def with_prior(self) -> BoolArray:
+        """Which parameters have a prior."""
+        return np.array([bool(p.prior) for p in self.parameters])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Residuals:
+    """Residuals of a problem under one noise, held inputs and weights."""
+
+    problem: Problem
+    noise: FloatArray
+    """s of each estimated group."""
+    held: FloatArray
+    """L^-1 J, shape (n, held inputs)."""
+    weights: FloatArray
+    """Of a robust loss, on squares, shape (n,); ones without."""
+
+    @cached_property
+    def scale(self) -> FloatArray:
+        """sqrt(weight)/s of every number."""
+        group = self.problem.group
+        s = np.ones(group.size) if self.noise.size == 0 else np.where(group < 0, 1.0, self.noise[group])
+        return np.asarray(np.sqrt(self.weights) / s)
+
+    @cached_property
+    def linear(self) -> FloatArray:
+        """[[L^-1 B/s, L^-1 J/s], [0, 1]]."""
+        free, held = self.problem.free, self.held
+        top = self.scale[:, None] * np.concatenate([free, held], axis=1)
+        count = held.shape[1]
+        below = np.concatenate([np.zeros((count, free.shape[1])), np.eye(count)], axis=1)
+        return np.concatenate([top, below])
+
+    @cached_property
+    def base(self) -> FloatArray:
+        """Q; directions that the data do not hold are left out."""
+        u, s, _ = np.linalg.svd(self.linear, full_matrices=False)
+        return np.asarray(u[:, s > 1e-10 * np.max(s, initial=1e-300)])
+
+    def projected(self, columns: FloatArray) -> FloatArray:
+        """Of numbers of the data, without what b and n can take up, shape (n + held, ...)."""
+        scaled = self.scale[:, None] * columns if columns.ndim == 2 else self.scale * columns
+        below = np.zeros((self.held.shape[1], *columns.shape[1:]))
+        full = np.concatenate([scaled, below])
+        return np.asarray(full - self.base @ (self.base.T @ full))
+
+    def at(self, t: FloatArray, *, predicted: FloatArray | None = None) -> FloatArray:
+        """Residuals and priors."""
+        found = self.problem.at(t) if predicted is None else predicted
+        return np.concatenate([self.projected(self.problem.measured - found), self.problem.priors(t)])
+
+    def slopes(self, t: FloatArray, *, of_prediction: FloatArray | None = None) -> FloatArray:
+        """d(residuals)/dt."""
+        slopes = self.problem.slopes(t) if of_prediction is None else of_prediction
+        return np.concatenate([-self.projected(slopes), self.problem.prior_slopes(t)])
+
+    def leverage(self, slopes: FloatArray) -> FloatArray:
+        """Of every number of the data: how much of it parameters, b and n take up.
+
+        Args: `slopes`: d(residuals)/dt.
+        """
+        n = self.problem.measured.size
+        u, s, _ = np.linalg.svd(slopes, full_matrices=False)
+        taken = u[:, s > 1e-10 * np.max(s, initial=1e-300)]
+        return np.asarray(np.sum(taken[:n] ** 2, axis=1) + np.sum(self.base[:n] ** 2, axis=1))
+
+    def with_noise(self, noise: FloatArray) -> Residuals:
+        """The same under another noise."""
+        return replace(self, noise=noise)
+
+
+def held_effects(problem: Problem, t: FloatArray, changes: Sequence[tuple[Any, Any]]) -> FloatArray:
+    """L^-1 J: change of the prediction per standard deviation of each held input, shape (n, inputs).
+
+    Args: `changes`: the problem's scene with each input one standard deviation lower, and higher.
+    """
+    columns = [np.zeros((problem.measured.size, 0))]
+    for low, high in changes:
+        sides = [replace(problem, scene=scene).at(t) for scene in (low, high)]
+        columns.append((sides[1] - sides[0])[:, None] / 2)
+    return np.concatenate(columns, axis=1)

@@ -1,0 +1,193 @@
+"""What can be fitted: quantities of a scene, each on a scale on which its effect is nearly linear.
+
+Positive quantities are fitted by their logarithm, ln x.  A loss coefficient acts through k + 1, so it is
+fitted by ln g (x + c): c = 1 for a prescribed k; for an extra loss such that it is ln(k + 1) to first order.
+Angles, positions and the pressure of the cavity are linear.  The prior of a parameter is the scene's
+[uncertainty]: a normal distribution of the quantity itself, of standard deviation U/1.96, which enters each
+fit once.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from ringbalance.identification.predict.device import device_of, models_of
+from ringbalance.identification.predict.vibration import STANDARD
+from ringbalance.reduced_model.chamber.inputs import half_widths
+from ringbalance.scene.models import Scene
+from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, nominal_value, with_value
+
+
+class FitError(ValueError):
+    """A fit that cannot be made; the text says why, and what to change."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameter:
+    """One quantity that is fitted, t = ln(x + offset) or t = x/scale."""
+
+    name: str
+    symbol: str
+    """In a combination, such as "(k + 1)"."""
+    start: float
+    """Of the scene, SI."""
+    lowest: float
+    """SI."""
+    highest: float
+    prior: float | None
+    """Standard deviation that the scene states, SI; None: nothing is known beforehand."""
+    offset: float = 0.0
+    """c of ln(x + c), SI."""
+    gain: float = 1.0
+    """g of ln g (x + c)."""
+    scale: float | None = None
+    """Of a linear parameter, SI; None: logarithmic."""
+    change: Callable[[Any, float], Any]
+    """The scene with another value."""
+
+    def inner(self, value: float) -> float:
+        """t of a value, SI."""
+        return math.log(self.gain * (value + self.offset)) if self.scale is None else value / self.scale
+
+    def value(self, inner: float) -> float:
+        """Value, SI, of t."""
+        return math.exp(inner) / self.gain - self.offset if self.scale is None else inner * self.scale
+
+    def slope(self, inner: float) -> float:
+        """dx/dt."""
+        return math.exp(inner) / self.gain if self.scale is None else self.scale
+
+
+_NATURAL: Final[Mapping[str, float]] = {"lambda_factor": 1.0}
+"""Start of quantities that a scene need not give."""
+_SYMBOLS: Final = {
+    "lambda_factor": "lambda",
+    "drag_coefficient": "(k + 1)",
+    "extra_loss": "(k + 1)",
+    "influence_coefficient": "kappa",
+}
+_REACH: Final = {"bore": 3.0, "outer_radius": 1.1, "inner_radius": 1.1, "central_angle": 1.1, "speed": 1.1}
+"""Factor up to which a logarithmic parameter is looked for."""
+_WIDE: Final = 30.0
+_LOSS_STEP: Final = 0.01
+
+
+def scene_parameter(scene: Scene, name: str) -> Parameter:
+    """A quantity of a liquid-ring scene as a parameter.
+
+    Raises: FitError: no such quantity, or one that the scene gives no value to start from.
+    """
+    if name not in UNCERTAIN_QUANTITIES:
+        raise FitError(f'"{name}" cannot be fitted; allowed: {", ".join(sorted(UNCERTAIN_QUANTITIES))}')
+    value = nominal_value(scene=scene, quantity=name)
+    start = _NATURAL.get(name) if value is None else value
+    if start is None:
+        raise FitError(
+            f"the scene has no {UNCERTAIN_QUANTITIES[name]}.{name}: give a value to start from to fit it"
+        )
+    width = half_widths(scene).get(name)
+    (offset, gain), scale = _loss_scale(scene, name), _scale(scene, name)
+    if offset == 0 and scale is None and start <= 0:
+        raise FitError(f"{UNCERTAIN_QUANTITIES[name]}.{name} is zero: give a value above zero to fit it")
+    low, high = _range(scene, name, start, offset)
+    return Parameter(
+        name=name,
+        symbol=_SYMBOLS.get(name, name),
+        start=start,
+        lowest=low,
+        highest=high,
+        prior=None if width is None else width / STANDARD,
+        offset=offset,
+        gain=gain,
+        scale=scale,
+        change=lambda to, value: with_value(scene=to, quantity=name, value=value),
+    )
+
+
+def _loss_scale(scene: Scene, name: str) -> tuple[float, float]:
+    """Offset and gain of a loss coefficient, so that t is ln(k + 1) at equal fills under the scene's gas.
+
+    k + 1 = 2 H/u^2 by definition, whatever the regime: d ln(k + 1) = -2 d ln u.
+    """
+    if name == "drag_coefficient":
+        return 1.0, 1.0
+    if name != "extra_loss":
+        return 0.0, 1.0
+    here = scene.tube.extra_loss
+    speeds = [
+        _velocity(with_value(scene=scene, quantity=name, value=here + step)) for step in (0.0, _LOSS_STEP)
+    ]
+    if speeds[1] <= 0 or speeds[0] <= speeds[1]:
+        return 1.0, 1.0
+    apart = _LOSS_STEP / (-2 * math.log(speeds[1] / speeds[0]))
+    law_loss = _driving_head(scene) * 2 / speeds[0] ** 2
+    return apart - here, law_loss / apart
+
+
+def _velocity(scene: Scene) -> float:
+    """Of a primed tube at equal fills, m/s."""
+    fill = scene.disc.initial_fill
+    law = device_of(scene, models_of(scene)).law
+    flow = law.evaluate(
+        fill_ratio=fill, opposite_fill_ratio=fill, gas_pressure=scene.gas.pressure, primed=True
+    )
+    return float(flow.velocity)
+
+
+def _driving_head(scene: Scene) -> float:
+    """H at equal fills, m^2/s^2."""
+    fill = scene.disc.initial_fill
+    ends = device_of(scene, models_of(scene)).law.ends(
+        fill_ratio=fill, opposite_fill_ratio=fill, gas_pressure=scene.gas.pressure
+    )
+    return float(ends.driving_pressure()) / scene.liquid.density
+
+
+def _scale(scene: Scene, name: str) -> float | None:
+    """Of a linear parameter."""
+    return {
+        "lag_angle": 1.0,
+        "hump_position": 1.0,
+        "vapour_pressure": scene.gas.ambient_pressure,
+        "ambient_pressure": scene.gas.ambient_pressure,
+    }.get(name)
+
+
+def _range(scene: Scene, name: str, start: float, offset: float) -> tuple[float, float]:
+    """Smallest and largest value that the scene's rules allow, or within reach of the start."""
+    tube, disc = scene.tube, scene.disc
+    ambient = scene.gas.ambient_pressure
+    fixed = {
+        "lag_angle": (start - math.pi, start + math.pi),
+        "hump_position": (0.02, 0.98),
+        "vapour_pressure": (0.0, ambient),
+        "ambient_pressure": (0.5 * ambient, 2 * ambient),
+        "extra_loss": (0.0, _WIDE * (offset + start)),
+        "drag_coefficient": (1e-3, _WIDE * (offset + start)),
+        "hump_radius": (0.5 * start, tube.port_radius),
+        "port_radius": (tube.hump_radius or 0.5 * start, disc.outer_radius),
+        "length": (max(0.2 * start, sum(b.angle * b.radius for b in tube.bends)), 5 * start),
+        "critical_ratio": (0.02, 0.98),
+        "roughness": (start / _WIDE, min(_WIDE * start, 0.04 * tube.bore)),
+        "plate_thickness": (start / 3, 2 * start),
+    }
+    if name in fixed:
+        return fixed[name]
+    reach = _REACH.get(name, _WIDE)
+    return start / reach, start * reach
+
+
+def scene_parameters(scene: Scene, names: Sequence[str]) -> tuple[Parameter, ...]:
+    """Parameters by name. Raises: FitError: as `scene_parameter`, or a name twice, or none at all."""
+    if not names or len(set(names)) < len(names):
+        raise FitError("name at least one parameter, and each once")
+    return tuple(scene_parameter(scene, name) for name in names)
+
+
+def held_inputs(scene: Scene, fitted: Sequence[str]) -> dict[str, float]:
+    """Standard deviation, SI, of every uncertain quantity of the scene that is not fitted."""
+    widths = half_widths(scene)
+    return {name: width / STANDARD for name, width in widths.items() if name not in fitted}

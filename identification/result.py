@@ -1,0 +1,98 @@
+"""What a fit finds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ringbalance.identification.identifiability import Combination, Verdict
+from ringbalance.identification.intervals import Profile
+from ringbalance.identification.optimisation import Optimum
+from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
+from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
+
+
+@dataclass(frozen=True, kw_only=True)
+class FittedParameter:
+    """One parameter before and after; SI, intervals of 95 %."""
+
+    name: str
+    value: float
+    interval: tuple[float, float]
+    at_bound: tuple[bool, bool]
+    """Whether an end of the interval is a rule of the scene and not the data."""
+    before: float
+    """Of the scene."""
+    before_interval: tuple[float, float] | None
+    """By the scene's [uncertainty]; None where nothing is known beforehand."""
+    verdict: Verdict
+    text: str
+    """The verdict with its reason, in one sentence."""
+    profile: Profile
+
+    @property
+    def path(self) -> str:
+        """Place in the scene, such as "tube.bore"."""
+        table = UNCERTAIN_QUANTITIES.get(self.name)
+        return self.name if table is None else f"{table}.{self.name}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Noise:
+    """Noise of one column of one kind of data."""
+
+    group: str
+    """Kind and column."""
+    standard_deviation: float | None
+    """SI; None where the data give it row by row."""
+    estimated: bool
+    freedom: float | None
+    """Degrees of freedom behind an estimate."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FileResiduals:
+    """Residuals of one file over their standard deviation, one row a row of the file."""
+
+    file: str
+    kind: str
+    lines: IntArray
+    """Shape (n,)."""
+    normalised: FloatArray
+    """Measured less fitted; shape (n, 1), or (n, 2) of a vibration: real and imaginary part."""
+    down_weighted: BoolArray
+    """Rows that a robust loss counts less than half, shape (n,)."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FitResult:
+    """A fit of a scene's parameters to files of measurements."""
+
+    parameters: tuple[FittedParameter, ...]
+    correlations: FloatArray
+    """Of the parameters in their own scales, in that order."""
+    combinations: tuple[Combination, ...]
+    """Products of powers of parameters that are not identified by themselves."""
+    noise: tuple[Noise, ...]
+    residuals: tuple[FileResiduals, ...]
+    held: Mapping[str, float]
+    """Uncertain inputs of the scene that were not fitted, with their standard deviations, SI; their effect is
+    in all intervals."""
+    loss: str
+    starts: int
+    evaluations: int
+    """Predictions of all data."""
+    log_likelihood: float
+    """Of the data at the optimum, priors and held inputs with it, but for constants."""
+    scene: Any
+    """With the fitted values."""
+    optimum: Optimum
+    """For criticism and for the choice of the next measurement."""
+
+    def parameter(self, name: str) -> FittedParameter:
+        """One parameter by name. Raises: KeyError: it was not fitted."""
+        for each in self.parameters:
+            if each.name == name:
+                return each
+        raise KeyError(name)

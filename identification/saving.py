@@ -1,0 +1,276 @@
+"""A fitted scene as a file: the scene with what was measured in the place of what was supposed.
+
+Each value has its own interval in the file; how the errors of two values go together is not kept. Commands
+take them as independent, which is too wide for a combination that the data identify better than its parts,
+such as lambda^2/(k + 1), and too narrow for one of parts that err together; a finding names the combinations.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from itertools import combinations, groupby
+from operator import attrgetter
+from pathlib import Path, PurePath
+from typing import Any, Final
+
+from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.identifiability import Combination, Verdict
+from ringbalance.identification.result import FitResult, FittedParameter
+from ringbalance.scene import deferred
+from ringbalance.scene.describe import usual_unit
+from ringbalance.scene.dimensions import DIMENSIONS
+from ringbalance.scene.keys.fields import Reader
+from ringbalance.scene.keys.schema import LIQUID_RING, ORIGIN, Schema
+from ringbalance.scene.loader import scene_from
+from ringbalance.scene.measured import MeasuredFile, MeasuredFinding
+from ringbalance.scene.origins import Origin
+from ringbalance.scene.platform.files import write_whole
+from ringbalance.scene.toml_writing import toml_bytes
+from ringbalance.scene.units import format_quantity, unit_of
+
+_DIGITS: Final = 9
+"""Of a saved number: far more than any fit has, so that saving changes nothing."""
+_ENTRY: Final = re.compile(r"(\w+)\.(\w+)(?:\[(\d)\])?")
+_NO_UNIT: Final = "1"
+_TOGETHER: Final = 0.5
+"""Correlation from which two errors are said to go together."""
+_LONGEST: Final = 200
+"""Characters of a finding, as of any text of a scene file."""
+_ANY_SIGN: Final = ("lag_angle", "phase")
+"""Keys whose uncertainty may be larger than the value."""
+_CUT: Final = "the interval of {} is wider than its value, which a scene cannot state: it has the value"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fitted:
+    """One value of a scene before and after a fit, SI; ends of 95 % intervals, None where there is none."""
+
+    path: str
+    """Such as "tube.bore", or "masses.friction_arm[0]" for an entry of a list."""
+    before: float
+    before_interval: tuple[float | None, float | None] = (None, None)
+    value: float
+    interval: tuple[float | None, float | None]
+    verdict: str
+    identified: bool
+    """By the data alone; else the value follows from what was known before and a combination."""
+
+    @property
+    def half_width(self) -> float | None:
+        """The larger distance from the value to an end of its interval."""
+        low, high = self.interval
+        return None if low is None or high is None else max(high - self.value, self.value - low)
+
+    @property
+    def origin(self) -> Origin:
+        """Of the value in the saved scene."""
+        return "measured" if self.identified else "inferred"
+
+
+def save_result(
+    path: Path, *, text: str, result: FitResult, data: Sequence[Observations], said: Sequence[str] = ()
+) -> Path:
+    """Write the scene that a fit found, see `save_fitted`.
+
+    Args: `said`: what the criticism of the fit says.
+    """
+    files = [
+        MeasuredFile(file=PurePath(each.file).name, kind=each.kind, rows=len(each), sha256=each.sha256)
+        for each in data
+    ]
+    findings = [
+        *(MeasuredFinding(about="residuals", text=_short(each)) for each in said),
+        *(MeasuredFinding(about="combination", text=_combination(each)) for each in result.combinations),
+        *(MeasuredFinding(about="correlation", text=each) for each in _correlations(result)),
+    ]
+    fitted = [_fitted(each) for each in result.parameters]
+    return save_fitted(path, text=text, fitted=fitted, files=files, findings=findings)
+
+
+def _fitted(parameter: FittedParameter) -> Fitted:
+    return Fitted(
+        path=parameter.path,
+        before=parameter.before,
+        before_interval=parameter.before_interval or (None, None),
+        value=parameter.value,
+        interval=parameter.interval,
+        verdict=str(parameter.verdict),
+        identified=parameter.verdict is Verdict.IDENTIFIED,
+    )
+
+
+def _combination(found: Combination) -> str:
+    return f"{found.text} is identified, within {100 * found.relative_uncertainty:.2g} %"
+
+
+def _correlations(result: FitResult) -> Iterator[str]:
+    names = [each.name for each in result.parameters]
+    for i, j in combinations(range(len(names)), 2):
+        value = float(result.correlations[i, j])
+        if abs(value) > _TOGETHER:
+            yield (
+                f"the errors of {names[i]} and {names[j]} go together (correlation {value:.2f}); a scene "
+                "states each by itself"
+            )
+
+
+def _short(text: str) -> str:
+    """Text that a scene file takes."""
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 4]} ..."
+
+
+def save_fitted(
+    path: Path,
+    *,
+    text: str,
+    fitted: Sequence[Fitted],
+    files: Sequence[MeasuredFile],
+    findings: Sequence[MeasuredFinding] = (),
+) -> Path:
+    """Write a scene with fitted values, their uncertainties and origins; whole or not at all.
+
+    Every key of the scene stays, its comments do not.
+    Args: `text`: of the scene file that was fitted.
+    Raises: SceneError: the fitted values make no scene, such as a crest outside the port. OSError: the file
+        cannot be written.
+    """
+    content = fitted_scene(text, fitted=fitted, files=files, findings=findings)
+    scene_from(content=content, file=str(path))
+    return write_whole(path, content.decode())
+
+
+def fitted_scene(
+    text: str,
+    *,
+    fitted: Sequence[Fitted],
+    files: Sequence[MeasuredFile],
+    findings: Sequence[MeasuredFinding] = (),
+) -> bytes:
+    """The bytes of that scene, not yet tried."""
+    document: dict[str, Any] = tomllib.loads(text)
+    placed = [_Placed(fitted=each, place=_place(each.path, document)) for each in fitted]
+    for each in placed:
+        _put_value(document, each)
+    cut = tuple(_put_widths(document, placed))
+    document["measured"] = {
+        "files": [asdict(each) for each in files],
+        "quantities": [_record(each) for each in placed],
+        "findings": [asdict(each) for each in (*findings, *cut)],
+    }
+    return toml_bytes(document)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Place:
+    """Where a value stands in a scene file, and how it is written there."""
+
+    table: str
+    key: str
+    entry: int | None
+    """Of a list; None for a single value."""
+    by_table: bool
+    """Whether [uncertainty] has a table for each table."""
+    dimension: str | None
+    unit: str
+    """Empty for a number without unit."""
+
+    def written(self, value: float) -> str | float:
+        """A value as it stands in the file."""
+        number = self.number(value)
+        return number if self.dimension is None else f"{number!r} {self.unit}"
+
+    def number(self, value: float) -> float:
+        """A value, SI, in the unit."""
+        if self.dimension is None:
+            return float(f"{value:.{_DIGITS}g}")
+        return float(format_quantity(value, self.dimension, self.unit, digits=_DIGITS).split(" ")[0])
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Placed:
+    fitted: Fitted
+    place: _Place
+
+
+def _place(path: str, document: Mapping[str, Any]) -> _Place:
+    eccentric = document.get("balancer") == "eccentric_mass"
+    schema: Schema = deferred.ECCENTRIC_MASS if eccentric else LIQUID_RING
+    match = _ENTRY.fullmatch(path)
+    if match is None or match[1] not in schema.tables or match[2] not in schema.tables[match[1]].keys:
+        raise ValueError(f"a scene file has no value {path!r}")
+    table, key, entry = match.groups()
+    takes = schema.key_at((table, key)).takes
+    dimension = takes.dimension if isinstance(takes, Reader) else None
+    here = document.get(table, {}).get(key)
+    return _Place(
+        table=table,
+        key=key,
+        entry=None if entry is None else int(entry),
+        by_table=eccentric,
+        dimension=dimension,
+        unit=_unit(here, path, dimension),
+    )
+
+
+def _unit(here: object, path: str, dimension: str | None) -> str:
+    """The unit that the file has there, else the one in which such a value is described, else the SI unit."""
+    if dimension is None:
+        return ""
+    one = here[0] if isinstance(here, list) and here else here
+    return (
+        (unit_of(one) if isinstance(one, str) else "")
+        or usual_unit(path)
+        or next(iter(DIMENSIONS[dimension].units))
+    )
+
+
+def _put_value(document: dict[str, Any], placed: _Placed) -> None:
+    place, value = placed.place, placed.place.written(placed.fitted.value)
+    content = document.setdefault(place.table, {})
+    if place.entry is not None:
+        both = list(content.get(place.key) or [place.written(0.0)] * 2)
+        both[place.entry] = value
+        content[place.key] = both
+    else:
+        content[place.key] = value
+    content.setdefault(ORIGIN, {})[place.key] = placed.fitted.origin
+
+
+def _put_widths(document: dict[str, Any], placed: Iterable[_Placed]) -> Iterator[MeasuredFinding]:
+    """Write the uncertainties; entries of a list share the largest. Yields: What a scene cannot state."""
+    keyfunc = attrgetter("place.table", "place.key")
+    for _, group in groupby(sorted(placed, key=keyfunc), key=keyfunc):
+        each = list(group)
+        widths = [one.fitted.half_width for one in each]
+        width, place = max((w for w in widths if w is not None), default=None), each[0].place
+        if width is None:
+            continue
+        largest = min(abs(one.fitted.value) for one in each)
+        cut = width > largest and place.key not in _ANY_SIGN
+        inside = document.setdefault("uncertainty", {})
+        inside = inside.setdefault(place.table, {}) if place.by_table else inside
+        inside[place.key] = place.written(largest if cut else width)
+        if cut:
+            yield MeasuredFinding(about="uncertainty", text=_CUT.format(each[0].fitted.path))
+
+
+def _record(placed: _Placed) -> dict[str, Any]:
+    """One quantity of [measured]; ends that there are not are left out."""
+    fitted, place = placed.fitted, placed.place
+    numbers = {
+        "before": fitted.before,
+        "before_low": fitted.before_interval[0],
+        "before_high": fitted.before_interval[1],
+        "value": fitted.value,
+        "low": fitted.interval[0],
+        "high": fitted.interval[1],
+    }
+    return {
+        "quantity": fitted.path,
+        "unit": place.unit or _NO_UNIT,
+        **{name: place.number(number) for name, number in numbers.items() if number is not None},
+        "verdict": fitted.verdict,
+    }

@@ -1,0 +1,182 @@
+"""Criticism of fits: silent where the model is right, and it names the pattern where it is not."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ringbalance.identification.criticism import LEVEL, Criticism, criticise, runs_probability
+from ringbalance.identification.law_comparison import compare_laws, needed_separation
+from ringbalance.identification.linear_fit import LinearFit
+from ringbalance.scene.arrays import FloatArray
+
+ROWS = 60
+PRESSURES = np.tile([0.4, 0.6, 0.8, 1.0, 1.2, 1.4], ROWS // 6)
+FILLS = np.repeat(np.linspace(0.1, 0.4, 10), 6)
+ORDER = np.random.default_rng(1).permutation(ROWS).astype(np.float64)
+COVARIATES = {
+    "order": np.append(ORDER, np.nan),
+    "pressure": np.append(PRESSURES, np.nan),
+    "fill ratio": np.append(FILLS, np.nan),
+}
+
+
+def linear_fit(measured: FloatArray, design: FloatArray, *, known: bool) -> LinearFit:
+    """Least squares with a weak prior on the first parameter as the last row."""
+    prior = np.zeros(design.shape[1])
+    prior[0] = 0.1
+    rows, wanted = np.vstack([design, prior]), np.append(measured, 0.0)
+    residuals = wanted - rows @ np.linalg.lstsq(rows, wanted, rcond=None)[0]
+    if not known:
+        residuals[:-1] /= np.sqrt(np.sum(residuals[:-1] ** 2) / (measured.size - design.shape[1]))
+    data = np.append(np.ones(measured.size, dtype=np.bool_), False)
+    return LinearFit(
+        residuals=residuals,
+        derivatives=rows,
+        block=np.where(data, "transfer mass", "prior"),
+        data=data,
+        known_noise=data if known else np.zeros_like(data),
+    )
+
+
+def judged(measured: FloatArray, design: FloatArray, *, known: bool = True) -> Criticism:
+    return criticise(linear_fit(measured, design, known=known), COVARIATES)
+
+
+DESIGN = np.column_stack([np.sqrt(PRESSURES), FILLS])
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_false_alarms_come_at_the_nominal_rate(known: bool) -> None:
+    """5 % nominal; 600 fits have a standard deviation of 0.9 %, and the runs are discrete: 2.5 to 7.5 %."""
+    draw = np.random.default_rng(7)
+    alarms = sum(
+        not judged(DESIGN @ [3.0, 2.0] + draw.standard_normal(ROWS), DESIGN, known=known).describes
+        for _ in range(600)
+    )
+    assert 0.025 < alarms / 600 < 0.075
+
+
+def _shapes() -> dict[str, tuple[FloatArray, str]]:
+    """What the model lacks, and what the residuals must be said to go with."""
+    return {
+        "a laminar law fitted to turbulent flow": (6 * PRESSURES, "pressure"),
+        "a moment that is not in proportion": (40 * (FILLS - 0.25) ** 2 * 4, "fill ratio"),
+        "a sensor that drifts": (2 * ORDER / ROWS, "order"),
+    }
+
+
+@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize("what", list(_shapes()))
+def test_a_wrong_law_is_rejected_with_its_pattern(what: str, known: bool) -> None:
+    lacking, against = _shapes()[what]
+    draw = np.random.default_rng(3)
+    found = judged(DESIGN @ [3.0, 2.0] + 2 * lacking + draw.standard_normal(ROWS), DESIGN, known=known)
+    assert not found.describes
+    assert next(f for f in found.findings if f.test == "pattern").against == against
+    assert f"with {against}" in found.text
+    assert found.text.startswith("the fit does not describe the data: ")
+
+
+def test_a_stated_noise_that_is_too_small_is_rejected() -> None:
+    draw = np.random.default_rng(11)
+    found = judged(DESIGN @ [3.0, 2.0] + 2 * draw.standard_normal(ROWS), DESIGN)
+    assert found.findings[0].test == "size"
+    assert "2 times as large as the stated noise" in found.findings[0].text or not found.describes
+    free = judged(DESIGN @ [3.0, 2.0] + 2 * draw.standard_normal(ROWS), DESIGN, known=False)
+    assert all(f.test != "size" for f in free.findings)
+
+
+@given(change=st.tuples(*[st.floats(-50, 50)] * 2))
+def test_what_parameters_can_describe_is_no_pattern(change: tuple[float, float]) -> None:
+    fit = linear_fit(np.random.default_rng(5).standard_normal(ROWS), DESIGN, known=True)
+    moved = replace(fit, residuals=fit.residuals + fit.derivatives @ change)
+    plain, other = (criticise(each, {"pressure": COVARIATES["pressure"]}) for each in (fit, moved))
+    same = {(f.block, f.text.split(",")[0]): f.p_value for f in plain.findings if f.test == "pattern"}
+    for found in (f for f in other.findings if f.test == "pattern"):
+        assert found.p_value == pytest.approx(same[found.block, found.text.split(",")[0]], rel=1e-6)
+
+
+def test_a_pattern_that_is_a_parameter_is_not_tested() -> None:
+    design = np.column_stack([np.ones(ROWS), PRESSURES])
+    found = judged(np.random.default_rng(2).standard_normal(ROWS), design)
+    kinds = {(f.against, "rise" in f.text or "fall" in f.text) for f in found.findings if f.test == "pattern"}
+    assert ("pressure", True) not in kinds
+    assert ("pressure", False) in kinds
+
+
+def test_few_rows_are_not_judged() -> None:
+    few = LinearFit(
+        residuals=np.array([1.0, -1.0, 1.0]),
+        derivatives=np.ones((3, 1)),
+        block=np.array(["flow flow_rate"] * 3),
+        data=np.ones(3, dtype=np.bool_),
+        known_noise=np.ones(3, dtype=np.bool_),
+    )
+    found = criticise(few, {"order": np.arange(3.0)})
+    assert found.describes
+    assert found.text.startswith("too few")
+
+
+@pytest.mark.parametrize(("plus", "minus"), [(2, 2), (3, 5), (4, 4), (6, 3)])
+def test_runs_are_counted_right(plus: int, minus: int) -> None:
+    """Against all orders of the signs."""
+    orders = set(itertools.permutations([True] * plus + [False] * minus)) if plus + minus < 9 else None
+    if orders is None:
+        places = itertools.combinations(range(plus + minus), plus)
+        orders = {tuple(i in place for i in range(plus + minus)) for place in places}
+    counts = [1 + sum(a != b for a, b in itertools.pairwise(order)) for order in orders]
+    for runs in range(2, plus + minus + 1):
+        expected = sum(count <= runs for count in counts) / len(counts)
+        assert runs_probability(plus, minus, runs) == pytest.approx(expected, rel=1e-12)
+
+
+def test_overlapping_patterns_count_once() -> None:
+    """The same covariate under two names leaves the corrected p-value where it was, within its draws."""
+    measured = DESIGN @ [3.0, 2.0] + np.random.default_rng(9).standard_normal(ROWS)
+    fit = linear_fit(measured, DESIGN, known=True)
+    once = {"pressure": COVARIATES["pressure"]}
+    twice = once | {"gas": COVARIATES["pressure"]}
+    first, second = (
+        next(f for f in criticise(fit, these).findings if f.against == "pressure") for these in (once, twice)
+    )
+    assert second.p_value == first.p_value
+    assert second.corrected == pytest.approx(first.corrected, abs=0.03)
+
+
+def _comparison(true: FloatArray, noise: float) -> Any:
+    """A square-root law against a linear one, each with its factor fitted."""
+    pressure = np.linspace(0.4, 1.4, 24)
+    measured = true + noise * np.random.default_rng(4).standard_normal(24)
+    own, other = np.sqrt(pressure), pressure
+    factor = float(own @ measured / (own @ own))
+    fit = LinearFit(
+        residuals=(measured - factor * own) / noise,
+        derivatives=own[:, None] / noise,
+        block=np.array(["flow flow_rate"] * 24),
+        data=np.ones(24, dtype=np.bool_),
+        known_noise=np.ones(24, dtype=np.bool_),
+    )
+    return compare_laws(fit, other="laminar flow", residuals=(measured - factor * other) / noise)
+
+
+def test_laws_are_told_apart_where_data_allow() -> None:
+    pressure = np.linspace(0.4, 1.4, 24)
+    clear = _comparison(np.sqrt(pressure), 0.01)
+    assert clear.verdict == "told apart"
+    assert "prefer the fitted law to laminar" in clear.text
+    assert "prefer laminar flow to the fitted" in _comparison(pressure, 0.01).text
+    assert "cannot tell" in _comparison(np.sqrt(pressure), 3.0).text
+
+
+def test_the_separation_is_the_power_of_a_test() -> None:
+    """At the needed separation nine of ten draws reject the other law at the 5 % level, two-sided."""
+    draws = np.random.default_rng(0).standard_normal(200_000) + np.sqrt(needed_separation())
+    assert np.mean(np.abs(draws) > 1.959964) == pytest.approx(0.9, abs=0.003)
+    assert LEVEL == 0.05

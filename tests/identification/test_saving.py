@@ -1,0 +1,128 @@
+"""A fitted scene on disk: every key kept, values, intervals and origins in place, or no file at all."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ringbalance.identification.saving import Fitted, fitted_scene, save_fitted
+from ringbalance.scene import SceneError, bundled_scene, load_scene
+from ringbalance.scene.describe import scene_table
+from ringbalance.scene.loader import scene_from
+from ringbalance.scene.measured import MeasuredFile, MeasuredFinding
+from ringbalance.scene.narrowing import eccentric_scene, liquid_ring_scene
+
+FILE = MeasuredFile(file="run.csv", kind="injection", rows=40, sha256="ab" * 32)
+SCENES = ("liquid_ring_paper", "perfluorinated_oil", "six_chamber", "eccentric_mass_paper", "washing_machine")
+
+
+def fitted(path: str, value: float, width: float, **more: Any) -> Fitted:
+    told: dict[str, Any] = {
+        "path": path,
+        "before": 1.1 * value,
+        "before_interval": (value, 1.2 * value),
+        "value": value,
+        "interval": (value - width, value + width),
+        "verdict": "identified",
+        "identified": True,
+    }
+    return Fitted(**told | more)
+
+
+def text_of(name: str) -> str:
+    return bundled_scene(name).read_text(encoding="utf-8")
+
+
+BORE = fitted("tube.bore", 1.4e-3, 0.02e-3)
+FACTOR = fitted("disc.lambda_factor", 0.97, 0.01, before=1.0, before_interval=(None, None))
+
+
+def test_values_uncertainties_and_origins(tmp_path: Path) -> None:
+    target = tmp_path / "fitted.toml"
+    lag = fitted("rotor.lag_angle", -0.01, 0.05)
+    loss = fitted("tube.extra_loss", 2.0, 0.5, verdict="practically not identified", identified=False)
+    save_fitted(
+        target, text=text_of("liquid_ring_paper"), fitted=[BORE, FACTOR, lag, loss], files=[FILE],
+        findings=[MeasuredFinding(about="combination", text="lambda^2/(k + 1)")],
+    )  # fmt: skip
+    scene = liquid_ring_scene(load_scene(target))
+    assert scene.tube.bore == pytest.approx(1.4e-3, rel=1e-9)
+    assert scene.disc.moment_factor == pytest.approx(0.97, rel=1e-9)
+    assert scene.rotor.lag_angle == pytest.approx(-0.01, rel=1e-8)
+    widths = {each.quantity: (each.half_width, each.relative) for each in scene.uncertainty}
+    assert widths["bore"] == (pytest.approx(0.02e-3, rel=1e-8), False)
+    assert widths["lag_angle"] == (pytest.approx(0.05, rel=1e-8), False)
+    assert widths["lambda_factor"] == (pytest.approx(0.01), False)
+    assert scene.origin_of("tube.bore") == "measured"
+    assert scene.origin_of("tube.extra_loss") == "inferred"
+    assert scene.origin_of("tube.length") == "assumed"
+    rows = {row.path: row for row in scene_table(scene)}
+    assert rows["disc.lambda_factor"].value == "0.97"
+    assert rows["disc.lambda_factor"].origin == "measured"
+    (bore, factor, *_), (finding,) = scene.measured.quantities, scene.measured.findings
+    assert (bore.unit, bore.before, bore.before_high, bore.value, bore.low) == ("mm", 1.54, 1.68, 1.4, 1.38)
+    assert (factor.unit, factor.before, factor.before_low) == ("1", 1.0, None)
+    assert (scene.measured.files, finding.text) == ((FILE,), "lambda^2/(k + 1)")
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_every_key_stays(name: str) -> None:
+    """Without fitted values the saved scene is the same one but for what it says of its measurements."""
+    text = text_of(name)
+    content = fitted_scene(text, fitted=[], files=[FILE])
+    document = tomllib.loads(content.decode())
+    assert document.pop("measured")["files"] == [
+        {"file": "run.csv", "kind": "injection", "rows": 40, "sha256": "ab" * 32}
+    ]
+    assert document == tomllib.loads(text)
+    saved = scene_from(content=content, file="a.toml")
+    assert saved.values_sha256 == scene_from(content=text.encode(), file="a.toml").values_sha256
+
+
+def test_entries_of_a_list_share_the_larger_uncertainty() -> None:
+    arms = [fitted("masses.friction_arm[1]", 0.012, 0.002), fitted("masses.friction_arm[0]", 0.01, 0.001)]
+    content = fitted_scene(text_of("eccentric_mass_paper"), fitted=arms, files=[FILE])
+    scene = eccentric_scene(scene_from(content=content, file="a.toml"))
+    assert scene.masses.friction_arm == pytest.approx((0.01, 0.012), rel=1e-9)
+    widths = {each.quantity: each.half_width for each in scene.uncertainty}
+    assert widths["masses.friction_arm"] == pytest.approx(0.002, rel=1e-8)
+    assert scene.origin_of("masses.friction_arm") == "measured"
+
+
+def test_an_interval_that_a_scene_cannot_state_is_said() -> None:
+    wide = fitted("tube.extra_loss", 0.2, 0.1, interval=(0.01, 0.9))
+    scene = scene_from(
+        content=fitted_scene(text_of("six_chamber"), fitted=[wide], files=[FILE]), file="a.toml"
+    )
+    assert {each.quantity: each.half_width for each in scene.uncertainty}["extra_loss"] == pytest.approx(0.2)
+    assert "tube.extra_loss" in scene.measured.findings[0].text
+
+
+def test_values_that_make_no_scene_leave_no_file(tmp_path: Path) -> None:
+    target = tmp_path / "fitted.toml"
+    outside = fitted("tube.hump_radius", 0.09, 0.001)
+    with pytest.raises(SceneError, match="hump_radius"):
+        save_fitted(target, text=text_of("liquid_ring_paper"), fitted=[outside], files=[FILE])
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("path", ["tube.colour", "nothing.bore", "bore", "masses.mass"])
+def test_a_path_that_no_scene_has_is_refused(path: str) -> None:
+    with pytest.raises(ValueError, match="no value"):
+        fitted_scene(text_of("six_chamber"), fitted=[fitted(path, 1.0, 0.1)], files=[FILE])
+
+
+@given(value=st.floats(1.01e-3, 2e-3), share=st.floats(1e-6, 0.9))
+def test_saving_loses_nothing_that_matters(value: float, share: float) -> None:
+    content = fitted_scene(
+        text_of("liquid_ring_paper"), fitted=[fitted("tube.bore", value, share * value)], files=[FILE]
+    )
+    scene = liquid_ring_scene(scene_from(content=content, file="a.toml"))
+    assert scene.tube.bore == pytest.approx(value, rel=1e-8)
+    width = {each.quantity: each.half_width for each in scene.uncertainty}["bore"]
+    assert width == pytest.approx(share * value, rel=1e-7)

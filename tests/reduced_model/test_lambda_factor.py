@@ -1,0 +1,77 @@
+"""A measured factor on lambda reaches all that depends on moments, and nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ringbalance.reduced_model.calibration import Calibration, calibrate
+from ringbalance.reduced_model.chamber.inputs import half_widths
+from ringbalance.reduced_model.selection.estimates import injection_time
+from ringbalance.scene.models import InputUncertainty, Scene
+from ringbalance.scene.narrowing import liquid_ring_scene
+
+FACTOR = 0.93
+WIDTH = 0.02
+
+
+@pytest.fixture(scope="module")
+def by_geometry(paper_scene: Scene) -> Calibration:
+    return calibrate(paper_scene)
+
+
+@pytest.fixture(scope="module")
+def measured(paper_scene: Scene) -> Calibration:
+    factor = InputUncertainty(quantity="lambda_factor", half_width=WIDTH, relative=False)
+    disc = replace(paper_scene.disc, lambda_factor=FACTOR)
+    return calibrate(replace(paper_scene, disc=disc, uncertainty=(*paper_scene.uncertainty, factor)))
+
+
+def test_lambda_and_moments_are_multiplied(by_geometry: Calibration, measured: Calibration) -> None:
+    lam, plain = measured.chamber.moment_per_mass, by_geometry.chamber.moment_per_mass
+    assert float(lam.value) == pytest.approx(FACTOR * float(plain.value), rel=1e-14)
+    assert float(lam.uncertainty) == pytest.approx(FACTOR * float(plain.uncertainty), rel=1e-9)
+    np.testing.assert_allclose(measured.chamber.moment.value, FACTOR * by_geometry.chamber.moment.value)
+    fills = np.linspace(0.0, measured.scene.disc.max_fill_ratio, 7)
+    np.testing.assert_allclose(
+        measured.lambda_over_fill(fill_ratio=fills),
+        FACTOR * by_geometry.lambda_over_fill(fill_ratio=fills),
+        rtol=1e-9,
+    )
+    assert measured.residual.usable_pair_moment == pytest.approx(
+        FACTOR * by_geometry.residual.usable_pair_moment
+    )
+
+
+def test_flow_and_geometry_stay(by_geometry: Calibration, measured: Calibration) -> None:
+    """Finite elements check the geometry, so they agree with it whatever was measured."""
+    assert measured.operating_point.velocity == by_geometry.operating_point.velocity
+    np.testing.assert_array_equal(
+        measured.chamber.wall_pressure.value, by_geometry.chamber.wall_pressure.value
+    )
+    assert measured.chamber.check.status.ok
+    assert measured.chamber.check.excess == by_geometry.chamber.check.excess
+
+
+def test_its_uncertainty_is_in_the_budget(by_geometry: Calibration, measured: Calibration) -> None:
+    lam = float(by_geometry.chamber.moment_per_mass.value)
+    share = measured.budgets["lambda"].inputs["disc.lambda_factor"]
+    assert share == pytest.approx(WIDTH * lam, rel=1e-6)
+    geometry = FACTOR * by_geometry.chamber.moment_per_mass_inputs
+    assert measured.chamber.moment_per_mass_inputs == pytest.approx(np.hypot(geometry, WIDTH * lam), rel=1e-6)
+    assert "disc.lambda_factor" not in measured.budgets["velocity"].inputs
+
+
+def test_the_injection_that_decides_is_longer_by_it(paper_scene: Scene) -> None:
+    law_based = replace(paper_scene.controller, kind="law_based")
+    plain = replace(paper_scene, controller=law_based)
+    smaller = replace(plain, disc=replace(plain.disc, lambda_factor=0.5))
+    assert injection_time(smaller) == pytest.approx(2 * injection_time(plain))
+
+
+def test_without_the_key_there_is_no_such_input(paper_scene: Scene) -> None:
+    assert paper_scene.disc.lambda_factor is None
+    assert paper_scene.disc.moment_factor == 1.0
+    assert "lambda_factor" not in half_widths(liquid_ring_scene(paper_scene))

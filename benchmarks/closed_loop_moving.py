@@ -39,7 +39,7 @@ GAIN = 0.3
 """Of the paper's, which suits the paper's own law; the calibrated law moves more liquid."""
 TIME_LIMIT = 20.0
 """s, of a run: some 40 samples."""
-JUDGED = 6
+JUDGED = 20
 """Injections of a run by which the rival's method is chosen."""
 RIVAL_RUNS = 2
 END_ERROR = 1e-9

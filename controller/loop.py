@@ -13,7 +13,6 @@ from ringbalance.controller.algorithms.algorithm import Command, Controller, Mea
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.checks import check_fit, check_settings
 from ringbalance.controller.formulas.stopping import Cause, has_held, stop_cause
-from ringbalance.controller.gas_use import gas_use
 from ringbalance.controller.judgement import misadjustments, noise_floor, overshoots, rose
 from ringbalance.controller.liquid_ring.closed_form import closed_form, has_closed_form
 from ringbalance.controller.liquid_ring.plant import Advance, DiscState, LiquidRing, initial_state, longest
@@ -26,8 +25,6 @@ from ringbalance.controller.simulation import Injection, Outcome, Sample, Simula
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor
 from ringbalance.reduced_model.chamber.gravity import check_ring
-from ringbalance.reduced_model.chamber.range import chamber_status
-from ringbalance.reduced_model.gas_line import line_answers
 from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw, balancer_model
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.reduced_model.selection.registry import ModelUsed
@@ -322,8 +319,9 @@ def _record(run: _Run, cause: Cause, *, integrator: str, used: tuple[ModelUsed, 
     outcome = outcome_of(facts)
     settled = outcome is Outcome.SETTLED
     return Simulation(
+        scene=run.scene,
+        model=run.plant.model,
         balancer="liquid_ring",
-        law=run.plant.model.name,
         integrator=integrator,
         outcome=outcome,
         verdict=VERDICTS[outcome],
@@ -342,16 +340,9 @@ def _record(run: _Run, cause: Cause, *, integrator: str, used: tuple[ModelUsed, 
         shortened=run.shortened,
         misadjustments=misadjustments(run.samples, floor=run.floor),
         noise_floor=run.floor,
-        limit=run.scene.controller.limit,
         energy=math.fsum(injection.operation.energy for injection in facts.injections),
-        gas=gas_use(
-            scene=run.scene, model=run.plant.model, operations=[i.operation for i in facts.injections]
-        ),
-        gas_line=line_answers(run.scene, run.plant.model),
         terms_modelled=terms_modelled(used),
         models_used=used,
-        tolerance=run.scene.tolerance,
-        model_status=chamber_status(run.scene),
     )
 
 

@@ -5,15 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cached_property
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
-from ringbalance.controller.gas_use import GasUse
+from ringbalance.controller.gas_use import GasUse, gas_use
 from ringbalance.controller.liquid_ring.plant import Operation
 from ringbalance.controller.tuning.loop_factor import LoopFactor
 from ringbalance.physics.results import Status
-from ringbalance.reduced_model.gas_line import LineAnswer
+from ringbalance.reduced_model.chamber.range import chamber_status
+from ringbalance.reduced_model.gas_line import LineAnswer, line_answers
+from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.selection.registry import ModelUsed
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Scene
 
 
 class Outcome(StrEnum):
@@ -73,10 +77,10 @@ class Injection:
 class Simulation:
     """One closed-loop run."""
 
+    scene: Scene
+    model: BalancerModel
     balancer: str
     """ "liquid_ring"."""
-    law: str
-    """Name of the model, such as "paper" or "calibrated"."""
     integrator: str
     """How operations were carried through time."""
     outcome: Outcome
@@ -109,18 +113,41 @@ class Simulation:
     """Operations after which the measured amplitude was higher by more than the noise floor."""
     noise_floor: float
     """m."""
-    limit: float
-    """m."""
     energy: float
     """Work of the driving gas against the surroundings over all injections, J."""
-    gas: GasUse
-    gas_line: tuple[LineAnswer, ...]
-    """What the gas line can deliver, or both ends of a default range of lines."""
     models_used: tuple[ModelUsed, ...]
     """Every physical term, with its model and its estimated contribution."""
-    tolerance: float
-    """At which the models were selected."""
-    model_status: Status
-    """Whether the models of the chamber hold over the range of fills."""
     terms_modelled: tuple[str, ...]
     """Names of the terms that are modelled beyond the flow law; empty: it alone carries the operations."""
+
+    # Most runs are one of many, of which nobody asks what follows.
+    @property
+    def law(self) -> str:
+        """Name of the model, such as "paper" or "calibrated"."""
+        return self.model.name
+
+    @property
+    def limit(self) -> float:
+        """m."""
+        return self.scene.controller.limit
+
+    @property
+    def tolerance(self) -> float:
+        """At which the models were selected."""
+        return self.scene.tolerance
+
+    @cached_property
+    def gas(self) -> GasUse:
+        """Gas consumption of all injections."""
+        done = [injection.operation for injection in self.injections]
+        return gas_use(scene=self.scene, model=self.model, operations=done)
+
+    @cached_property
+    def gas_line(self) -> tuple[LineAnswer, ...]:
+        """What the gas line can deliver, or both ends of a default range of lines."""
+        return line_answers(self.scene, self.model)
+
+    @cached_property
+    def model_status(self) -> Status:
+        """Whether the models of the chamber hold over the range of fills."""
+        return chamber_status(self.scene)

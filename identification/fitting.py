@@ -90,7 +90,6 @@ def _effects(problem: Problem, t: FloatArray, held: dict[str, float]) -> FloatAr
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Findings:
-    factors: FloatArray
     profiles: tuple[Profile, ...]
     verdicts: tuple[Verdict, ...]
     combinations: tuple[Combination, ...]
@@ -101,12 +100,12 @@ def _findings(best: Optimum) -> _Findings:
     spread, factors = covariance(best.slopes), student(best)
     parameters = best.residuals.problem.parameters
     data = best.slopes[: best.slopes.shape[0] - int(np.count_nonzero(best.residuals.problem.with_prior))]
-    found = verdicts(parameters, best.t, data, factors)
+    profiles = tuple(profile(best, i, float(f), spread) for i, f in enumerate(factors))
+    found = verdicts(parameters, best.t, data, profiles)
     return _Findings(
-        factors=factors,
-        profiles=tuple(profile(best, i, float(f), spread) for i, f in enumerate(factors)),
+        profiles=profiles,
         verdicts=found,
-        combinations=combinations(parameters, best.t, data, found, factors),
+        combinations=combinations(parameters, best.t, data, found, profiles),
         spread=spread,
     )
 

@@ -3,13 +3,13 @@
 In the parameters' own scales t, ln x or ln(k + 1), F = J'J with J = d(residuals)/dt.
 
 - **Structurally not identified**: J has no column for the parameter, or its columns are linearly dependent.
-- **Practically not identified**: the interval that the data alone give is wider than the scene's prior, or
-  than a factor of two where there is none.
+- **Practically not identified**: the interval that the data alone give, by F, is wider than the scene's
+  prior, or than a factor of two where there is none; or the profile is that wide in spite of F.
 - **Identified**: otherwise.
 
-Of parameters that are not identified, products of powers may be: the directions in which F, with all else
-free, is strong.  They are reduced to as few parameters as possible, and their exponents to small whole
-numbers where those serve as well.
+Where a parameter is not identified, products of powers may be: the directions in which F is strong, measured
+by those widths.  They are reduced to as few parameters as possible, and their exponents to whole numbers
+where those serve as well.
 Source: Raue et al., Bioinformatics 25 (2009) 1923 (both kinds of non-identifiability); Rothenberg,
 Econometrica 39 (1971) 577 (rank of the information).
 """
@@ -24,7 +24,9 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.identification.intervals import Profile
 from ringbalance.identification.parameters import Parameter
+from ringbalance.identification.predict.vibration import STANDARD
 from ringbalance.scene.arrays import BoolArray, FloatArray
 
 DEPENDENT: Final = 3e-5
@@ -34,6 +36,11 @@ FACTOR: Final = math.log(2)
 """Half-width of t up to which a parameter without a prior is identified."""
 _ALIKE: Final = 2.0
 """Ratio of standard deviations up to which whole exponents serve as well as the best ones."""
+_ROUNDED: Final = 0.05
+"""Part of the largest exponent by which whole ones may differ: that of a velocity also falls as liquid
+starts to move, and as the fills change."""
+_UNSEEN: Final = 1e-9
+"""In place of a singular value or a norm of zero."""
 _WHOLE: Final = 3
 """Largest whole exponent looked for."""
 
@@ -75,36 +82,45 @@ def _normalised(slopes: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]
     return norms, padded, vt
 
 
-def verdicts(
-    parameters: Sequence[Parameter], t: FloatArray, slopes: FloatArray, factors: FloatArray
-) -> tuple[Verdict, ...]:
-    """Verdict of each parameter.
+def allowed_widths(parameters: Sequence[Parameter], t: FloatArray) -> FloatArray:
+    """Half-width (95 %) of each t above which data say less than is known beforehand, or than a factor of
+    two."""
+    return np.array(
+        [
+            STANDARD * p.prior / p.slope(x) if p.prior else FACTOR
+            for p, x in zip(parameters, t.tolist(), strict=True)
+        ]
+    )
 
-    Args: `slopes`: d(residuals of the data)/dt without priors. `factors`: Student's t of each.
-    """
+
+def verdicts(
+    parameters: Sequence[Parameter], t: FloatArray, slopes: FloatArray, profiles: Sequence[Profile]
+) -> tuple[Verdict, ...]:
+    """Verdict of each parameter. Args: `slopes`: d(residuals of the data)/dt, without priors."""
     _, s, vt = _normalised(slopes)
     null = vt[s <= DEPENDENT]
-    in_null = np.any(np.abs(null) > 1e-2, axis=0) if null.size else np.zeros(t.size, dtype=np.bool_)
-    spread = data_spread(slopes)
+    lost = np.any(np.abs(null) > 1e-2, axis=0) if null.size else np.zeros(t.size, dtype=np.bool_)
+    alone = np.linalg.norm(data_root(slopes), axis=1)
+    allowed = allowed_widths(parameters, t)
     found = []
-    for i, parameter in enumerate(parameters):
-        if in_null[i]:
-            found.append(Verdict.STRUCTURALLY)
-        else:
-            alone = factors[i] * math.sqrt(spread[i, i])
-            prior = parameter.prior and 1.96 * parameter.prior / parameter.slope(float(t[i]))
-            weak = alone > (prior or FACTOR)
-            found.append(Verdict.PRACTICALLY if weak else Verdict.IDENTIFIED)
+    for i, (parameter, profile) in enumerate(zip(parameters, profiles, strict=True)):
+        reach = max(profile.high - float(t[i]), float(t[i]) - profile.low)
+        # Prior and data of equal weight leave the prior's width over the root of two.
+        wide = reach > allowed[i] / (math.sqrt(2) if parameter.prior else 1.0)
+        weak = wide or profile.factor * alone[i] > allowed[i]
+        found.append(Verdict.STRUCTURALLY if lost[i] else Verdict.PRACTICALLY if weak else Verdict.IDENTIFIED)
     return tuple(found)
 
 
-def data_spread(slopes: FloatArray) -> FloatArray:
-    """Covariance of t by the data alone; huge along what they do not see."""
+def data_root(slopes: FloatArray, *, unseen: float = _UNSEEN) -> FloatArray:
+    """H of the covariance H H' of t by the data alone.
+
+    Args: `unseen`: singular value along what they do not see: small, or infinite to leave that out.
+    """
     norms, s, vt = _normalised(slopes)
-    floor = np.where(s > DEPENDENT, s, 1e-9)
-    size = np.where(norms > 0, norms, 1e-9)
-    half = (vt.T / floor) / size[:, None]
-    return np.asarray(half @ half.T)
+    seen = np.where(s > DEPENDENT, s, unseen)
+    size = np.where(norms > 0, norms, unseen)
+    return np.asarray((vt.T / seen) / size[:, None])
 
 
 def combinations(
@@ -112,30 +128,44 @@ def combinations(
     t: FloatArray,
     slopes: FloatArray,
     found: Sequence[Verdict],
-    factors: FloatArray,
+    profiles: Sequence[Profile],
 ) -> tuple[Combination, ...]:
-    """Products of powers of the parameters that are not identified, as far as the data identify them."""
-    weak = np.array([v is not Verdict.IDENTIFIED for v in found])
-    if not np.any(weak):
+    """Products of powers that the data identify, where they do not identify each parameter.
+
+    Args: `slopes`: as of `verdicts`.
+    """
+    if all(verdict is Verdict.IDENTIFIED for verdict in found):
         return ()
-    factor = float(np.max(factors))
-    reduced = _without(slopes[:, ~weak], slopes[:, weak])
-    _, s, vt = np.linalg.svd(reduced, full_matrices=False)
-    strong = vt[factor < FACTOR * s]
-    # One that is dependent on nothing else would stand alone, and be identified.
-    rows = [row for row in _echelon(strong) if np.count_nonzero(row) > 1]
-    names = [p for p, is_weak in zip(parameters, weak, strict=True) if is_weak]
-    inner = t[weak]
-    spread = data_spread(reduced)
-    return tuple(_combination(names, inner, _simple(row, spread), spread, factor) for row in rows)
+    factor, allowed = max(p.factor for p in profiles), allowed_widths(parameters, t)
+    weak = np.array([verdict is not Verdict.IDENTIFIED for verdict in found])
+    flat = _flattened(slopes, t, allowed, [p for p, one in zip(profiles, weak, strict=True) if one])
+    _, s, vt = np.linalg.svd(flat * allowed, full_matrices=False)
+    # A row is the gradient of a product's logarithm; one that has a single parameter is a verdict.
+    root = data_root(flat)
+    # A profile is never wider than its prior, so that a direction counts from a root of two, as above.
+    strong = vt[s > math.sqrt(2) * factor]
+    rows = [_simple(row, root) for row in _echelon(strong / allowed)]
+    rows = [row for row in rows if np.count_nonzero(row) > 1 and np.any(row[weak] != 0)]
+    # What rounding of the exponents lets in of directions that are not seen at all is no width.
+    seen = data_root(slopes, unseen=math.inf)
+    widths = [factor * float(np.linalg.norm(row @ seen)) for row in rows]
+    return tuple(_combination(parameters, t, row, width) for row, width in zip(rows, widths, strict=True))
 
 
-def _without(others: FloatArray, columns: FloatArray) -> FloatArray:
-    """Columns without what others can take up."""
-    if others.shape[1] == 0:
-        return columns
-    q, _ = np.linalg.qr(others)
-    return np.asarray(columns - q @ (q.T @ columns))
+def _flattened(
+    slopes: FloatArray, t: FloatArray, allowed: FloatArray, profiles: Sequence[Profile]
+) -> FloatArray:
+    """J with no more information along the way to the ends of wide profiles than these show."""
+    for profile in profiles:
+        for end in profile.ends:
+            way = (np.array(end) - t) / allowed
+            length = float(np.linalg.norm(way))
+            if length > 1 / math.sqrt(2):
+                along = way / length
+                scaled = slopes * allowed
+                without = scaled - np.outer(scaled @ along, along)
+                slopes = np.concatenate([without, (profile.factor / length) * along[None, :]]) / allowed
+    return slopes
 
 
 def _echelon(rows: FloatArray) -> FloatArray:
@@ -152,28 +182,28 @@ def _echelon(rows: FloatArray) -> FloatArray:
         for j in range(rows.shape[0]):
             if j != i:
                 rows[j] -= rows[j, column] * rows[i]
-    rows[np.abs(rows) < 0.02] = 0.0
     return rows
 
 
-def _simple(row: FloatArray, spread: FloatArray) -> FloatArray:
-    """Whole exponents where the data identify them nearly as well, else two decimals; the first positive."""
-    best = _width(row, spread)
-    row = row / row[np.flatnonzero(row)[0]]
+def _simple(row: FloatArray, root: FloatArray) -> FloatArray:
+    """Whole exponents where they are near or the data identify them as well, else two decimals."""
+    best, row = _width(row, root), row / np.max(np.abs(row))
+    row = row * np.sign(row[np.flatnonzero(np.abs(row) > _ROUNDED)[0]])
     for largest in range(1, _WHOLE + 1):
-        whole = np.round(row / np.max(np.abs(row)) * largest)
-        if np.array_equal(whole != 0, row != 0) and _width(whole, spread) <= _ALIKE * best:
+        whole = np.round(row * largest)
+        near = bool(np.max(np.abs(whole / largest - row)) < _ROUNDED)
+        if near or _width(whole, root) <= _ALIKE * best:
             return np.asarray(whole / np.gcd.reduce(whole.astype(np.int64)))
     return np.asarray(np.round(row, 2))
 
 
-def _width(row: FloatArray, spread: FloatArray) -> float:
+def _width(row: FloatArray, root: FloatArray) -> float:
     """Standard deviation along a direction, per unit of length."""
-    return math.sqrt(float(row @ spread @ row) / float(row @ row))
+    return float(np.linalg.norm(row @ root) / np.linalg.norm(row))
 
 
 def _combination(
-    parameters: Sequence[Parameter], t: FloatArray, row: FloatArray, spread: FloatArray, factor: float
+    parameters: Sequence[Parameter], t: FloatArray, row: FloatArray, width: float
 ) -> Combination:
     used: BoolArray = row != 0
     return Combination(
@@ -181,7 +211,7 @@ def _combination(
         exponents=tuple(float(x) for x in row[used]),
         text=power_text([p.symbol for p, one in zip(parameters, used, strict=True) if one], row[used]),
         value=math.exp(float(row @ t)),
-        relative_uncertainty=factor * math.sqrt(float(row @ spread @ row)),
+        relative_uncertainty=width,
     )
 
 

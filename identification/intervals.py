@@ -23,7 +23,9 @@ from ringbalance.scene.arrays import FloatArray
 
 _CLOSE: Final = 0.01
 """Relative, of the root of S at an end of the interval."""
-_TRIALS: Final = 12
+_TRIALS: Final = 16
+_LONGEST: Final = 0.7
+"""In t, of a step beyond what is known."""
 _LARGEST_STEP: Final = 3.0
 """Factor by which a trial may go beyond what the curvature at the optimum says."""
 
@@ -40,6 +42,8 @@ class Profile:
     high_bound: bool
     factor: float
     """Student's t."""
+    ends: tuple[tuple[float, ...], tuple[float, ...]]
+    """All parameters' t at both ends."""
     points: tuple[tuple[float, float], ...]
     """t and the rise of S above its least, ascending in t."""
     evaluations: int
@@ -74,61 +78,68 @@ def profile(optimum: Optimum, which: int, factor: float, spread: FloatArray) -> 
     Args: `factor`: Student's t. `spread`: `covariance` at the optimum.
     """
     least = float(np.sum(optimum.at**2))
-    ends = [_end(optimum, which, sign, factor, spread, least) for sign in (-1.0, 1.0)]
-    points = sorted([*ends[0][2], (float(optimum.t[which]), 0.0), *ends[1][2]])
+    low, high = (_end(optimum, which, sign, factor, spread, least) for sign in (-1.0, 1.0))
+    points = sorted([*low.points, (float(optimum.t[which]), 0.0), *high.points])
     return Profile(
-        low=ends[0][0],
-        high=ends[1][0],
-        low_bound=ends[0][1],
-        high_bound=ends[1][1],
+        low=low.place,
+        high=high.place,
+        low_bound=low.bound,
+        high_bound=high.bound,
         factor=factor,
+        ends=(tuple(low.t.tolist()), tuple(high.t.tolist())),
         points=tuple(points),
-        evaluations=ends[0][3] + ends[1][3],
+        evaluations=low.evaluations + high.evaluations,
     )
 
 
-def _end(
-    optimum: Optimum, which: int, sign: float, factor: float, spread: FloatArray, least: float
-) -> tuple[float, bool, list[tuple[float, float]], int]:
-    """t at one end, whether it is a bound, points on the way, and the number of predictions."""
-    bound = float(optimum.residuals.problem.bounds[0 if sign < 0 else 1][which])
-    here = float(optimum.t[which])
-    inside, outside = (here, 0.0), (math.inf * sign, math.inf)
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _End:
+    place: float
+    bound: bool
+    t: FloatArray
+    points: list[tuple[float, float]]
+    evaluations: int
+
+
+def _end(optimum: Optimum, which: int, sign: float, factor: float, spread: FloatArray, least: float) -> _End:
+    """Where the root of S - S0, nearly linear in t, is `factor`: by the secant, in steps."""
+    bounds = optimum.residuals.problem.bounds
+    bound, here = float(bounds[0 if sign < 0 else 1][which]), float(optimum.t[which])
     wide = math.sqrt(float(spread[which, which]))
     along = spread[:, which] / max(float(spread[which, which]), 1e-300)
-    distance, slopes, evaluations = factor * wide, optimum.slopes, 0
+    inside, outside = (0.0, 0.0), (math.inf, math.inf)
+    start, slopes, evaluations = optimum.t, optimum.slopes, 0
     points: list[tuple[float, float]] = []
-    start = optimum.t
+    distance = min(factor * wide, _LONGEST)
     for _ in range(_TRIALS):
         place = here + sign * distance
         if (place - bound) * sign >= 0:
-            place = bound
-        begin = np.clip(start + along * (place - start[which]), *optimum.residuals.problem.bounds)
+            place, distance = bound, abs(bound - here)
+        begin = np.clip(start + along * (place - start[which]), *bounds)
         begin[which] = place
         end, cost, slopes, used = constrained(optimum.residuals, begin, slopes, which)
         evaluations += used
         root = math.sqrt(max(cost - least, 0.0))
         points.append((place, cost - least))
-        if abs(root - factor) <= _CLOSE * factor:
-            return place, False, points, evaluations
+        at_bound = root < factor and place == bound
+        if at_bound or abs(root - factor) <= _CLOSE * factor:
+            return _End(place=place, bound=at_bound, t=end, points=points, evaluations=evaluations)
         if root < factor:
-            if place == bound:
-                return bound, True, points, evaluations
-            inside, start = (place, root), end
+            inside, start = (distance, root), end
+            if len(points) > 1:
+                along = (end - optimum.t) / (place - here)
         else:
-            outside = (place, root)
-        distance = abs(_next(here, inside, outside, factor, wide) - here)
-    return (inside[0] if math.isinf(outside[0]) else outside[0]), False, points, evaluations
+            outside = (distance, root)
+        distance = _next(inside, outside, factor, wide)
+    place = here + sign * (inside[0] if math.isinf(outside[0]) else outside[0])
+    return _End(place=place, bound=False, t=end, points=points, evaluations=evaluations)
 
 
-def _next(
-    here: float, inside: tuple[float, float], outside: tuple[float, float], factor: float, wide: float
-) -> float:
-    """Where the root of S - S0, nearly linear in t, should be `factor`."""
+def _next(inside: tuple[float, float], outside: tuple[float, float], factor: float, wide: float) -> float:
+    """Distance of the next trial from those within and beyond the end."""
+    reach, root = inside
     if math.isinf(outside[0]):
-        reach = abs(inside[0] - here)
-        slope = inside[1] / reach if reach > 0 else 1 / wide
-        further = min(factor / max(slope, 1e-300), _LARGEST_STEP * max(reach, factor * wide))
-        return here + math.copysign(max(further, 1.02 * reach), outside[0])
-    part = (factor - inside[1]) / (outside[1] - inside[1])
-    return inside[0] + min(max(part, 0.05), 0.95) * (outside[0] - inside[0])
+        slope = root / reach if reach > 0 else 1 / wide
+        return min(factor / max(slope, 1e-300), reach + _LONGEST, _LARGEST_STEP * max(reach, factor * wide))
+    part = (factor - root) / (outside[1] - root)
+    return reach + min(max(part, 0.05), 0.95) * (outside[0] - reach)

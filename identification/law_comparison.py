@@ -40,8 +40,8 @@ class LawComparison:
         threshold = float(stats.chi2.isf(_LEVEL, 1))
         if abs(self.preference) < threshold:
             return f"the data lie between the fitted law and {self.other}"
-        better = "the fitted law" if self.preference > 0 else self.other
-        return f"the data tell the fitted law from {self.other} and prefer {better}"
+        better, worse = ("the fitted law", self.other)[:: 1 if self.preference > 0 else -1]
+        return f"the data prefer {better} to {worse}"
 
 
 def needed_separation() -> float:

@@ -25,6 +25,11 @@ _EVALUATIONS: Final = 40
 _APART: Final = 1.0
 """Of t for a further start, in prior standard deviations or, without a prior, in half of ln 2."""
 _WIDE: Final = 0.35
+_STEPS: Final = 6
+_GAIN: Final = 1e-3
+"""Of the sum of squares, below which a step is not taken."""
+_LONGEST: Final = 1.0
+"""Of a step, in t."""
 _ROBUST: Final = 1.345
 """Residual over its standard deviation from which soft_l1 bends, for 95 % efficiency."""
 
@@ -212,37 +217,61 @@ def constrained(
 ) -> tuple[FloatArray, float, FloatArray, int]:
     """Least sum of squares with one parameter held, by Gauss-Newton steps with Broyden's updates.
 
+    Where these come to no end, slopes are found again by differences.
     Args: `t`: where to begin, with the held parameter's value. `slopes`: d(residuals)/dt nearby.
     Returns: t, the sum of squares, the updated slopes, and the number of predictions.
     Source: Broyden, Math. Comput. 19 (1965) 577.
     """
-    low, high = residuals.problem.bounds
-    other = np.arange(t.size) != fixed
-    at = residuals.at(t)
-    cost, evaluations = float(at @ at), 1
-    for _ in range(8):
-        step = np.zeros(t.size)
-        usable = other & ~_blocked(t, slopes.T @ at, low, high)
-        if not np.any(usable):
+    search = _Search(residuals=residuals, fixed=fixed, t=t, at=residuals.at(t), slopes=slopes, evaluations=1)
+    for fresh in (False, True):
+        if fresh:
+            search.renew()
+        if any(search.ended() for _ in range(_STEPS)):
             break
-        step[usable] = -np.linalg.lstsq(slopes[:, usable], at, rcond=1e-10)[0]
-        gain = float(np.sum((slopes @ step) ** 2))
-        if gain < 1e-3:
-            break
-        part = 1.0
-        while True:
-            there = np.clip(t + part * step, low, high)
-            found = residuals.at(there)
-            evaluations += 1
-            moved = there - t
-            slopes = slopes + np.outer(found - at - slopes @ moved, moved) / max(float(moved @ moved), 1e-300)
-            if float(found @ found) < cost or part < 0.1:
-                break
-            part /= 4
-        if float(found @ found) >= cost:
-            break
-        t, at, cost = there, found, float(found @ found)
-    return t, cost, slopes, evaluations
+    return search.t, float(search.at @ search.at), search.slopes, search.evaluations
+
+
+@dataclass(kw_only=True, eq=False)
+class _Search:
+    """State of one search; lives inside one call of `constrained`."""
+
+    residuals: Residuals
+    fixed: int
+    t: FloatArray
+    at: FloatArray
+    slopes: FloatArray
+    evaluations: int
+
+    def renew(self) -> None:
+        """Find the slopes by differences."""
+        self.slopes = self.residuals.slopes(self.t)
+        self.evaluations += 2 * self.t.size
+
+    def ended(self) -> bool:
+        """Take one step; whether there was nothing left to gain."""
+        step = self._step()
+        if float(np.sum((self.slopes @ step) ** 2)) < _GAIN:
+            return True
+        step *= min(1.0, _LONGEST / float(np.max(np.abs(step))))
+        low, high = self.residuals.problem.bounds
+        for part in (1.0, 0.25, 0.0625):
+            there = np.clip(self.t + part * step, low, high)
+            found, moved = self.residuals.at(there), there - self.t
+            self.evaluations += 1
+            missed = found - self.at - self.slopes @ moved
+            self.slopes = self.slopes + np.outer(missed, moved) / max(float(moved @ moved), 1e-300)
+            if float(found @ found) < float(self.at @ self.at):
+                self.t, self.at = there, found
+                return False
+        return False
+
+    def _step(self) -> FloatArray:
+        low, high = self.residuals.problem.bounds
+        free = (np.arange(self.t.size) != self.fixed) & ~_blocked(self.t, self.slopes.T @ self.at, low, high)
+        step = np.zeros(self.t.size)
+        if np.any(free):
+            step[free] = -np.linalg.lstsq(self.slopes[:, free], self.at, rcond=1e-10)[0]
+        return step
 
 
 def _blocked(t: FloatArray, gradient: FloatArray, low: FloatArray, high: FloatArray) -> BoolArray:

@@ -1,9 +1,10 @@
 """What can be fitted: quantities of a scene, each on a scale on which its effect is nearly linear.
 
 Positive quantities are fitted by their logarithm, ln x.  A loss coefficient acts through k + 1, so it is
-fitted by ln(x + c), c = 1 for a prescribed k, and all else that k + 1 consists of for an extra loss.  Angles,
-positions and the pressure of the cavity are linear.  The prior of a parameter is the scene's [uncertainty]: a
-normal distribution of the quantity itself, of standard deviation U/1.96, which enters each fit once.
+fitted by ln g (x + c): c = 1 for a prescribed k; for an extra loss such that it is ln(k + 1) to first order.
+Angles, positions and the pressure of the cavity are linear.  The prior of a parameter is the scene's
+[uncertainty]: a normal distribution of the quantity itself, of standard deviation U/1.96, which enters each
+fit once.
 """
 
 from __future__ import annotations
@@ -13,10 +14,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from ringbalance.identification.predict.device import device_of, models_of
 from ringbalance.identification.predict.vibration import STANDARD
-from ringbalance.physics.tube.state import tube_state
 from ringbalance.reduced_model.chamber.inputs import half_widths
-from ringbalance.reduced_model.selection.range_flow import range_velocities
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, nominal_value, with_value
 
@@ -41,6 +41,8 @@ class Parameter:
     """Standard deviation that the scene states, SI; None: nothing is known beforehand."""
     offset: float = 0.0
     """c of ln(x + c), SI."""
+    gain: float = 1.0
+    """g of ln g (x + c)."""
     scale: float | None = None
     """Of a linear parameter, SI; None: logarithmic."""
     change: Callable[[Any, float], Any]
@@ -48,15 +50,15 @@ class Parameter:
 
     def inner(self, value: float) -> float:
         """t of a value, SI."""
-        return math.log(value + self.offset) if self.scale is None else value / self.scale
+        return math.log(self.gain * (value + self.offset)) if self.scale is None else value / self.scale
 
     def value(self, inner: float) -> float:
         """Value, SI, of t."""
-        return math.exp(inner) - self.offset if self.scale is None else inner * self.scale
+        return math.exp(inner) / self.gain - self.offset if self.scale is None else inner * self.scale
 
     def slope(self, inner: float) -> float:
         """dx/dt."""
-        return math.exp(inner) if self.scale is None else self.scale
+        return math.exp(inner) / self.gain if self.scale is None else self.scale
 
 
 _NATURAL: Final[Mapping[str, float]] = {"lambda_factor": 1.0}
@@ -70,6 +72,7 @@ _SYMBOLS: Final = {
 _REACH: Final = {"bore": 3.0, "outer_radius": 1.1, "inner_radius": 1.1, "central_angle": 1.1, "speed": 1.1}
 """Factor up to which a logarithmic parameter is looked for."""
 _WIDE: Final = 30.0
+_LOSS_STEP: Final = 0.01
 
 
 def scene_parameter(scene: Scene, name: str) -> Parameter:
@@ -86,7 +89,7 @@ def scene_parameter(scene: Scene, name: str) -> Parameter:
             f"the scene has no {UNCERTAIN_QUANTITIES[name]}.{name}: give a value to start from to fit it"
         )
     width = half_widths(scene).get(name)
-    offset, scale = _offset(scene, name), _scale(scene, name)
+    (offset, gain), scale = _loss_scale(scene, name), _scale(scene, name)
     if offset == 0 and scale is None and start <= 0:
         raise FitError(f"{UNCERTAIN_QUANTITIES[name]}.{name} is zero: give a value above zero to fit it")
     low, high = _range(scene, name, start, offset)
@@ -98,21 +101,49 @@ def scene_parameter(scene: Scene, name: str) -> Parameter:
         highest=high,
         prior=None if width is None else width / STANDARD,
         offset=offset,
+        gain=gain,
         scale=scale,
         change=lambda to, value: with_value(scene=to, quantity=name, value=value),
     )
 
 
-def _offset(scene: Scene, name: str) -> float:
+def _loss_scale(scene: Scene, name: str) -> tuple[float, float]:
+    """Offset and gain of a loss coefficient, so that t is ln(k + 1) at equal fills under the scene's gas.
+
+    k + 1 = 2 H/u^2 by definition, whatever the regime: d ln(k + 1) = -2 d ln u.
+    """
     if name == "drag_coefficient":
-        return 1.0
+        return 1.0, 1.0
     if name != "extra_loss":
-        return 0.0
-    velocities = range_velocities(scene)
-    state = tube_state(
-        tube=scene.tube, liquid=scene.liquid, angular_velocity=scene.rotor.speed, velocity=velocities
+        return 0.0, 1.0
+    here = scene.tube.extra_loss
+    speeds = [
+        _velocity(with_value(scene=scene, quantity=name, value=here + step)) for step in (0.0, _LOSS_STEP)
+    ]
+    if speeds[1] <= 0 or speeds[0] <= speeds[1]:
+        return 1.0, 1.0
+    apart = _LOSS_STEP / (-2 * math.log(speeds[1] / speeds[0]))
+    law_loss = _driving_head(scene) * 2 / speeds[0] ** 2
+    return apart - here, law_loss / apart
+
+
+def _velocity(scene: Scene) -> float:
+    """Of a primed tube at equal fills, m/s."""
+    fill = scene.disc.initial_fill
+    law = device_of(scene, models_of(scene)).law
+    flow = law.evaluate(
+        fill_ratio=fill, opposite_fill_ratio=fill, gas_pressure=scene.gas.pressure, primed=True
     )
-    return float(state.k[velocities.size // 2]) + 1 - scene.tube.extra_loss
+    return float(flow.velocity)
+
+
+def _driving_head(scene: Scene) -> float:
+    """H at equal fills, m^2/s^2."""
+    fill = scene.disc.initial_fill
+    ends = device_of(scene, models_of(scene)).law.ends(
+        fill_ratio=fill, opposite_fill_ratio=fill, gas_pressure=scene.gas.pressure
+    )
+    return float(ends.driving_pressure()) / scene.liquid.density
 
 
 def _scale(scene: Scene, name: str) -> float | None:

@@ -11,11 +11,14 @@ import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from itertools import groupby
+from itertools import combinations, groupby
 from operator import attrgetter
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any, Final
 
+from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.identifiability import Combination, Verdict
+from ringbalance.identification.result import FitResult, FittedParameter
 from ringbalance.scene import deferred
 from ringbalance.scene.describe import usual_unit
 from ringbalance.scene.dimensions import DIMENSIONS
@@ -32,6 +35,10 @@ _DIGITS: Final = 9
 """Of a saved number: far more than any fit has, so that saving changes nothing."""
 _ENTRY: Final = re.compile(r"(\w+)\.(\w+)(?:\[(\d)\])?")
 _NO_UNIT: Final = "1"
+_TOGETHER: Final = 0.5
+"""Correlation from which two errors are said to go together."""
+_LONGEST: Final = 200
+"""Characters of a finding, as of any text of a scene file."""
 _ANY_SIGN: Final = ("lag_angle", "phase")
 """Keys whose uncertainty may be larger than the value."""
 _CUT: Final = "the interval of {} is wider than its value, which a scene cannot state: it has the value"
@@ -61,6 +68,58 @@ class Fitted:
     def origin(self) -> Origin:
         """Of the value in the saved scene."""
         return "measured" if self.identified else "inferred"
+
+
+def save_result(
+    path: Path, *, text: str, result: FitResult, data: Sequence[Observations], said: Sequence[str] = ()
+) -> Path:
+    """Write the scene that a fit found, see `save_fitted`.
+
+    Args: `said`: what the criticism of the fit says.
+    """
+    files = [
+        MeasuredFile(file=PurePath(each.file).name, kind=each.kind, rows=len(each), sha256=each.sha256)
+        for each in data
+    ]
+    findings = [
+        *(MeasuredFinding(about="residuals", text=_short(each)) for each in said),
+        *(MeasuredFinding(about="combination", text=_combination(each)) for each in result.combinations),
+        *(MeasuredFinding(about="correlation", text=each) for each in _correlations(result)),
+    ]
+    fitted = [_fitted(each) for each in result.parameters]
+    return save_fitted(path, text=text, fitted=fitted, files=files, findings=findings)
+
+
+def _fitted(parameter: FittedParameter) -> Fitted:
+    return Fitted(
+        path=parameter.path,
+        before=parameter.before,
+        before_interval=parameter.before_interval or (None, None),
+        value=parameter.value,
+        interval=parameter.interval,
+        verdict=str(parameter.verdict),
+        identified=parameter.verdict is Verdict.IDENTIFIED,
+    )
+
+
+def _combination(found: Combination) -> str:
+    return f"{found.text} is identified, within {100 * found.relative_uncertainty:.2g} %"
+
+
+def _correlations(result: FitResult) -> Iterator[str]:
+    names = [each.name for each in result.parameters]
+    for i, j in combinations(range(len(names)), 2):
+        value = float(result.correlations[i, j])
+        if abs(value) > _TOGETHER:
+            yield (
+                f"the errors of {names[i]} and {names[j]} go together (correlation {value:.2f}); a scene "
+                "states each by itself"
+            )
+
+
+def _short(text: str) -> str:
+    """Text that a scene file takes."""
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 4]} ..."
 
 
 def save_fitted(

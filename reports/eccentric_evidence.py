@@ -12,7 +12,7 @@ from ringbalance.reports.provenance import provenance
 from ringbalance.reports.section import Level, Record
 from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.eccentric_models import EccentricScene, SpeedPoint
-from ringbalance.scene.keys.declaration import keys_of
+from ringbalance.scene.keys.declaration import Key, keys_of
 from ringbalance.scene.keys.eccentric_schema import ECCENTRIC_MASS
 from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.models import InputUncertainty
@@ -69,7 +69,7 @@ def parameters(scene: EccentricScene) -> list[Record]:
         {
             "group": name.replace("_", " ").capitalize(),
             "quantity": key.replace("_", " "),
-            "value": _written(value, entry.takes),
+            "value": _value(value, entry, scene.origin_of(f"{name}.{key}")),
             "uncertainty": widths.get(f"{name}.{key}", ""),
             "note": entry.presence.meaning,
             "origin": scene.origin_of(f"{name}.{key}"),
@@ -78,8 +78,18 @@ def parameters(scene: EccentricScene) -> list[Record]:
         for name, table in ECCENTRIC_MASS.tables.items()
         if table.record is not None
         for key, entry in keys_of(table.record).items()
-        if (value := getattr(getattr(scene, name, None), key, None)) is not None
+        if (value := getattr(getattr(scene, name, None), key, None)) not in (None, ())
     ]
+
+
+def _value(value: Any, entry: Key, origin: str) -> str:
+    """As the file has it; a default in the words of its declaration, or as it follows from other values."""
+    if origin != "default":
+        return _written(value, entry.takes)
+    if entry.presence.kind != "standard":
+        return _written(value, entry.takes, digits=3)
+    texts = entry.presence.default if isinstance(entry.presence.default, list) else [entry.presence.default]
+    return ", ".join(str(text).replace("*", " ") for text in texts)
 
 
 def _width(uncertain: InputUncertainty) -> str:
@@ -90,13 +100,13 @@ def _width(uncertain: InputUncertainty) -> str:
     return _written(uncertain.half_width, keys_of(record)[key].takes) if record else ""
 
 
-def _written(value: Any, takes: object) -> str:
+def _written(value: Any, takes: object, *, digits: int = 6) -> str:
     if isinstance(value, tuple):
-        return ", ".join(_written(item, takes) for item in value)
+        return ", ".join(_written(item, takes, digits=digits) for item in value)
     if isinstance(value, SpeedPoint):
         return f"{given(value.speed, 'rad/s')} from {given(value.time, 's')}"
     if isinstance(value, bool | str):
         return str(value)
     dimension = takes.dimension if isinstance(takes, Reader) else None
     unit = next(iter(DIMENSIONS[dimension].units)).replace("*", " ") if dimension else ""
-    return given(value, unit) if unit else short(float(value))
+    return given(value, unit, digits=digits) if unit else short(float(value), digits=digits)

@@ -6,7 +6,6 @@ versions.
 
 from __future__ import annotations
 
-import math
 import platform
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict
@@ -24,7 +23,6 @@ from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reduced_model.paper import formulas as paper
-from ringbalance.reports.pages.cases import typeset_equations
 from ringbalance.reports.pictures.fields import chamber_field
 from ringbalance.reports.provenance import provenance
 from ringbalance.reports.section import Level, Record, Work
@@ -71,9 +69,6 @@ def collect_evidence(
         tell("sections")
         work = Work(scene=scene, calibration=calibration, level=level)
         sections = collected(work, last=False)
-        tell("equations")
-        # While the cases still run, there is time for what the page will need.
-        typeset_equations()
         tell("verification")
         cases = merge_saved(finished_cases(under_way, tell), saved)
     sections |= collected(work, last=True)
@@ -181,23 +176,15 @@ def _operating_point(scene: Scene, calibration: Calibration) -> Record:
         "reynolds": reynolds,
         "flow_state": str(np.asarray(tube.flow_state)[nearest]),
         "velocity_paper_m_s": float(by_paper.velocity),
-        **_threshold_uncertainties(record, calibration),
+        "priming_uncertainty": _total(calibration, "priming_pressure_vented"),
+        "stall_uncertainty": _total(calibration, "stall_pressure"),
     }
 
 
-def _threshold_uncertainties(point: Record, calibration: Calibration) -> Record:
-    """Expanded uncertainties (95 %) of the pressures at which flow begins and stalls."""
-    law = calibration.flow_law
-    level = float(law.wall_pressure_uncertainty(law.max_fill_ratio))
-    scale = math.hypot(law.inputs.relative_density, 2 * law.inputs.relative_speed)
-
-    def width(pressure: float | None, own: float) -> float | None:
-        return None if pressure is None else math.hypot(scale * pressure, own, level)
-
-    return {
-        "priming_uncertainty": width(point["priming_pressure_vented_Pa"], law.inputs.hump_pressure),
-        "stall_uncertainty": width(point["stall_pressure_Pa"], 0.0),
-    }
+def _total(calibration: Calibration, quantity: str) -> float | None:
+    """Expanded uncertainty (95 %) of a quantity; None where it has no budget."""
+    budget = calibration.budgets.get(quantity)
+    return None if budget is None else budget.total
 
 
 def _flow_law(scene: Scene, calibration: Calibration) -> Record:

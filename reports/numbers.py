@@ -120,7 +120,9 @@ def percent(fraction: float | None, *, digits: int = 2, signed: bool = False) ->
 
 def with_unit(text: str, unit: str) -> str:
     """A number's text with its unit, which never breaks onto the next line."""
-    return text if unit in {"", "1"} or text == MISSING else f"{text}{THIN_SPACE}{unit}"
+    if unit in {"", "1"} or text == MISSING:
+        return text
+    return f"{text}{'' if unit == '°' else THIN_SPACE}{unit}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -186,7 +188,8 @@ def shown_apart(
 
     Raises: ValueError: a value that is not finite.
     """
-    display = display_unit(unit, value)
+    # A value that its own half-width exceeds is shown in the unit of that half-width.
+    display = display_unit(unit, value, half_width)
     if value is None:
         return MISSING, ""
     width = None if half_width is None else half_width * display.factor

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import groupby
@@ -19,7 +20,16 @@ from ringbalance.reports.figures.chamber import moment, pressure_profile, transf
 from ringbalance.reports.figures.loop import amplitude, early_amplitude, early_time, fill_ratios, regimes
 from ringbalance.reports.figures.style import Drawing
 from ringbalance.reports.figures.tube import drag, drag_terms, flow_laws
-from ringbalance.reports.numbers import display_unit, fixed, measured, number, percent, short, shown
+from ringbalance.reports.numbers import (
+    PLUS_MINUS,
+    display_unit,
+    fixed,
+    measured,
+    number,
+    percent,
+    short,
+    shown,
+)
 from ringbalance.reports.pages.cases import case_view
 from ringbalance.reports.pages.eccentric_scene import BALANCER
 from ringbalance.reports.section import Cells, Record, Table
@@ -45,6 +55,7 @@ DOCUMENTS: Final[Mapping[str, Record]] = MappingProxyType(
     }
 )
 """The documents by file name; the report last, for where it is, all else is."""
+_LEADING: Final = re.compile(r"\d+(?:\.\d+)?")
 _FIRST_INJECTIONS: Final = 12
 """Injections that are listed."""
 _PICTURE_WIDTH: Final = 1000
@@ -165,7 +176,19 @@ def _models(rows: list[Record]) -> Table:
 
 
 def _scene_groups(rows: list[Record]) -> list[tuple[str, list[Record]]]:
-    return [(name, list(group)) for name, group in groupby(rows, key=lambda row: row["group"])]
+    told = ({**row, "value": _as_known(row)} for row in rows)
+    return [(name, list(group)) for name, group in groupby(told, key=lambda row: row["group"])]
+
+
+def _as_known(row: Record) -> str:
+    """A value of the scene; one that the program supplied has no more digits than its uncertainty leaves."""
+    text: str = row["value"]
+    value, width = _LEADING.match(text), _LEADING.match(row["uncertainty"])
+    if row["origin"] != "default" or value is None or width is None:
+        return text
+    share = 0.01 * float(value[0]) if row["uncertainty"].endswith("%") else 1.0
+    known, _, _ = measured(float(value[0]), share * float(width[0])).partition(PLUS_MINUS)
+    return known + text[value.end() :]
 
 
 def _mesh_facts(mesh: Record) -> Facts:
@@ -257,7 +280,7 @@ def _stamp(evidence: Record) -> Facts:
     return (
         ("Scene", evidence["scene"]["file"]),
         ("Hash", evidence["scene"]["sha256"][:12]),
-        ("Level", evidence["level"]),
+        ("Effort", evidence["level"]),
         ("Date", evidence["times"]["date"]),
         ("ringbalance", evidence["versions"]["ringbalance"]),
     )

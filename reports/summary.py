@@ -1,9 +1,10 @@
-"""Claims and checks, counted by verdict."""
+"""Verdicts: on requirements, and claims and checks counted by theirs."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Iterable
 from typing import Final
 
 from ringbalance.reports.section import Record
@@ -23,6 +24,31 @@ _TONES: Final = {
     "cannot be told": "open",
     "none stated": "idle",
 }
+
+
+MET: Final = "met"
+MISSED: Final = "not met"
+OPEN: Final = "cannot be told"
+UNASKED: Final = "none stated"
+"""Verdicts on a requirement."""
+
+
+def above(value: float, bound: float, width: float) -> str:
+    """Whether a value is above a bound by more than a half-width."""
+    if abs(value - bound) <= width:
+        return OPEN
+    return MET if value > bound else MISSED
+
+
+def below(values: Iterable[float], bound: float) -> str:
+    """Whether all of some values are at most a bound, none, or some."""
+    within = [value <= bound for value in values]
+    return MET if all(within) else (OPEN if any(within) else MISSED)
+
+
+def worst(*verdicts: str) -> str:
+    """The worst of some verdicts on requirements."""
+    return next(verdict for verdict in (MISSED, OPEN, MET) if verdict in verdicts)
 
 
 def is_verdict(text: str) -> bool:

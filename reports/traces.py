@@ -11,6 +11,7 @@ from ringbalance.reports.numbers import shown
 from ringbalance.reports.prose import typeset
 
 _OPEN, _MIDDLE, _CLOSE = "\ue000", "\ue001", "\ue002"
+_INDEXED: Final = re.compile(r"(?<![\w.])([A-Za-zα-ωΑ-Ω])_([A-Za-zΩ]{1,3})(?!\w)")
 _TRACED: Final = re.compile(f"{_OPEN}([^{_MIDDLE}]*){_MIDDLE}([^{_CLOSE}]*){_CLOSE}")
 
 
@@ -35,14 +36,19 @@ def marked_up(value: object) -> object:
     if not isinstance(value, str) or isinstance(value, Markup):
         return value
     if _OPEN not in value:
-        return typeset(value)
+        return _lowered(typeset(value))
     # Between two traces stands prose; every third part, from the first on, is such.
     parts = _TRACED.split(value)
-    found = [escape(typeset(parts[0]))]
+    found = [escape(_lowered(typeset(parts[0])))]
     for path, text, prose in zip(parts[1::3], parts[2::3], parts[3::3], strict=True):
         found.append(Markup('<span data-from="{}">{}</span>').format(path, typeset(text)))
-        found.append(escape(typeset(prose)))
+        found.append(escape(_lowered(typeset(prose))))
     return Markup("").join(found)
+
+
+def _lowered(text: str) -> str:
+    """Symbols such as K_B with their index below the line; other text as it is."""
+    return Markup(_INDEXED.sub(r"\1<sub>\2</sub>", str(escape(text)))) if _INDEXED.search(text) else text
 
 
 def evidence_at(evidence: Any, path: str) -> Any:

@@ -39,6 +39,10 @@ COMMANDS = {
         "ringbalance.controller.tuning.cli:tune",
         "Recommended gain, its margins, and the settling times under it.",
     ),
+    "fit": (
+        "ringbalance.identification.cli:fit",
+        "Parameters of a built disc from measurements, with intervals and what the data identify.",
+    ),
     "verify": (
         "ringbalance.verification.cli:verify",
         "The verification cases and the paper's claims, judged.",

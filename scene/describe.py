@@ -44,6 +44,8 @@ class _Line:
     """Empty without unit."""
 
 
+_EXACT = 15
+"""Digits of a number whose last place does not matter."""
 _GROUPS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "Disc": ("disc",),
@@ -97,6 +99,20 @@ def usual_unit(path: str) -> str:
     """Unit in which a value of a scene with a liquid ring is described; empty without one."""
     line = _LINES.get(path)
     return line.shown.unit if line is not None else ""
+
+
+def usual_name(path: str) -> str:
+    """Name of a value of a scene, such as "bore d"; its path where it has none."""
+    line = _LINES.get(path)
+    return line.shown.name if line is not None else path
+
+
+def in_usual_unit(path: str, value: float) -> float:
+    """A value of a scene, SI, in its usual unit."""
+    line = _LINES.get(path)
+    if line is None or not line.dimension:
+        return value
+    return float(format_quantity(value, line.dimension, line.shown.unit, digits=_EXACT).split(" ")[0])
 
 
 def scene_fault(*, scene: Scene, table: str, key: str, problem: str, allowed: str) -> Fault:

@@ -369,6 +369,10 @@ class InputUncertainty:
     """Relative when `relative`, else SI."""
     relative: bool
 
+    def absolute(self, value: float) -> float:
+        """Half-width in the unit of the quantity, whose value is given in SI."""
+        return self.half_width * (abs(value) if self.relative else 1.0)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Scene(SceneFile):

@@ -1,6 +1,6 @@
-"""Write the tables of README.md and docs/measurements.md that follow from cases and kinds of data.
+"""Write the tables of README.md and of docs/ that follow from cases and kinds of data.
 
-python tools/measurement_tables.py            prints both pages with fresh tables
+python tools/measurement_tables.py            prints the pages with fresh tables
 python tools/measurement_tables.py --write    puts the tables into the pages
 """
 
@@ -12,6 +12,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from ringbalance.identification.data.kinds import KINDS as FIT_KINDS
+from ringbalance.identification.data.kinds import DataKind
 from ringbalance.reports.saved import saved_cases
 from ringbalance.scene import write_whole
 from ringbalance.verification.catalogue import load_cases
@@ -23,6 +25,7 @@ from ringbalance.verification.validation.comparison import KINDS
 _ROOT: Final = Path(__file__).resolve().parents[1]
 README: Final = _ROOT / "README.md"
 PAGE: Final = _ROOT / "docs" / "measurements.md"
+FIT_PAGE: Final = _ROOT / "docs" / "fit.md"
 
 
 def kind_table() -> str:
@@ -41,6 +44,34 @@ def kind_table() -> str:
             for name, kind in KINDS.items()
         ],
     )
+
+
+def fit_kind_table() -> str:
+    """Kinds of data that a fit takes, and their columns."""
+    return _markdown(
+        ("kind", "what it is", "measured", "further columns"),
+        [
+            (
+                f"`{name}`",
+                kind.title + (", eccentric masses" if kind.balancer == "eccentric_mass" else ""),
+                "; ".join(_explained(kind, measured=True)),
+                "; ".join(_explained(kind, measured=False)),
+            )
+            for name, kind in FIT_KINDS.items()
+        ],
+    )
+
+
+def _explained(kind: DataKind, *, measured: bool) -> list[str]:
+    """The columns that are measured, or the others, with what they hold."""
+    letters = ["`chamber`: letter of the driven chamber"] if kind.has_chamber and not measured else []
+    return letters + [
+        f"`{column.head}`: {column.meaning}"
+        + (" (optional)" if column.optional else "")
+        + (f" (instead of `{kind.one_of[0]}`)" if column.name in kind.one_of[1:] else "")
+        for column in kind.columns
+        if column.measured == measured
+    ]
 
 
 def standing_table(cases: Sequence[Mapping[str, Any]]) -> str:
@@ -74,6 +105,7 @@ def _documents() -> list[dict[str, Any]]:
 if __name__ == "__main__":
     for path, name, table in (
         (PAGE, "kinds", kind_table()),
+        (FIT_PAGE, "fit_kinds", fit_kind_table()),
         (README, "standing", standing_table(_documents())),
     ):
         text = fresh(path.read_text(encoding="utf-8"), name, table)

@@ -85,7 +85,7 @@ def _range(one: RestsOn, scene: Any, value: float, origin: str) -> tuple[float, 
     if one.low is not None and one.high is not None:
         return one.low, one.high, one.why
     stated = [
-        stated.half_width * (abs(value) if stated.relative else 1.0)
+        stated.absolute(value)
         for stated in getattr(scene, "uncertainty", ())
         if stated.quantity == one.path.partition(".")[2] and not one.documented
     ]

@@ -84,7 +84,7 @@ def _warnings(facts: RunFacts) -> list[tuple[bool, str]]:
         ),
         (
             facts.hold == HELD,
-            "the drives still hold the masses at the end, as friction alone is not certain to",
+            "the drives must stay on at the end: friction alone is not certain to hold the masses",
         ),
         (
             facts.least_gap < gap,

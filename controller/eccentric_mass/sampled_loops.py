@@ -10,8 +10,8 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, replace
+from typing import Any, Final
 
 import numpy as np
 
@@ -93,6 +93,24 @@ def recommended_gains(scene: EccentricScene) -> RecommendedGains:
         step=min(loop.recommended_step for loop in (regulator, speed, pair)),
         drive_speed=_drive_speed(scene, min(speed.value, speed.recommended)),
     )
+
+
+def advised(
+    scene: EccentricScene, gains: RecommendedGains | None = None
+) -> tuple[EccentricScene, dict[str, float]]:
+    """The scene with those gains lowered that are above the recommended ones, and its drives fast enough.
+
+    Returns: The scene, and the values that changed by key, SI.
+    """
+    advice = recommended_gains(scene) if gains is None else gains
+    changes = {loop.key: loop.recommended for loop in advice.loops if loop.value > loop.recommended}
+    if advice.drive_speed > scene.friction_filter.drive_speed:
+        changes["friction_filter.drive_speed"] = advice.drive_speed
+    for key, value in changes.items():
+        table, name = key.split(".")
+        changed: dict[str, Any] = {table: replace(getattr(scene, table), **{name: value})}
+        scene = replace(scene, **changed)
+    return scene, changes
 
 
 def _regulator(scene: EccentricScene) -> SampledLoop:

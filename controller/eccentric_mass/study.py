@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
@@ -13,17 +12,18 @@ import numpy as np
 from ringbalance.controller.eccentric_mass.document import eccentric_document
 from ringbalance.controller.eccentric_mass.plant.open_loop import Progress
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
+from ringbalance.controller.eccentric_mass.plant.speed import steady_until
 from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
-from ringbalance.controller.eccentric_mass.sampled_loops import (
-    GAIN_MARGIN,
-    RecommendedGains,
-    recommended_gains,
-)
+from ringbalance.controller.eccentric_mass.sampled_loops import GAIN_MARGIN, RecommendedGains
 from ringbalance.controller.eccentric_mass.strategy.plan import STAGE_NAMES, Stage
 from ringbalance.controller.eccentric_mass.strategy.targets import target_angles
 from ringbalance.controller.eccentric_mass.uncertainty import Judged, effects, lost, moved_runs
-from ringbalance.controller.tuning.eccentric import eccentric_tuning_document
+from ringbalance.controller.tuning.eccentric import (
+    EccentricTuning,
+    eccentric_tuning_document,
+    tune_eccentric,
+)
 from ringbalance.scene.eccentric_models import EccentricScene
 
 _AT_LEAST: Final = "at least"
@@ -91,7 +91,8 @@ class EccentricStudy:
     """As the scene says."""
     locked: EccentricRun
     """With the masses clamped where they start: the same rotor without balancing."""
-    gains: RecommendedGains
+    tuning: EccentricTuning
+    """The loops alone, without runs."""
     requirements: tuple[Requirement, ...]
 
     def document(self) -> dict[str, Any]:
@@ -99,7 +100,7 @@ class EccentricStudy:
         return {
             "run": eccentric_document(self.run),
             "locked": eccentric_document(self.locked),
-            "tuning": eccentric_tuning_document(self.scene, self.gains),
+            "tuning": eccentric_tuning_document(self.tuning),
             "requirements": [
                 {**asdict(row), "met": row.met, "verdict": row.verdict} for row in self.requirements
             ],
@@ -113,12 +114,12 @@ def eccentric_study(
 
     A scene that states uncertainties is run again with each input at both ends of its interval.
     """
-    gains = recommended_gains(scene)
+    tuning = tune_eccentric(scene, runs=0)
     run = simulate_eccentric(scene, seed=seed, progress=progress)
     locked = locked_run(scene, progress=progress)
     moved = moved_runs(scene, _judged, seed=scene.run.seed if seed is None else seed)
-    requirements = (*(_with_intervals(row, moved) for row in _of_run(scene, run)), *_of_loops(gains))
-    return EccentricStudy(scene=scene, run=run, locked=locked, gains=gains, requirements=requirements)
+    requirements = (*(_with_intervals(row, moved) for row in _of_run(scene, run)), *_of_loops(tuning.gains))
+    return EccentricStudy(scene=scene, run=run, locked=locked, tuning=tuning, requirements=requirements)
 
 
 def _of_run(scene: EccentricScene, run: EccentricRun) -> Sequence[Requirement]:
@@ -149,11 +150,10 @@ def _of_run(scene: EccentricScene, run: EccentricRun) -> Sequence[Requirement]:
 
 def _deadline(scene: EccentricScene) -> tuple[float, str]:
     """Time by which the rotor must be balanced, s, and what sets it."""
-    profile, end = scene.rotor.speed_profile, scene.run.time_limit
-    changes = [here.time for here, after in pairwise(profile) if here.speed != after.speed]
-    if changes and 0 < changes[0] < end:
-        return changes[0], "the speed begins to change"
-    return end, "run.time_limit, the end of the run"
+    change = steady_until(scene)
+    if change is not None:
+        return change, "the speed begins to change"
+    return scene.run.time_limit, "run.time_limit, the end of the run"
 
 
 def _of_loops(gains: RecommendedGains) -> Sequence[Requirement]:

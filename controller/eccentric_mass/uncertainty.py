@@ -5,6 +5,7 @@ The plant is moved, not what the controller is configured with: it does not know
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Final
@@ -14,6 +15,7 @@ import numpy as np
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.strategy.settings import strategy_settings
+from ringbalance.controller.ensemble.samples import NORMAL_95
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.models import InputUncertainty
 
@@ -47,18 +49,37 @@ def moved_runs(
 
 
 def _both_ends(scene: EccentricScene, uncertain: InputUncertainty) -> Iterator[EccentricScene]:
+    def at(sign: int) -> Callable[[float], float]:
+        return lambda value: value + sign * uncertain.absolute(value)
+
+    for sign in (-1, 1):
+        yield _moved(scene, uncertain, at(sign))
+
+
+def drawn_plant(scene: EccentricScene, random: np.random.Generator) -> EccentricScene:
+    """The scene with every stated input drawn: relative ones log-normal, so that none changes its sign."""
+    for uncertain in scene.uncertainty:
+        scene = _moved(scene, uncertain, _drawn(uncertain, random.standard_normal() / NORMAL_95))
+    return scene
+
+
+def _drawn(uncertain: InputUncertainty, part: float) -> Callable[[float], float]:
+    """Args: `part`: of the half-width, a normal deviate."""
+    if uncertain.relative:
+        return lambda value: value * math.exp(math.log1p(uncertain.half_width) * part)
+    return lambda value: value + uncertain.half_width * part
+
+
+def _moved(
+    scene: EccentricScene, uncertain: InputUncertainty, move: Callable[[float], float]
+) -> EccentricScene:
+    """The values of both masses move together."""
     table, key = uncertain.quantity.split(".")
     record = getattr(scene, table)
-    for sign in (-1, 1):
-        value = _moved(getattr(record, key), sign * uncertain.half_width, uncertain.relative)
-        changed: dict[str, Any] = {table: replace(record, **{key: value})}
-        yield replace(scene, **changed)
-
-
-def _moved(value: Any, width: float, relative: bool) -> Any:
-    if isinstance(value, tuple):
-        return tuple(_moved(each, width, relative) for each in value)
-    return value * (1 + width) if relative else value + width
+    value = getattr(record, key)
+    moved = tuple(map(move, value)) if isinstance(value, tuple) else move(value)
+    changed: dict[str, Any] = {table: replace(record, **{key: moved})}
+    return replace(scene, **changed)
 
 
 def effects(value: float, moved: Mapping[str, list[Judged]], name: str) -> dict[str, tuple[float, float]]:

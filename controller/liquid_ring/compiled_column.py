@@ -29,7 +29,8 @@ from ringbalance.reduced_model.tube.regime import CLEARING
 
 _SLOWEST: Final = 1e-150
 """m/s, below which the tube's loss is neglected."""
-_NEWTON_STEPS: Final = 5
+_NEWTON_STEPS: Final = 60
+"""At the most; each that leaves the interval known to hold the root is replaced by half of that."""
 _CONVERGED: Final = 1e-9
 """Of a piece of a table: Newton's next change would be below round-off."""
 _SLOW_FROUDE: Final = CLEARING[0]
@@ -57,26 +58,31 @@ def table(plant: Record, which: int, x: float) -> tuple[float, float]:
 
 @compiled
 def _inverse(plant: Record, which: int, y: float) -> float:
-    """The x of a value, to round-off, for a table that grows from node to node."""
-    low, high = 0, plant.pieces[which] - 1
-    while low < high:
-        middle = (low + high + 1) // 2
-        if plant.cells[which, middle, 0] < y:
-            low = middle
-        else:
-            high = middle - 1
-    c = plant.cells[which, low]
-    rise = c[1] + c[2] + c[3] + c[4] + c[5]
-    t = min(max((y - c[0]) / rise, 0.0), 1.0)
-    change = 0.0
-    for step in range(_NEWTON_STEPS + 1):
-        t = min(max(t + change, 0.0), 1.0)
+    """The x of a value, to round-off, for a table that grows; it continues straight beyond its ends."""
+    last = plant.pieces[which] - 1
+    low, high, place = 0.0, last + 1.0, _guess(plant, which, y)
+    for _ in range(_NEWTON_STEPS):
+        place = min(max(place, 0.0), last + 1.0)
+        cell = min(max(math.floor(place), 0), last)
+        c = plant.cells[which, cell]
+        t = place - cell
         found = c[0] + t * (c[1] + t * (c[2] + t * (c[3] + t * (c[4] + t * c[5]))))
         slope = c[1] + t * (2 * c[2] + t * (3 * c[3] + t * (4 * c[4] + t * 5 * c[5])))
+        low, high = (place, high) if found < y else (low, place)
         change = (y - found) / slope
-        if step > 0 and abs(change) < _CONVERGED:
+        if abs(change) < _CONVERGED or place == (0.0 if change < 0.0 else last + 1.0):
+            place += change
             break
-    return float(plant.table_start[which] + (low + t + change) / plant.nodes_per[which])
+        place = place + change if low <= place + change <= high else (low + high) / 2.0
+    return float(plant.table_start[which] + place / plant.nodes_per[which])
+
+
+@inlined
+def _guess(plant: Record, which: int, y: float) -> float:
+    """Place of a value on the straight line through both ends of a table."""
+    last = plant.pieces[which] - 1
+    first, c = plant.cells[which, 0, 0], plant.cells[which, last]
+    return float((last + 1.0) * (y - first) / (c[0] + c[1] + c[2] + c[3] + c[4] + c[5] - first))
 
 
 @inlined
@@ -91,19 +97,19 @@ def _velocity(plant: Record, which: int, pressure: float, log_speed: float) -> f
 
 
 @inlined
-def _loss(plant: Record, which: int, speed: float, log_speed: float) -> tuple[float, float]:
+def _law_log(speed: float, log_speed: float) -> float:
+    """ln of the velocity that the law itself has where a factor on it gives this one."""
+    return math.log(max(abs(speed), _SLOWEST)) - log_speed
+
+
+@inlined
+def _loss(plant: Record, which: int, speed: float, law_log: float) -> tuple[float, float]:
     """Pressure that a velocity loses over rho, m^2/s^2, and its derivative by the velocity, m/s."""
     if abs(speed) < _SLOWEST:
         return 0.0, 0.0
-    value, slope = table(plant, which, math.log(abs(speed)) - log_speed)
+    value, slope = table(plant, which, law_log)
     loss = math.copysign(math.exp(value), speed)
     return loss, loss * slope / speed
-
-
-@compiled
-def _exceeds(plant: Record, which: int, pressure: float, velocity: float, log_speed: float) -> bool:
-    """Whether the quasi-steady velocity under a pressure is above a given one."""
-    return bool(pressure / plant.density > _loss(plant, which, velocity, log_speed)[0])
 
 
 @inlined
@@ -204,7 +210,7 @@ def _crest_margin(
     cleared, slope = _cleared(plant, spill)
     more = max(primed_margin - gas_margin, 0.0)
     if slope > 0.0:
-        slope /= plant.density * _loss(plant, which, spill, log_speed)[1]
+        slope /= plant.density * _loss(plant, which, spill, _law_log(spill, log_speed))[1]
     return gas_margin + cleared * more, cleared, slope * more
 
 
@@ -254,6 +260,23 @@ def holds(
 
 
 @compiled
+def clearance(
+    plant: Record, at: tuple[float, float, float, float], direction: int, log_speed: float
+) -> float:
+    """What an unprimed tube has beyond the flow that carries the gas over its crest out.
+
+    Returns: Pressure over rho, m^2/s^2.
+    """
+    half = _HALF_CLEARED * plant.froude_velocity
+    if half == 0.0:
+        return math.inf
+    law_log = _law_log(half, log_speed)
+    spills = _margins(plant, at)[1] / plant.density - _loss(plant, _crest_table(direction), half, law_log)[0]
+    flows = _driving(plant, at) / plant.density - _loss(plant, HEAD, half, law_log)[0]
+    return float(min(spills, flows))
+
+
+@compiled
 def _fills(
     plant: Record,
     at: tuple[float, float, float, float],
@@ -265,11 +288,8 @@ def _fills(
     if not plant.crest:
         return True
     which, driving = _crest_table(direction), _driving(plant, at)
-    if not primed and plant.froude_velocity > 0.0:
-        half = _HALF_CLEARED * plant.froude_velocity
-        spills = _exceeds(plant, which, _margins(plant, at)[1], half, log_speed)
-        if not (spills and _exceeds(plant, HEAD, driving, half, log_speed)):
-            return False
+    if not primed and clearance(plant, at, direction, log_speed) <= 0.0:
+        return False
     if at[3] >= plant.port_pressure:
         return True
     margin = _crest_margin(plant, at, direction, primed, log_speed)[0]
@@ -292,7 +312,8 @@ def accelerations(
     Returns: the two, then the derivatives of the smaller one by the speed, by the pressure upstream (of gas
     or liquid), by the gas pressure downstream and by the liquid's pressure there.
     """
-    loss, slope = _loss(plant, HEAD, speed, log_speed)
+    law_log = _law_log(speed, log_speed)
+    loss, slope = _loss(plant, HEAD, speed, law_log)
     length, covered = plant.length, 1.0 if at[3] > plant.port_pressure else 0.0
     per, each = 1.0 / length, 1.0 / (plant.density * length)
     full = _driving(plant, at) * each - loss * per
@@ -300,7 +321,7 @@ def accelerations(
         return full, math.inf, -slope * per, each, -each, -each * covered
     fraction = plant.crest_end if direction > 0 else plant.return_crest_end
     margin, cleared, more = _crest_margin(plant, at, direction, primed, log_speed)
-    upper_loss, upper_slope = _loss(plant, _crest_table(direction), speed, log_speed)
+    upper_loss, upper_slope = _loss(plant, _crest_table(direction), speed, law_log)
     per_upper, each_upper = 1.0 / (fraction * length), 1.0 / (plant.density * fraction * length)
     broken = margin * each_upper - upper_loss * per_upper
     if full <= broken:

@@ -11,6 +11,7 @@ from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.controller.liquid_ring.compiled_column import (
     accelerations,
     can_flow,
+    clearance,
     ends,
     holds,
     holds_at_rest,
@@ -25,6 +26,10 @@ NONE: Final = EVENTS.index(Event.NONE)
 STALLED: Final = EVENTS.index(Event.STALLED)
 EMPTY: Final = EVENTS.index(Event.EMPTY)
 FULL: Final = EVENTS.index(Event.FULL)
+FILLS: Final = 2
+"""The tube counts as filled, beside the directions of a start."""
+STOPS: Final = 3
+"""The column comes to rest."""
 _SIPHON: Final = int(Regime.SIPHON)
 _SEPARATED: Final = int(Regime.SEPARATED)
 _REVERSE: Final = int(Regime.REVERSE)
@@ -137,6 +142,31 @@ def changes(plant: Record, motion: Record, state: Four) -> bool:
         filled = not motion.primed and holds_column(plant, motion, state)
         return filled or flow_end(plant, motion, state) != NONE
     return separates(plant, motion, state) or starts(plant, motion, state) != 0
+
+
+@compiled
+def heading(plant: Record, motion: Record, state: Four) -> int:
+    """What `changes` has found in a state, for `beyond`: a start's direction, else `FILLS`, `STOPS` or 0."""
+    if motion.direction == 0:
+        return starts(plant, motion, state)
+    if not plant.inertia:
+        return 0
+    if not motion.primed and holds_column(plant, motion, state):
+        return FILLS
+    return STOPS if state[1] * motion.direction < 0.0 else 0
+
+
+@compiled
+def beyond(plant: Record, motion: Record, state: Four, what: int) -> float:
+    """How far a state is past an event, in a measure of the event's own: below zero before it, above after.
+
+    A guide to it and no more: `changes` tells on which side a state is.
+    """
+    if motion.direction == 0:
+        return _push(plant, motion, state, what) if what != 0 else 0.0
+    if what == FILLS:
+        return clearance(plant, pair_ends(plant, state, motion.direction), motion.direction, motion.log_speed)
+    return -state[1] * motion.direction if what == STOPS else 0.0
 
 
 @compiled

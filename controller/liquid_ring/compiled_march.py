@@ -18,8 +18,10 @@ from ringbalance.controller.liquid_ring.compiled_events import (
     NONE,
     STALLED,
     Four,
+    beyond,
     changes,
     flow_end,
+    heading,
     holds_column,
     limit_in_the_way,
     now,
@@ -47,6 +49,8 @@ from ringbalance.scene.arrays import FloatArray
 _ROUND_OFF: Final = 1e-12
 """s, of the clock of a valve."""
 _BISECTIONS: Final = 40
+_SECANTS: Final = 12
+"""Of these, that may be guided: a smooth event takes five."""
 _REST_EVENT: Final = 0.01
 """Of the instant of an event in a step at rest, which may be long, over the error allowed to a step."""
 _NOTHING_MOVED: Final = 1e-13
@@ -203,7 +207,8 @@ def _step(
     h = take(plant, motion, left, w)
     if changes(plant, motion, _at(w, END)):
         h = _cut(plant, motion, h, w)
-    if motion.noted < count and notes[0, motion.noted] < motion.now + h:
+    moves = motion.direction != 0
+    if moves and motion.noted < count and notes[0, motion.noted] < motion.now + h:
         rates_at_end(plant, motion, w)
         while motion.noted < count and notes[0, motion.noted] < motion.now + h:
             between(plant, motion, h, (notes[0, motion.noted] - motion.now) / h, w)
@@ -226,22 +231,38 @@ def _step(
 def _cut(plant: Record, motion: Record, h: float, w: FloatArray) -> float:
     """End the step just taken at the first event. Returns: its length then, s."""
     rates_at_end(plant, motion, w)
-    low, high, near = 0.0, 1.0, plant.relative_error
-    if motion.direction == 0:
-        near *= _REST_EVENT
-    for _ in range(_BISECTIONS):
-        middle = (low + high) / 2.0
-        between(plant, motion, h, middle, w)
-        if changes(plant, motion, _at(w, BETWEEN)):
-            high = middle
-        else:
-            low = middle
-        if high - low <= near:
-            break
-    if high < 1.0:
-        h *= high
+    near = plant.relative_error * (_REST_EVENT if motion.direction == 0 else 1.0)
+    part = _event_part(plant, motion, h, near, w)
+    if part < 1.0:
+        h *= part
         shorten(plant, motion, h, w)
     return h
+
+
+@compiled
+def _event_part(plant: Record, motion: Record, h: float, near: float, w: FloatArray) -> float:
+    """Part of the step just taken after which the first event lies, at most `near` late.
+
+    By the secant through how far both ends are `beyond` it, which halves the weight of an end that stays
+    (the Illinois rule); by halves where that has no sign change or takes long.
+    """
+    low, high, what, stays = 0.0, 1.0, heading(plant, motion, _at(w, END)), 0
+    before = beyond(plant, motion, now(motion), what)
+    after = beyond(plant, motion, _at(w, END), what)
+    for step in range(_BISECTIONS):
+        guided = step < _SECANTS and before < 0.0 < after
+        middle = low + (high - low) * (before / (before - after) if guided else 0.5)
+        # Never nearer to an end than that: so a root close to it is soon between two close ends.
+        middle = min(max(middle, low + near / 2.0), high - near / 2.0)
+        between(plant, motion, h, middle, w)
+        found = beyond(plant, motion, _at(w, BETWEEN), what)
+        if changes(plant, motion, _at(w, BETWEEN)):
+            high, after, before, stays = middle, found, before * (0.5 if stays < 0 else 1.0), -1
+        else:
+            low, before, after, stays = middle, found, after * (0.5 if stays > 0 else 1.0), 1
+        if high - low <= near:
+            break
+    return high
 
 
 @compiled

@@ -111,5 +111,5 @@ MOTION: Final = np.dtype(
 """One pair of chambers; x of chamber 1 is total - x, here as everywhere, so liquid is conserved."""
 EVENTS: Final = tuple(Event)
 """Events by number."""
-WORKSPACE: Final = (14, 8)
+WORKSPACE: Final = (13, 8)
 """Shape of the array that a step of a pair works in."""

@@ -10,12 +10,16 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from ringbalance.controller.eccentric_mass.sampled_loops import recommended_gains
-from ringbalance.controller.tuning.eccentric import eccentric_tuning_document, show_eccentric_tuning
+from ringbalance.controller.tuning.eccentric import (
+    eccentric_tuning_document,
+    show_eccentric_tuning,
+    tune_eccentric,
+)
 from ringbalance.controller.tuning.tune import Tuning, tuning_document
 from ringbalance.controller.tuning.tune import tune as tune_scene
 from ringbalance.reduced_model.gas_line import line_text, line_warning
 from ringbalance.reduced_model.law_by_name import law_by_name
+from ringbalance.reduced_model.selection.registry import neglected_in_injections
 from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.loader import load_scene
@@ -46,8 +50,8 @@ def tune(
         models: "finest" models every term that has a model, whatever the tolerance.
 
     Returns:
-        Exit code: 0 a gain is recommended and settles 95 % of the runs, or the loops of eccentric masses are
-        stable; 1 otherwise; the result is printed either way.
+        Exit code: 0 what is recommended settles 95 % of the runs; 1 otherwise; the result is printed either
+        way.
 
     Raises:
         SceneError: a scene or a law that cannot be used.
@@ -65,12 +69,13 @@ def tune(
 
 
 def _eccentric_masses(scene: EccentricScene, *, json: bool) -> int:
-    gains = recommended_gains(scene)
+    with activity("tune", "runs ...") as shown:
+        found = tune_eccentric(scene, told=shown.show)
     if json:
-        print(json_format.dumps(eccentric_tuning_document(scene, gains), allow_nan=False))
+        print(json_format.dumps(eccentric_tuning_document(found), allow_nan=False))
     else:
-        show_eccentric_tuning(gains, results_console())
-    return TUNED if all(loop.stable for loop in gains.loops) else NOT_TUNED
+        show_eccentric_tuning(found, results_console())
+    return TUNED if found.succeeded else NOT_TUNED
 
 
 def _show(tuning: Tuning, console: Console) -> None:
@@ -126,6 +131,7 @@ def _rows(tuning: Tuning) -> dict[str, str]:
         )
     rows["smallest correction of the valve"] = f"{tuning.smallest_correction * _UM:.4g} um"
     rows["gas line"] = line_text(tuning.gas_line)
+    rows["neglected"] = neglected_in_injections(tuning.models_used).text
     return rows | _settling(tuning) | _tried(tuning)
 
 
@@ -138,15 +144,4 @@ def _tried(tuning: Tuning) -> dict[str, str]:
 
 
 def _settling(tuning: Tuning) -> dict[str, str]:
-    settling = tuning.settling
-    if settling is None:
-        return {}
-    times = ", ".join(
-        f"{name[1:]} % within {f'{time:.3g} s' if time is not None else 'not reached'}"
-        for name, time in settling.quantiles.items()
-    )
-    limit = tuning.scene.run.time_limit
-    return {
-        "settling time": times,
-        "settled": f"{settling.settled.value:.2%} of {settling.runs} runs within {limit:.4g} s",
-    }
+    return {} if tuning.settling is None else tuning.settling.rows(tuning.scene.run.time_limit)

@@ -1,19 +1,148 @@
-"""Tuning of eccentric masses: the sampled loops of their drives, as `recommended_gains` judges them."""
+"""Tuning of eccentric masses: the sampled loops of their drives, and the settling times with sound gains."""
 
 from __future__ import annotations
 
-from typing import Any
+import math
+import statistics
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Final
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
+from ringbalance.controller.eccentric_mass.plant.speed import steady_until
+from ringbalance.controller.eccentric_mass.run import simulate_eccentric
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun
+from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, advised, recommended_gains
+from ringbalance.controller.eccentric_mass.strategy.plan import STAGE_NAMES, Stage
+from ringbalance.controller.eccentric_mass.strategy.settings import strategy_settings
+from ringbalance.controller.eccentric_mass.uncertainty import drawn_plant
+from ringbalance.controller.tuning.settling import QUANTILES, Progress, SettlingTimes, summary
 from ringbalance.scene.eccentric_models import EccentricScene
 
+RUNS: Final = 40
+FIRST_RUNS: Final = 16
+"""Of these come first; more only where their 95 % interval leaves it open that 95 % of them settle."""
+_LONGER: Final = 2.0
+"""Times what half of the runs take: for so long all run first, and to the end where they have not settled."""
 
-def _eccentric_status(gains: RecommendedGains) -> str:
-    """Whether the scene's loops are stable and have their margin, and what to change."""
+
+@dataclass(frozen=True, kw_only=True)
+class EccentricSettling:
+    """Settling with the recommended gains, over the stated uncertainty and the sensors' noise."""
+
+    times: SettlingTimes
+    span: float
+    """s, of a run at most: until the speed changes, or the scene's time limit."""
+    outcomes: Mapping[str, int]
+    """Number of runs by how they ended."""
+    advice: str
+    """Status of one run that ended in the most frequent way without settling; empty: all settled."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EccentricTuning:
+    """What is recommended for the drives of eccentric masses."""
+
+    scene: EccentricScene
+    """As given."""
+    gains: RecommendedGains
+    tuned: Mapping[str, float]
+    """Keys that the runs had lowered or raised to the recommended value, SI."""
+    settling: EccentricSettling | None
+    """None: not asked for, or the masses are locked."""
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether 95 % of the runs settle; without runs, whether the scene's loops are stable."""
+        if self.settling is None:
+            return all(loop.stable for loop in self.gains.loops)
+        return self.settling.times.quantiles["p95"] is not None
+
+    @property
+    def status(self) -> str:
+        """Whether the loops have their margin and the runs settle, and what to change."""
+        return "; ".join(text for text in (_of_loops(self.gains), _of_runs(self.settling)) if text)
+
+
+def tune_eccentric(
+    scene: EccentricScene, *, runs: int = RUNS, told: Progress | None = None
+) -> EccentricTuning:
+    """Judge the loops of a scene's drives, and let it settle many times with what is recommended.
+
+    Args: `runs`: at the most; 0 judges the loops alone.
+    """
+    gains = recommended_gains(scene)
+    ready, changes = advised(scene, gains)
+    settling = None
+    if runs and scene.supervisor.strategy != "locked":
+        settling = eccentric_settling(ready, runs=runs, told=told or _silent)
+    return EccentricTuning(scene=scene, gains=gains, tuned=changes, settling=settling)
+
+
+def eccentric_settling(scene: EccentricScene, *, runs: int, told: Progress) -> EccentricSettling:
+    """Run a scene with its plant drawn from the stated uncertainty; the strategy keeps the scene's values.
+
+    Few runs first, and more where these leave it open that 95 % settle.
+    """
+    span = steady_until(scene) or scene.run.time_limit
+    done: list[EccentricRun] = []
+    # A mass that is balanced rests: what has settled by an early end is still so later.
+    short = span
+    for number in range(runs):
+        told(f"run {number + 1}")
+        done.append(_one_run(scene, number, spans=(short, span)))
+        short = min(_until_rest(done), span)
+        if number + 1 == min(FIRST_RUNS, runs) and _times(done).settled.high < QUANTILES["p95"]:
+            break
+    return EccentricSettling(
+        times=_times(done),
+        span=span,
+        outcomes=dict(Counter(run.outcome.value for run in done).most_common()),
+        advice=_advice(done),
+    )
+
+
+def _one_run(scene: EccentricScene, number: int, *, spans: tuple[float, float]) -> EccentricRun:
+    seed = scene.run.seed + number
+    random = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(0,)))
+    settings, plant = strategy_settings(scene), drawn_plant(scene, random)
+    for span in dict.fromkeys(spans):
+        limited = replace(plant, run=replace(plant.run, time_limit=span))
+        run = simulate_eccentric(limited, seed=seed, settings=settings)
+        if run.settled:
+            break
+    return run
+
+
+def _until_rest(done: list[EccentricRun]) -> float:
+    """Time, s, within which most runs like those that have settled will have settled as well."""
+    last = STAGE_NAMES[Stage.REST]
+    rests = [s.start for run in done if run.settled for s in run.stages if s.name == last]
+    return _LONGER * statistics.median(rests) if rests else math.inf
+
+
+def _times(done: list[EccentricRun]) -> SettlingTimes:
+    return summary([math.inf if run.settling_time is None else run.settling_time for run in done])
+
+
+def _advice(done: list[EccentricRun]) -> str:
+    failed = [run for run in done if not run.settled]
+    if not failed:
+        return ""
+    usual = Counter(run.outcome for run in failed).most_common(1)[0][0]
+    return next(run.status for run in failed if run.outcome is usual)
+
+
+def _silent(_: str) -> None:
+    """No progress wanted."""
+
+
+def _of_loops(gains: RecommendedGains) -> str:
     unstable = ", ".join(loop.name for loop in gains.loops if not loop.stable)
     high = [loop for loop in gains.loops if loop.value > loop.recommended]
     if not unstable and not high:
@@ -24,12 +153,26 @@ def _eccentric_status(gains: RecommendedGains) -> str:
     return f"{found}: {cure} the voltage for at most {gains.step:.4g} s"
 
 
-def eccentric_tuning_document(scene: EccentricScene, gains: RecommendedGains) -> dict[str, Any]:
-    """The loops of a scene's drives as a JSON document in SI."""
+def _of_runs(settling: EccentricSettling | None) -> str:
+    if settling is None:
+        return ""
+    times = settling.times
+    slow = times.quantiles["p95"]
+    if slow is not None:
+        return f"95 % of {times.runs} runs settle within {slow:.3g} s"
+    return (
+        f"{times.settled.value:.1%} of {times.runs} runs settle within {settling.span:.4g} s: 95 % is not "
+        f"reached; most of the others: {settling.advice}"
+    )
+
+
+def eccentric_tuning_document(tuning: EccentricTuning) -> dict[str, Any]:
+    """The loops of a scene's drives and the settling times as a JSON document in SI; null: not reached."""
+    scene, gains = tuning.scene, tuning.gains
     return {
         "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
         "balancer": scene.balancer,
-        "status": _eccentric_status(gains),
+        "status": tuning.status,
         "gain": {loop.key: loop.recommended for loop in gains.loops},
         "loops": [
             {
@@ -48,13 +191,29 @@ def eccentric_tuning_document(scene: EccentricScene, gains: RecommendedGains) ->
         ],
         "step_s": gains.step,
         "drive_speed_rad_per_s": gains.drive_speed,
+        "tuned": dict(tuning.tuned),
+        "drawn": [each.quantity for each in scene.uncertainty],
+        **_settling_document(tuning.settling),
     }
 
 
-def show_eccentric_tuning(gains: RecommendedGains, console: Console) -> None:
-    """Print the loops of a scene's drives."""
-    stable = all(loop.stable for loop in gains.loops)
-    console.print(Text(_eccentric_status(gains), style=f"bold {'green' if stable else 'yellow'}"))
+def _settling_document(settling: EccentricSettling | None) -> dict[str, Any]:
+    if settling is None:
+        return {}
+    times = settling.times
+    return {
+        "settling_time_s": times.quantiles,
+        "fraction_settled": times.settled.value,
+        "fraction_settled_95": [times.settled.low, times.settled.high],
+        "runs": times.runs,
+        "span_s": settling.span,
+        "outcomes": dict(settling.outcomes),
+    }
+
+
+def show_eccentric_tuning(tuning: EccentricTuning, console: Console) -> None:
+    """Print the loops of a scene's drives, and the settling times."""
+    console.print(Text(tuning.status, style=f"bold {'green' if tuning.succeeded else 'yellow'}"))
     table = Table()
     for name in (
         "loop",
@@ -66,7 +225,7 @@ def show_eccentric_tuning(gains: RecommendedGains, console: Console) -> None:
         "voltage hold, at most",
     ):
         table.add_column(name)
-    for loop in gains.loops:
+    for loop in tuning.gains.loops:
         table.add_row(
             loop.name,
             loop.key,
@@ -77,3 +236,11 @@ def show_eccentric_tuning(gains: RecommendedGains, console: Console) -> None:
             f"{loop.recommended_step:.4g} s",
         )
     console.print(table)
+    if tuning.settling is not None:
+        _show_settling(tuning, tuning.settling, console)
+
+
+def _show_settling(tuning: EccentricTuning, settling: EccentricSettling, console: Console) -> None:
+    drawn = ", ".join(each.quantity for each in tuning.scene.uncertainty) or "nothing, the scene states none"
+    for name, value in (settling.times.rows(settling.span) | {"drawn from their uncertainty": drawn}).items():
+        console.print(f"{name}: {value}")

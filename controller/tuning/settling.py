@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -43,6 +43,15 @@ class SettlingTimes:
     quantiles: dict[str, float | None]
     """s, by which that fraction of all runs has settled; None: fewer have."""
 
+    def rows(self, limit: float) -> dict[str, str]:
+        """As a person reads them; `limit` is the time that each run had, s."""
+        times = ", ".join(
+            f"{name[1:]} % within {f'{time:.3g} s' if time is not None else 'not reached'}"
+            for name, time in self.quantiles.items()
+        )
+        fraction = f"{self.settled.value:.2%} of {self.runs} runs within {limit:.4g} s"
+        return {"settling time": times, "settled": fraction}
+
 
 def settling_times(
     scene: Scene, model: BalancerModel, widths: MemberUncertainty, *, members: int, runs: int, told: Progress
@@ -77,12 +86,14 @@ def _runs(
 ) -> SettlingTimes:
     if scene.controller.kind == "target_vector":
         return _of_ensemble(scene, model, widths, members=number, told=told)
-    times = np.array([_one_run(scene, model, widths, number=i, told=told) for i in range(number)])
-    return SettlingTimes(
-        runs=number,
-        settled=binomial_share(count=int(np.isfinite(times).sum()), of=number),
-        quantiles={name: _quantile(times, q) for name, q in QUANTILES.items()},
-    )
+    return summary([_one_run(scene, model, widths, number=i, told=told) for i in range(number)])
+
+
+def summary(times: Sequence[float]) -> SettlingTimes:
+    """Of runs one by one, each with its settling time, s, or infinity; quantiles are of all of them."""
+    settled = binomial_share(count=sum(map(math.isfinite, times)), of=len(times))
+    quantiles = {name: _quantile(np.array(times), q) for name, q in QUANTILES.items()}
+    return SettlingTimes(runs=len(times), settled=settled, quantiles=quantiles)
 
 
 def _of_ensemble(
@@ -119,7 +130,8 @@ def _one_run(
         influence_coefficient=float(drawn.influence_coefficient[number] * factor),
         lag_angle=float(drawn.lag_angle[number]),
     )
-    asked = replace(scene, rotor=rotor, run=replace(scene.run, seed=scene.run.seed + number))
+    run = replace(scene.run, seed=scene.run.seed + number)
+    asked = replace(scene, rotor=rotor, gas=drawn.gas_of(scene.gas, number), run=run)
     time = simulate(asked, model).settling_time
     return math.inf if time is None else time
 

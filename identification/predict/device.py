@@ -44,6 +44,8 @@ class Models:
     tube: TubeModels
     gravity: bool
     """Whether the chamber's values hold gravity."""
+    other: Callable[[CalibratedLaw], CalibratedLaw] | None = None
+    """Makes another law of the scene's, to be compared with it."""
 
 
 def models_of(scene: Scene) -> Models:
@@ -57,11 +59,13 @@ class Device:
 
     scene: Scene
     gravity: bool
+    other: Callable[[CalibratedLaw], CalibratedLaw] | None = None
 
     @cached_property
     def law(self) -> CalibratedLaw:
         """Flow law and moments."""
-        return nominal_law(self.scene, gravity=self.gravity)
+        law = nominal_law(self.scene, gravity=self.gravity)
+        return law if self.other is None else self.other(law)
 
     @cached_property
     def _plant(self) -> npt.NDArray[np.void]:
@@ -109,9 +113,9 @@ def device_of(scene: Scene, models: Models) -> Device:
     )
     disc = replace(scene.disc, lambda_factor=None)
     tube = replace(scene.tube, models=models.tube)
-    return _device(replace(scene, rotor=rotor, disc=disc, tube=tube), models.gravity)
+    return _device(replace(scene, rotor=rotor, disc=disc, tube=tube), models.gravity, models.other)
 
 
 @lru_cache(maxsize=_KEPT)
-def _device(scene: Scene, gravity: bool) -> Device:
-    return Device(scene=scene, gravity=gravity)
+def _device(scene: Scene, gravity: bool, other: Callable[[CalibratedLaw], CalibratedLaw] | None) -> Device:
+    return Device(scene=scene, gravity=gravity, other=other)

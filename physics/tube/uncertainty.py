@@ -141,11 +141,7 @@ def _half_widths(
         "kinematic_viscosity": liquid.viscosity_uncertainty * liquid.kinematic_viscosity,
         "roughness": ASSUMED_ROUGHNESS_UNCERTAINTY * tube.roughness,
     }
-    given = {
-        name: i.half_width * (abs(nominal[name]) if i.relative else 1.0)
-        for name, i in stated.items()
-        if nominal.get(name) is not None
-    }
+    given = {name: i.absolute(nominal[name]) for name, i in stated.items() if nominal.get(name) is not None}
     return {name: width for name, width in (assumed | given).items() if width > 0}
 
 

@@ -14,7 +14,7 @@ from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_first_m
 from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
 from ringbalance.physics.tube.uncertainty import ASSUMED_ROUGHNESS_UNCERTAINTY
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import InputUncertainty, Scene
+from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import nominal_value, with_value
 
 CHAMBER_INPUTS: Final = (
@@ -55,17 +55,10 @@ def half_widths(scene: Scene) -> Mapping[str, float]:
         "kinematic_viscosity": liquid.viscosity_uncertainty * liquid.kinematic_viscosity,
     }
     for stated in scene.uncertainty:
-        width = _absolute(scene, stated)
-        if width is not None:
-            found[stated.quantity] = width
+        value = nominal_value(scene=scene, quantity=stated.quantity)
+        if value is not None:
+            found[stated.quantity] = stated.absolute(value)
     return {name: width for name, width in found.items() if width > 0}
-
-
-def _absolute(scene: Scene, stated: InputUncertainty) -> float | None:
-    value = nominal_value(scene=scene, quantity=stated.quantity)
-    if value is None:
-        return None
-    return stated.half_width * (abs(value) if stated.relative else 1.0)
 
 
 def input_effects(*, scene: Scene, fill_ratio: FloatArray) -> Mapping[str, InputEffect]:

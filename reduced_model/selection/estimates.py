@@ -128,7 +128,7 @@ def term_estimates(scene: Scene) -> Mapping[str, TermEstimate]:
     return MappingProxyType({**_steady(steady(scene)), **injection_estimates(scene)})
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=32)
 def _steady(scene: Scene) -> Mapping[str, TermEstimate]:
     return {**_chamber(scene), **_tube(scene)}
 

@@ -13,6 +13,7 @@ from ringbalance.reduced_model.law.building import tube_path
 from ringbalance.reduced_model.selection.loss_models import CORRELATIONS, ROTATING, velocity_under_head
 from ringbalance.reduced_model.tube.regime import TubeEnds, can_flow, column_flow
 from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.scene.loop_models import Sensor
 from ringbalance.scene.models import Scene
 from ringbalance.scene.tube_models import FINEST_MODELS
 
@@ -31,8 +32,21 @@ def steady(scene: Scene) -> Scene:
     return replace(
         scene,
         tube=replace(scene.tube, models=FINEST_MODELS),
-        rotor=replace(scene.rotor, influence_coefficient=1.0, lag_angle=0.0),
-        controller=replace(scene.controller, proportional=1.0),
+        rotor=replace(
+            scene.rotor, influence_coefficient=1.0, lag_angle=0.0, initial_amplitude=1.0, initial_phase=0.0
+        ),
+        sensor=Sensor(amplitude_noise=0.0, phase_noise=0.0),
+        controller=replace(
+            scene.controller,
+            kind="target_vector",
+            limit=1.0,
+            period=1.0,
+            hold_time=1.0,
+            proportional=1.0,
+            first_trial=1.0,
+            long_step=1.0,
+            short_step=1.0,
+        ),
         run=replace(scene.run, seed=0, time_limit=1.0),
     )
 

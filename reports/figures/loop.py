@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -13,6 +14,10 @@ from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import shown
 from ringbalance.reports.section import Record
 
+_SAME: Final = 1e-3
+"""Relative change of the amplitude that counts as none."""
+_CROPPED: Final = 0.7
+"""Fraction of a run up to which its rest is cut off, when nothing moves there."""
 _MARKED: Final = 20
 """Samples that are marked."""
 _LAWS: Final[dict[str, dict[str, Any]]] = {
@@ -45,9 +50,13 @@ def amplitude(runs: Record, limit: float) -> Drawing:
         time = np.asarray(run["samples"]["time_s"])
         return time, np.interp(time, run["time_s"], run["amplitude_m"]), {**line, **marks}
 
+    until, end = still_from(list(runs.values()))
+
     def paint(axes: Axes) -> None:
         style.amplitudes(axes, [curve(runs[name], line) for name, line in laws.items()], limit)
+        axes.set_xlim(0, until)
 
+    rests = "" if until == end else f" Nothing moves from there to {shown(end, 's', digits=3)}."
     ends = ", ".join(
         f"{shown(runs[name]['amplitude_m'][-1], 'm', digits=2)} under {line['label']}"
         for name, line in laws.items()
@@ -59,8 +68,21 @@ def amplitude(runs: Record, limit: float) -> Drawing:
         wide=True,
         height=3.5,
         alt=f"Vibration amplitude against time on a logarithmic scale; it ends at {ends}.",
-        caption=f"Vibration amplitude at each sample of the controller, under both laws. It ends at {ends}.",
+        caption="Vibration amplitude at each sample of the controller, under both laws. It ends at "
+        f"{ends}.{rests}",
     )
+
+
+def still_from(runs: Sequence[Record]) -> tuple[float, float]:
+    """Time from which no amplitude changes, with some room before it, and the end of the runs; both in s."""
+    end = max(float(run["time_s"][-1]) for run in runs)
+    last = 0.0
+    for run in runs:
+        time, values = np.asarray(run["time_s"]), np.asarray(run["amplitude_m"])
+        moving = np.flatnonzero(np.abs(values - values[-1]) > _SAME * values[-1])
+        last = max(last, float(time[moving[-1]]) if moving.size else 0.0)
+    room = 1.5 * last
+    return (room, end) if 0 < room < _CROPPED * end else (end, end)
 
 
 def early_amplitude(runs: Record, limit: float) -> Drawing:

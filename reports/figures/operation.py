@@ -79,7 +79,7 @@ def operating_map(found: Record) -> Drawing:
         columns=2,
         wide=True,
         height=3.6,
-        alt=f"Map of the tube’s regimes over fill and gas pressure; the operating point is {there}.",
+        alt=f"Map of the tube’s regimes over fill and gas pressure; at the operating point: {there}.",
         caption=f"Regime of the tube as the gas valve opens, the opposite chamber holding the rest of the "
         f"pair’s liquid. At the operating point: {there}. Working range: fills of {low} to {high} at "
         f"{given(point['gas_pressure_Pa'], 'Pa')}; outside it gas enters a port.",
@@ -328,11 +328,10 @@ def _requirement_bar(axes: Axes, place: int, row: Record, end: float) -> None:
         axes.plot([low, min(high, end)], [place, place], color=style.INK, linewidth=1.2)
         caps = [each for each in (low, high) if each < end]
         axes.plot(caps, [place] * len(caps), "|", color=style.INK, markersize=6)
-    axes.plot([1, 1], [place - 0.3, place + 0.3], color=style.INK, linewidth=1.8)
+    axes.plot([1, 1], [place - 0.24, place + 0.24], color=style.INK, linewidth=1.8)
     if high > end:
-        beyond = f"{'' if ratio > end else 'up to '}{number(max(ratio, high), digits=2)} \u25b8"
-        axes.text(0.995 * end, place - 0.32, beyond, ha="right", va="bottom", color=style.INK)
+        start = "up to " if ratio <= end else ("" if high <= ratio else f"{number(ratio, digits=2)} to ")
+        beyond = f"{start}{number(max(ratio, high), digits=2)} \u25b8"
+        axes.text(0.995 * end, place - 0.28, beyond, ha="right", va="bottom", color=style.INK)
     sense = "at least" if row["at_least"] else "at most"
-    axes.text(
-        0.0, place - 0.32, f"{row['label']} ({sense} 1): {row['verdict']}", va="bottom", color=style.INK
-    )
+    axes.text(0.0, place - 0.28, f"{row['label']} ({sense}): {row['verdict']}", va="bottom", color=style.INK)

@@ -18,25 +18,24 @@ from ringbalance.reports.numbers import (
     shown,
     with_unit,
 )
-from ringbalance.reports.pages.requirements import input_name
+from ringbalance.reports.origins import input_name
 from ringbalance.reports.section import Record, Table
 from ringbalance.reports.tables import FOLDER, is_long, table_file
 from ringbalance.reports.traces import traced
-from ringbalance.verification.catalogue import load_cases
 
 _NOTHING: Final = 1e-3
 """Fraction of a range below which one of its ends is zero."""
 _FACTS: Final = (
     ("explanation", "Finding"),
     ("judgement", "Why this verdict"),
-    ("consequence", "Consequence"),
-    ("cause", "Common cause"),
     ("protects", "Protects"),
     ("assumes", "Assumes"),
     ("does_not_cover", "Does not cover"),
 )
 _LOPSIDED: Final = 1.2
 """Ratio of the two sides of an interval from which on both ends are shown."""
+_FINE: Final = 0.01
+"""Half-width over error below which two digits of the error say enough."""
 _NAMED_INPUTS: Final = 2
 _RELATIVE_METRICS: Final = ("relative", "validation", "within_uncertainty")
 
@@ -44,12 +43,6 @@ _RELATIVE_METRICS: Final = ("relative", "validation", "within_uncertainty")
 def anchor(case: Record) -> str:
     """Place of a case on the page."""
     return f"case-{str(case['id']).replace('_', '-')}"
-
-
-def typeset_equations() -> None:
-    """Set the equations of every case once, which takes seconds, before a page asks for them."""
-    for definition in load_cases():
-        _equations({"id": definition.id, "equations": definition.equations})
 
 
 def _sentence(value: Any) -> str:
@@ -61,7 +54,9 @@ def _facts(case: Record) -> list[tuple[str, str]]:
     reference = case.get("reference") or {}
     told = [str(reference[key]) for key in ("kind", "source", "uncertainty") if reference.get(key)]
     rests = [("Rests on", "; ".join(map(_assumption, found)))] if (found := case.get("rests_on")) else []
-    return [*pairs, *rests, *([("Reference", "; ".join(told))] if told else []), ("Run", _how_run(case))]
+    rows = [*pairs, *rests, ("Reference", "; ".join(told)), ("Must be noticed", "; ".join(_mutations(case)))]
+    doubts = ("Doubts", " ".join(case.get("doubts") or []))
+    return [(label, text) for label, text in (*rows, doubts, ("Run", _how_run(case))) if text]
 
 
 def _assumption(one: Record) -> str:
@@ -111,7 +106,7 @@ def _quantity_row(quantity: Record, path: str) -> Record:
             "reference",
             shown(quantity.get("reference"), unit, quantity.get("reference_uncertainty"), digits=4),
         ),
-        "error": marked("error", shown(quantity.get("error"), unit, quantity.get("uncertainty"), digits=2)),
+        "error": marked("error", _error(quantity, unit)),
         "parts": [
             shown((quantity.get("validation") or {}).get(part), unit, digits=2)
             for part in ("u_num", "u_input", "u_D")
@@ -119,6 +114,13 @@ def _quantity_row(quantity: Record, path: str) -> Record:
         "limit": _criterion(quantity),
         "verdict": quantity.get("verdict") or "not run",
     }
+
+
+def _error(quantity: Record, unit: str) -> str:
+    """To the second digit of its half-width, or to two digits of its own where those are fewer."""
+    error, width = quantity.get("error"), quantity.get("uncertainty")
+    fine = error and width and width < _FINE * abs(error)
+    return shown(error, unit, None if fine else width, digits=2)
 
 
 def _value(quantity: Record, half_width: float | None) -> str:
@@ -226,11 +228,12 @@ def _in_brief(case: Record) -> Record:
 
 
 def _brief_value(quantity: Record) -> str:
-    """A found number without its half-width: two digits where that leaves none standing."""
-    value, own = quantity.get("value"), quantity.get("value_uncertainty")
-    if value and own and own > abs(value) / 2:
+    """A found number with the digits that the comparison leaves standing, at least two."""
+    value = quantity.get("value")
+    width = max(quantity.get("value_uncertainty") or 0.0, quantity.get("uncertainty") or 0.0)
+    if value and width > abs(value) / 2:
         return given(value, quantity.get("unit") or "1", digits=2)
-    return _without_half_width(_value(quantity, own))
+    return _without_half_width(_value(quantity, width or None))
 
 
 def _width(quantity: Record) -> str:
@@ -299,6 +302,4 @@ def case_view(case: Record) -> Record:
             for table in case.get("tables") or []
             if is_long(table)
         ],
-        "mutations": _mutations(case),
-        "doubts": case.get("doubts") or [],
     }

@@ -8,14 +8,14 @@ from typing import Final
 from ringbalance.reports.figures.operation import tornado
 from ringbalance.reports.figures.style import Drawing
 from ringbalance.reports.numbers import MISSING, display_unit, fixed, given, number, percent, shown
-from ringbalance.reports.pages.requirements import named_with_origin
+from ringbalance.reports.origins import named_with_origin
 from ringbalance.reports.section import Cells, Record, Section, Table
 from ringbalance.reports.traces import read, traced
 from ringbalance.verification.standing import budget_standing
 
 _NAMES: Final = {
     "lambda": "Lever arm λ, moment per transferred mass",
-    "drag_coefficient": "Drag coefficient k",
+    "drag_coefficient": "Loss coefficient k of the tube",
     "velocity": "Velocity in the tube at equal fills",
     "wall_pressure": "Wall pressure at the largest fill",
     "moment": "Moment of one chamber at the largest fill",
@@ -24,6 +24,8 @@ _NAMES: Final = {
     "crest_pressure": "Pressure over the siphon crest as the tube runs, gauge",
     "cavitation_margin": "Cavitation margin of a tube that ran full; below zero the column separates",
 }
+_EXACT: Final = 1e-6
+"""Relative total below which a number is a closed form of inputs that are taken as exact."""
 _DRAWN: Final = {"velocity": "Velocity", "usable_moment": "Usable moment", "lambda": "Lever arm λ"}
 _REGIMES: Final = {
     "blocked": "is blocked",
@@ -78,12 +80,16 @@ def _tornado(evidence: Record) -> Drawing | None:
 
 def _row(evidence: Record, name: str) -> Cells:
     path, budget = f"calibration.budgets.{name}", evidence["calibration"]["budgets"][name]
-    unit = display_unit(budget["unit"], budget["value"])
+    unit = display_unit(budget["unit"], budget["value"], budget["total"])
     parts = [
         _part(budget[part] * unit.factor, budget["total"] * unit.factor, f"{path}.{part}")
         for part in ("numerical", "input", "model")
     ]
-    value = traced(shown(budget["value"], budget["unit"], budget["total"]), f"{path}.value")
+    exact = budget["total"] < _EXACT * abs(budget["value"])
+    parts = [MISSING] * len(parts) if exact else parts
+    value = traced(
+        shown(budget["value"], budget["unit"], None if exact else budget["total"], digits=6), f"{path}.value"
+    )
     behind = budget_standing(evidence["verification"], name)
     return _NAMES[name], value, *parts, _largest(evidence, budget), behind, _paper(evidence, name)
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from ringbalance.reports import summary
-from ringbalance.reports.pages.requirements import input_name
+from ringbalance.reports.origins import input_name
 from ringbalance.reports.section import Cells, Record, Section, Table
 from ringbalance.verification.standing import HEADS, standing_rows
 
@@ -64,7 +64,7 @@ def _credibility(evidence: Record) -> Table:
         "the program’s authors and not reviewed by others.",
         heads=("Factor", "Level", "Evidence"),
         rows=[*_development(evidence), *_use(evidence)],
-        style="",
+        style="whole",
     )
 
 

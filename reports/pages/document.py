@@ -28,7 +28,7 @@ _LIQUID_RING: Final = (
     ("x", "1", "fill ratio"),
     ("α", "m/(kg m)", "influence coefficient"),
     ("θ", "rad", "central angle"),
-    ("λ", "m", "lambda"),
+    ("λ", "m", "lever arm"),
 )
 _ECCENTRIC_MASS: Final = (
     ("b", "kg m", "moment of a mass"),
@@ -88,7 +88,7 @@ def _view(_own: Record, evidence: Record) -> Record:
             caption="Sign-off; empty until filled in by hand.",
             heads=("Role", "Name", "Date", "Signature"),
             rows=[(role, "", "", "") for role in ("Prepared", "Checked", "Approved")],
-            style="",
+            style="whole",
         ),
         "nomenclature": NOMENCLATURE[balancer],
         "definitions": _DEFINITIONS[balancer],
@@ -106,6 +106,7 @@ def _facts(evidence: Record) -> tuple[tuple[str, str], ...]:
         ("Command", made.get("command") or "not recorded"),
         ("Date and machine", f"{evidence['times']['date']}; {made.get('machine') or 'not recorded'}"),
         ("Scene file", f"{scene['file']}, SHA-256 {scene['sha256']}"),
+        ("Scene values", f"SHA-256 {scene['values_sha256']}; kept evidence names its scene by these"),
         ("Lock file", f"SHA-256 {made['lock_sha256']}" if made.get("lock_sha256") else "not there"),
         ("evidence.json", f"SHA-256 {_evidence_hash(evidence)}"),
         ("Kept evidence", _kept(evidence)),
@@ -127,7 +128,7 @@ def _evidence_hash(evidence: Record) -> str:
 def _kept(evidence: Record) -> str:
     """Heavy cases that were not run for this report, with the date and the scene of the run that is shown."""
     kept = [case for case in evidence["verification"] if case.get("date")]
-    told = [f"{c['id']} of {c['date']}, scene {str(c.get('scene_sha256', ''))[:_KEPT]}" for c in kept]
+    told = [f"{c['id']} of {c['date']}, values {str(c.get('scene_sha256', ''))[:_KEPT]}" for c in kept]
     return "; ".join(told) or "none: every case shown was run for this report, or not at all"
 
 

@@ -20,14 +20,30 @@ from ringbalance.reports.figures.eccentric import (
     sampled_poles,
 )
 from ringbalance.reports.figures.operation import requirement_bars
-from ringbalance.reports.numbers import MISSING, display_unit, given, number, percent, shown, with_unit
+from ringbalance.reports.numbers import (
+    MISSING,
+    THIN_SPACE,
+    display_unit,
+    given,
+    number,
+    percent,
+    shown,
+    with_unit,
+)
+from ringbalance.reports.origins import input_name
 from ringbalance.reports.pages import credibility, document
 from ringbalance.reports.pages.cases import case_view
-from ringbalance.reports.pages.requirements import OPEN, input_name
 from ringbalance.reports.section import Cells, Record, Section, Table
+from ringbalance.reports.summary import OPEN
+from ringbalance.reports.traces import traced
 
 BALANCER: Final = "eccentric_mass"
 _MODEL: Final = "Plant and filters are models; no measurement of this machine is compared with here."
+_USE: Final = (
+    "Use: for choosing masses, drives and filters before they are built, and for planning measurements. Not "
+    "as proof of safety, not in place of a balancing test to ISO 21940-11, and for a vertical shaft only: "
+    "gravity along the track is left out."
+)
 _STATED: Final = (
     "Intervals (95 %) follow from the uncertainties that the scene states and from the sensors’ noise: each "
     "input was moved to both ends of its own, and the controller kept as configured. What the models leave "
@@ -49,7 +65,10 @@ def _parts(*parts: tuple[str, Any]) -> Record:
 def _summary(_own: Record, evidence: Record) -> Record:
     run, locked, rows = evidence["closed_loop"]["balanced"], evidence["locked"], evidence["requirements"]
     ratio = percent(run["residual_ratio"])
-    worst = [shown(each["worst_amplitude_m"], "m", digits=3) for each in (run, locked)]
+    worst = [
+        traced(shown(each["worst_amplitude_m"], "m", digits=3), f"{path}.worst_amplitude_m")
+        for each, path in ((run, "closed_loop.balanced"), (locked, "locked"))
+    ]
     stated = any(row["achieved_interval"] for row in rows)
     return _parts(
         ("lead", _decision(rows)),
@@ -62,6 +81,7 @@ def _summary(_own: Record, evidence: Record) -> Record:
         *(("alert", f"{text[0].upper()}{text[1:].rstrip('.')}.") for text in run["warnings"]),
         ("table", _requirements(rows)),
         ("items", _actions(rows)),
+        ("text", _USE),
         ("figure", requirement_bars(map(_bar, rows))),
         ("items", [_MODEL, _STATED if stated else _UNSTATED, _origins(evidence["scene"]["table"])]),
     )
@@ -72,7 +92,8 @@ def _decision(rows: list[Record]) -> str:
     named = {v: [row["quantity"] for row in rows if row["verdict"] == v] for v in ("not met", OPEN)}
     met = len(rows) - sum(map(len, named.values()))
     parts = [f"{verdict}: {', '.join(names)}" for verdict, names in named.items() if names]
-    return f"{'; '.join([f'{met} of {len(rows)} requirements are met', *parts])}."
+    are = "is" if met == 1 else "are"
+    return f"{'; '.join([f'{met} of {len(rows)} requirements {are} met', *parts])}."
 
 
 def _actions(rows: list[Record]) -> list[str]:
@@ -82,7 +103,7 @@ def _actions(rows: list[Record]) -> list[str]:
         if row["verdict"] == OPEN and (causes := _causes(row)):
             found.setdefault(", ".join(sorted(causes)), []).append(row["quantity"])
     return [
-        f"Determine more closely: {causes}. Whether these requirements are met depends on it: "
+        f"Determine more closely: {causes}. That decides whether these requirements are met: "
         f"{', '.join(names)}."
         for causes, names in found.items()
     ]
@@ -121,14 +142,16 @@ def _bar(row: Record) -> Record:
 
 
 def _requirements(requirements: list[Record]) -> Table:
-    def cells(row: Record) -> Cells:
+    def cells(place: int, row: Record) -> Cells:
+        path = f"requirements.{place}"
         unit, reached, interval = row["unit"] or "1", row["achieved"], row["achieved_interval"]
         needed = _span(row["required_interval"], unit)
         return (
             f"{row['quantity'][0].upper()}{row['quantity'][1:]}",
-            f"{row['sense']} {given(row['required'], unit, digits=3)}{f' ({needed})' if needed else ''}",
+            f"{row['sense']} {traced(given(row['required'], unit, digits=3), f'{path}.required')}"
+            f"{f' ({needed})' if needed else ''}",
             row["set_by"],
-            "not reached" if reached is None else shown(reached, unit, digits=3),
+            "not reached" if reached is None else traced(shown(reached, unit, digits=3), f"{path}.achieved"),
             "not always reached" if row["lost"] else _span(interval, unit) or MISSING,
             row["verdict"],
             ", ".join(_causes(row)),
@@ -137,9 +160,10 @@ def _requirements(requirements: list[Record]) -> Table:
     return Table(
         caption="Requirements: what sets each, what this run and these loops come to, with its 95 % "
         "interval, and the inputs on which it depends most. Where only part of the interval meets a "
-        "requirement, the verdict cannot be told.",
+        "requirement, the verdict cannot be told. A settling time counts where the vibration stays within "
+        "the limit to the end of the run, any run-up included.",
         heads=("Quantity", "Required", "Set by", "Reached", "Interval", "Verdict", "Depends on"),
-        rows=[cells(row) for row in requirements],
+        rows=[cells(place, row) for place, row in enumerate(requirements)],
         style="words",
     )
 
@@ -166,15 +190,16 @@ def _run(_own: Record, evidence: Record) -> Record:
 
 
 def _stages(run: Record) -> Table:
-    def cells(stage: Record) -> Cells:
+    def cells(place: int, stage: Record) -> Cells:
+        path = f"closed_loop.balanced.stages.{place}"
         amplitude = float(np.interp(stage["end_s"], run["time_s"], run["amplitude_m"]))
-        times = (shown(stage[key], "s", digits=4) for key in ("start_s", "end_s"))
+        times = (traced(shown(stage[k], "s", digits=4), f"{path}.{k}") for k in ("start_s", "end_s"))
         return stage["name"].replace("_", " "), *times, shown(amplitude, "m", digits=3)
 
     return Table(
         caption="Stages of the strategy.",
         heads=("Stage", "From", "To", "Amplitude at its end"),
-        rows=[cells(stage) for stage in run["stages"]],
+        rows=[cells(place, stage) for place, stage in enumerate(run["stages"])],
     )
 
 
@@ -232,9 +257,20 @@ def _estimate_table(estimates: Record, truth: Record) -> Table:
 def _loops(_own: Record, evidence: Record) -> Record:
     tuning = evidence["tuning"]
     return _parts(
-        ("text", f"{tuning['status'][0].upper()}{tuning['status'][1:]}."),
+        ("text", f"{tuning['status'][0].upper()}{tuning['status'][1:]}.{_drawn(tuning)}"),
         ("table", _loop_table(tuning["loops"])),
         ("pair", [sampled_poles(tuning["loops"]), mass_angles(evidence["closed_loop"]["balanced"])]),
+    )
+
+
+def _drawn(tuning: Record) -> str:
+    """What the runs with drawn inputs are judged by; empty without any."""
+    if not tuning.get("runs"):
+        return ""
+    return (
+        f" These runs, with inputs drawn from their uncertainty, are judged over their first "
+        f"{shown(tuning['span_s'], 's', digits=3)}, before the speed changes: what a run-up does afterwards "
+        "is in the requirements."
     )
 
 
@@ -256,14 +292,20 @@ def _loop_table(loops: list[Record]) -> Table:
                 loop["name"],
                 loop["key"],
                 *(
-                    f"{number(loop[key], digits=3)} {loop['unit']}".rstrip()
-                    for key in ("value", "recommended")
+                    traced(
+                        with_unit(number(loop[key], digits=digits), unit.replace("*", THIN_SPACE)),
+                        f"tuning.loops.{place}.{key}",
+                    )
+                    for key, digits, unit in (
+                        ("value", 3, loop["unit"]),
+                        ("recommended", 3, loop["unit"]),
+                        ("radius", 4, ""),
+                        ("gain_margin", 3, ""),
+                    )
                 ),
-                number(loop["radius"], digits=4),
-                number(loop["gain_margin"], digits=3),
                 f"at most {shown(loop['recommended_step_s'], 's', digits=2)}",
             )
-            for loop in loops
+            for place, loop in enumerate(loops)
         ],
         style="dense",
     )
@@ -290,7 +332,7 @@ def _scene(_own: Record, evidence: Record) -> Record:
 
 
 SECTIONS: Final = (
-    Section(name="summary", title="In short", place="report", show=_summary, in_parts=True),
+    Section(name="summary", title="Decision", place="report", show=_summary, in_parts=True),
     Section(name="run", title="Run-up and stages", place="report", show=_run, in_parts=True),
     Section(name="estimates", title="Estimates", place="report", show=_estimates, in_parts=True),
     Section(

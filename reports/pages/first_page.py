@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from ringbalance.controller.loop import simulate
@@ -10,18 +10,19 @@ from ringbalance.controller.tuning.tune import tuning_document
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.chamber.inputs import half_widths
 from ringbalance.reports.numbers import THIN_SPACE, given, number, percent, shown
+from ringbalance.reports.origins import named_with_origin
 from ringbalance.reports.pages.requirements import (
-    MISSED,
-    OPEN,
+    STANDING,
     Requirement,
     decision,
-    named_with_origin,
     requirement_figure,
     requirement_record,
     requirement_table,
     requirements,
 )
+from ringbalance.reports.prose import key_words
 from ringbalance.reports.section import Record, Section, Work
+from ringbalance.reports.summary import MISSED, OPEN
 from ringbalance.reports.traces import traced
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.verification.assumptions import assumptions_of
@@ -36,9 +37,12 @@ _VALVE: Final = {
     OPEN: "Choose the valve before anything else is built, and put its conductance, critical ratio and lag "
     "into the scene: only a fast one can reach the limit.",
     MISSED: "Find a valve and gas line whose smallest correction is within the limit, or raise the limit: "
-    "with a valve as assumed the last corrections are larger than the limit, whatever the gain.",
+    "with {valve} the last corrections are larger than the limit, whatever the gain.",
 }
 """What to do about a valve that may not, or cannot, reach the limit."""
+_LIKELY: Final = 0.95
+"""Fraction of runs that must settle before a gain is recommended for use."""
+_ROTOR: Final = ("rotor.influence_coefficient", "rotor.lag_angle", "rotor.initial_amplitude")
 _DOMINANT: Final = 3
 _MAIN: Final = {
     "velocity": "flow velocity",
@@ -130,7 +134,7 @@ def _view(found: Record, evidence: Record) -> Record:
         "actions": _actions(evidence, rows),
         "dominant": dominant(evidence),
         "unmeasured": _NO_MEASUREMENT,
-        "rests": _bore(found, evidence),
+        "rests": [*_bore(found, evidence), *_exact(evidence), *_borrowed(evidence)],
     }
 
 
@@ -153,6 +157,8 @@ def loop_sentences(evidence: Record) -> list[str]:
     if tuned is not None:
         gain, own = (shown(r, "s/m", digits=2) for r in _gains(evidence, tuned))
         told.append(f"Recommended gain: {gain} (the scene has {own}). With it this run {_ending(tuned)}.")
+        change = ((evidence.get("summary") or {}).get("tuning") or {}).get("change")
+        told += [f"Recommended beside it, but not part of this run: {change}."] if change else []
     paper = evidence["closed_loop"].get("paper")
     if paper is not None:
         told.append(f"Under the paper’s law, with the scene’s gain, it {_ending(paper)}.")
@@ -187,7 +193,8 @@ def _factor(run: Record) -> str:
         for key in ("loop_factor", "loop_factor_limit")
     )
     if factor > run["loop_factor_limit"]:
-        end = f"more than {limit} times, so that it grows"
+        chance = "; that this run settles is chance" if run["settled"] else ""
+        end = f"more than {limit} times, so that it grows{chance}"
     elif factor > 1:
         end = (
             f"so that {percent(factor - 1)} of it is left on the opposite side; "
@@ -253,26 +260,63 @@ def _chamber(evidence: Record) -> list[str]:
 
 def _actions(evidence: Record, rows: Sequence[Requirement]) -> list[str]:
     """What to do next, the most urgent first."""
-    told, tuned = [], retuned(evidence)
     verdicts = {row.name.split(" with ")[0]: row.verdict for row in reversed(rows)}
-    if tuned is not None and verdicts.get("Loop factor") == MISSED:
-        told.append(f"Set the proportional gain to {shown(tuned['proportional_s_per_m'], 's/m', digits=2)}.")
-    if valve := _VALVE.get(verdicts.get("Smallest correction that the valve can give", "")):
-        told.append(valve)
+    told = _valve_and_gain(evidence, verdicts)
+    change = ((evidence.get("summary") or {}).get("tuning") or {}).get("change")
+    if verdicts.get(STANDING) in {MISSED, OPEN} and not change:
+        told.append(
+            "With the valve in the scene, run tune: it recommends the times to add to the valve-open times, "
+            "without which small corrections only fill gas."
+        )
     if verdicts.get("Correction capacity of one pair") in {MISSED, OPEN}:
         told.append("Balance the rotor better by hand, or take a larger disc: the capacity has no reserve.")
     if any("siphon crest radius" in row.rests for row in rows):
-        crest = (evidence.get("summary") or {}).get("crest")
-        most = shown(crest["priming_pressure_Pa"][-1], "Pa", digits=2) if crest else ""
-        told.append(
-            "Measure the radius of the siphon crest: it sets the gas pressure that starts the flow"
-            f"{f'; {most} would do wherever it may lie' if most else ''}."
-        )
+        told.append(_crest(evidence))
     if any("bore" in row.rests for row in rows):
         told.append(
             "Measure the flow through the tube at three gas pressures; every velocity and gain rests on the "
             "bore."
         )
+    return told
+
+
+def _crest(evidence: Record) -> str:
+    if evidence["operating_point"].get("priming_pressure_vented_Pa") is None:
+        return (
+            "Find out whether the tube passes over a siphon crest, and at which radius: this scene has none, "
+            "and with one the flow needs more gas pressure to start."
+        )
+    crest = (evidence.get("summary") or {}).get("crest")
+    most = shown(crest["priming_pressure_Pa"][-1], "Pa", digits=2) if crest else ""
+    return (
+        "Measure the radius of the siphon crest: it sets the gas pressure that starts the flow"
+        f"{f'; {most} would do wherever it may lie' if most else ''}."
+    )
+
+
+def _valve_and_gain(evidence: Record, verdicts: Mapping[str, str]) -> list[str]:
+    """The valve first: a gain holds for the valve that it was found with, and only where runs settle."""
+    line = evidence["calibration"].get("gas_line") or {"given": True}
+    valve = _VALVE.get(verdicts.get("Smallest correction that the valve can give", ""))
+    valve_named = "the scene’s valve" if line["given"] else "any valve of the default range"
+    told = [valve.format(valve=valve_named)] if valve else []
+    tuned, tuning = retuned(evidence), (evidence.get("summary") or {}).get("tuning") or {}
+    if tuned is None:
+        return told
+    gain = shown(tuned["proportional_s_per_m"], "s/m", digits=2)
+    if tuning.get("fraction_settled") is not None and tuning["fraction_settled"] < _LIKELY:
+        reached = tuning.get("reachable_limit_m")
+        lowest = f"; a limit of {shown(reached, 'm', digits=2)} is reached" if reached else ""
+        return [
+            *told,
+            f"Do not expect a gain to make this loop settle: none that was tried does{lowest}. The run with "
+            f"the scene’s gain: {evidence['closed_loop']['calibrated']['status'].rstrip('.')}.",
+        ]
+    change = tuning.get("change")
+    if verdicts.get("Loop factor") == MISSED or change:
+        later = " for a valve that acts at once, and tune again for the valve chosen"
+        beside = f", and {change}" if change else ""
+        told.append(f"Set the proportional gain to {gain}{'' if line['given'] else later}{beside}.")
     return told
 
 
@@ -296,6 +340,30 @@ def dominant(evidence: Record) -> list[str]:
 def _cause(evidence: Record, cause: str, effect: float, name: str) -> str:
     label = named_with_origin(evidence, cause)
     return f"{label[0].upper()}{label[1:]}: ±{THIN_SPACE}{percent(effect)} of the {_MAIN[name]}"
+
+
+def _exact(evidence: Record) -> list[str]:
+    """That results hold for exactly the scene's values, where it states no uncertainty."""
+    rows = evidence["scene"].get("table") or []
+    if any(row.get("uncertainty") for row in rows if row.get("origin") != "default"):
+        return []
+    return [
+        "The scene states no uncertainty of its inputs: every ± holds for exactly its values, and tolerances "
+        "of the parts are likely to matter more. [uncertainty] in the scene file states them."
+    ]
+
+
+def _borrowed(evidence: Record) -> list[str]:
+    """Values of the paper's rotor that stand in for those of the user's."""
+    origins = evidence["scene"].get("origins") or {}
+    rows = {row.get("path"): row.get("origin") for row in evidence["scene"].get("table") or []}
+    names = [key_words(p) for p in _ROTOR if "default" in (rows.get(p), origins.get(p))]
+    if not names:
+        return []
+    return [
+        f"Not in the scene, so those of the paper’s rotor: {', '.join(names)}. Capacity needed, gain and "
+        "settling time hold for that rotor only."
+    ]
 
 
 def _bore(found: Record, evidence: Record) -> list[str]:

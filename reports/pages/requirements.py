@@ -11,17 +11,14 @@ from ringbalance.controller.tuning.loop_factor import STAYING_DEVIATIONS
 from ringbalance.reports.figures.operation import requirement_bars
 from ringbalance.reports.figures.style import Drawing
 from ringbalance.reports.numbers import given, number, percent, shown
-from ringbalance.reports.prose import key_words
+from ringbalance.reports.origins import resting
 from ringbalance.reports.section import Record, Table
+from ringbalance.reports.summary import MET, MISSED, OPEN, UNASKED, above, below, worst
 from ringbalance.reports.traces import evidence_at, read, traced, untraced
 from ringbalance.scene import Scene
 
-MET: Final = "met"
-MISSED: Final = "not met"
-OPEN: Final = "cannot be told"
-UNASKED: Final = "none stated"
+STANDING: Final = "Vibration up to which the scene’s valve-open times only fill gas"
 _NONE: Final = "the scene asks for none"
-_CERTAIN: Final = ("given", "measured")
 _LIKELY: Final = 0.95
 """Fraction of runs that must settle in time, the confidence of every interval in the report."""
 
@@ -112,32 +109,11 @@ def requirement_figure(rows: Iterable[Requirement]) -> Drawing | None:
 def decision(rows: Iterable[Requirement]) -> str:
     """One sentence: how many requirements are met, and which are not."""
     judged = [row for row in rows if row.verdict in {MET, MISSED, OPEN}]
-    named = {v: [r.name.lower() for r in judged if r.verdict == v] for v in (MISSED, OPEN)}
-    said = f"{len(judged) - sum(map(len, named.values()))} of {len(judged)} requirements are met"
+    named = {v: [r.name[0].lower() + r.name[1:] for r in judged if r.verdict == v] for v in (MISSED, OPEN)}
+    met = len(judged) - sum(map(len, named.values()))
+    said = f"{met} of {len(judged)} requirements {'is' if met == 1 else 'are'} met"
     parts = [f"{verdict}: {', '.join(names)}" for verdict, names in named.items() if names]
     return "; ".join([said, *parts]) + "."
-
-
-def resting(evidence: Record, *paths: str) -> str:
-    """The inputs among some that are neither given nor measured, with their origin."""
-    origins = evidence["scene"].get("origins") or {}
-    by_origin: dict[str, list[str]] = {}
-    for path in paths:
-        if (origin := origins.get(path, "given")) not in _CERTAIN:
-            by_origin.setdefault(origin, []).append(key_words(path))
-    return "; ".join(f"{origin}: {', '.join(names)}" for origin, names in by_origin.items())
-
-
-def named_with_origin(evidence: Record, path: str) -> str:
-    """An input's name, with its origin where it is neither given nor measured."""
-    origin = (evidence["scene"].get("origins") or {}).get(path, "given")
-    return input_name(path) + ("" if origin in _CERTAIN else f" ({origin})")
-
-
-def input_name(path: str) -> str:
-    """The name of an input that a path in the scene file stands for, such as "bore of the tube"."""
-    table, _, key = path.partition(".")
-    return f"{key_words(path)} of the {table.replace('_', ' ')}" if key else path
 
 
 def _capacity(evidence: Record) -> Requirement | None:
@@ -154,7 +130,7 @@ def _capacity(evidence: Record) -> Requirement | None:
         name="Correction capacity of one pair",
         wanted=f"at least {read(evidence, path, 'kg m', width=width)}",
         result=read(evidence, usable, "kg m", width=total),
-        verdict=_above(rest["usable_pair_moment_kg_m"], needed, both),
+        verdict=above(rest["usable_pair_moment_kg_m"], needed, both),
         rests=resting(evidence, "rotor.influence_coefficient", "disc.plate_thickness", "tube.bore"),
         required=needed,
         reached=rest["usable_pair_moment_kg_m"],
@@ -171,12 +147,6 @@ def _usable_width(evidence: Record) -> float:
     )
 
 
-def _above(value: float, bound: float, width: float) -> str:
-    if abs(value - bound) <= width:
-        return OPEN
-    return MET if value > bound else MISSED
-
-
 def _gas_pressure(evidence: Record) -> Requirement | None:
     point = evidence["operating_point"]
     starts = point.get("priming_pressure_vented_Pa") is not None
@@ -191,7 +161,7 @@ def _gas_pressure(evidence: Record) -> Requirement | None:
         read(evidence, f"summary.crest.priming_pressure_Pa.{end}", "Pa", digits=2) for end in (0, 1) if crest
     )
     anywhere = f"; {' to '.join(ends)} wherever the crest may lie" if crest else ""
-    verdicts = {_above(gas, bound, both) for bound in (least, most)}
+    verdicts = {above(gas, bound, both) for bound in (least, most)}
     return Requirement(
         name="Gas pressure " + ("that lifts the liquid over the siphon crest" if starts else "above stall"),
         wanted=f"at least {read(evidence, f'operating_point.{key}', 'Pa', width=width)}{anywhere}",
@@ -249,7 +219,7 @@ def _recommended_gain(evidence: Record) -> Requirement | None:
         name=f"Loop factor with the recommended gain of {gain}",
         wanted=f"less than {traced(number(bound, digits=3), 'closed_loop.calibrated.loop_factor_limit')}",
         result=read(evidence, "summary.tuning.loop_factor", "1", width=width),
-        verdict=_above(bound, tuning["loop_factor"], width),
+        verdict=above(bound, tuning["loop_factor"], width),
         rests=resting(evidence, "tube.bore", "rotor.influence_coefficient"),
         required=bound,
         reached=tuning["loop_factor"],
@@ -260,29 +230,40 @@ def _recommended_gain(evidence: Record) -> Requirement | None:
 
 def _settling(evidence: Record) -> Requirement | None:
     tuning = _tuning(evidence)
-    times = tuning.get("settling_time_s") or {}
-    if times.get("p95") is None:
+    if not tuning.get("runs") or tuning.get("fraction_settled") is None:
         return None
+    times = tuning.get("settling_time_s") or {}
     wanted = (evidence["summary"].get("requirement") or {}).get("settling_time_s")
     low, high = tuning["fraction_settled_95"]
-    late, certain = wanted is not None and times["p95"] > wanted, low >= _LIKELY
-    judged = MISSED if late or high < _LIKELY else (MET if certain else OPEN)
-    middle = read(evidence, "summary.tuning.settling_time_s.p50", "s", digits=2)
-    slow = read(evidence, "summary.tuning.settling_time_s.p95", "s", digits=2)
+    late = wanted is not None and (times.get("p95") or math.inf) > wanted
+    judged = MISSED if late or high < _LIKELY else (MET if low >= _LIKELY else OPEN)
+    until = evidence["summary"]["time_limit_s"] if wanted is None else wanted
+    # Runs that do not settle at all are judged, whether or not a time is required.
+    unasked = wanted is None and times.get("p95") is not None
     return Requirement(
         name="Settling time with the recommended gain",
-        wanted=_NONE if wanted is None else f"at most {given(wanted, 's')} in {percent(_LIKELY)} of runs",
-        result=f"median {middle}, {percent(_LIKELY)} of runs within {slow}; settled: "
+        wanted=_NONE if unasked else f"at most {given(until, 's')} in {percent(_LIKELY)} of runs",
+        result=f"{_times(evidence, times)}settled: "
         f"{traced(percent(tuning['fraction_settled']), 'summary.tuning.fraction_settled')} of "
         f"{tuning['runs']} runs, with 95 % confidence {percent(low)} to {percent(high)}"
         f"{_ideal_valve(evidence)}",
-        verdict=UNASKED if wanted is None else judged,
+        verdict=UNASKED if unasked else judged,
         rests=resting(evidence, "tube.bore", "rotor.influence_coefficient", "controller.period"),
         required=wanted,
-        reached=times["p95"],
+        reached=times.get("p95"),
         unit="s",
         at_least=False,
     )
+
+
+def _times(evidence: Record, times: Record) -> str:
+    """The median and the time within which most have settled, as far as so many have."""
+    path, told = "summary.tuning.settling_time_s", []
+    if times.get("p50") is not None:
+        told.append(f"median {read(evidence, f'{path}.p50', 's', digits=2)}")
+    if times.get("p95") is not None:
+        told.append(f"{percent(_LIKELY)} of runs within {read(evidence, f'{path}.p95', 's', digits=2)}")
+    return f"{', '.join(told)}; " if told else ""
 
 
 def _residual_row(evidence: Record) -> Requirement | None:
@@ -296,18 +277,30 @@ def _residual_row(evidence: Record) -> Requirement | None:
     noise, limit = STAYING_DEVIATIONS * evidence_at(evidence, path), wanted["residual_m"]
     moment = read(evidence, "summary.requirement.residual_moment_kg_m", "kg m", digits=2)
     gain = "the recommended gain" if tuning.get("stationary_deviation_m") else "the scene’s gain"
+    alone = below((noise,), limit)
+    verdict = worst(alone, _line_verdict(evidence), _settles(evidence))
     return Requirement(
-        name="Residual vibration, zero to peak",
+        name="Residual vibration (zero to peak)",
         wanted=f"at most {given(limit, 'm')}, an unbalance of {moment}",
         result=f"{shown(noise, 'm', digits=2)}: {STAYING_DEVIATIONS:g} standard deviations of what noise "
-        f"keeps up with {gain}{_ideal_valve(evidence)}",
-        verdict=MET if noise <= limit else MISSED,
+        f"keeps up with {gain}{_steps(evidence)}",
+        verdict=verdict,
         rests=resting(evidence, "sensor.amplitude_noise", "rotor.influence_coefficient"),
-        required=limit,
+        # Where more than noise decides, a bar of the noise would show less than is there.
+        required=limit if verdict == alone else None,
         reached=noise,
         unit="m",
         at_least=False,
     )
+
+
+def _steps(evidence: Record) -> str:
+    """What makes the residual larger than noise does."""
+    steps = {MISSED: "is", OPEN: "may be"}.get(_line_verdict(evidence))
+    told = [f"the smallest correction {steps} larger than the limit"] if steps else []
+    if _settles(evidence) != MET:
+        told.append("too few runs settle")
+    return "; ".join([_ideal_valve(evidence), *told])
 
 
 def _ideal_valve(evidence: Record) -> str:
@@ -321,8 +314,7 @@ def _smallest(evidence: Record) -> Requirement | None:
 
 def _standing(evidence: Record) -> Requirement | None:
     """With the scene's own gain and offsets, by the dead time in which gas only fills a chamber."""
-    name = "Vibration up to which the scene’s valve-open times only fill gas"
-    return _of_line(evidence, "standing_amplitude_m", name)
+    return _of_line(evidence, "standing_amplitude_m", STANDING)
 
 
 def _of_line(evidence: Record, key: str, name: str) -> Requirement | None:
@@ -333,14 +325,42 @@ def _of_line(evidence: Record, key: str, name: str) -> Requirement | None:
     low, high = (
         read(evidence, f"calibration.gas_line.ends.{i}.{key}", "m", digits=2) for i in (ends[0], ends[-1])
     )
-    above = [end[key] > line["limit_m"] for end in line["ends"]]
+    least, most = (line["ends"][i][key] for i in (ends[0], ends[-1]))
     return Requirement(
         name=name,
         wanted=f"at most {given(line['limit_m'], 'm')}",
-        result=low if low == high else f"{low} (fast valve) to {high} (slow valve)",
-        verdict=MISSED if all(above) else (OPEN if any(above) else MET),
+        result=_valves(low, high, len(ends)) if most else "none",
+        verdict=below((least, most), line["limit_m"]),
         rests="" if line["given"] else "a default range of valves: the scene describes none",
+        required=line["limit_m"],
+        reached=least,
+        low=least,
+        high=most,
+        unit="m",
+        at_least=False,
     )
+
+
+def _valves(low: str, high: str, valves: int) -> str:
+    return low if valves == 1 else f"{low} (fast valve) to {high} (slow valve)"
+
+
+def _line_verdict(evidence: Record) -> str:
+    """Whether the gas line's smallest correction leaves the limit within reach; met without one."""
+    line = evidence["calibration"].get("gas_line")
+    if not line or any(end.get("smallest_correction_m") is None for end in line["ends"]):
+        return MET
+    return below((end["smallest_correction_m"] for end in line["ends"]), line["limit_m"])
+
+
+def _settles(evidence: Record) -> str:
+    """Whether runs with the recommended gain settle, late or not; met where no runs were made."""
+    tuning = _tuning(evidence)
+    if not tuning.get("runs") or tuning.get("fraction_settled") is None:
+        return MET
+    if tuning["fraction_settled_95"][1] < _LIKELY:
+        return MISSED
+    return MET if tuning["fraction_settled"] >= _LIKELY else OPEN
 
 
 def _grade_row(evidence: Record) -> Requirement | None:
@@ -349,13 +369,16 @@ def _grade_row(evidence: Record) -> Requirement | None:
     if reached is None:
         return None
     path = "summary.requirement.grade_at_residual_m_s"
+    verdict = UNASKED
+    if bound is not None:
+        verdict = worst(below((reached,), bound), _line_verdict(evidence), _settles(evidence))
     return Requirement(
-        name="Balance quality grade at the residual, ISO 21940-11",
+        name="Balance quality grade (ISO 21940-11) where the residual is met",
         wanted=_NONE if bound is None else f"at most G {number(1e3 * bound, digits=3)}",
         result=f"G {traced(number(1e3 * reached, digits=2), path)}, in mm/s",
-        verdict=UNASKED if bound is None else (MET if reached <= bound else MISSED),
+        verdict=verdict,
         rests=resting(evidence, "rotor.mass", "rotor.influence_coefficient"),
-        required=bound,
+        required=bound if verdict == below((reached,), bound or reached) else None,
         reached=reached,
         unit="m/s",
         at_least=False,

@@ -217,9 +217,8 @@ def _viscosity_uncertainty(scene: Scene, liquids: tuple[Liquid, ...]) -> FloatAr
     uncertainty_95 = np.array([q.viscosity_uncertainty for q in liquids])
     for stated in scene.uncertainty:
         if stated.quantity == "kinematic_viscosity":
-            uncertainty_95[0] = stated.half_width / (
-                1.0 if stated.relative else liquids[0].kinematic_viscosity
-            )
+            nu = liquids[0].kinematic_viscosity
+            uncertainty_95[0] = stated.absolute(nu) / nu
     return uncertainty_95
 
 

@@ -170,8 +170,8 @@ def test_laws_are_told_apart_where_data_allow() -> None:
     pressure = np.linspace(0.4, 1.4, 24)
     clear = _comparison(np.sqrt(pressure), 0.01)
     assert clear.verdict == "told apart"
-    assert "prefer the fitted law" in clear.text
-    assert "prefer laminar flow" in _comparison(pressure, 0.01).text
+    assert "prefer the fitted law to laminar" in clear.text
+    assert "prefer laminar flow to the fitted" in _comparison(pressure, 0.01).text
     assert "cannot tell" in _comparison(np.sqrt(pressure), 3.0).text
 
 

@@ -48,7 +48,7 @@ def test_kept_evidence_is_named_with_its_date_and_scene(evidence: Record) -> Non
     assert facts(evidence)["Kept evidence"].startswith("none")
     case = evidence["verification"][-1]
     case.update(date="2029-02-03", scene_sha256="cd" * 32)
-    assert facts(evidence)["Kept evidence"] == f"{case['id']} of 2029-02-03, scene cdcdcdcdcdcd"
+    assert facts(evidence)["Kept evidence"] == f"{case['id']} of 2029-02-03, values cdcdcdcdcdcd"
 
 
 def test_provenance_names_neither_folder_nor_machine() -> None:

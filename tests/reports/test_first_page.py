@@ -11,12 +11,13 @@ import pytest
 from ringbalance.reports.pages.first_page import SECTION, crest_range, dominant, loop_sentences
 from ringbalance.reports.pages.loop import SECTION as LOOP
 from ringbalance.reports.pages.requirements import (
-    OPEN,
     Requirement,
     decision,
+    requirement_figure,
     requirement_record,
     requirements,
 )
+from ringbalance.reports.summary import OPEN
 from ringbalance.reports.traces import untraced
 from ringbalance.scene import Scene
 from ringbalance.verification.loops import calibration_of
@@ -93,7 +94,7 @@ def test_a_loop_factor_is_explained_on_either_side_of_one(evidence: Record) -> N
         ends[factor] = untraced(loop_sentences(evidence)[0]).split(". ")[-1]
     assert "and leaves the rest to the next;" in ends[0.8]
     assert "50\u202f% of it is left on the opposite side" in ends[1.5]
-    assert ends[2.3].endswith("so that it grows.")
+    assert "so that it grows" in ends[2.3]
 
 
 def test_no_run_is_compared_with_another_by_a_ratio(evidence: Record) -> None:
@@ -222,9 +223,39 @@ def test_settling_is_judged_with_its_probability(
     assert row_of(found, "Settling time").verdict == verdict
 
 
+@pytest.mark.parametrize("wanted", [None, 5.0])
+def test_runs_that_do_not_settle_are_judged_whatever_is_asked(evidence: Record, wanted: float | None) -> None:
+    evidence["summary"]["requirement"]["settling_time_s"] = wanted
+    few = {"fraction_settled": 0.1, "fraction_settled_95": [0.0, 0.3], "reachable_limit_m": 1e-6}
+    found = tuned(evidence, settling_time_s={"p50": None, "p95": None}, **few)
+    row = row_of(found, "Settling time")
+    assert row.verdict == row_of(found, "Residual").verdict == "not met"
+    assert f"at most {wanted or 120:g}\u202fs" in row.wanted
+    actions = view(found)["actions"]
+    assert not any(text.startswith("Set the proportional gain") for text in actions)
+    assert any("none that was tried does; a limit of 1.0\u202fµm is reached" in text for text in actions)
+
+
 def test_the_residual_is_judged_by_what_noise_keeps_up(evidence: Record) -> None:
     assert row_of(tuned(evidence), "Residual").verdict == "met"
     assert row_of(tuned(evidence, stationary_deviation_m=2e-8), "Residual").verdict == "not met"
+
+
+def test_a_gain_is_recommended_for_the_valve_that_it_was_found_with(evidence: Record) -> None:
+    evidence["closed_loop"]["calibrated"].update(loop_factor=1.9, largest_staying_loop_factor=1.37)
+    ends = [{"smallest_correction_m": 1e-7}]
+    line = {"given": False, "limit_m": 5e-8, "ends": ends, "warning": ""}
+    evidence["calibration"]["gas_line"] = line
+    change = "controller.gas_time_offset = 9 ms"
+    valve, gain, *_ = view(tuned(evidence, change=change))["actions"]
+    assert valve.startswith("Find a valve and gas line")
+    assert "any valve of the default range" in valve
+    assert gain.startswith("Set the proportional gain to 0.024\u202fs/µm for a valve that acts at once")
+    assert gain.endswith(f"and {change}.")
+    line["given"] = True
+    valve, gain, *_ = view(tuned(evidence))["actions"]
+    assert "the scene’s valve" in valve
+    assert gain == "Set the proportional gain to 0.024\u202fs/µm."
 
 
 def test_a_gain_that_noise_or_instability_forbids_is_not_met(evidence: Record) -> None:
@@ -256,9 +287,23 @@ def test_the_valve_decides_what_can_be_corrected(
     evidence["calibration"]["gas_line"] = {"given": False, "limit_m": 5e-8, "ends": ends}
     assert row_of(evidence, "Smallest correction").verdict == verdict
     assert row_of(evidence, "Vibration up to which").verdict == verdict
+    # What the valve cannot correct, noise alone does not make small.
+    assert row_of(tuned(evidence), "Residual").verdict == verdict
     # The trial algorithm has no gain that could leave an amplitude standing.
     ends[0]["standing_amplitude_m"] = None
     assert not any(row.name.startswith("Vibration up to which") for row in requirements(evidence))
+
+
+def test_every_requirement_with_numbers_is_drawn(evidence: Record) -> None:
+    ends = [{"smallest_correction_m": end, "standing_amplitude_m": 10 * end} for end in (1e-7, 7.5e-6)]
+    evidence["calibration"]["gas_line"] = {"given": False, "limit_m": 5e-8, "ends": ends}
+    rows = requirements(tuned(evidence))
+    drawn = requirement_figure(rows)
+    assert drawn is not None
+    for row in rows:
+        assert (untraced(row.name) in drawn.svg) == (row.required is not None), row.name
+    assert "up to 150 " in drawn.svg
+    assert "20 to 1500 " in drawn.svg
 
 
 def test_the_decision_counts_and_names(evidence: Record) -> None:
@@ -313,3 +358,27 @@ def test_the_bore_and_the_other_reading_are_named(evidence: Record) -> None:
 
 def test_that_nothing_was_measured_is_said(evidence: Record) -> None:
     assert view(evidence)["unmeasured"].startswith("No comparison with measurements of this device exists.")
+
+
+def test_what_the_scene_leaves_to_the_paper_s_rotor_is_named(evidence: Record) -> None:
+    assert not any("paper’s rotor" in text for text in view(evidence)["rests"])
+    evidence["scene"]["origins"]["rotor.influence_coefficient"] = "default"
+    told = view(evidence)["rests"][-1]
+    assert told.startswith("Not in the scene, so those of the paper’s rotor: influence coefficient.")
+
+
+def test_a_scene_without_uncertainties_says_so(evidence: Record) -> None:
+    rows = evidence["scene"]["table"]
+    rows[0]["uncertainty"] = "0.05 mm"
+    assert not any("states no uncertainty" in text for text in view(evidence)["rests"])
+    for row in rows:
+        row["uncertainty"] = ""
+    assert any("states no uncertainty" in text for text in view(evidence)["rests"])
+
+
+def test_settling_beyond_stability_is_called_chance(evidence: Record) -> None:
+    run = evidence["closed_loop"]["calibrated"]
+    run.update(loop_factor=2.3, settled=True, verdict="settled")
+    assert untraced(loop_sentences(evidence)[0]).endswith(
+        "so that it grows; that this run settles is chance."
+    )

@@ -22,7 +22,7 @@ from ringbalance.reports.numbers import given as as_given
         (1333e-6, "kg m", "1333 g mm"),
         (67.7e-6, "m^3", "67.7 ml"),
         (10000 * math.pi / 30, "rad/s", "10 000 rpm"),
-        (math.pi / 2, "rad", "90 °"),
+        (math.pi / 2, "rad", "90°"),
         (0.0108, "m/(kg m)", "0.0108 µm/(g mm)"),
         (0.08e6, "s/m", "0.08 s/µm"),
         (0.25, "1", "0.25"),

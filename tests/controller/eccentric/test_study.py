@@ -44,11 +44,11 @@ def test_a_requirement_that_is_missed_says_so(study: EccentricStudy) -> None:
 
 
 def test_a_loop_at_its_gain_margin_is_at_the_edge(study: EccentricStudy) -> None:
-    speed = study.gains.speed
+    speed = study.tuning.gains.speed
     edge = changed(study.scene, "friction_filter", speed_gain=speed.value * speed.gain_margin * (1 + 1e-6))
     beyond = eccentric_study(replace(edge, run=replace(edge.run, time_limit=1.0)))
-    assert not beyond.gains.speed.stable
-    assert beyond.gains.speed.radius == pytest.approx(1.0, abs=1e-4)
+    assert not beyond.tuning.gains.speed.stable
+    assert beyond.tuning.gains.speed.radius == pytest.approx(1.0, abs=1e-4)
     row = next(row for row in beyond.requirements if row.quantity == "gain margin of the speed control")
     assert not row.met
 

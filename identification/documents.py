@@ -1,0 +1,146 @@
+"""A fit as JSON: SI units, intervals of 95 %."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.identifiability import Combination
+from ringbalance.identification.next_measurement import NextMeasurement
+from ringbalance.identification.result import FileResiduals, FitResult, FittedParameter, Noise
+from ringbalance.identification.review import Review
+from ringbalance.reduced_model.chamber.inputs import half_widths
+from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, nominal_value
+
+
+def exact_inputs(result: FitResult) -> list[str]:
+    """Quantities of the scene that are neither fitted nor stated as uncertain."""
+    scene = result.optimum.residuals.problem.scene
+    known = {*half_widths(scene), *(parameter.name for parameter in result.parameters)}
+    return [
+        name
+        for name in UNCERTAIN_QUANTITIES
+        if name not in known and nominal_value(scene=scene, quantity=name) is not None
+    ]
+
+
+def fit_document(
+    result: FitResult, *, data: Sequence[Observations], told: Review, following: NextMeasurement | None
+) -> dict[str, Any]:
+    """What `ringbalance fit --json` prints."""
+    scene = result.optimum.residuals.problem.scene
+    names = [parameter.name for parameter in result.parameters]
+    return {
+        "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
+        "data": [_file(each) for each in data],
+        "parameters": [_parameter(each) for each in result.parameters],
+        "combinations": [_combination(each) for each in result.combinations],
+        "correlations": {"names": names, "matrix": result.correlations.tolist()},
+        "noise": [_noise(each) for each in result.noise],
+        "residuals": [_residuals(each) for each in result.residuals],
+        "held": dict(result.held),
+        "exact": exact_inputs(result),
+        "loss": result.loss,
+        "starts": result.starts,
+        "evaluations": result.evaluations,
+        "log_likelihood": result.log_likelihood,
+        "criticism": _criticism(told),
+        "next_measurement": None if following is None else _following(following),
+    }
+
+
+def _criticism(told: Review) -> dict[str, Any]:
+    return {
+        "describes": told.criticism.describes,
+        "text": told.criticism.text,
+        "findings": [
+            {
+                "test": each.test,
+                "residuals_of": each.block,
+                "against": each.against,
+                "p_value": each.p_value,
+                "corrected_p_value": each.corrected,
+                "fails": each.fails,
+            }
+            for each in told.criticism.findings
+        ],
+        "laws": [
+            {
+                "other_law": each.other,
+                "separation": each.separation,
+                "preference": each.preference,
+                "text": each.text,
+            }
+            for each in told.laws
+        ],
+    }
+
+
+def _following(found: NextMeasurement) -> dict[str, Any]:
+    return {
+        "parameter": found.parameter,
+        "text": found.text,
+        "candidates": [
+            {"measurement": each.candidate, "expected_width_ratio": each.ratio} for each in found.gains
+        ],
+    }
+
+
+def _file(data: Observations) -> dict[str, Any]:
+    return {
+        "file": data.file,
+        "kind": data.kind,
+        "source": data.source,
+        "rows": len(data),
+        "sha256": data.sha256,
+        "uncertainty_given": sorted(data.uncertainty),
+    }
+
+
+def _parameter(found: FittedParameter) -> dict[str, Any]:
+    return {
+        "name": found.name,
+        "path": found.path,
+        "value": found.value,
+        "interval": [_finite(end) for end in found.interval],
+        "at_bound": list(found.at_bound),
+        "before": found.before,
+        "before_interval": None if found.before_interval is None else list(found.before_interval),
+        "verdict": found.verdict.value,
+        "text": found.text,
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _combination(found: Combination) -> dict[str, Any]:
+    return {
+        "text": found.text,
+        "names": list(found.names),
+        "exponents": list(found.exponents),
+        "value": found.value,
+        "relative_uncertainty": found.relative_uncertainty,
+    }
+
+
+def _noise(found: Noise) -> dict[str, Any]:
+    return {
+        "group": found.group,
+        "standard_deviation": found.standard_deviation,
+        "estimated": found.estimated,
+        "degrees_of_freedom": found.freedom,
+    }
+
+
+def _residuals(found: FileResiduals) -> dict[str, Any]:
+    return {
+        "file": found.file,
+        "kind": found.kind,
+        "lines": found.lines.tolist(),
+        "normalised": found.normalised.tolist(),
+        "down_weighted": found.down_weighted.tolist(),
+    }

@@ -1,0 +1,232 @@
+"""Which measurement would narrow a parameter's interval most.
+
+Candidates are rows of every kind of data that the balancer allows, over the ranges of the scene or of the
+data.  Their noise is that of the fit; a kind that was not measured has an assumed one, which is said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any, Final
+
+import numpy as np
+
+from ringbalance.identification.data.kinds import KINDS
+from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.expected_gain import Candidate, Gain, expected_gains
+from ringbalance.identification.identifiability import Verdict
+from ringbalance.identification.likelihood import Block, Problem, block_of, held_effects
+from ringbalance.identification.result import FitResult
+from ringbalance.reduced_model.chamber.inputs import shifted
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.dimensions import DIMENSIONS
+from ringbalance.scene.models import Scene
+from ringbalance.scene.units import format_quantity
+
+ASSUMED_NOISE: Final = 0.01
+"""Standard deviation of a kind that was not measured, relative to the largest that is predicted."""
+_FRACTIONS: Final = (0.3, 0.5, 0.7)
+"""Of the largest fill."""
+_PRESSURES: Final = (0.8, 1.0, 1.25)
+"""Of the scene's gas pressure."""
+_TIMES: Final = (0.05, 0.2, 0.8)
+"""s, of valve-open."""
+_BEYOND: Final = (0.5, 1.0, 2.0)
+"""Of the middle of what was measured, or of what makes the vibration at the start."""
+Grid = Mapping[str, Sequence[float]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class NextMeasurement:
+    """What to measure next for one parameter."""
+
+    parameter: str
+    gains: tuple[Gain, ...]
+    """Best first."""
+
+    @property
+    def text(self) -> str:
+        """One sentence."""
+        best = self.gains[0]
+        if best.ratio > 0.99:
+            return f"no single measurement would narrow the interval of {self.parameter} by more than 1 %"
+        share = "a finite one" if best.ratio == 0 else f"{100 * best.ratio:.2g} % of its width"
+        return f"{best.candidate} would narrow the interval of {self.parameter} to {share}"
+
+
+def next_measurement(result: FitResult, parameter: str | None = None) -> NextMeasurement | None:
+    """Rank candidates for a parameter; None: the one that the data identify least.
+
+    Returns: None where no candidates are known for the balancer.
+    Raises: KeyError: the parameter was not fitted.
+    """
+    problem = result.optimum.residuals.problem
+    if not isinstance(problem.scene, Scene):
+        return None
+    names = [each.name for each in result.parameters]
+    chosen = parameter or _least_identified(result)
+    result.parameter(chosen)
+    candidates = [c for kind in _grids(problem.scene_at(result.optimum.t)) for c in _candidates(result, kind)]
+    gains = expected_gains(_information(result), parameter=names.index(chosen), candidates=candidates)
+    return NextMeasurement(parameter=chosen, gains=gains)
+
+
+def _least_identified(result: FitResult) -> str:
+    """Not identified before identified, and the widest interval in the parameters' own scales."""
+
+    def key(which: int) -> tuple[int, float]:
+        each = result.parameters[which]
+        return list(Verdict).index(each.verdict), each.profile.high - each.profile.low
+
+    return result.parameters[max(range(len(result.parameters)), key=key)].name
+
+
+def _information(result: FitResult) -> FloatArray:
+    """Fisher information of parameters, of what is fitted beside them and of held inputs, with priors."""
+    best = result.optimum
+    residuals, t = best.residuals, best.t
+    data = np.hstack(
+        [residuals.scale[:, None] * best.of_prediction, residuals.linear[: residuals.scale.size]]
+    )
+    held = residuals.held.shape[1]
+    whole = data.T @ data
+    whole[: t.size, : t.size] += (s := residuals.problem.prior_slopes(t)).T @ s
+    if held:
+        whole[-held:, -held:] += np.eye(held)
+    return np.asarray(whole)
+
+
+def _candidates(result: FitResult, kind: str) -> Iterator[Candidate]:
+    """Rows of one kind with derivatives in the columns of `_information`."""
+    best = result.optimum
+    problem, t = best.residuals.problem, best.t
+    scene = problem.scene_at(t)
+    measured = next((b for b in problem.blocks if b.observations.kind == kind), None)
+    offered = offered_rows(scene, kind, None if measured is None else measured.observations)
+    block = block_of(offered)
+    asked = replace(problem, blocks=(block,))
+    scale = 1 / _noise(result, measured, asked, t)
+    rows = np.hstack(
+        [
+            asked.slopes(t),
+            _free(problem, measured, block),
+            held_effects(asked, t, _changes(problem.scene, result.held)),
+        ]
+    )
+    count = len(offered)
+    assumed = "" if measured is not None else f" (noise of {100 * ASSUMED_NOISE:g} % assumed)"
+    for i in range(count):
+        yield Candidate(
+            text=f"{words_of(offered, i)}{assumed}", derivatives=scale[i::count, None] * rows[i::count]
+        )
+
+
+def _noise(result: FitResult, measured: Block | None, asked: Problem, t: FloatArray) -> FloatArray:
+    """Standard deviation of each whitened number of the candidates."""
+    size = asked.measured.size
+    residuals = result.optimum.residuals
+    if measured is None:
+        count = len(asked.blocks[0].observations)
+        parts = np.reshape(asked.at(t), (-1, count))
+        return np.full(size, ASSUMED_NOISE * max(float(np.max(np.hypot.reduce(parts, axis=0))), 1e-300))
+    if not measured.estimated:
+        return np.ones(size)
+    return np.full(size, residuals.noise[residuals.problem.estimated_groups.index(measured.group)])
+
+
+def _free(problem: Problem, measured: Block | None, block: Block) -> FloatArray:
+    """Effect of what is fitted beside the parameters: candidates join the first series of their kind."""
+    found = np.zeros((block.measured.size, problem.free.shape[1]))
+    at = 0
+    for each in problem.blocks:
+        width = each.free.shape[1]
+        if each is measured and width:
+            first = _first_series(each)
+            found[:, at : at + width] = np.kron(np.eye(2), np.tile(first, (len(block.observations), 1)))
+        at += width
+    return found
+
+
+def _first_series(block: Block) -> FloatArray:
+    names = np.unique(block.observations.series)
+    return np.asarray(names == block.observations.series[0], dtype=np.float64)
+
+
+def _changes(scene: Any, held: Mapping[str, float]) -> list[tuple[Any, Any]]:
+    return [
+        (
+            shifted(scene=scene, quantity=name, change=-width),
+            shifted(scene=scene, quantity=name, change=width),
+        )
+        for name, width in held.items()
+    ]
+
+
+def _grids(scene: Scene) -> dict[str, Grid]:
+    """Values of what is set, by kind and column, SI, over the ranges of a scene."""
+    fills = [x * scene.disc.max_fill_ratio for x in _FRACTIONS]
+    pressures = [x * scene.gas.pressure for x in _PRESSURES]
+    unbalance = scene.rotor.initial_amplitude / scene.rotor.influence_coefficient
+    injections = {"fill_ratio": fills, "pressure": pressures, "gas_time": _TIMES}
+    return {
+        "injection": injections,
+        "transfer": injections,
+        "flow": {"pressure_difference": [x * scene.gas.pressure for x in (0.1, 0.3, 1.0)]},
+        "pressure": {"fill_ratio": fills, "radius": [scene.disc.outer_radius]},
+        "trial_weight": {"unbalance": [x * unbalance for x in _BEYOND], "angle": [0.0, np.pi / 2]},
+    }
+
+
+def offered_rows(scene: Scene, kind: str, measured: Observations | None) -> Observations:
+    """All rows of a kind's grid, each a series of its own; what is measured is that of the data's middle."""
+    grid = dict(_grids(scene)[kind])
+    if measured is not None:
+        for name in ("gas_time", "pressure_difference", "unbalance"):
+            if name in grid:
+                values = measured.columns[name]
+                grid[name] = [x * float(np.median(values[values > 0])) for x in _BEYOND]
+    rows = list(product(*grid.values()))
+    count = len(rows)
+    columns = {name: np.array([row[i] for row in rows]) for i, name in enumerate(grid)}
+    middles, widths = _middles(scene, kind, measured)
+    return Observations(
+        kind=kind,
+        file="",
+        lines=np.arange(1, count + 1),
+        series=np.array([f"{i}" for i in range(count)]),
+        chamber=np.full(count, "A" if kind in ("injection", "transfer") else ""),
+        columns={name: np.full(count, value) for name, value in middles.items() if name not in columns}
+        | columns,
+        uncertainty={name: np.full(count, width) for name, width in widths.items()},
+    )
+
+
+def _middles(
+    scene: Scene, kind: str, measured: Observations | None
+) -> tuple[Mapping[str, float], Mapping[str, float]]:
+    """Middle of every measured column and of its uncertainty."""
+    if measured is None:
+        names = [c.name for c in KINDS[kind].columns if c.measured or c.amplitude]
+        return dict.fromkeys((n for n in names if n != "mass"), scene.rotor.initial_amplitude), {}
+    named = {c.name for c in KINDS[kind].columns if c.measured or c.amplitude}
+    return (
+        {name: float(np.median(v)) for name, v in measured.columns.items() if name in named},
+        {name: float(np.median(v)) for name, v in measured.uncertainty.items()},
+    )
+
+
+def words_of(offered: Observations, row: int) -> str:
+    """Such as "transfer with fill ratio 0.25, pressure 0.7 MPa, gas time 200 ms"."""
+    said = []
+    for column in KINDS[offered.kind].columns:
+        values = offered.columns.get(column.name)
+        if values is None or column.measured or column.amplitude:
+            continue
+        value = float(values[row])
+        text = f"{value:.3g}"
+        if column.dimension is not None and column.dimension in DIMENSIONS:
+            text = format_quantity(value, column.dimension, column.unit, digits=3)
+        said.append(f"{column.name.replace('_', ' ')} {text}")
+    return f"{offered.kind.replace('_', ' ')} with {', '.join(said)}"

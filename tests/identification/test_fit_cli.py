@@ -1,0 +1,195 @@
+"""The command fit end to end: the examples, text and JSON, templates, refusals, the pages about it."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import example_measurements
+import measurement_tables
+import pytest
+
+from ringbalance.cli import main
+from ringbalance.identification.data.kinds import KINDS
+from ringbalance.identification.data.reading import observations_of
+from ringbalance.identification.data.template import template
+from ringbalance.scene import bundled_scene, load_scene
+from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.scene.uncertain import nominal_value
+
+PAPER = str(bundled_scene("liquid_ring_paper"))
+EXAMPLES = {kind: str(example_measurements.FOLDER / f"{kind}.csv") for kind in example_measurements.EXAMPLES}
+ROOT = Path(__file__).resolve().parents[2]
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Run:
+    """Exit code, standard output and standard error of `ringbalance fit` with some words."""
+
+    def run_it(*words: str | Path) -> tuple[int, str, str]:
+        capsys.readouterr()
+        code = main(["fit", *map(str, words)])
+        written = capsys.readouterr()
+        return code, written.out, written.err
+
+    return run_it
+
+
+@pytest.mark.parametrize("kind", EXAMPLES)
+def test_the_examples_are_what_their_tool_writes(kind: str) -> None:
+    assert Path(EXAMPLES[kind]).read_text(encoding="utf-8") == example_measurements.example(kind)
+
+
+def test_the_examples_together_give_back_the_truth(run: Run, paper_scene: Scene) -> None:
+    """Each interval (95 %) holds the truth, and is narrower than what was known, or than a tenth of lambda
+    and a fifth of k + 1 of about 15 where nothing was."""
+    widest = {
+        "lambda_factor": 0.1,
+        "bore": 0.1e-3,
+        "extra_loss": 3.0,
+        "influence_coefficient": 0.14 * 0.0108,
+        "lag_angle": math.radians(6),
+    }
+    code, out, _ = run(PAPER, *EXAMPLES.values(), "--parameters", ",".join(widest), "--json")
+    assert code == 0
+    document = json.loads(out)
+    assert [each["name"] for each in document["parameters"]] == list(widest)
+    for each in document["parameters"]:
+        low, high = each["interval"]
+        assert low < example_measurements.TRUTH[each["name"]] < high, each
+        assert high - low < widest[each["name"]], each
+        assert each["verdict"] == "identified"
+        assert each["before"] == pytest.approx(
+            nominal_value(scene=paper_scene, quantity=each["name"]) or 1.0, abs=1.0
+        )
+    assert [each["kind"] for each in document["data"]] == list(EXAMPLES)
+    given = {each["group"]: each["estimated"] for each in document["noise"]}
+    assert given["transfer mass"] is False
+    assert given["pressure pressure"] is True
+
+
+def has_key(document: Any, name: str) -> bool:
+    """Whether a key stands anywhere in nested documents."""
+    if isinstance(document, Mapping):
+        return name in document or any(has_key(each, name) for each in document.values())
+    return isinstance(document, list) and any(has_key(each, name) for each in document)
+
+
+def test_the_promised_keys_are_there(run: Run) -> None:
+    _, out, _ = run(
+        PAPER, EXAMPLES["injection"], "--parameters", "lambda_factor,influence_coefficient", "--json"
+    )
+    document = json.loads(out)
+    section = (ROOT / "docs/commands.md").read_text().split("## `fit --json`\n")[1].split("\n## ")[0]
+    promised = [name for line in section.splitlines() for name in re.findall(r"`([a-z0-9_]+)`", line)]
+    assert len(promised) > 25
+    missing = {name for name in promised if not has_key(document, name)}
+    assert missing <= {"identified", "pattern", "size", "runs"}  # values, and no keys
+
+
+def test_text_names_what_an_engineer_must_know(run: Run) -> None:
+    code, out, _ = run(
+        PAPER, EXAMPLES["trial_weight"], "--parameters", "influence_coefficient,lag_angle,bore"
+    )
+    assert code == 0
+    text = " ".join(out.split())
+    assert "fitted to 7 measurements of one file" in text
+    assert re.search(r"influence.* 0\.0111?\d", text)
+    assert "bore: structurally not identified" in text
+    assert "taken as exact" in text
+    assert "extra_loss" in text.split("taken as exact")[1]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_template_is_printed_and_nothing_else(kind: str, run: Run) -> None:
+    assert run("--template", kind) == (0, template(kind), "")
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ([], "SCENE is missing: ringbalance fit SCENE DATA.csv"),
+        ([PAPER], "DATA is missing: ringbalance fit SCENE DATA.csv"),
+        (["no.toml", EXAMPLES["flow"]], "no.toml: there is no such file"),
+        ([PAPER, "no.csv"], "no.csv: the file cannot be read: No such file"),
+        ([PAPER, EXAMPLES["flow"], EXAMPLES["flow"]], "same content"),
+        ([PAPER, EXAMPLES["flow"], "--parameters", "bore,bore"], '--parameters = "bore,bore"'),
+        ([PAPER, EXAMPLES["flow"], "--parameters", "bor"], '"bor"'),
+        ([PAPER, EXAMPLES["flow"], "--parameters", ""], '--parameters = ""'),
+        ([PAPER, EXAMPLES["flow"], "--loss", "huber"], "huber"),
+        (["--template", "flwo"], 'did you mean "flow"'),
+        ([EXAMPLES["flow"], PAPER], "flow.csv: this is not TOML"),
+        ([PAPER, PAPER], "liquid_ring_paper.toml:"),
+        ([str(bundled_scene("washing_machine")), EXAMPLES["flow"]], "washing_machine.toml"),
+    ],
+)
+def test_what_cannot_be_fitted_is_refused(words: list[str], told: str, run: Run) -> None:
+    code, out, err = run(*words)
+    assert (code, out) == (2, "")
+    assert told in err
+    assert "Traceback" not in err
+
+
+def test_the_page_has_every_kind_and_its_example_can_be_read(paper_scene: Scene) -> None:
+    page = measurement_tables.FIT_PAGE.read_text(encoding="utf-8")
+    assert measurement_tables.fresh(page, "fit_kinds", measurement_tables.fit_kind_table()) == page
+    example = page.split("## Files of measurements")[1].split("```")[1].lstrip("\n")
+    found, faults = observations_of(example.encode(), file="example", scene=paper_scene)
+    assert faults == ()
+    assert found is not None
+    assert len(found) == 3
+
+
+def test_the_fitted_scene_is_written_and_taken(run: Run, tmp_path: Path) -> None:
+    target = tmp_path / "fitted.toml"
+    words = (PAPER, EXAMPLES["trial_weight"], "--parameters", "influence_coefficient,lag_angle")
+    code, _, err = run(*words, "--save", target, "--next", "lag_angle")
+    assert code == 0
+    assert f"fitted scene written to {target}" in " ".join(err.split())
+    scene = liquid_ring_scene(load_scene(target))
+    assert scene.origin_of("rotor.influence_coefficient") == "measured"
+    assert [each.quantity for each in scene.measured.quantities] == [
+        "rotor.influence_coefficient",
+        "rotor.lag_angle",
+    ]
+    code, _, err = run(target, EXAMPLES["trial_weight"])
+    assert code == 2
+    assert "was fitted to this file already" in err
+
+
+def test_a_file_that_cannot_be_written_is_refused_before_the_work(run: Run, tmp_path: Path) -> None:
+    code, out, err = run(PAPER, EXAMPLES["trial_weight"], "--save", tmp_path)
+    assert (code, out) == (2, "")
+    assert "is a folder" in err
+    code, _, err = run(PAPER, EXAMPLES["trial_weight"], "--next", "bore")
+    assert code == 2
+    assert "not fitted" in err
+
+
+def test_a_fit_that_fails_says_so(run: Run, tmp_path: Path) -> None:
+    """A bore three times too wide that no parameter may correct."""
+    wrong = tmp_path / "wrong.csv"
+    lines = Path(EXAMPLES["transfer"]).read_text(encoding="utf-8").splitlines()
+    numbers = [i for i, line in enumerate(lines) if line[:1].isdigit()]
+    head = lines[numbers[0] - 1].split(",")
+    place, pressure = (
+        next(i for i, name in enumerate(head) if name.startswith(w)) for w in ("mass", "press")
+    )
+    for i in numbers:
+        cells = lines[i].split(",")
+        cells[place] = f"{float(cells[place]) * float(cells[pressure]) ** 3:.4f}"
+        lines[i] = ",".join(cells)
+    wrong.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    code, out, _ = run(PAPER, wrong, "--json")
+    document = json.loads(out)
+    assert code == 1
+    assert document["criticism"]["describes"] is False
+    worst = document["criticism"]["findings"][0]
+    assert worst["fails"]
+    assert document["criticism"]["text"].startswith("the fit does not describe the data")

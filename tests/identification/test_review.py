@@ -1,0 +1,162 @@
+"""Criticism, comparison of laws, next measurement and saving of fits by the program's own laws."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.fitting import fit
+from ringbalance.identification.next_measurement import next_measurement, offered_rows, words_of
+from ringbalance.identification.other_laws import LAMINAR, UNBROKEN, power_of
+from ringbalance.identification.predict.device import Models, device_of, models_of
+from ringbalance.identification.predict.kinds import PREDICTED
+from ringbalance.identification.result import FitResult
+from ringbalance.identification.review import review
+from ringbalance.identification.saving import save_result
+from ringbalance.scene import bundled_scene, load_scene
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import liquid_ring_scene
+
+ROWS = 24
+SET = {
+    "pressure": np.tile([0.6e6, 0.7e6, 0.9e6, 1.0e6], 6),
+    "fill_ratio": np.tile([0.2, 0.25, 0.3], 8),
+    "gas_time": np.random.default_rng(2).permutation(np.linspace(0.05, 0.3, ROWS)),
+}
+
+
+def observed(kind: str, columns: Mapping[str, FloatArray], widths: Mapping[str, FloatArray]) -> Observations:
+    count = len(next(iter(columns.values())))
+    return Observations(
+        kind=kind,
+        file=f"{kind}.csv",
+        sha256="0" * 64,
+        lines=np.arange(count) + 4,
+        series=np.full(count, "a"),
+        chamber=np.full(count, "A" if kind in ("injection", "transfer") else ""),
+        columns=columns,
+        uncertainty=widths,
+    )
+
+
+def transfers(
+    true: Scene, models: Models, *, seed: int, known: bool = True, share: float = 0.01
+) -> Observations:
+    """Volumes moved, with a noise of one per cent."""
+    plain = observed("transfer", SET | {"volume": np.ones(ROWS)}, {})
+    volume = PREDICTED["transfer"].predict(true, plain, models)
+    sigma = share * volume
+    noisy = volume + sigma * np.random.default_rng(seed).standard_normal(ROWS)
+    return replace(
+        plain,
+        columns=SET | {"volume": noisy},
+        uncertainty={"volume": 1.96 * sigma} if known else {},
+    )
+
+
+@pytest.fixture(scope="module")
+def true(paper_scene: Scene) -> Scene:
+    """A disc whose tube is a little narrower than its drawing."""
+    return replace(paper_scene, tube=replace(paper_scene.tube, bore=1.47e-3))
+
+
+@pytest.fixture(scope="module")
+def found(paper_scene: Scene, true: Scene) -> FitResult:
+    data = transfers(true, models_of(paper_scene), seed=0)
+    return fit(paper_scene, data=[data], parameters=["bore", "extra_loss"])
+
+
+def test_a_right_law_is_not_criticised(found: FitResult) -> None:
+    told = review(found)
+    assert told.criticism.describes
+    assert {f.against for f in told.criticism.findings} >= {"pressure", "fill ratio", "gas time"}
+    assert told.sentences[0].startswith("no pattern")
+
+
+def test_other_laws_are_told_apart_by_these_data(found: FitResult) -> None:
+    verdicts = {each.other: each for each in review(found).laws}
+    assert verdicts[LAMINAR].text.startswith("the data prefer the fitted law to laminar flow")
+    assert verdicts[UNBROKEN].text.startswith("the data prefer the fitted law to a column that never")
+
+
+@pytest.mark.parametrize(("exponent", "preferred"), [(1.0, LAMINAR)])
+def test_a_disc_with_another_law_is_found_out(
+    paper_scene: Scene, true: Scene, exponent: float, preferred: str
+) -> None:
+    """Data of a disc whose loss follows the velocity: the fit fails, and that law is the better one."""
+    models = models_of(paper_scene)
+    velocity = float(
+        device_of(paper_scene, models).law.evaluate(fill_ratio=0.25, gas_pressure=0.7e6).velocity
+    )
+    other = replace(models, other=lambda law: power_of(law, velocity, exponent))
+    data = transfers(true, other, seed=1, known=False)
+    told = review(fit(paper_scene, data=[data], parameters=["bore", "extra_loss"]))
+    assert not told.criticism.describes
+    assert "residuals of transfer.csv" in told.criticism.text
+    law = next(each for each in told.laws if each.other == preferred)
+    assert law.text.startswith("the data prefer laminar flow")
+
+
+def some(observations: Observations, rows: list[int], **columns: FloatArray) -> Observations:
+    """A few rows of a file, with other values of some columns."""
+    return replace(
+        observations,
+        lines=observations.lines[rows],
+        series=observations.series[rows],
+        chamber=observations.chamber[rows],
+        columns={name: values[rows] for name, values in observations.columns.items()} | columns,
+        uncertainty={name: values[rows] for name, values in observations.uncertainty.items()},
+    )
+
+
+@pytest.mark.parametrize("row", [0, 13, 26])
+def test_the_expected_gain_is_that_of_fits_made_again(paper_scene: Scene, true: Scene, row: int) -> None:
+    """Interval of the bore with a candidate among four measurements, against the one expected without it.
+
+    Noise is given, so that an interval depends on the draw through curvature alone: within 5 %.
+    """
+    data = some(transfers(true, models_of(paper_scene), seed=0, share=0.02), [0, 6, 13, 19])
+    first = fit(paper_scene, data=[data], parameters=["bore"])
+    told = next_measurement(first, "bore")
+    assert told is not None
+    offered = offered_rows(first.scene, "transfer", data)
+    chosen = next(g for g in told.gains if g.candidate == words_of(offered, row))
+    volume = PREDICTED["transfer"].predict(first.scene, offered, models_of(paper_scene))
+    more = replace(some(offered, [row], volume=volume[[row]]), file="more.csv")
+    again = fit(paper_scene, data=[data, more], parameters=["bore"])
+    widths = [r.parameters[0].profile.high - r.parameters[0].profile.low for r in (first, again)]
+    assert widths[1] / widths[0] == pytest.approx(chosen.ratio, rel=0.05)
+
+
+def test_weak_parameters_are_asked_for_first(found: FitResult) -> None:
+    told = next_measurement(found)
+    assert told is not None
+    widths = {p.name: p.profile.high - p.profile.low for p in found.parameters}
+    assert told.parameter in widths
+    assert told.gains[0].after <= told.gains[-1].after
+    assert "of its width" in told.text or "no single measurement" in told.text
+
+
+def test_the_saved_scene_is_the_fitted_one(found: FitResult, tmp_path: Path) -> None:
+    target = tmp_path / "fitted.toml"
+    data = [b.observations for b in found.optimum.residuals.problem.blocks]
+    text = bundled_scene("liquid_ring_paper").read_text(encoding="utf-8")
+    save_result(target, text=text, result=found, data=data, said=review(found).sentences)
+    scene = liquid_ring_scene(load_scene(target))
+    assert scene.tube.bore == pytest.approx(found.parameter("bore").value, rel=1e-8)
+    widths = {each.quantity: each.half_width for each in scene.uncertainty}
+    low, high = found.parameter("bore").interval
+    value = found.parameter("bore").value
+    assert widths["bore"] == pytest.approx(max(high - value, value - low), rel=1e-6)
+    assert scene.measured.files[0].kind == "transfer"
+    said = {each.about for each in scene.measured.findings}
+    assert said >= {"residuals", "correlation"}
+    # The fitted scene is a scene to fit again: nothing moves by more than a tenth of its interval.
+    again = fit(scene, data=data, parameters=["bore", "extra_loss"])
+    assert abs(again.parameter("bore").value - value) < 0.5 * (high - low)

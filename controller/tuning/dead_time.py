@@ -16,7 +16,7 @@ import numpy as np
 
 from ringbalance.controller.terms import run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import balanced_fills, vibration_rates
-from ringbalance.reduced_model.gas_line import largest_standing, line_ends, short_injection
+from ringbalance.reduced_model.gas_line import line_ends, short_injection, standing_amplitude
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.selection.estimates import FILLING
 from ringbalance.reduced_model.short_injection import Fills
@@ -49,29 +49,27 @@ def _dead_time(scene: Scene, fills: Fills, *, rate: float) -> float:
     return round(max(float(injection.dead_time(metres)), 0.0), _DIGITS)
 
 
-def compensated(scene: Scene, model: BalancerModel) -> Scene:
-    """The scene with the dead times as offsets where an amplitude above its limit would stand still.
+def compensated(scene: Scene, model: BalancerModel, dead: tuple[float, ...]) -> Scene:
+    """The scene with its dead times as offsets where an amplitude above its limit would stand still.
 
     Not for the trial algorithm, whose valve-open times are the scene's.
     """
-    dead = () if scene.controller.kind == "trial" else dead_times(scene, model)
-    if not dead or dead_zone(scene, model, dead) <= scene.controller.limit:
+    if (
+        scene.controller.kind == "trial"
+        or not dead
+        or dead_zone(scene, model, dead) <= scene.controller.limit
+    ):
         return scene
     return replace(scene, controller=replace(scene.controller, gas_time_offset=dead))
 
 
 def dead_zone(scene: Scene, model: BalancerModel, dead: Sequence[float]) -> float:
-    """Largest amplitude, m, at which no commanded injection moves liquid, by the gain alone.
-
-    The law-based algorithm asks for the time in which the law moves the residual.
-    """
+    """`standing_amplitude` at the balanced fills, m, the least valve-open time counted."""
     settings, n = scene.controller, scene.disc.chambers
     lost = [max(d - o, 0.0) for d, o in zip(dead or (0.0,) * n, settings.offsets(n), strict=True)]
     still = [max(each, settings.minimum_gas_time) for each in lost]
-    if settings.kind == "law_based":
-        rates = np.maximum(vibration_rates(scene, model).T.ravel(), 0.0)
-        return largest_standing([s * float(b) for s, b in zip(still, rates, strict=True)])
-    return largest_standing(still) / settings.proportional
+    rates = np.maximum(vibration_rates(scene, model).T.ravel(), 0.0)
+    return standing_amplitude(settings, still, rates=rates.tolist())
 
 
 def offset_text(offsets: Sequence[float]) -> str:
@@ -83,7 +81,7 @@ def offset_text(offsets: Sequence[float]) -> str:
 
 def standing_remedy(scene: Scene, model: BalancerModel) -> str:
     """What to change where the dead time leaves an amplitude above the limit where it is; else empty."""
-    mended = compensated(scene, model).controller.gas_time_offset
+    mended = compensated(scene, model, dead_times(scene, model)).controller.gas_time_offset
     if not mended or mended == scene.controller.gas_time_offset:
         return ""
     still = dead_zone(scene, model, mended)

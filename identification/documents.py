@@ -15,11 +15,6 @@ from ringbalance.reduced_model.chamber.inputs import half_widths
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, nominal_value
 
 
-def path_of(name: str) -> str:
-    """Place in the scene of a fitted quantity, such as "tube.bore"."""
-    return f"{UNCERTAIN_QUANTITIES[name]}.{name}" if name in UNCERTAIN_QUANTITIES else name
-
-
 def exact_inputs(result: FitResult) -> list[str]:
     """Quantities of the scene that are neither fitted nor stated as uncertain."""
     scene = result.optimum.residuals.problem.scene
@@ -32,9 +27,9 @@ def exact_inputs(result: FitResult) -> list[str]:
 
 
 def fit_document(
-    result: FitResult, *, data: Sequence[Observations], told: Review, following: NextMeasurement | None
+    result: FitResult, *, data: Sequence[Observations], said: Review, following: NextMeasurement | None
 ) -> dict[str, Any]:
-    """What `ringbalance fit --json` prints."""
+    """What `ringbalance fit --json` prints. Args: `following`: what to measure next."""
     scene = result.optimum.residuals.problem.scene
     names = [parameter.name for parameter in result.parameters]
     return {
@@ -51,45 +46,9 @@ def fit_document(
         "starts": result.starts,
         "evaluations": result.evaluations,
         "log_likelihood": result.log_likelihood,
-        "criticism": _criticism(told),
-        "next_measurement": None if following is None else _following(following),
-    }
-
-
-def _criticism(told: Review) -> dict[str, Any]:
-    return {
-        "describes": told.criticism.describes,
-        "text": told.criticism.text,
-        "findings": [
-            {
-                "test": each.test,
-                "residuals_of": each.block,
-                "against": each.against,
-                "p_value": each.p_value,
-                "corrected_p_value": each.corrected,
-                "fails": each.fails,
-            }
-            for each in told.criticism.findings
-        ],
-        "laws": [
-            {
-                "other_law": each.other,
-                "separation": each.separation,
-                "preference": each.preference,
-                "text": each.text,
-            }
-            for each in told.laws
-        ],
-    }
-
-
-def _following(found: NextMeasurement) -> dict[str, Any]:
-    return {
-        "parameter": found.parameter,
-        "text": found.text,
-        "candidates": [
-            {"measurement": each.candidate, "expected_width_ratio": each.ratio} for each in found.gains
-        ],
+        "criticism": _criticism(said),
+        "laws": [{**vars(each), "verdict": each.verdict, "text": each.text} for each in said.laws],
+        "next_measurement": None if following is None else _next(following),
     }
 
 
@@ -107,7 +66,7 @@ def _file(data: Observations) -> dict[str, Any]:
 def _parameter(found: FittedParameter) -> dict[str, Any]:
     return {
         "name": found.name,
-        "path": path_of(found.name),
+        "path": found.path,
         "value": found.value,
         "interval": [_finite(end) for end in found.interval],
         "at_bound": list(found.at_bound),
@@ -115,6 +74,22 @@ def _parameter(found: FittedParameter) -> dict[str, Any]:
         "before_interval": None if found.before_interval is None else list(found.before_interval),
         "verdict": found.verdict.value,
         "text": found.text,
+    }
+
+
+def _criticism(said: Review) -> dict[str, Any]:
+    found = said.criticism
+    findings = [{**vars(each), "fails": each.fails} for each in found.findings]
+    return {"describes": found.describes, "text": found.text, "findings": findings}
+
+
+def _next(following: NextMeasurement) -> dict[str, Any]:
+    return {
+        "parameter": following.parameter,
+        "text": following.text,
+        "candidates": [
+            {"measurement": gain.candidate, "width_ratio": gain.ratio} for gain in following.gains
+        ],
     }
 
 

@@ -139,7 +139,7 @@ def combinations(
     _, s, vt = np.linalg.svd(flat * allowed, full_matrices=False)
     # A row is the gradient of a product's logarithm; one that has a single parameter is a verdict.
     roots = data_root(slopes), data_root(flat)
-    # The profile of a parameter with a prior cannot be wider than that: it counts from a root of two, as above.
+    # A profile is never wider than its prior, so that a direction counts from a root of two, as above.
     strong = vt[s > math.sqrt(2) * factor]
     rows = [_simple(row, roots[1]) for row in _echelon(strong / allowed)]
     rows = [row for row in rows if np.count_nonzero(row) > 1 and np.any(row[weak] != 0)]

@@ -10,6 +10,7 @@ from ringbalance.identification.identifiability import Combination, Verdict
 from ringbalance.identification.intervals import Profile
 from ringbalance.identification.optimisation import Optimum
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
+from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,6 +30,12 @@ class FittedParameter:
     text: str
     """The verdict with its reason, in one sentence."""
     profile: Profile
+
+    @property
+    def path(self) -> str:
+        """Place in the scene, such as "tube.bore"."""
+        table = UNCERTAIN_QUANTITIES.get(self.name)
+        return self.name if table is None else f"{table}.{self.name}"
 
 
 @dataclass(frozen=True, kw_only=True)

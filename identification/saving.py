@@ -30,7 +30,6 @@ from ringbalance.scene.measured import MeasuredFile, MeasuredFinding
 from ringbalance.scene.origins import Origin
 from ringbalance.scene.platform.files import write_whole
 from ringbalance.scene.toml_writing import toml_bytes
-from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 from ringbalance.scene.units import format_quantity, unit_of
 
 _DIGITS: Final = 9
@@ -97,9 +96,8 @@ def save_result(
 
 
 def _fitted(parameter: FittedParameter, scale: Parameter) -> Fitted:
-    table = UNCERTAIN_QUANTITIES.get(parameter.name)
     return Fitted(
-        path=parameter.name if table is None else f"{table}.{parameter.name}",
+        path=parameter.path,
         before=parameter.before,
         before_interval=parameter.before_interval or (None, None),
         value=parameter.value,

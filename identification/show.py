@@ -14,7 +14,7 @@ from rich.text import Text
 
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.documents import exact_inputs, path_of
+from ringbalance.identification.documents import exact_inputs
 from ringbalance.identification.identifiability import Verdict
 from ringbalance.identification.next_measurement import NextMeasurement
 from ringbalance.identification.result import FitResult, FittedParameter, Noise
@@ -36,21 +36,28 @@ _FAR: Final = 3.0
 
 
 def fit_view(
-    result: FitResult, *, data: Sequence[Observations], told: Review, following: NextMeasurement | None
+    result: FitResult, *, data: Sequence[Observations], said: Review, following: NextMeasurement | None
 ) -> RenderableType:
-    """Parameters, whether the fit holds, and what else the data say, for a rich console."""
-    more = [] if following is None else [Text(_sentence(following.text))]
-    remarks = [*_review(told), *_remarks(result), *more]
-    return Group(_heading(result, data), _parameters(result), *remarks)
+    """Parameters, then what else the data say, for a console. Args: `following`: what to measure next."""
+    return Group(
+        _heading(result, data),
+        _parameters(result),
+        *_review(said),
+        *_remarks(result),
+        *([] if following is None else [Text(f"Measure next: {following.text}.", style="bold")]),
+        *_not_fitted(result),
+    )
 
 
-def _review(told: Review) -> Iterator[Text]:
-    yield Text(_sentence(told.criticism.text), "" if told.criticism.describes else "bold red")
-    yield from (Text(_sentence(each.text)) for each in told.laws)
+def _review(said: Review) -> Iterator[Text]:
+    """Whether the fit describes the data, and other laws that would."""
+    style = "green" if said.criticism.describes else "bold red"
+    yield Text(_sentence(said.criticism.text), style=style)
+    yield from (Text(_sentence(each.text)) for each in said.laws)
 
 
 def _sentence(text: str) -> str:
-    return f"{text[0].upper()}{text[1:]}."
+    return f"{text[:1].upper()}{text[1:]}."
 
 
 def _heading(result: FitResult, data: Sequence[Observations]) -> RenderableType:
@@ -72,7 +79,7 @@ def _parameters(result: FitResult) -> Table:
 
 def _numbers(found: FittedParameter) -> tuple[str, str, str, str, str]:
     """Value, ends of its interval, unit, and what was known before, in the usual unit."""
-    path = path_of(found.name)
+    path = found.path
     low, high = (in_usual_unit(path, end) if math.isfinite(end) else end for end in found.interval)
     value, before = (in_usual_unit(path, number) for number in (found.value, found.before))
     width = (high - low) / 2 if math.isfinite(high - low) else abs(value)
@@ -97,6 +104,9 @@ def _remarks(result: FitResult) -> Iterator[Text]:
     yield from (Text(_noise(each)) for each in result.noise)
     yield from map(Text, _pairs(result))
     yield from _rows(result)
+
+
+def _not_fitted(result: FitResult) -> Iterator[Text]:
     if result.held:
         held = ", ".join(result.held)
         yield Text(f"Not fitted, their [uncertainty] is in all intervals: {held}.", "dim")

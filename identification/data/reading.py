@@ -57,7 +57,7 @@ def read_observations(paths: Iterable[Path], *, scene: AnyScene) -> tuple[Observ
             observations, wrong = observations_of(content, file=file_name(path), scene=scene)
             found += [observations] if observations else []
         faults += in_order(wrong)
-    faults += _given_twice(found)
+    faults += [*_given_twice(found), *_known_already(found, scene)]
     if faults:
         raise SceneError(faults)
     return tuple(found)
@@ -69,6 +69,16 @@ def _given_twice(found: Iterable[Observations]) -> Iterator[Fault]:
         if each.sha256 in first:
             yield data_fault(each.file, "", f"it has the same content as {first[each.sha256]}; give it once")
         first.setdefault(each.sha256, each.file)
+
+
+def _known_already(found: Iterable[Observations], scene: AnyScene) -> Iterator[Fault]:
+    """Files that the scene was fitted to: its [uncertainty] has what they say."""
+    known = {each.sha256 for each in scene.measured.files}
+    for each in found:
+        if each.sha256 in known:
+            problem = f"{scene.file} was fitted to this file already, so that it would count twice"
+            allowed = "the scene as it was before, with all files together"
+            yield data_fault(each.file, "", problem, allowed=allowed)
 
 
 def observations_of(

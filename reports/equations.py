@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
+import json
+import lzma
 import re
 import tomllib
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
+from importlib import import_module
 from importlib.resources import files
-from typing import Final
-
-with warnings.catch_warnings():
-    # ziamath finds its font by importlib.resources.path, which Python 3.11 (and no other) calls deprecated.
-    warnings.filterwarnings("ignore", message="path is deprecated", category=DeprecationWarning)
-    from ziamath.zmath import Latex
-
+from typing import Final, cast
 
 GLYPHS: Final = "<!-- glyphs -->"
 _SYMBOL: Final = re.compile(r'<symbol id="([^"]+)"([^>]*/>|[^>]*>.*?</symbol>)', re.DOTALL)
@@ -47,16 +43,24 @@ def equation_svg(latex: str, words: str, name: str) -> str:
     Args: `name`: prefix of every id within, so that two equations on one page do not share glyphs.
     Raises: ValueError: LaTeX that cannot be set.
     """
-    try:
-        text = Latex(latex, size=16, color="currentColor").svg()
-    # The library has no error class of its own: wrong LaTeX ends in whatever its parser met.
-    except Exception as error:
-        raise ValueError(f"this equation cannot be set: {latex}") from error
+    text = _kept().get(latex) or _typeset(latex)
     text = re.sub(r'\bid="', f'id="{name}-', text)
     text = re.sub(r'href="#', f'href="#{name}-', text)
     text = re.sub(r' width="([\d.]+)" height="([\d.]+)"', _in_em, text, count=1)
     label = words.replace("&", "&amp;").replace('"', "&quot;").replace("<", "&lt;")
     return text.replace("<svg ", f'<svg role="img" aria-label="{label}" class="math" ', 1)
+
+
+@cache
+def _kept() -> Mapping[str, str]:
+    """SVG of the program's own equations by their LaTeX, as `tools/equation_table.py` has set them."""
+    packed = files("ringbalance.reports").joinpath("data", "equations.json.xz").read_bytes()
+    return cast(Mapping[str, str], json.loads(lzma.decompress(packed)))
+
+
+def _typeset(latex: str) -> str:
+    """An equation that is not the program's own; what sets it is loaded for that alone."""
+    return cast(str, import_module("ringbalance.reports.typesetting").typeset(latex))
 
 
 def share_glyphs(page: str) -> str:

@@ -23,7 +23,6 @@ from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reduced_model.paper import formulas as paper
-from ringbalance.reports.pages.cases import typeset_equations
 from ringbalance.reports.pictures.fields import chamber_field
 from ringbalance.reports.provenance import provenance
 from ringbalance.reports.section import Level, Record, Work
@@ -70,9 +69,6 @@ def collect_evidence(
         tell("sections")
         work = Work(scene=scene, calibration=calibration, level=level)
         sections = collected(work, last=False)
-        tell("equations")
-        # While the cases still run, there is time for what the page will need.
-        typeset_equations()
         tell("verification")
         cases = merge_saved(finished_cases(under_way, tell), saved)
     sections |= collected(work, last=True)

@@ -156,11 +156,13 @@ def run_stretch(
 def _keep(record: Record, i: int, memory: StrategyState, state: FloatArray, command: FloatArray) -> None:
     """Write one row of the record."""
     plan, estimate = memory.plan, memory.whirl.estimate
-    record.state[i] = state
-    record.voltage[i] = command
+    # An element at a time: numba compiles array assignment ten times as long.
+    for place in range(state.size):
+        record.state[i, place] = state[place]
     record.stage[i], record.cause[i], record.hold[i] = plan.stage, plan.cause, plan.hold
     for k in range(2):
         friction = memory.beliefs.friction[k]
+        record.voltage[i, k] = command[k]
         record.goal[i, k] = plan.goal[k]
         record.imbalance[i, k] = estimate.state[4 + k]
         record.friction_arm[i, k] = friction.arm

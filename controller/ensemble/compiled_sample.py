@@ -52,7 +52,8 @@ def run_members(
     """Run members one after the other; `runs`, of type `RUN`, holds what differs and is filled.
 
     Where `shared.moving`, `motions`, of type `MOTION`, has room for every pair twice and one more, and
-    `notes` for the instants of an injection and its tail and for the fills of every pair then.
+    `notes` for the instants of an injection and its tail and for the fills of every pair then.  Elsewhere
+    `motions` is None, and no march is compiled.
     """
     for i in range(runs.size):
         run = runs[i]
@@ -63,7 +64,7 @@ def run_members(
             if run.cause == NONE and run.samples < shared.most_samples:
                 run.samples += 1
                 _sample(shared, run)
-                if run.cause == NONE and shared.moving:
+                if run.cause == NONE and motions is not None:
                     _inject(shared, plant, run, motions, notes, workspace)
                 elif run.cause == NONE:
                     _keep_residual(shared, run)
@@ -112,7 +113,7 @@ def _holds(shared: Record, run: Record, time: float) -> bool:
 def _start(shared: Record, plant: Record, run: Record, motions: Any) -> None:
     """Level chambers, nothing remembered."""
     reset(shared, run)
-    if shared.moving:
+    if motions is not None:
         for i in range(shared.chambers // 2):
             begin(plant, motions[i], shared.initial_fill, run.speed, run.residual_fill)
     _forget(run)

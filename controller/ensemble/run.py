@@ -78,7 +78,8 @@ class EnsemblePlan:
         shared = self.shared.copy()
         shared["key_0"], shared["key_1"] = noise_key(seed=seed)
         half = int(shared["chambers"][0]) // 2
-        motions, notes = np.zeros(2 * half + 1, dtype=MOTION), np.zeros((half + 1, NOTES))
+        motions = np.zeros(2 * half + 1, dtype=MOTION) if shared["moving"][0] else None
+        notes = np.zeros((half + 1, NOTES))
         run_members(shared[0], self.plant[0], runs, motions, notes, np.zeros(WORKSPACE))
         return MemberRuns(
             settled=runs["settled"] > 0,

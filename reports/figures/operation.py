@@ -328,15 +328,10 @@ def _requirement_bar(axes: Axes, place: int, row: Record, end: float) -> None:
         axes.plot([low, min(high, end)], [place, place], color=style.INK, linewidth=1.2)
         caps = [each for each in (low, high) if each < end]
         axes.plot(caps, [place] * len(caps), "|", color=style.INK, markersize=6)
-    axes.plot([1, 1], [place - 0.3, place + 0.3], color=style.INK, linewidth=1.8)
+    axes.plot([1, 1], [place - 0.24, place + 0.24], color=style.INK, linewidth=1.8)
     if high > end:
         start = "up to " if ratio <= end else ("" if high <= ratio else f"{number(ratio, digits=2)} to ")
         beyond = f"{start}{number(max(ratio, high), digits=2)} \u25b8"
-        axes.text(0.995 * end, place - 0.32, beyond, ha="right", va="bottom", color=style.INK)
-    sense = "reach" if row["at_least"] else "stay below"
-    axes.text(
-        *(0.0, place - 0.32),
-        f"{row['label']}, must {sense} the line: {row['verdict']}",
-        va="bottom",
-        color=style.INK,
-    )
+        axes.text(0.995 * end, place - 0.28, beyond, ha="right", va="bottom", color=style.INK)
+    sense = "at least" if row["at_least"] else "at most"
+    axes.text(0.0, place - 0.28, f"{row['label']} ({sense}): {row['verdict']}", va="bottom", color=style.INK)

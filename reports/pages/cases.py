@@ -22,7 +22,6 @@ from ringbalance.reports.origins import input_name
 from ringbalance.reports.section import Record, Table
 from ringbalance.reports.tables import FOLDER, is_long, table_file
 from ringbalance.reports.traces import traced
-from ringbalance.verification.catalogue import load_cases
 
 _NOTHING: Final = 1e-3
 """Fraction of a range below which one of its ends is zero."""
@@ -44,12 +43,6 @@ _RELATIVE_METRICS: Final = ("relative", "validation", "within_uncertainty")
 def anchor(case: Record) -> str:
     """Place of a case on the page."""
     return f"case-{str(case['id']).replace('_', '-')}"
-
-
-def typeset_equations() -> None:
-    """Set the equations of every case once, which takes seconds, before a page asks for them."""
-    for definition in load_cases():
-        _equations({"id": definition.id, "equations": definition.equations})
 
 
 def _sentence(value: Any) -> str:

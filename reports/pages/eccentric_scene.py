@@ -92,7 +92,8 @@ def _decision(rows: list[Record]) -> str:
     named = {v: [row["quantity"] for row in rows if row["verdict"] == v] for v in ("not met", OPEN)}
     met = len(rows) - sum(map(len, named.values()))
     parts = [f"{verdict}: {', '.join(names)}" for verdict, names in named.items() if names]
-    return f"{'; '.join([f'{met} of {len(rows)} requirements are met', *parts])}."
+    are = "is" if met == 1 else "are"
+    return f"{'; '.join([f'{met} of {len(rows)} requirements {are} met', *parts])}."
 
 
 def _actions(rows: list[Record]) -> list[str]:

@@ -109,7 +109,8 @@ def decision(rows: Iterable[Requirement]) -> str:
     """One sentence: how many requirements are met, and which are not."""
     judged = [row for row in rows if row.verdict in {MET, MISSED, OPEN}]
     named = {v: [r.name[0].lower() + r.name[1:] for r in judged if r.verdict == v] for v in (MISSED, OPEN)}
-    said = f"{len(judged) - sum(map(len, named.values()))} of {len(judged)} requirements are met"
+    met = len(judged) - sum(map(len, named.values()))
+    said = f"{met} of {len(judged)} requirements {'is' if met == 1 else 'are'} met"
     parts = [f"{verdict}: {', '.join(names)}" for verdict, names in named.items() if names]
     return "; ".join([said, *parts]) + "."
 
@@ -275,14 +276,17 @@ def _residual_row(evidence: Record) -> Requirement | None:
     noise, limit = STAYING_DEVIATIONS * evidence_at(evidence, path), wanted["residual_m"]
     moment = read(evidence, "summary.requirement.residual_moment_kg_m", "kg m", digits=2)
     gain = "the recommended gain" if tuning.get("stationary_deviation_m") else "the scene’s gain"
+    alone = below((noise,), limit)
+    verdict = worst(alone, _line_verdict(evidence), _settles(evidence))
     return Requirement(
         name="Residual vibration (zero to peak)",
         wanted=f"at most {given(limit, 'm')}, an unbalance of {moment}",
         result=f"{shown(noise, 'm', digits=2)}: {STAYING_DEVIATIONS:g} standard deviations of what noise "
         f"keeps up with {gain}{_steps(evidence)}",
-        verdict=worst(below((noise,), limit), _line_verdict(evidence), _settles(evidence)),
+        verdict=verdict,
         rests=resting(evidence, "sensor.amplitude_noise", "rotor.influence_coefficient"),
-        required=limit,
+        # Where more than noise decides, a bar of the noise would show less than is there.
+        required=limit if verdict == alone else None,
         reached=noise,
         unit="m",
         at_least=False,
@@ -365,15 +369,16 @@ def _grade_row(evidence: Record) -> Requirement | None:
     if reached is None:
         return None
     path = "summary.requirement.grade_at_residual_m_s"
+    verdict = UNASKED
+    if bound is not None:
+        verdict = worst(below((reached,), bound), _line_verdict(evidence), _settles(evidence))
     return Requirement(
         name="Balance quality grade (ISO 21940-11) where the residual is met",
         wanted=_NONE if bound is None else f"at most G {number(1e3 * bound, digits=3)}",
         result=f"G {traced(number(1e3 * reached, digits=2), path)}, in mm/s",
-        verdict=UNASKED
-        if bound is None
-        else worst(below((reached,), bound), _line_verdict(evidence), _settles(evidence)),
+        verdict=verdict,
         rests=resting(evidence, "rotor.mass", "rotor.influence_coefficient"),
-        required=bound,
+        required=bound if verdict == below((reached,), bound or reached) else None,
         reached=reached,
         unit="m/s",
         at_least=False,

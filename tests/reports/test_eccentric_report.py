@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from check_traces import traces, untrue
 
 from ringbalance.reports import eccentric_evidence
 from ringbalance.reports.eccentric_evidence import parameters
@@ -69,6 +70,12 @@ def test_report_and_annex_are_written_with_their_figures(folder: Path) -> None:
         *("eccentric-amplitude", "eccentric-run-up", "eccentric-imbalance", "eccentric-friction"),
         *("eccentric-angles", "sampled-poles", "requirements"),
     }
+
+
+def test_every_traced_number_is_the_evidence_s(folder: Path, evidence: Record) -> None:
+    pages = [(folder / name).read_text() for name in ("report.html", "annex.html")]
+    assert len(traces(pages)) > 50
+    assert untrue(pages, evidence) == []
 
 
 def test_every_section_is_there_and_says_something(folder: Path) -> None:

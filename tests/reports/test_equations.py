@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
+import lzma
 import re
 from xml.etree import ElementTree
 
+import equation_table
 import pytest
 
 from ringbalance.reports.equations import GLYPHS, equation_svg, equations, share_glyphs
@@ -19,6 +22,11 @@ def test_every_equation_is_set_in_the_text_colour(name: str) -> None:
     assert "currentColor" in svg
     assert not re.search(r"#[0-9a-fA-F]{6}\b|rgb\(", svg)
     assert all(found.startswith(f"eq-{name}-") for found in re.findall(r'id="([^"]+)"', svg))
+
+
+def test_the_kept_equations_are_those_of_the_program_as_set_today() -> None:
+    kept = json.loads(lzma.decompress(equation_table.TABLE.read_bytes()))
+    assert kept == equation_table.equation_table(), "run tools/equation_table.py"
 
 
 def test_glyphs_are_shared_and_all_found() -> None:

@@ -17,6 +17,7 @@ from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.scene.models import Scene
 from ringbalance.verification.catalogue import case_code
+from ringbalance.verification.validation import tube_at_rest
 from ringbalance.verification.validation.comparison import KINDS, compare
 from ringbalance.verification.validation.measurements import measurements
 from ringbalance.verification.validation.model_bias import ModelStatistics, model_statistics
@@ -176,6 +177,25 @@ def test_the_uncertainty_of_wave_frequencies_comes_from_tanks_that_are_not_judge
     found = compare(data.where(taught)).statistics
     width = math.hypot(found.bias, 2 * found.standard_deviation)
     assert round(width, 2) == FREQUENCY_UNCERTAINTY
+
+
+def test_the_bore_of_a_tube_comes_from_a_point_that_is_not_judged() -> None:
+    data = measurements("eisenklam_1958")
+    taught = compare(data.where(np.isin(data.series, tube_at_rest.CALIBRATING)))
+    assert taught.predicted == pytest.approx(taught.measured, rel=1e-3)
+    assert taught.measured.size == len(tube_at_rest.CALIBRATING)
+
+
+def test_end_losses_that_are_left_out_are_noticed() -> None:
+    data = measurements("eisenklam_1958")
+    long = data.where(np.char.startswith(data.series, "tube"))
+    reynolds, slenderness = tube_at_rest.tube_numbers(long)
+    friction = slenderness * 64 / reynolds
+    found = compare(long)
+    pairs = zip(slenderness, reynolds, strict=True)
+    dynamic = found.predicted / (1 + np.array([tube_at_rest.tube_loss(*pair, 100.0)[0] for pair in pairs]))
+    assert np.max(np.abs(found.predicted / found.measured - 1)) < 0.04
+    assert np.min(dynamic * (1 + friction) / found.measured) < 0.8
 
 
 @pytest.mark.parametrize("depth", [0.06, 0.3, 1.5])

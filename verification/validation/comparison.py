@@ -19,13 +19,19 @@ from ringbalance.verification.validation.model_bias import (
     model_statistics,
     statistics_numbers,
 )
+from ringbalance.verification.validation.tube_at_rest import TUBE_AT_REST
 from ringbalance.verification.validation.tube_friction import FRICTION
 from ringbalance.verification.validation.vessel import VESSEL
 from ringbalance.verification.validation.wave_frequency import WAVE_FREQUENCY
 from ringbalance.verification.verdicts import Verdict, judge_quantity
 
 KINDS: Final[Mapping[str, Kind]] = MappingProxyType(
-    {"friction": FRICTION, "vessel": VESSEL, "wave_frequency": WAVE_FREQUENCY}
+    {
+        "friction": FRICTION,
+        "tube_at_rest": TUBE_AT_REST,
+        "vessel": VESSEL,
+        "wave_frequency": WAVE_FREQUENCY,
+    }
 )
 """Kinds of data that the program can predict."""
 PROMISED: Final = 0.93

@@ -98,7 +98,11 @@ def predict(estimate: ImbalanceEstimate, matrices: FilterMatrices, masses: MassI
     state[0] -= 0.5 * masses.drift.real
     state[1] -= 0.5 * masses.drift.imag
     state[4], state[5] = x[4], x[5]
-    covariance = sandwich(a, estimate.covariance) + matrices.process
+    covariance = sandwich(a, estimate.covariance)
+    # An element at a time, here and below: numba compiles expressions of arrays ten times as long.
+    for i in range(6):
+        for k in range(6):
+            covariance[i, k] += matrices.process[i, k]
     for i in range(4):
         for k in range(4):
             for m in range(2):
@@ -237,7 +241,10 @@ def _history(
     estimate = start
     for i in range(count):
         estimate, _ = correct(predict(estimate, matrices, masses), matrices, samples[i], variance)
-        states[i], covariances[i] = estimate.state, estimate.covariance
+        for j in range(6):
+            states[i, j] = estimate.state[j]
+            for k in range(6):
+                covariances[i, j, k] = estimate.covariance[j, k]
     return states, covariances
 
 

@@ -147,7 +147,11 @@ def _process_covariance(
     found = np.zeros((6, 6))
     for i in range(_GAUSS_POINTS.size):
         part = whirl_transition(model, angular_velocity, 0.5 * step * (1.0 + _GAUSS_POINTS[i]))
-        found += 0.5 * step * _GAUSS_WEIGHTS[i] * sandwich(part, power)
+        grown, weight = sandwich(part, power), 0.5 * step * _GAUSS_WEIGHTS[i]
+        # An element at a time: numba compiles expressions of arrays ten times as long.
+        for j in range(6):
+            for k in range(6):
+                found[j, k] += weight * grown[j, k]
     return found
 
 

@@ -1,0 +1,23 @@
+"""LaTeX set as SVG paths."""
+
+from __future__ import annotations
+
+import warnings
+from typing import cast
+
+with warnings.catch_warnings():
+    # ziamath finds its font by importlib.resources.path, which Python 3.11 (and no other) calls deprecated.
+    warnings.filterwarnings("ignore", message="path is deprecated", category=DeprecationWarning)
+    from ziamath.zmath import Latex
+
+
+def typeset(latex: str) -> str:
+    """One equation as an SVG document in the current text colour, 16 px high.
+
+    Raises: ValueError: LaTeX that cannot be set.
+    """
+    try:
+        return cast(str, Latex(latex, size=16, color="currentColor").svg())
+    # The library has no error class of its own: wrong LaTeX ends in whatever its parser met.
+    except Exception as error:
+        raise ValueError(f"this equation cannot be set: {latex}") from error

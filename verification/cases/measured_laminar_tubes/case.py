@@ -1,0 +1,45 @@
+"""Pressure over whole tubes in laminar flow, as measured and as predicted."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Final
+
+import numpy as np
+
+from ringbalance.identification.data.measurements import Measurements
+from ringbalance.scene.arrays import BoolArray
+from ringbalance.scene.models import Scene
+from ringbalance.verification.evidence import Evidence, Level
+from ringbalance.verification.validation.comparison import compare, data_evidence
+from ringbalance.verification.validation.measurements import measurements
+from ringbalance.verification.validation.tube_at_rest import CALIBRATING, tube_numbers
+
+_DEVELOPED: Final = 0.0125
+"""L/(d Re) from which an undeveloped profile was expected to cost no more than the interval of the outlet."""
+_CONTRADICTED: Final = 1.5e5
+"""Pressure, Pa, below which the cut tube contradicts the others."""
+
+
+def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    data = measurements("eisenklam_1958")
+    usable, developed = _usable(data)
+    found = data_evidence(data.where(usable & developed), unit="Pa", mutation=defect)
+    short = compare(data.where(usable & ~developed)).statistics
+    uncut = compare(data.where(usable & np.char.startswith(data.series, "tube")))
+    more = {
+        "short_points": float(short.points),
+        "short_bias": short.bias,
+        "short_within": short.share_within,
+        "long_worst": float(np.max(np.abs(uncut.predicted / uncut.measured - 1))),
+    }
+    return dataclasses.replace(found, numbers={**found.numbers, **more})
+
+
+def _usable(data: Measurements) -> tuple[BoolArray, BoolArray]:
+    """Points that taught no bore and contradict no others, and those where flow could develop."""
+    taught = np.isin(data.series, CALIBRATING)
+    cut = np.char.startswith(data.series, "cut")
+    contradicted = cut & (data.columns["pressure"] < _CONTRADICTED)
+    reynolds, slenderness = tube_numbers(data)
+    return ~taught & ~contradicted, slenderness >= _DEVELOPED * reynolds

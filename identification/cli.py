@@ -20,8 +20,7 @@ from ringbalance.identification.saving import save_result
 from ringbalance.identification.show import fit_view
 from ringbalance.scene.faults import Fault, SceneError, did_you_mean, option_error
 from ringbalance.scene.loader import read_scene
-from ringbalance.scene.models import Scene
-from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.platform.files import check_file
 from ringbalance.scene.platform.progress import activity
 from ringbalance.scene.platform.terminal import messages_console, results_console
@@ -70,8 +69,7 @@ def fit(
         return DONE
     if scene is None or not data:
         raise _missing("SCENE" if scene is None else "DATA")
-    read, text = read_scene(scene)
-    given = liquid_ring_scene(read)
+    given, text = read_scene(scene)
     observations = read_observations(data, scene=given)
     names = None if parameters is None else _names(parameters)
     if save is not None:
@@ -91,7 +89,9 @@ def fit(
     return DONE if said.criticism.describes else NOT_DESCRIBED
 
 
-def _fitted(scene: Scene, data: Sequence[Observations], names: Sequence[str] | None, loss: Loss) -> FitResult:
+def _fitted(
+    scene: AnyScene, data: Sequence[Observations], names: Sequence[str] | None, loss: Loss
+) -> FitResult:
     try:
         return fit_scene(scene, data=data, parameters=names, loss=loss)
     except FitError as error:

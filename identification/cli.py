@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import json as json_format
-from collections.abc import Sequence
 from pathlib import Path
 
-from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.data.reading import read_observations
 from ringbalance.identification.data.template import template as template_of
 from ringbalance.identification.documents import fit_document
 from ringbalance.identification.fitting import Loss
 from ringbalance.identification.fitting import fit as fit_scene
-from ringbalance.identification.next_measurement import NextMeasurement, next_measurement
+from ringbalance.identification.next_measurement import next_measurement
 from ringbalance.identification.parameters import FitError
 from ringbalance.identification.result import FitResult
 from ringbalance.identification.review import review
@@ -20,13 +18,11 @@ from ringbalance.identification.saving import save_result
 from ringbalance.identification.show import fit_view
 from ringbalance.scene.faults import Fault, SceneError, did_you_mean, option_error
 from ringbalance.scene.loader import read_scene
-from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.platform.files import check_file
 from ringbalance.scene.platform.progress import activity
 from ringbalance.scene.platform.terminal import messages_console, results_console
 
-DONE = 0
-NOT_DESCRIBED = 1
+DONE, FAILED = 0, 1
 _USAGE = (
     "ringbalance fit SCENE DATA.csv [DATA.csv ...], for example ringbalance fit my_disc.toml injections.csv; "
     "ringbalance fit --template KIND prints an empty file of measurements"
@@ -38,7 +34,7 @@ def fit(
     *data: Path,
     parameters: str | None = None,
     loss: Loss = "linear",
-    next_: str | None = None,
+    next: str | None = None,
     save: Path | None = None,
     json: bool = False,
     template: str | None = None,
@@ -51,60 +47,53 @@ def fit(
         parameters: names with commas between, such as "bore,extra_loss"; default those that the kinds of data
             tell most about.
         loss: "soft_l1" counts outliers less, and says which rows they are.
-        next_: name of the fitted parameter that the next measurement should narrow down; default the one that
-            these data tell least about.
-        save: also write the scene with fitted values, their uncertainties and origins to this file.
+        next: the parameter for which to say what to measure next; default the one that the data identify
+            least.
+        save: also write the fitted scene to this file, for all other commands.
         json: print one JSON document instead of tables.
         template: print an empty file of measurements of this kind, with explanations, and do nothing else.
 
     Returns:
-        Exit code: 0; 1 when the fit does not describe the data; the result is printed either way.
+        Exit code: 1 when the fit does not describe the data.
 
     Raises:
         SceneError: a scene, a file of measurements or a parameter that cannot be used.
-        OSError: the fitted scene's file cannot be written.
+        OSError: the fitted scene cannot be written.
     """
     if template is not None:
         print(template_of(template), end="")
         return DONE
     if scene is None or not data:
         raise _missing("SCENE" if scene is None else "DATA")
+    if save is not None:
+        check_file(save)
     given, text = read_scene(scene)
     observations = read_observations(data, scene=given)
     names = None if parameters is None else _names(parameters)
-    if save is not None:
-        check_file(save)
-    with activity("fit", "several starts, profiles of the likelihood ...") as shown:
-        result = _fitted(given, observations, names, loss)
-        shown.show("patterns in the residuals, other laws, what to measure next ...")
-        said, following = review(result), _following(result, next_)
+    try:
+        with activity("fit", "several starts, profiles of the likelihood ..."):
+            result = fit_scene(given, data=observations, parameters=names, loss=loss)
+    except FitError as error:
+        fault = Fault(file=given.file, table="", key="", value="", problem=str(error), allowed="")
+        raise SceneError([fault]) from error
+    told, following = review(result), next_measurement(result, _fitted_name(next, result))
     if json:
-        document = fit_document(result, data=observations, said=said, following=following)
+        document = fit_document(result, data=observations, told=told, following=following)
         print(json_format.dumps(document, allow_nan=False))
     else:
-        results_console().print(fit_view(result, data=observations, said=said, following=following))
+        results_console().print(fit_view(result, data=observations, told=told, following=following))
     if save is not None:
-        save_result(save, text=text, result=result, data=observations, said=said.sentences)
-        messages_console().print(f"scene written to {save}", highlight=False, soft_wrap=True)
-    return DONE if said.criticism.describes else NOT_DESCRIBED
+        save_result(save, text=text, result=result, data=observations, said=told.sentences)
+        messages_console().print(f"fitted scene written to {save}", highlight=False, soft_wrap=True)
+    return DONE if told.criticism.describes else FAILED
 
 
-def _fitted(
-    scene: AnyScene, data: Sequence[Observations], names: Sequence[str] | None, loss: Loss
-) -> FitResult:
-    try:
-        return fit_scene(scene, data=data, parameters=names, loss=loss)
-    except FitError as error:
-        fault = Fault(file=scene.file, table="", key="", value="", problem=str(error), allowed="")
-        raise SceneError([fault]) from error
-
-
-def _following(result: FitResult, name: str | None) -> NextMeasurement | None:
+def _fitted_name(name: str | None, result: FitResult) -> str | None:
     fitted = [each.name for each in result.parameters]
     if name is not None and name not in fitted:
-        problem = f"this parameter was not fitted{did_you_mean(name, fitted)}"
+        problem = f"this parameter is not fitted{did_you_mean(name, fitted)}"
         raise option_error(option="--next", value=name, problem=problem, allowed=", ".join(fitted))
-    return next_measurement(result, name)
+    return name
 
 
 def _missing(word: str) -> SceneError:

@@ -21,9 +21,9 @@ def exact_inputs(result: FitResult) -> list[str]:
 
 
 def fit_document(
-    result: FitResult, *, data: Sequence[Observations], said: Review, following: NextMeasurement | None
+    result: FitResult, *, data: Sequence[Observations], told: Review, following: NextMeasurement | None
 ) -> dict[str, Any]:
-    """What `ringbalance fit --json` prints. Args: `following`: what to measure next."""
+    """What `ringbalance fit --json` prints."""
     scene = result.optimum.residuals.problem.scene
     names = [parameter.name for parameter in result.parameters]
     return {
@@ -40,9 +40,45 @@ def fit_document(
         "starts": result.starts,
         "evaluations": result.evaluations,
         "log_likelihood": result.log_likelihood,
-        "criticism": _criticism(said),
-        "laws": [{**vars(each), "verdict": each.verdict, "text": each.text} for each in said.laws],
-        "next_measurement": None if following is None else _next(following),
+        "criticism": _criticism(told),
+        "next_measurement": None if following is None else _following(following),
+    }
+
+
+def _criticism(told: Review) -> dict[str, Any]:
+    return {
+        "describes": told.criticism.describes,
+        "text": told.criticism.text,
+        "findings": [
+            {
+                "test": each.test,
+                "residuals_of": each.block,
+                "against": each.against,
+                "p_value": each.p_value,
+                "corrected_p_value": each.corrected,
+                "fails": each.fails,
+            }
+            for each in told.criticism.findings
+        ],
+        "laws": [
+            {
+                "other_law": each.other,
+                "separation": each.separation,
+                "preference": each.preference,
+                "text": each.text,
+            }
+            for each in told.laws
+        ],
+    }
+
+
+def _following(found: NextMeasurement) -> dict[str, Any]:
+    return {
+        "parameter": found.parameter,
+        "text": found.text,
+        "candidates": [
+            {"measurement": each.candidate, "expected_width_ratio": each.ratio} for each in found.gains
+        ],
     }
 
 
@@ -68,22 +104,6 @@ def _parameter(found: FittedParameter) -> dict[str, Any]:
         "before_interval": None if found.before_interval is None else list(found.before_interval),
         "verdict": found.verdict.value,
         "text": found.text,
-    }
-
-
-def _criticism(said: Review) -> dict[str, Any]:
-    found = said.criticism
-    findings = [{**vars(each), "fails": each.fails} for each in found.findings]
-    return {"describes": found.describes, "text": found.text, "findings": findings}
-
-
-def _next(following: NextMeasurement) -> dict[str, Any]:
-    return {
-        "parameter": following.parameter,
-        "text": following.text,
-        "candidates": [
-            {"measurement": gain.candidate, "width_ratio": gain.ratio} for gain in following.gains
-        ],
     }
 
 

@@ -36,28 +36,21 @@ _FAR: Final = 3.0
 
 
 def fit_view(
-    result: FitResult, *, data: Sequence[Observations], said: Review, following: NextMeasurement | None
+    result: FitResult, *, data: Sequence[Observations], told: Review, following: NextMeasurement | None
 ) -> RenderableType:
-    """Parameters, then what else the data say, for a console. Args: `following`: what to measure next."""
-    return Group(
-        _heading(result, data),
-        _parameters(result),
-        *_review(said),
-        *_remarks(result),
-        *([] if following is None else [Text(f"Measure next: {following.text}.", style="bold")]),
-        *_not_fitted(result),
-    )
+    """Parameters, whether the fit holds, and what else the data say, for a rich console."""
+    more = [] if following is None else [Text(_sentence(following.text))]
+    remarks = [*_review(told), *_remarks(result), *more]
+    return Group(_heading(result, data), _parameters(result), *remarks)
 
 
-def _review(said: Review) -> Iterator[Text]:
-    """Whether the fit describes the data, and other laws that would."""
-    style = "green" if said.criticism.describes else "bold red"
-    yield Text(_sentence(said.criticism.text), style=style)
-    yield from (Text(_sentence(each.text)) for each in said.laws)
+def _review(told: Review) -> Iterator[Text]:
+    yield Text(_sentence(told.criticism.text), "" if told.criticism.describes else "bold red")
+    yield from (Text(_sentence(each.text)) for each in told.laws)
 
 
 def _sentence(text: str) -> str:
-    return f"{text[:1].upper()}{text[1:]}."
+    return f"{text[0].upper()}{text[1:]}."
 
 
 def _heading(result: FitResult, data: Sequence[Observations]) -> RenderableType:
@@ -104,9 +97,6 @@ def _remarks(result: FitResult) -> Iterator[Text]:
     yield from (Text(_noise(each)) for each in result.noise)
     yield from map(Text, _pairs(result))
     yield from _rows(result)
-
-
-def _not_fitted(result: FitResult) -> Iterator[Text]:
     if result.held:
         held = ", ".join(result.held)
         yield Text(f"Not fitted, their [uncertainty] is in all intervals: {held}.", "dim")

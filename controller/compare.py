@@ -9,19 +9,18 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.algorithms.by_name import target_vector_of
 from ringbalance.controller.compare_rotor import OneRotor, own_scene, rotor_of, scene_on
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.sampled_loops import advised
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import chamber_letters
-from ringbalance.controller.tuning.dead_time import compensated
-from ringbalance.controller.tuning.loop_factor import loop_factor
-from ringbalance.controller.tuning.recommendation import recommended_gain
+from ringbalance.controller.tuning.recommendation import factor_uncertainty
+from ringbalance.controller.tuning.search import recommended
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.selection.registry import ModelUsed
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.faults import Fault, SceneError
+from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
 
@@ -176,22 +175,13 @@ def _side(
 
 
 def _liquid_side(scene: Scene, model: BalancerModel, *, span: float, runs: int, tuned: bool) -> Side:
-    changes: dict[str, float] = {}
-    ready = replace(scene, run=replace(scene.run, time_limit=span))
-    if tuned and scene.controller.kind == "target_vector":
-        gain = recommended_gain(scene, model, loop=loop_factor(scene, model, target_vector_of(scene)))
-        if gain > 0:
-            changes = {"controller.proportional": gain}
-            ready = replace(ready, controller=replace(ready.controller, proportional=gain))
-    if tuned:
-        ready = compensated(ready, model)
-        if ready.controller.gas_time_offset != scene.controller.gas_time_offset:
-            offsets = ready.controller.offsets(ready.disc.chambers)
-            letters = chamber_letters(ready.disc.chambers)
-            changes |= {
-                f"controller.gas_time_offset.{letter}": offset
-                for letter, offset in zip(letters, offsets, strict=True)
-            }
+    # Valve-open times of the trial algorithm are the scene's.
+    best = None
+    if tuned and scene.controller.kind != "trial":
+        best = recommended(scene, model, factor_uncertainty(scene, model))
+    ready = scene if best is None else best.scene
+    changes = _changes(scene.controller, ready.controller, chambers=scene.disc.chambers)
+    ready = replace(ready, run=replace(ready.run, time_limit=span))
     done = [
         simulate(replace(ready, run=replace(ready.run, seed=ready.run.seed + i)), model, to_time_limit=True)
         for i in range(runs)
@@ -207,6 +197,17 @@ def _liquid_side(scene: Scene, model: BalancerModel, *, span: float, runs: int, 
         for run in done
     )
     return Side(scene=ready, tuned=changes, results=results, models_used=done[0].models_used)
+
+
+def _changes(before: ControllerSettings, after: ControllerSettings, *, chambers: int) -> dict[str, float]:
+    """Scene keys that tuning has changed, with their values, SI."""
+    changes = {}
+    if after.proportional != before.proportional:
+        changes["controller.proportional"] = after.proportional
+    if after.gas_time_offset != before.gas_time_offset:
+        offsets = zip(chamber_letters(chambers), after.offsets(chambers), strict=True)
+        changes |= {f"controller.gas_time_offset.{letter}": offset for letter, offset in offsets}
+    return changes
 
 
 def _driven_side(rotor: OneRotor, scene: EccentricScene, *, span: float, runs: int, tuned: bool) -> Side:

@@ -112,11 +112,14 @@ def verdicts(
     return tuple(found)
 
 
-def data_root(slopes: FloatArray) -> FloatArray:
-    """H of the covariance H H' of t by the data alone; huge along what they do not see."""
+def data_root(slopes: FloatArray, *, unseen: float = _UNSEEN) -> FloatArray:
+    """H of the covariance H H' of t by the data alone.
+
+    Args: `unseen`: singular value along what they do not see: small, or infinite to leave that out.
+    """
     norms, s, vt = _normalised(slopes)
-    seen = np.where(s > DEPENDENT, s, _UNSEEN)
-    size = np.where(norms > 0, norms, _UNSEEN)
+    seen = np.where(s > DEPENDENT, s, unseen)
+    size = np.where(norms > 0, norms, unseen)
     return np.asarray((vt.T / seen) / size[:, None])
 
 
@@ -138,13 +141,14 @@ def combinations(
     flat = _flattened(slopes, t, allowed, [p for p, one in zip(profiles, weak, strict=True) if one])
     _, s, vt = np.linalg.svd(flat * allowed, full_matrices=False)
     # A row is the gradient of a product's logarithm; one that has a single parameter is a verdict.
-    roots = data_root(slopes), data_root(flat)
+    root = data_root(flat)
     # A profile is never wider than its prior, so that a direction counts from a root of two, as above.
     strong = vt[s > math.sqrt(2) * factor]
-    rows = [_simple(row, roots[1]) for row in _echelon(strong / allowed)]
+    rows = [_simple(row, root) for row in _echelon(strong / allowed)]
     rows = [row for row in rows if np.count_nonzero(row) > 1 and np.any(row[weak] != 0)]
-    # A flattened J knows less than the data about what its way only nearly leaves alone.
-    widths = [factor * min(float(np.linalg.norm(row @ root)) for root in roots) for row in rows]
+    # What rounding of the exponents lets in of directions that are not seen at all is no width.
+    seen = data_root(slopes, unseen=math.inf)
+    widths = [factor * float(np.linalg.norm(row @ seen)) for row in rows]
     return tuple(_combination(parameters, t, row, width) for row, width in zip(rows, widths, strict=True))
 
 

@@ -78,11 +78,11 @@ def surface_radius(*, disc: Disc, fill_ratio: npt.ArrayLike) -> FloatArray:
     whole = within(radius=r2)
     target = x * (whole - within(radius=r1))
     # The depth form keeps full relative accuracy for a film of a micrometre, where a^2 = R2^2 - ... cancels.
-    squared = r2**2 - x * (r2**2 - r1**2)
+    squared, enough = r2**2 - x * (r2**2 - r1**2), 4 * np.finfo(np.float64).eps * r2**2
     for _ in range(60):
         a = np.sqrt(squared)
         step = (whole - within(radius=a) - target) / half_angle(disc=disc, radius=a)
         squared = np.minimum(np.maximum(squared + step, r1**2), r2**2)
-        if np.all(np.abs(step) <= 4 * np.finfo(np.float64).eps * r2**2):
+        if (np.abs(step) <= enough).all():
             break
     return np.asarray(np.sqrt(squared), dtype=np.float64)

@@ -16,3 +16,8 @@ def distinct(values: npt.ArrayLike) -> FloatArray:
     """The different values in rising order, as np.unique gives them: that imports numpy's masked arrays."""
     ordered = np.sort(np.asarray(values, dtype=np.float64).ravel())
     return ordered[np.append(True, ordered[1:] != ordered[:-1])] if ordered.size else ordered
+
+
+def clipped(values: npt.ArrayLike, low: float, high: float) -> FloatArray:
+    """As np.clip, which takes three times as long for a few numbers."""
+    return np.minimum(np.maximum(values, low), high)

@@ -16,6 +16,7 @@ from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import (
 )
 from ringbalance.controller.eccentric_mass.estimation.imbalance_model import ProcessNoise
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
+from ringbalance.controller.eccentric_mass.plant.substep_limit import longest_run
 from ringbalance.controller.eccentric_mass.plant.whirl import influence
 from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, Remedy, RunFacts
 from ringbalance.controller.eccentric_mass.sampled_loops import recommended_gains
@@ -35,6 +36,11 @@ _ATTAINED: Final = 0.3
 _MARGIN: Final = 1.5
 _TRIALS: Final = 40
 """Of fine tuning that a longer time should allow."""
+_TIME: Final = "run.time_limit"
+_NEARLY: Final = 0.99
+"""Of the longest run: a remedy's value is rounded."""
+_NOTABLY: Final = 1.05
+"""Times the run's length, below which a longer run is no remedy."""
 _NO_GATE: Final = 0.5
 """Relative standard deviation beyond which a gate lets anything pass."""
 
@@ -149,7 +155,7 @@ def _friction_remedy(scene: EccentricScene, *, arm: float, speed: float) -> Reme
         )
     longer = 4 * scene.supervisor.friction_time
     total = scene.run.time_limit + longer
-    return _remedy(scene, ("supervisor.friction_time", longer), ("run.time_limit", total))
+    return _remedy(scene, ("supervisor.friction_time", longer), (_TIME, total))
 
 
 def _gain_remedy(scene: EccentricScene) -> Remedy | None:
@@ -214,7 +220,12 @@ _UNITS: Final = {
 
 
 def _remedy(scene: EccentricScene, *changes: tuple[str, float | str]) -> Remedy:
-    """Changes that are made together, each to three digits, with their text."""
+    """Changes that are made together, to three digits each, with their text; no run longer than allowed."""
+    longest = _NEARLY * longest_run(scene)
+    changes = tuple(
+        (key, min(value, longest) if key == _TIME and not isinstance(value, str) else value)
+        for key, value in changes
+    )
     rounded = [(key, value if isinstance(value, str) else _rounded(key, value)) for key, value in changes]
     return Remedy(changes=tuple(rounded), text=" and ".join(_change_text(scene, *each) for each in rounded))
 
@@ -241,9 +252,9 @@ def _more_time(facts: RunFacts) -> tuple[Remedy, ...]:
     told, tuning = facts.scene.supervisor, facts.scene.fine_tuning
     stages = told.start + told.imbalance_time + told.friction_time + told.positioning_time
     tuned = told.fine_tuning_time if facts.stage >= Stage.CHECK else 0.0
-    return (
-        _remedy(facts.scene, ("run.time_limit", stages + tuning.wait + tuning.average + tuned + facts.time)),
-    )
+    found = _remedy(facts.scene, (_TIME, stages + tuning.wait + tuning.average + tuned + facts.time))
+    longer = _NOTABLY * facts.scene.run.time_limit
+    return tuple(found for _, value in found.changes if not isinstance(value, str) and value > longer)
 
 
 def _more_volts(facts: RunFacts) -> list[Remedy]:
@@ -258,7 +269,8 @@ def _stalled_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
     faster = _remedy(
         facts.scene, ("friction_filter.drive_speed", 4 * facts.scene.friction_filter.drive_speed)
     )
-    return (*([found] if found else []), *_more_volts(facts), *([] if found else [faster]))
+    # More volts alone do nothing for a gain that is too low.
+    return (found,) if found else (*_more_volts(facts), faster)
 
 
 def _arrival_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
@@ -284,7 +296,7 @@ def _tuning_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
     told = facts.scene.fine_tuning
     longer = max(3 * facts.scene.supervisor.fine_tuning_time, _TRIALS * (told.wait + told.average))
     total = facts.scene.run.time_limit + longer
-    more = _remedy(facts.scene, ("supervisor.fine_tuning_time", longer), ("run.time_limit", total))
+    more = _remedy(facts.scene, ("supervisor.fine_tuning_time", longer), (_TIME, total))
     return (more, *_limit_remedy(facts))
 
 

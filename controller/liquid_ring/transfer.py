@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.reduced_model.law.flow_law import Flow, FlowLaw, Regime
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import FloatArray, clipped
 
 
 class Event(StrEnum):
@@ -62,12 +62,12 @@ class Drive:
     def opposite(self, fill: npt.ArrayLike) -> FloatArray:
         """Fill ratio of the opposite chamber, x_C = total - x, held within the law's range."""
         other = self.total - np.asarray(fill, dtype=np.float64)
-        return np.asarray(np.clip(other, 0.0, self.law.max_fill_ratio), dtype=np.float64)
+        return clipped(other, 0.0, self.law.max_fill_ratio)
 
     def flow(self, fill: npt.ArrayLike, *, primed: bool = True) -> Flow:
         """The law's answer for fill ratios of the driven chamber, any shape."""
         return self.law.evaluate(
-            fill_ratio=np.clip(fill, 0.0, self.law.max_fill_ratio),
+            fill_ratio=clipped(fill, 0.0, self.law.max_fill_ratio),
             opposite_fill_ratio=self.opposite(fill),
             gas_pressure=self.gas_pressure,
             primed=primed,

@@ -19,6 +19,7 @@ from ringbalance.controller.tuning.tune import Tuning, tuning_document
 from ringbalance.controller.tuning.tune import tune as tune_scene
 from ringbalance.reduced_model.gas_line import line_text, line_warning
 from ringbalance.reduced_model.law_by_name import law_by_name
+from ringbalance.reduced_model.selection.registry import neglected_in_injections
 from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.loader import load_scene
@@ -130,6 +131,7 @@ def _rows(tuning: Tuning) -> dict[str, str]:
         )
     rows["smallest correction of the valve"] = f"{tuning.smallest_correction * _UM:.4g} um"
     rows["gas line"] = line_text(tuning.gas_line)
+    rows["neglected"] = neglected_in_injections(tuning.models_used).text
     return rows | _settling(tuning) | _tried(tuning)
 
 

@@ -49,13 +49,16 @@ def _dead_time(scene: Scene, fills: Fills, *, rate: float) -> float:
     return round(max(float(injection.dead_time(metres)), 0.0), _DIGITS)
 
 
-def compensated(scene: Scene, model: BalancerModel) -> Scene:
-    """The scene with the dead times as offsets where an amplitude above its limit would stand still.
+def compensated(scene: Scene, model: BalancerModel, dead: tuple[float, ...]) -> Scene:
+    """The scene with its dead times as offsets where an amplitude above its limit would stand still.
 
     Not for the trial algorithm, whose valve-open times are the scene's.
     """
-    dead = () if scene.controller.kind == "trial" else dead_times(scene, model)
-    if not dead or dead_zone(scene, model, dead) <= scene.controller.limit:
+    if (
+        scene.controller.kind == "trial"
+        or not dead
+        or dead_zone(scene, model, dead) <= scene.controller.limit
+    ):
         return scene
     return replace(scene, controller=replace(scene.controller, gas_time_offset=dead))
 
@@ -83,7 +86,7 @@ def offset_text(offsets: Sequence[float]) -> str:
 
 def standing_remedy(scene: Scene, model: BalancerModel) -> str:
     """What to change where the dead time leaves an amplitude above the limit where it is; else empty."""
-    mended = compensated(scene, model).controller.gas_time_offset
+    mended = compensated(scene, model, dead_times(scene, model)).controller.gas_time_offset
     if not mended or mended == scene.controller.gas_time_offset:
         return ""
     still = dead_zone(scene, model, mended)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ringbalance.controller.algorithms.by_name import controller_of, law_based_of, target_vector_of
+from ringbalance.controller.algorithms.by_name import controller_of, law_based_of
 from ringbalance.controller.checks import check_settings
 from ringbalance.controller.liquid_ring.plant import initial_state
 from ringbalance.controller.liquid_ring.reach import BEYOND_CAPACITY, unreachable_vibration
@@ -20,14 +20,13 @@ from ringbalance.controller.tuning.recommendation import (
     Contribution,
     FactorUncertainty,
     factor_uncertainty,
-    recommended_gain,
 )
 from ringbalance.controller.tuning.search import LIMITS, Candidate, Search, recommended, search
 from ringbalance.controller.tuning.settling import MEMBERS, RUNS, Progress, SettlingTimes, settling_times
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.gas_line import LineAnswer, line_answers, line_document
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.selection.registry import ModelUsed
+from ringbalance.reduced_model.selection.registry import ModelUsed, neglected_in_injections
 from ringbalance.scene.models import Scene
 
 
@@ -96,11 +95,8 @@ def tune(
     check_ring(scene)
     told("uncertainty ...")
     known = factor_uncertainty(scene, model)
-    wanted = recommended_gain(
-        scene, model, loop=loop_factor(scene, model, target_vector_of(scene)), uncertainty=known
-    )
     best, found, settling = recommended(scene, model, known), None, None
-    if wanted > 0:
+    if best is not None:
         told("settling times ...")
         settling = settling_times(best.scene, model, known.widths, members=members, runs=runs, told=told)
         if settling.quantiles["p95"] is None and _beyond_capacity(scene, model) <= scene.controller.limit:
@@ -119,20 +115,22 @@ def _judged(
     model: BalancerModel,
     known: FactorUncertainty,
     *,
-    best: Candidate,
+    best: Candidate | None,
     found: Search | None,
     settling: SettlingTimes | None,
 ) -> Tuning:
-    tuned, flows = best.scene, settling is not None
+    tuned, flows = scene if best is None else best.scene, best is not None
     settings = tuned.controller
     present = loop_factor(scene, model, controller_of(scene, model))
     loop = loop_factor(tuned, model, controller_of(tuned, model))
     smallest = float(np.max(vibration_rates(tuned, model))) * settings.minimum_gas_time
-    dead = dead_times(tuned, model)
+    dead = dead_times(tuned, model) if best is None else best.dead
     zone = dead_zone(tuned, model, dead)
     lines = line_answers(tuned, model)
     beyond = _beyond_capacity(scene, model)
-    within = flows and loop.stays and max(zone, smallest / 2, beyond) <= settings.limit
+    settles = settling is not None and settling.quantiles["p95"] is not None
+    reaches = settles or max(zone, smallest / 2) <= settings.limit
+    within = flows and loop.stays and reaches and beyond <= settings.limit
     # The law-based algorithm asks for the time in which the law moves the whole residual.
     gain = (1.0 / loop.rate if settings.kind == "law_based" else settings.proportional) if flows else None
     return Tuning(
@@ -150,7 +148,7 @@ def _judged(
         smallest_correction=smallest,
         dead_times=dead,
         dead_zone=zone,
-        change=best.change,
+        change="" if best is None else best.change,
         search=found,
         beyond_capacity=beyond,
         reachable=within and _line_reaches(lines),
@@ -210,26 +208,26 @@ def _status(
     zone: float,
     smallest: float,
     settling: SettlingTimes | None,
-    best: Candidate,
+    best: Candidate | None,
     found: Search | None,
 ) -> str:
     limit, um = scene.controller.limit, 1e6
     if loop.rate == 0.0:
         return "no gain: the gas drives no liquid at the balanced fills: raise gas.pressure"
-    if settling is None or not loop.stays:
+    if best is None or settling is None or not loop.stays:
         return (
             f"no gain keeps the amplitude within {limit * um:.4g} um: the sensor's noise is "
             f"{scene.sensor.amplitude_noise * um:.4g} um: raise controller.limit or average the sensor"
         )
+    reached, also = settling.quantiles["p95"], f", with {best.change}" if best.change else ""
+    if reached is not None:
+        return f"tuned{also}: 95 % of the runs settle within {reached:.3g} s"
     if max(zone, smallest / 2) > limit:
         return (
             f"the valve is too slow for the limit of {limit * um:.4g} um: the shortest valve-open time moves "
             f"the vibration by {smallest * um:.4g} um, and up to {zone * um:.4g} um none moves liquid: "
             f"lower controller.minimum_gas_time{_reached(found)}"
         )
-    reached, also = settling.quantiles["p95"], f", with {best.change}" if best.change else ""
-    if reached is not None:
-        return f"tuned{also}: 95 % of the runs settle within {reached:.3g} s"
     share = (
         f"{settling.settled.value:.1%} of the runs settle within the time limit of "
         f"{scene.run.time_limit:.4g} s{also}: 95 % is not reached"
@@ -292,6 +290,7 @@ def tuning_document(tuning: Tuning) -> dict[str, Any]:
         "fraction_settled_95": None if settling is None else [settling.settled.low, settling.settled.high],
         "runs": 0 if settling is None else settling.runs,
         "left_out": [],
+        "neglected": asdict(neglected_in_injections(tuning.models_used)),
         "models_used": [asdict(used) for used in tuning.models_used],
     }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -13,6 +14,7 @@ from ringbalance.identification.predict.scalars import scalar_covariance
 from ringbalance.physics.tube.state import tube_state
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
+from ringbalance.scene.tube_models import FINEST_MODELS
 
 _ROUNDS: Final = 12
 _STEP: Final = 1e-4
@@ -49,8 +51,9 @@ def _flow_rate(device: Device, observations: Observations) -> FloatArray:
 
 
 def _loss(scene: Scene, velocity: FloatArray) -> FloatArray:
-    """k of the tube at rest."""
-    return tube_state(tube=scene.tube, liquid=scene.liquid, angular_velocity=0.0, velocity=velocity).k
+    """k of the tube at rest, by the finest models: the scene's are chosen for its own velocities."""
+    tube = replace(scene.tube, models=FINEST_MODELS)
+    return tube_state(tube=tube, liquid=scene.liquid, angular_velocity=0.0, velocity=velocity).k
 
 
 def covariance(observations: Observations) -> FloatArray:

@@ -27,6 +27,7 @@ grows evenly along the arcs of surface and wall: rot chi flows in through the on
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
@@ -91,6 +92,7 @@ class SloshingSystem:
         return np.asarray(ratios[squares.size :], dtype=np.float64)
 
 
+@lru_cache(maxsize=128)
 def sloshing_system(*, disc: Disc, surface_radius: float, cells: tuple[int, int]) -> SloshingSystem:
     """Assemble and condense the problem on one mesh.
 

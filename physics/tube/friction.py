@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.physics.tube.rotation import STRAIGHT_CRITICAL_REYNOLDS
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import FloatArray, clipped
 
 
 def friction_factor(
@@ -32,7 +32,7 @@ def friction_factor(
     """
     re = np.asarray(reynolds, dtype=np.float64)
     # Below Re = 1e-6 and above 1e12 only the powers would overflow: there one branch rules alone.
-    bounded = np.clip(re, 1e-6, 1e12)
+    bounded = clipped(re, 1e-6, 1e12)
     b = (37530 / bounded) ** 16 * np.asarray(critical_ratio, dtype=np.float64) ** 16
     laminar = 8 * np.asarray(laminar_ratio, dtype=np.float64) / re
     a = _log_power(bounded, relative_roughness) / np.asarray(turbulent_ratio, dtype=np.float64) ** 8
@@ -86,7 +86,7 @@ def _branch_gap(
     re: FloatArray, relative_roughness: float, laminar_ratio: npt.ArrayLike, turbulent_ratio: npt.ArrayLike
 ) -> FloatArray:
     # The turbulent branch without its onset term; below Re = 1000 its logarithm changes sign.
-    bounded = np.clip(re, 1000.0, 1e12)
+    bounded = clipped(re, 1000.0, 1e12)
     turbulent = 8 * np.asarray(turbulent_ratio) * _log_power(bounded, relative_roughness) ** -0.125
     # Where rotation has raised the laminar branch above the turbulent one there is no jump to be early or
     # late for: what was measured in rotating ducts lies at the laminar branch or above it.
@@ -104,4 +104,4 @@ def turbulent_share(
     """
     re = np.asarray(reynolds, dtype=np.float64)
     log_ratio = np.log(STRAIGHT_CRITICAL_REYNOLDS * np.asarray(critical_ratio, dtype=np.float64) / re)
-    return np.asarray(1 / (1 + np.exp(np.clip(sharpness * log_ratio, -300, 300))), dtype=np.float64)
+    return np.asarray(1 / (1 + np.exp(clipped(sharpness * log_ratio, -300, 300))), dtype=np.float64)

@@ -26,7 +26,7 @@ import numpy.typing as npt
 
 from ringbalance.physics.results import Estimate, Status, StatusCode
 from ringbalance.physics.splines import Surface
-from ringbalance.scene.arrays import BoolArray, FloatArray, distinct
+from ringbalance.scene.arrays import BoolArray, FloatArray, clipped, distinct
 
 Rows = Sequence[Mapping[str, str]]
 
@@ -125,14 +125,14 @@ def _rectangle(table: str, rows: Rows) -> Rectangle:
 
 def _logarithm(rectangle: Rectangle, a: FloatArray, b: FloatArray) -> FloatArray:
     """ln F at the nearest point of the rectangle."""
-    a, b = np.clip(a, 0.0, rectangle.a_limit), np.clip(b, 0.0, rectangle.b_limit)
+    a, b = clipped(a, 0.0, rectangle.a_limit), clipped(b, 0.0, rectangle.b_limit)
     logarithm = _base_at(rectangle.table, a, b) + rectangle.difference(a, b)
     return np.asarray(np.where(a > 0.0, logarithm, 0.0))
 
 
 def _discretisation(rectangle: Rectangle, a: FloatArray, b: FloatArray) -> FloatArray:
     """Relative discretisation uncertainty there."""
-    return rectangle.numerical(np.clip(a, 0.0, rectangle.a_limit), np.clip(b, 0.0, rectangle.b_limit))
+    return rectangle.numerical(clipped(a, 0.0, rectangle.a_limit), clipped(b, 0.0, rectangle.b_limit))
 
 
 def _gap(rectangle: Rectangle, rows: Rows) -> FloatArray:
@@ -165,7 +165,7 @@ def friction_table() -> FrictionTable:
 
 def _smooth_step(x: FloatArray) -> FloatArray:
     """0 below 0, 1 above 1, twice continuously differentiable."""
-    c = np.clip(x, 0.0, 1.0)
+    c = clipped(x, 0.0, 1.0)
     return np.asarray(c**3 * (10 - 15 * c + 6 * c**2), dtype=np.float64)
 
 

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.scene.arrays import BoolArray, FloatArray, clipped
 
 FILL_SLACK: Final = 1e-9
 """Fill ratios this far outside the range are taken as its end: integrators land there by round-off."""
@@ -45,16 +45,18 @@ def checked_conditions(
     opposite = max_fill_ratio - x if opposite_fill_ratio is None else opposite_fill_ratio
     y = _within(opposite, max_fill_ratio, "opposite_fill_ratio")
     p = np.asarray(gas_pressure, dtype=np.float64)
-    if not np.all(np.isfinite(p) & (p + ambient_pressure >= 0)):
+    if not (np.isfinite(p) & (p + ambient_pressure >= 0)).all():
         raise ValueError(
             f"gas_pressure must be finite and at least minus the ambient {ambient_pressure:g} Pa"
         )
-    x, y, p, wet = np.broadcast_arrays(x, y, p, np.asarray(primed, dtype=np.bool_))
+    wet = np.asarray(primed, dtype=np.bool_)
+    if not x.shape == y.shape == p.shape == wet.shape:
+        x, y, p, wet = np.broadcast_arrays(x, y, p, wet)
     return Conditions(fill_ratio=x, opposite_fill_ratio=y, gas_pressure=p, primed=wet)
 
 
 def _within(fill_ratio: npt.ArrayLike, largest: float, name: str) -> FloatArray:
     x = np.asarray(fill_ratio, dtype=np.float64)
-    if not np.all((x >= -FILL_SLACK) & (x <= largest + FILL_SLACK)):
+    if not ((x >= -FILL_SLACK) & (x <= largest + FILL_SLACK)).all():
         raise ValueError(f"{name} must lie within [0, {largest:g}]")
-    return np.asarray(np.clip(x, 0.0, largest), dtype=np.float64)
+    return clipped(x, 0.0, largest)

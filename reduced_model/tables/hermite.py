@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import FloatArray, clipped
 
 _NEWTON_STEPS = 5
 
@@ -63,8 +63,8 @@ class HermiteTable:
     def with_slope(self, x: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Value and slope at any x."""
         place = (np.asarray(x, dtype=np.float64) - self.start) / self.step
-        cell = np.clip(np.floor(place), 0, self.value.size - 2).astype(np.intp)
-        t = np.clip(place - cell, 0.0, 1.0)
+        cell = clipped(np.floor(place), 0, self.value.size - 2).astype(np.intp)
+        t = clipped(place - cell, 0.0, 1.0)
         y, slope = self._within(cell, t)
         beyond = place - cell - t
         return np.asarray(y + beyond * self.step * slope), slope
@@ -79,13 +79,13 @@ class HermiteTable:
     def inverse(self, y: npt.ArrayLike) -> FloatArray:
         """The x of a value, for a table that grows from node to node."""
         wanted = np.asarray(y, dtype=np.float64)
-        cell = np.clip(np.searchsorted(self.value, wanted) - 1, 0, self.value.size - 2)
+        cell = np.minimum(np.maximum(np.searchsorted(self.value, wanted) - 1, 0), self.value.size - 2)
         low = self.value[cell]
-        t = np.clip((wanted - low) / (self.value[cell + 1] - low), 0.0, 1.0)
+        t = clipped((wanted - low) / (self.value[cell + 1] - low), 0.0, 1.0)
         for _ in range(_NEWTON_STEPS):
             found, slope = self._within(cell, t)
-            better = np.clip(t + (wanted - found) / (self.step * slope), 0.0, 1.0)
-            if np.array_equal(better, t):
+            better = clipped(t + (wanted - found) / (self.step * slope), 0.0, 1.0)
+            if (better == t).all():
                 break
             t = better
         else:

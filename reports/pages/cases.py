@@ -28,14 +28,14 @@ _NOTHING: Final = 1e-3
 _FACTS: Final = (
     ("explanation", "Finding"),
     ("judgement", "Why this verdict"),
-    ("consequence", "Consequence"),
-    ("cause", "Common cause"),
     ("protects", "Protects"),
     ("assumes", "Assumes"),
     ("does_not_cover", "Does not cover"),
 )
 _LOPSIDED: Final = 1.2
 """Ratio of the two sides of an interval from which on both ends are shown."""
+_FINE: Final = 0.01
+"""Half-width over error below which two digits of the error say enough."""
 _NAMED_INPUTS: Final = 2
 _RELATIVE_METRICS: Final = ("relative", "validation", "within_uncertainty")
 
@@ -54,7 +54,9 @@ def _facts(case: Record) -> list[tuple[str, str]]:
     reference = case.get("reference") or {}
     told = [str(reference[key]) for key in ("kind", "source", "uncertainty") if reference.get(key)]
     rests = [("Rests on", "; ".join(map(_assumption, found)))] if (found := case.get("rests_on")) else []
-    return [*pairs, *rests, *([("Reference", "; ".join(told))] if told else []), ("Run", _how_run(case))]
+    rows = [*pairs, *rests, ("Reference", "; ".join(told)), ("Must be noticed", "; ".join(_mutations(case)))]
+    doubts = ("Doubts", " ".join(case.get("doubts") or []))
+    return [(label, text) for label, text in (*rows, doubts, ("Run", _how_run(case))) if text]
 
 
 def _assumption(one: Record) -> str:
@@ -104,7 +106,7 @@ def _quantity_row(quantity: Record, path: str) -> Record:
             "reference",
             shown(quantity.get("reference"), unit, quantity.get("reference_uncertainty"), digits=4),
         ),
-        "error": marked("error", shown(quantity.get("error"), unit, quantity.get("uncertainty"), digits=2)),
+        "error": marked("error", _error(quantity, unit)),
         "parts": [
             shown((quantity.get("validation") or {}).get(part), unit, digits=2)
             for part in ("u_num", "u_input", "u_D")
@@ -112,6 +114,13 @@ def _quantity_row(quantity: Record, path: str) -> Record:
         "limit": _criterion(quantity),
         "verdict": quantity.get("verdict") or "not run",
     }
+
+
+def _error(quantity: Record, unit: str) -> str:
+    """To the second digit of its half-width, or to two digits of its own where those are fewer."""
+    error, width = quantity.get("error"), quantity.get("uncertainty")
+    fine = error and width and width < _FINE * abs(error)
+    return shown(error, unit, None if fine else width, digits=2)
 
 
 def _value(quantity: Record, half_width: float | None) -> str:
@@ -293,6 +302,4 @@ def case_view(case: Record) -> Record:
             for table in case.get("tables") or []
             if is_long(table)
         ],
-        "mutations": _mutations(case),
-        "doubts": case.get("doubts") or [],
     }

@@ -24,6 +24,8 @@ _NAMES: Final = {
     "crest_pressure": "Pressure over the siphon crest as the tube runs, gauge",
     "cavitation_margin": "Cavitation margin of a tube that ran full; below zero the column separates",
 }
+_EXACT: Final = 1e-6
+"""Relative total below which a number is a closed form of inputs that are taken as exact."""
 _DRAWN: Final = {"velocity": "Velocity", "usable_moment": "Usable moment", "lambda": "Lever arm λ"}
 _REGIMES: Final = {
     "blocked": "is blocked",
@@ -83,7 +85,11 @@ def _row(evidence: Record, name: str) -> Cells:
         _part(budget[part] * unit.factor, budget["total"] * unit.factor, f"{path}.{part}")
         for part in ("numerical", "input", "model")
     ]
-    value = traced(shown(budget["value"], budget["unit"], budget["total"]), f"{path}.value")
+    exact = budget["total"] < _EXACT * abs(budget["value"])
+    parts = [MISSING] * len(parts) if exact else parts
+    value = traced(
+        shown(budget["value"], budget["unit"], None if exact else budget["total"], digits=6), f"{path}.value"
+    )
     behind = budget_standing(evidence["verification"], name)
     return _NAMES[name], value, *parts, _largest(evidence, budget), behind, _paper(evidence, name)
 

@@ -98,7 +98,7 @@ def _chance_table(ensembles: list[Record]) -> Table:
     members = short(ensembles[0]["members"]) if ensembles else ""
     return Table(
         caption="Probabilities over the uncertainty of k, λ, influence coefficient, lag angle and noise: "
-        f"{members} runs each, 95 % intervals in brackets.",
+        f"{members} runs each under the flow law alone; 95 % intervals in brackets.",
         heads=("", *_COLUMNS[: len(ensembles)]),
         rows=[*chances, ("half of all runs settled by (5 %; 95 %)", *times)],
         style="",

@@ -103,7 +103,7 @@ def _actions(rows: list[Record]) -> list[str]:
         if row["verdict"] == OPEN and (causes := _causes(row)):
             found.setdefault(", ".join(sorted(causes)), []).append(row["quantity"])
     return [
-        f"Determine more closely: {causes}. Whether these requirements are met depends on it: "
+        f"Determine more closely: {causes}. That decides whether these requirements are met: "
         f"{', '.join(names)}."
         for causes, names in found.items()
     ]

@@ -12,6 +12,7 @@ from ringbalance.reduced_model.chamber.inputs import half_widths
 from ringbalance.reports.numbers import THIN_SPACE, given, number, percent, shown
 from ringbalance.reports.origins import named_with_origin
 from ringbalance.reports.pages.requirements import (
+    STANDING,
     Requirement,
     decision,
     requirement_figure,
@@ -19,6 +20,7 @@ from ringbalance.reports.pages.requirements import (
     requirement_table,
     requirements,
 )
+from ringbalance.reports.prose import key_words
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.reports.summary import MISSED, OPEN
 from ringbalance.reports.traces import traced
@@ -40,6 +42,7 @@ _VALVE: Final = {
 """What to do about a valve that may not, or cannot, reach the limit."""
 _LIKELY: Final = 0.95
 """Fraction of runs that must settle before a gain is recommended for use."""
+_ROTOR: Final = ("rotor.influence_coefficient", "rotor.lag_angle", "rotor.initial_amplitude")
 _DOMINANT: Final = 3
 _MAIN: Final = {
     "velocity": "flow velocity",
@@ -131,7 +134,7 @@ def _view(found: Record, evidence: Record) -> Record:
         "actions": _actions(evidence, rows),
         "dominant": dominant(evidence),
         "unmeasured": _NO_MEASUREMENT,
-        "rests": _bore(found, evidence),
+        "rests": [*_bore(found, evidence), *_exact(evidence), *_borrowed(evidence)],
     }
 
 
@@ -190,7 +193,8 @@ def _factor(run: Record) -> str:
         for key in ("loop_factor", "loop_factor_limit")
     )
     if factor > run["loop_factor_limit"]:
-        end = f"more than {limit} times, so that it grows"
+        chance = "; that this run settles is chance" if run["settled"] else ""
+        end = f"more than {limit} times, so that it grows{chance}"
     elif factor > 1:
         end = (
             f"so that {percent(factor - 1)} of it is left on the opposite side; "
@@ -258,21 +262,36 @@ def _actions(evidence: Record, rows: Sequence[Requirement]) -> list[str]:
     """What to do next, the most urgent first."""
     verdicts = {row.name.split(" with ")[0]: row.verdict for row in reversed(rows)}
     told = _valve_and_gain(evidence, verdicts)
+    change = ((evidence.get("summary") or {}).get("tuning") or {}).get("change")
+    if verdicts.get(STANDING) in {MISSED, OPEN} and not change:
+        told.append(
+            "With the valve in the scene, run tune: it recommends the times to add to the valve-open times, "
+            "without which small corrections only fill gas."
+        )
     if verdicts.get("Correction capacity of one pair") in {MISSED, OPEN}:
         told.append("Balance the rotor better by hand, or take a larger disc: the capacity has no reserve.")
     if any("siphon crest radius" in row.rests for row in rows):
-        crest = (evidence.get("summary") or {}).get("crest")
-        most = shown(crest["priming_pressure_Pa"][-1], "Pa", digits=2) if crest else ""
-        told.append(
-            "Measure the radius of the siphon crest: it sets the gas pressure that starts the flow"
-            f"{f'; {most} would do wherever it may lie' if most else ''}."
-        )
+        told.append(_crest(evidence))
     if any("bore" in row.rests for row in rows):
         told.append(
             "Measure the flow through the tube at three gas pressures; every velocity and gain rests on the "
             "bore."
         )
     return told
+
+
+def _crest(evidence: Record) -> str:
+    if evidence["operating_point"].get("priming_pressure_vented_Pa") is None:
+        return (
+            "Find out whether the tube passes over a siphon crest, and at which radius: this scene has none, "
+            "and with one the flow needs more gas pressure to start."
+        )
+    crest = (evidence.get("summary") or {}).get("crest")
+    most = shown(crest["priming_pressure_Pa"][-1], "Pa", digits=2) if crest else ""
+    return (
+        "Measure the radius of the siphon crest: it sets the gas pressure that starts the flow"
+        f"{f'; {most} would do wherever it may lie' if most else ''}."
+    )
 
 
 def _valve_and_gain(evidence: Record, verdicts: Mapping[str, str]) -> list[str]:
@@ -321,6 +340,30 @@ def dominant(evidence: Record) -> list[str]:
 def _cause(evidence: Record, cause: str, effect: float, name: str) -> str:
     label = named_with_origin(evidence, cause)
     return f"{label[0].upper()}{label[1:]}: ±{THIN_SPACE}{percent(effect)} of the {_MAIN[name]}"
+
+
+def _exact(evidence: Record) -> list[str]:
+    """That results hold for exactly the scene's values, where it states no uncertainty."""
+    rows = evidence["scene"].get("table") or []
+    if any(row.get("uncertainty") for row in rows if row.get("origin") != "default"):
+        return []
+    return [
+        "The scene states no uncertainty of its inputs: every ± holds for exactly its values, and tolerances "
+        "of the parts are likely to matter more. [uncertainty] in the scene file states them."
+    ]
+
+
+def _borrowed(evidence: Record) -> list[str]:
+    """Values of the paper's rotor that stand in for those of the user's."""
+    origins = evidence["scene"].get("origins") or {}
+    rows = {row.get("path"): row.get("origin") for row in evidence["scene"].get("table") or []}
+    names = [key_words(p) for p in _ROTOR if "default" in (rows.get(p), origins.get(p))]
+    if not names:
+        return []
+    return [
+        f"Not in the scene, so those of the paper’s rotor: {', '.join(names)}. Capacity needed, gain and "
+        "settling time hold for that rotor only."
+    ]
 
 
 def _bore(found: Record, evidence: Record) -> list[str]:

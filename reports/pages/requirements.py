@@ -17,6 +17,7 @@ from ringbalance.reports.summary import MET, MISSED, OPEN, UNASKED, above, below
 from ringbalance.reports.traces import evidence_at, read, traced, untraced
 from ringbalance.scene import Scene
 
+STANDING: Final = "Vibration up to which the scene’s valve-open times only fill gas"
 _NONE: Final = "the scene asks for none"
 _LIKELY: Final = 0.95
 """Fraction of runs that must settle in time, the confidence of every interval in the report."""
@@ -313,8 +314,7 @@ def _smallest(evidence: Record) -> Requirement | None:
 
 def _standing(evidence: Record) -> Requirement | None:
     """With the scene's own gain and offsets, by the dead time in which gas only fills a chamber."""
-    name = "Vibration up to which the scene’s valve-open times only fill gas"
-    return _of_line(evidence, "standing_amplitude_m", name)
+    return _of_line(evidence, "standing_amplitude_m", STANDING)
 
 
 def _of_line(evidence: Record, key: str, name: str) -> Requirement | None:

@@ -13,6 +13,8 @@ from ringbalance.controller.algorithms.algorithm import Measurement
 from ringbalance.controller.algorithms.by_name import law_based_of, target_vector_of
 from ringbalance.controller.ensemble.monte_carlo import simulate_members
 from ringbalance.controller.loop import simulate
+from ringbalance.controller.tuning import search
+from ringbalance.controller.tuning import tune as tune_module
 from ringbalance.controller.tuning.dead_time import (
     compensated,
     dead_times,
@@ -41,7 +43,7 @@ def slow(scene: Scene) -> Scene:
 
 @pytest.fixture(scope="module")
 def offset(slow: Scene, calibrated: BalancerModel) -> Scene:
-    return compensated(slow, calibrated)
+    return compensated(slow, calibrated, dead_times(slow, calibrated))
 
 
 # --- what stands still ---
@@ -75,13 +77,13 @@ def _start(scene: Scene, amplitude: float) -> Any:
 
 def test_only_a_line_that_runs_model_has_a_dead_time(scene: Scene, calibrated: BalancerModel) -> None:
     assert dead_times(scene, calibrated) == ()
-    assert compensated(scene, calibrated) is scene
+    assert compensated(scene, calibrated, ()) is scene
     assert standing_remedy(scene, calibrated) == ""
 
 
 def test_the_trial_algorithm_keeps_its_steps(slow: Scene, calibrated: BalancerModel) -> None:
     trial = with_settings(slow, kind="trial")
-    assert compensated(trial, calibrated) is trial
+    assert compensated(trial, calibrated, (0.1,) * 4) is trial
     assert line_answers(trial, calibrated)[0].standing_amplitude is None
 
 
@@ -164,6 +166,40 @@ def test_the_law_based_algorithm_gets_the_same(slow: Scene, calibrated: Balancer
     assert "gas_time_offset" in found.status
     assert found.settling is not None
     assert found.settling.quantiles["p95"] is not None
+
+
+def test_the_law_based_algorithm_keeps_its_times_where_offsets_would_slow_it(
+    slow: Scene, calibrated: BalancerModel
+) -> None:
+    """It learns the dead time of a fast line from the first response."""
+    gas = replace(slow.gas, conductance=5e-8, valve_lag=2e-3)
+    fast = with_settings(replace(slow, gas=gas), kind="law_based", limit=0.1e-6)
+    dead = dead_times(fast, calibrated)
+    assert dead_zone(fast, calibrated, dead) > fast.controller.limit
+    found = tuned(fast, calibrated)
+    assert found.change == ""
+    assert found.succeeded
+    assert found.reachable is True
+
+
+def test_dead_times_and_the_gain_are_found_once(
+    slow: Scene, calibrated: BalancerModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: list[str] = []
+
+    def counted(name: str, function: Any) -> Any:
+        def called(*args: Any, **kwargs: Any) -> Any:
+            calls.append(name)
+            return function(*args, **kwargs)
+
+        return called
+
+    for module in (search, tune_module):
+        for name in ("recommended_gain", "dead_times"):
+            if hasattr(module, name):
+                monkeypatch.setattr(module, name, counted(name, getattr(module, name)))
+    tuned(slow, calibrated)
+    assert sorted(calls) == ["dead_times", "recommended_gain"]
 
 
 def test_what_its_runs_refute_is_not_recommended(slow: Scene, calibrated: BalancerModel) -> None:

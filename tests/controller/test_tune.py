@@ -221,6 +221,14 @@ def test_bad_input_is_exit_code_two(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert "Traceback" not in capsys.readouterr().err
 
 
+def test_a_tuning_states_what_its_runs_leave_out(scene: Scene) -> None:
+    """The liquid that each injection lifts to the crest takes most of one at the limit."""
+    document = tuning_document(tune(scene, calibrated_model(scene), members=8))
+    assert document["neglected"]["terms"] == ("liquid held in the tube",)
+    assert document["neglected"]["bound"] > 0.5
+    assert document["neglected"]["unknown"] == ("gas filling", "valve lag")
+
+
 # --- eccentric masses ---
 
 

@@ -94,7 +94,7 @@ def test_a_loop_factor_is_explained_on_either_side_of_one(evidence: Record) -> N
         ends[factor] = untraced(loop_sentences(evidence)[0]).split(". ")[-1]
     assert "and leaves the rest to the next;" in ends[0.8]
     assert "50\u202f% of it is left on the opposite side" in ends[1.5]
-    assert ends[2.3].endswith("so that it grows.")
+    assert "so that it grows" in ends[2.3]
 
 
 def test_no_run_is_compared_with_another_by_a_ratio(evidence: Record) -> None:
@@ -358,3 +358,27 @@ def test_the_bore_and_the_other_reading_are_named(evidence: Record) -> None:
 
 def test_that_nothing_was_measured_is_said(evidence: Record) -> None:
     assert view(evidence)["unmeasured"].startswith("No comparison with measurements of this device exists.")
+
+
+def test_what_the_scene_leaves_to_the_paper_s_rotor_is_named(evidence: Record) -> None:
+    assert not any("paper’s rotor" in text for text in view(evidence)["rests"])
+    evidence["scene"]["origins"]["rotor.influence_coefficient"] = "default"
+    told = view(evidence)["rests"][-1]
+    assert told.startswith("Not in the scene, so those of the paper’s rotor: influence coefficient.")
+
+
+def test_a_scene_without_uncertainties_says_so(evidence: Record) -> None:
+    rows = evidence["scene"]["table"]
+    rows[0]["uncertainty"] = "0.05 mm"
+    assert not any("states no uncertainty" in text for text in view(evidence)["rests"])
+    for row in rows:
+        row["uncertainty"] = ""
+    assert any("states no uncertainty" in text for text in view(evidence)["rests"])
+
+
+def test_settling_beyond_stability_is_called_chance(evidence: Record) -> None:
+    run = evidence["closed_loop"]["calibrated"]
+    run.update(loop_factor=2.3, settled=True, verdict="settled")
+    assert untraced(loop_sentences(evidence)[0]).endswith(
+        "so that it grows; that this run settles is chance."
+    )

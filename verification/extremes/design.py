@@ -9,11 +9,10 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass
 from functools import cache, cached_property, partial
+from importlib import import_module
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
-
-from scipy.stats import qmc
 
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import scene_from
@@ -103,7 +102,8 @@ def design(*, count: int, seed: int) -> tuple[Point, ...]:
     Source: Sobol's sequence, scrambled after Owen, as in scipy.stats.qmc.
     """
     size = 1 << max(count - 1, 0).bit_length()
-    shares = qmc.Sobol(2 * len(AXES), rng=seed).random(size)[:count]
+    # Loaded here: a report that only shows the kept result would wait for it.
+    shares = import_module("scipy.stats.qmc").Sobol(2 * len(AXES), rng=seed).random(size)[:count]
     return tuple(_point(row[: len(AXES)], row[len(AXES) :]) for row in shares)
 
 

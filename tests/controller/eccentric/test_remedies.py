@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import random
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,9 +14,11 @@ from scipy.stats import chi2
 
 from ringbalance.controller.eccentric_mass.document import eccentric_document
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
-from ringbalance.controller.eccentric_mass.remedies import found_beforehand, friction_floor
+from ringbalance.controller.eccentric_mass.plant.substep_limit import check_substeps, longest_run
+from ringbalance.controller.eccentric_mass.remedies import _more_time, found_beforehand, friction_floor
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun, Remedy
+from ringbalance.controller.eccentric_mass.strategy.plan import Stage
 from ringbalance.scene import EccentricScene, SceneError, bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.eccentric_models import SpeedPoint
 from ringbalance.verification.eccentric_mass.scenes import RPM, at_constant_speed, changed
@@ -266,3 +270,30 @@ def test_random_scenes_end_with_a_status_and_a_remedy_that_works(number: int) ->
         except SceneError:
             pytest.skip("the remedy's run would take too long")
     assert run.settled
+
+
+def test_no_remedy_asks_for_a_run_that_would_be_refused() -> None:
+    """Drives of a time constant far below the sample: the stages' times would need too many steps."""
+    fast = changed(bundled("driven_masses_small"), "motor", resistance=0.02, maximum_voltage=None)
+    short = changed(fast, "run", time_limit=0.5)
+    longest = longest_run(short)
+    with pytest.raises(SceneError):
+        check_substeps(changed(short, "run", time_limit=1.01 * longest))
+    run = simulate_eccentric(short)
+    assert run.outcome == "time_limit"
+    (remedy,) = run.remedies
+    check_substeps(cured(short, remedy))
+    assert cured(short, remedy).run.time_limit == pytest.approx(longest, rel=0.02)
+    # No longer run is allowed: then none is advised.
+    least = changed(short, "run", time_limit=0.99 * longest)
+    facts: Any = SimpleNamespace(scene=least, stage=Stage.IMBALANCE, time=least.run.time_limit)
+    assert _more_time(facts) == ()
+
+
+def test_a_stalled_drive_with_too_low_a_gain_is_not_advised_more_volts_alone(scene: EccentricScene) -> None:
+    weak = changed(scene, "friction_filter", speed_gain=0.5)
+    limited = changed(changed(weak, "masses", friction_arm=(0.03, 0.03)), "motor", maximum_voltage=0.5)
+    run = simulate_eccentric(limited)
+    assert run.outcome == "stalled"
+    for remedy in run.remedies:
+        assert simulate_eccentric(cured(limited, remedy)).outcome != "stalled"

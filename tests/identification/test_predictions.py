@@ -1,0 +1,189 @@
+"""Predictions of measurements agree with the calibrated law, the closed loop's plant, and closed forms."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from synthetic_rigs import READINGS, observations
+
+from ringbalance.controller.liquid_ring.plant import LiquidRing, initial_state
+from ringbalance.controller.liquid_ring.quadrature import quadrature
+from ringbalance.controller.rotor import disc_unbalance, influence
+from ringbalance.controller.terms import dynamics_of
+from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.predict import injections, trial_weights
+from ringbalance.identification.predict.device import device_of, models_of
+from ringbalance.identification.predict.kinds import PREDICTED
+from ringbalance.mesh.geometry import chamber_volume, surface_radius
+from ringbalance.physics.tube.loss import tube_loss
+from ringbalance.reduced_model.calibration import calibrated_model
+from ringbalance.reduced_model.selection.estimates import INERTIA
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Scene
+from ringbalance.scene.uncertain import with_value
+
+
+def predicted(scene: Scene, data: Observations) -> FloatArray:
+    return PREDICTED[data.kind].predict(scene, data, models_of(scene))
+
+
+def test_the_quick_law_is_the_calibrated_one(paper_scene: Scene) -> None:
+    slow = calibrated_model(paper_scene)
+    quick = device_of(paper_scene, models_of(paper_scene)).law
+    fills = np.linspace(0.02, 0.48, 60)
+    for gas in (0.0, 0.6e6, 1.2e6):
+        one, other = (
+            law.evaluate(fill_ratio=fills, gas_pressure=gas, primed=True) for law in (slow.flow, quick)
+        )
+        np.testing.assert_allclose(other.velocity, one.velocity, rtol=1e-4)
+        np.testing.assert_array_equal(other.primed, one.primed)
+    moments = [
+        curve.pair_moment(fill_ratio=fills, opposite_fill_ratio=0.5 - fills)
+        for curve in (slow.moment, quick.moment)
+    ]
+    np.testing.assert_allclose(moments[1], moments[0], rtol=1e-12, atol=1e-15)
+
+
+def test_injections_are_those_of_the_closed_loop(paper_scene: Scene) -> None:
+    """Two injections into one pair and one into the other, through the plant that `simulate` runs."""
+    scene = with_value(scene=paper_scene, quantity="lambda_factor", value=0.9)
+    columns = {"gas_time": [0.2, 0.1, 0.15], "pressure": [scene.gas.pressure] * 3}
+    zeros = {name: [0.0] * 3 for name in READINGS}
+    found = predicted(scene, observations("injection", columns | zeros, ["A", "C", "D"]))
+    model = calibrated_model(scene)
+    plant = LiquidRing(
+        model=model,
+        chambers=4,
+        gas_pressure=scene.gas.pressure,
+        integrator=quadrature,
+        dynamics=dynamics_of(scene=scene, model=model, modelled=[INERTIA]),
+    )
+    state, before, expected = initial_state(disc=scene.disc), 0j, []
+    k = influence(coefficient=scene.rotor.influence_coefficient, lag_angle=scene.rotor.lag_angle)
+    for chamber, time in ((0, 0.2), (2, 0.1), (3, 0.15)):
+        state = plant.advance(state, gas_times={chamber: time}, duration=3.0, points=1).state
+        after = complex(k * disc_unbalance(moment=model.moment, fill_ratio=np.array(state.fills())))
+        expected.append(after - before)
+        before = after
+    np.testing.assert_allclose(found[:3] + 1j * found[3:], expected, rtol=2e-4)
+
+
+def test_a_stated_fill_begins_again(paper_scene: Scene) -> None:
+    """Rows that state their chamber's fill do not depend on those before, on either side of a pair."""
+    columns = {"gas_time": [0.2] * 3, "pressure": [paper_scene.gas.pressure] * 3, "fill_ratio": [0.3] * 3}
+    zeros = {name: [0.0] * 3 for name in READINGS}
+    found = predicted(paper_scene, observations("injection", columns | zeros, ["A", "A", "C"]))
+    change = found[:3] + 1j * found[3:]
+    np.testing.assert_allclose(change[1:], [change[0], -change[0]], rtol=1e-6)
+
+
+def test_an_unknown_chamber_is_refused_with_its_line(paper_scene: Scene) -> None:
+    columns = {"gas_time": [0.2], "pressure": [1e6]}
+    zeros = {name: [0.0] for name in READINGS}
+    with pytest.raises(ValueError, match=r'line 2, column "chamber": "E" .* A, B, C, D'):
+        predicted(paper_scene, observations("injection", columns | zeros, ["E"]))
+
+
+def test_a_gas_line_delays_what_is_moved(paper_scene: Scene) -> None:
+    """A lag alone moves nothing but time; a narrow line moves less liquid."""
+    data = observations(
+        "transfer", {"fill_ratio": [0.25], "pressure": [0.8e6], "gas_time": [0.2], "volume": [1.0]}
+    )
+    plain = float(predicted(paper_scene, data)[0])
+    gas = replace(paper_scene.gas, conductance=2e-9, critical_ratio=0.3, dead_volume=0.0)
+    narrow = float(predicted(replace(paper_scene, gas=gas), data)[0])
+    late = float(predicted(replace(paper_scene, gas=replace(paper_scene.gas, valve_lag=0.05)), data)[0])
+    assert late == pytest.approx(plain, rel=1e-6)
+    assert 0.2 * plain < narrow < 1.5 * plain
+    assert narrow != pytest.approx(plain, rel=0.02)
+
+
+def test_mass_is_density_times_volume(paper_scene: Scene) -> None:
+    rows = {"fill_ratio": [0.25, 0.3], "pressure": [0.8e6] * 2, "gas_time": [0.2, 0.3]}
+    volume, mass = (
+        predicted(paper_scene, observations("transfer", rows | {n: [1.0] * 2})) for n in ("volume", "mass")
+    )
+    np.testing.assert_allclose(mass, paper_scene.liquid.density * volume, rtol=1e-12)
+    assert np.all((volume > 0) & (volume < 0.3 * chamber_volume(disc=paper_scene.disc)))
+
+
+def test_flow_at_rest_obeys_the_definition_of_k(paper_scene: Scene) -> None:
+    """(k + 1) rho u^2/2 = p with k of a tube that does not turn."""
+    pressures = np.geomspace(1e3, 1e6, 9)
+    rate = predicted(paper_scene, observations("flow", {"pressure_difference": pressures}))
+    u = rate / (math.pi / 4 * paper_scene.tube.bore**2)
+    liquid = paper_scene.liquid
+    k = tube_loss(tube=paper_scene.tube, liquid=liquid, angular_velocity=0.0, velocity=u).k.value
+    np.testing.assert_allclose((k + 1) * liquid.density * u**2 / 2, pressures, rtol=1e-8)
+
+
+def test_pressure_of_a_turning_ring(paper_scene: Scene) -> None:
+    disc, rho = paper_scene.disc, paper_scene.liquid.density
+    radius = np.array([disc.outer_radius, disc.outer_radius, disc.inner_radius])
+    data = observations("pressure", {"radius": radius, "fill_ratio": [0.2, 0.4, 0.2], "pressure": [1.0] * 3})
+    a = surface_radius(disc=disc, fill_ratio=np.array([0.2, 0.4]))
+    wall = rho * paper_scene.rotor.speed**2 * (disc.outer_radius**2 - a**2) / 2
+    np.testing.assert_allclose(predicted(paper_scene, data), [*wall, 0.0], rtol=1e-12)
+
+
+def test_the_vibration_without_weight_is_free_in_each_series(paper_scene: Scene) -> None:
+    """Any vibration of a series lies in what its two unknowns can take up; K U does not."""
+    data = replace(
+        observations("trial_weight", {"unbalance": [0, 1e-4, 0, 1e-4], "angle": [0, 1, 0, 1]}),
+        series=np.array(["a", "a", "b", "b"]),
+    )
+    free = trial_weights.free(data)
+    assert np.linalg.matrix_rank(free) == 4
+    alike = np.array([1, 1, 3, 3, 2, 2, -5, -5.0])
+    assert np.linalg.norm(alike - free @ np.linalg.lstsq(free, alike, rcond=None)[0]) < 1e-12
+    k = influence(coefficient=paper_scene.rotor.influence_coefficient, lag_angle=paper_scene.rotor.lag_angle)
+    found = predicted(paper_scene, data)
+    assert found[1] + 1j * found[5] == pytest.approx(k * 1e-4 * np.exp(1j))
+
+
+def chain(shared: bool) -> Observations:
+    random = np.random.default_rng(3)
+    seen = 1e-5 + 1e-6 * random.standard_normal(4)
+    again = seen if shared else seen * (1 + 1e-3 * random.standard_normal(4))
+    columns: dict[str, npt.ArrayLike] = {
+        "gas_time": [0.1] * 3,
+        "pressure": [1e6] * 3,
+        "amplitude_before": again[:-1],
+        "phase_before": [0.1] * 3,
+        "amplitude_after": seen[1:],
+        "phase_after": [0.1] * 3,
+    }
+    return observations("injection", columns, ["A", "B", "A"])
+
+
+@pytest.mark.parametrize("shared", [True, False])
+def test_errors_of_readings_that_serve_twice(shared: bool) -> None:
+    """Against many draws of the readings' errors."""
+    data = chain(shared)
+    assert bool(injections.shared_readings(data)) is shared
+    random = np.random.default_rng(5)
+    if shared:
+        errors = random.standard_normal((200_000, 4))
+        changes = errors[:, 1:] - errors[:, :-1]
+    else:
+        changes = np.diff(random.standard_normal((200_000, 3, 2)), axis=2)[:, :, 0]
+    np.testing.assert_allclose(injections.covariance(data)[:3, :3], np.cov(changes.T), atol=0.03)
+
+
+def test_a_stated_noise_of_amplitude_and_phase() -> None:
+    """Along the vector by the amplitude, across it by the phase; against draws."""
+    data = observations(
+        "trial_weight", {"unbalance": [0.0], "angle": [0.0], "amplitude": [1e-5], "phase": [0.7]}
+    )
+    stated = {"amplitude": np.array([4e-7]), "phase": np.array([0.01])}
+    data = replace(data, uncertainty=stated)
+    random = np.random.default_rng(2)
+    seen = (1e-5 + 4e-7 / 1.96 * random.standard_normal(400_000)) * np.exp(
+        1j * (0.7 + 0.01 / 1.96 * random.standard_normal(400_000))
+    )
+    expected = np.cov(np.stack([seen.real, seen.imag]))
+    np.testing.assert_allclose(trial_weights.covariance(data), expected, rtol=0.02)

@@ -10,7 +10,15 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.predict import flows, injections, pressures, transfers, trial_weights
+from ringbalance.identification.predict import (
+    flows,
+    injections,
+    positionings,
+    pressures,
+    run_ups,
+    transfers,
+    trial_weights,
+)
 from ringbalance.scene.arrays import FloatArray
 
 
@@ -63,6 +71,23 @@ PREDICTED: Final[Mapping[str, PredictedKind]] = MappingProxyType(
         "transfer": _kind(transfers, transfers.column, "bore", "extra_loss"),
         "flow": _kind(flows, "flow_rate", "bore", "extra_loss"),
         "pressure": _kind(pressures, "pressure", "density", by_law=False),
+        "run_up": _kind(
+            run_ups,
+            "amplitude",
+            "rotor.stiffness",
+            "rotor.damping",
+            "imbalance.mass",
+            "imbalance.phase",
+            by_law=False,
+        ),
+        "positioning": _kind(
+            positionings,
+            "angle",
+            "masses.friction_arm[0]",
+            "motor.torque_constant",
+            "motor.back_emf_constant",
+            by_law=False,
+        ),
     }
 )
 

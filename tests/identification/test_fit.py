@@ -122,7 +122,7 @@ def test_held_inputs_widen_the_interval(paper_scene: Scene) -> None:
 
 
 def injected(scene: Scene, *, sd: float) -> Observations:
-    """Injections whose every vibration was read anew, with its noise stated."""
+    """Injections with a reading of its own before and after each, and its noise stated."""
     plan = measured("injection", scene, models_of(scene), np.random.default_rng(11))
     found = PREDICTED["injection"].predict(scene, plan, models_of(scene))
     rows, random = len(plan), np.random.default_rng(12)

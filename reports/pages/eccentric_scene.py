@@ -30,7 +30,7 @@ from ringbalance.reports.numbers import (
     shown,
     with_unit,
 )
-from ringbalance.reports.origins import input_name
+from ringbalance.reports.origins import input_name, named_with_origin
 from ringbalance.reports.pages import credibility, document, measured
 from ringbalance.reports.pages.cases import case_view
 from ringbalance.reports.section import Cells, Record, Section, Table
@@ -79,7 +79,7 @@ def _summary(_own: Record, evidence: Record) -> Record:
             "the vibration without balancing is left.",
         ),
         *(("alert", f"{text[0].upper()}{text[1:].rstrip('.')}.") for text in run["warnings"]),
-        ("table", _requirements(rows)),
+        ("table", _requirements(rows, evidence)),
         ("items", _actions(rows)),
         ("text", _USE),
         ("figure", requirement_bars(map(_bar, rows))),
@@ -101,7 +101,7 @@ def _actions(rows: list[Record]) -> list[str]:
     found: dict[str, list[str]] = {}
     for row in rows:
         if row["verdict"] == OPEN and (causes := _causes(row)):
-            found.setdefault(", ".join(sorted(causes)), []).append(row["quantity"])
+            found.setdefault(", ".join(sorted(map(input_name, causes))), []).append(row["quantity"])
     return [
         f"Determine more closely: {causes}. That decides whether these requirements are met: "
         f"{', '.join(names)}."
@@ -110,14 +110,12 @@ def _actions(rows: list[Record]) -> list[str]:
 
 
 def _causes(row: Record) -> list[str]:
-    """Names of the inputs that a row hangs on most: those that lose it, then the largest effects."""
+    """Paths of the inputs that a row hangs on most: those that lose it, then the largest effects."""
     effects = {path: max(both) for path, both in row["effects"].items()}
     largest = max(effects.values(), default=0.0)
     ranked = sorted(effects, key=lambda path: -effects[path])
     telling = [path for path in ranked if effects[path] > 0.1 * largest]
-    return [input_name(path) for path in dict.fromkeys([*row["lost"], *telling])][
-        : max(_CAUSES, len(row["lost"]))
-    ]
+    return list(dict.fromkeys([*row["lost"], *telling]))[: max(_CAUSES, len(row["lost"]))]
 
 
 def _origins(rows: list[Record]) -> str:
@@ -141,7 +139,7 @@ def _bar(row: Record) -> Record:
     }
 
 
-def _requirements(requirements: list[Record]) -> Table:
+def _requirements(requirements: list[Record], evidence: Record) -> Table:
     def cells(place: int, row: Record) -> Cells:
         path = f"requirements.{place}"
         unit, reached, interval = row["unit"] or "1", row["achieved"], row["achieved_interval"]
@@ -154,7 +152,7 @@ def _requirements(requirements: list[Record]) -> Table:
             "not reached" if reached is None else traced(shown(reached, unit, digits=3), f"{path}.achieved"),
             "not always reached" if row["lost"] else _span(interval, unit) or MISSING,
             row["verdict"],
-            ", ".join(_causes(row)),
+            ", ".join(named_with_origin(evidence, path) for path in _causes(row)),
         )
 
     return Table(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Sequence
 from typing import Any, Final
@@ -53,6 +54,8 @@ _UNSTATED: Final = (
     "The scene states no uncertainties: every result holds for exactly its values. [uncertainty] in the "
     "scene file states them."
 )
+_KEY: Final = re.compile(r"\b[a-z_]+\.[a-z_]+\b")
+"""A key of the scene file, such as supervisor.limit."""
 _CAUSES: Final = 2
 """Inputs that a row names as those it hangs on most."""
 
@@ -148,7 +151,7 @@ def _requirements(requirements: list[Record], evidence: Record) -> Table:
             f"{row['quantity'][0].upper()}{row['quantity'][1:]}",
             f"{row['sense']} {traced(given(row['required'], unit, digits=3), f'{path}.required')}"
             f"{f' ({needed})' if needed else ''}",
-            row["set_by"],
+            _KEY.sub(lambda match: input_name(match[0]), row["set_by"]),
             "not reached" if reached is None else traced(shown(reached, unit, digits=3), f"{path}.achieved"),
             "not always reached" if row["lost"] else _span(interval, unit) or MISSING,
             row["verdict"],

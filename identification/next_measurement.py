@@ -9,17 +9,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
+from ringbalance.identification.balancers import both_sides
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.expected_gain import Candidate, Gain, expected_gains
 from ringbalance.identification.identifiability import Verdict
 from ringbalance.identification.likelihood import Block, Problem, block_of, held_effects
 from ringbalance.identification.result import FitResult
-from ringbalance.reduced_model.chamber.inputs import shifted
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.models import Scene
@@ -112,7 +112,7 @@ def _candidates(result: FitResult, kind: str) -> Iterator[Candidate]:
         [
             asked.slopes(t),
             _free(problem, measured, block),
-            held_effects(asked, t, _changes(problem.scene, result.held)),
+            held_effects(asked, t, [both_sides(problem.scene, n, sd) for n, sd in result.held.items()]),
         ]
     )
     count = len(offered)
@@ -152,16 +152,6 @@ def _free(problem: Problem, measured: Block | None, block: Block) -> FloatArray:
 def _first_series(block: Block) -> FloatArray:
     names = np.unique(block.observations.series)
     return np.asarray(names == block.observations.series[0], dtype=np.float64)
-
-
-def _changes(scene: Any, held: Mapping[str, float]) -> list[tuple[Any, Any]]:
-    return [
-        (
-            shifted(scene=scene, quantity=name, change=-width),
-            shifted(scene=scene, quantity=name, change=width),
-        )
-        for name, width in held.items()
-    ]
 
 
 def _grids(scene: Scene) -> dict[str, Grid]:

@@ -246,7 +246,7 @@ def test_the_same_file_counts_once(
         ("kind".encode("utf-16"), "line 1, character 1: this is not UTF-8"),
         (b"PK\x03\x04rest", "workbook"),
         (b"a" * (tables.LARGEST_FILE + 1), "up to 8 MiB"),
-        (b"a,b\n" + b"1,2\n" * (tables.MOST_ROWS + 1), "up to 10000 rows"),
+        (b"a,b\n" + b"1,2\n" * (tables.MOST_ROWS + 1), "up to 2000 rows"),
     ],
 )
 def test_what_is_no_table_is_refused(content: bytes, told: str, paper_scene: Scene, tmp_path: Path) -> None:

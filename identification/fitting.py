@@ -114,7 +114,7 @@ def _result(best: Optimum, held: dict[str, float], loss: str) -> FitResult:
         held=held,
         loss=loss,
         starts=best.starts,
-        evaluations=best.evaluations + sum(p.evaluations for p in found.profiles),
+        evaluations=problem.evaluations,
         log_likelihood=_log_likelihood(best),
         scene=problem.scene_at(best.t),
         optimum=best,

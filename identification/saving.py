@@ -18,7 +18,7 @@ from typing import Any, Final
 
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.identifiability import Combination, Verdict
-from ringbalance.identification.parameters import Parameter
+from ringbalance.identification.parameters import START, Parameter
 from ringbalance.identification.result import FitResult, FittedParameter
 from ringbalance.scene import deferred
 from ringbalance.scene.describe import usual_unit
@@ -91,7 +91,8 @@ def save_result(
         *(MeasuredFinding(about="correlation", text=each) for each in _correlations(result)),
     ]
     scales = result.optimum.residuals.problem.parameters
-    fitted = [_fitted(each, scale) for each, scale in zip(result.parameters, scales, strict=True)]
+    both = zip(result.parameters, scales, strict=True)
+    fitted = [_fitted(each, scale) for each, scale in both if each.name not in START]
     return save_fitted(path, text=text, fitted=fitted, files=files, findings=findings)
 
 

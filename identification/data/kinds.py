@@ -175,6 +175,12 @@ _TRIAL_WEIGHT: Final = DataKind(
     ),
 )
 
+_TRIAL_AMPLITUDE: Final = DataKind(
+    title="amplitude alone of the vibration with a known unbalance on the rotor",
+    balancer="liquid_ring",
+    columns=tuple(column for column in _TRIAL_WEIGHT.columns if column.name != "phase"),
+)
+
 _INJECTION: Final = DataKind(
     title="vibration before and after one injection of gas",
     balancer="liquid_ring",
@@ -282,6 +288,7 @@ _POSITIONING: Final = DataKind(
 KINDS: Final[Mapping[str, DataKind]] = MappingProxyType(
     {
         "trial_weight": _TRIAL_WEIGHT,
+        "trial_amplitude": _TRIAL_AMPLITUDE,
         "injection": _INJECTION,
         "transfer": _TRANSFER,
         "flow": _FLOW,

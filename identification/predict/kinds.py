@@ -17,6 +17,7 @@ from ringbalance.identification.predict import (
     pressures,
     run_ups,
     transfers,
+    trial_amplitudes,
     trial_weights,
 )
 from ringbalance.scene.arrays import FloatArray
@@ -67,6 +68,14 @@ def _kind(
 PREDICTED: Final[Mapping[str, PredictedKind]] = MappingProxyType(
     {
         "trial_weight": _kind(trial_weights, "amplitude", "influence_coefficient", "lag_angle", by_law=False),
+        "trial_amplitude": _kind(
+            trial_amplitudes,
+            "amplitude",
+            "influence_coefficient",
+            "initial_amplitude",
+            "initial_phase",
+            by_law=False,
+        ),
         "injection": _kind(injections, "amplitude_after", "lambda_factor", "bore"),
         "transfer": _kind(transfers, transfers.column, "bore", "extra_loss"),
         "flow": _kind(flows, "flow_rate", "bore", "extra_loss"),

@@ -208,7 +208,7 @@ def _middles(
 
 
 def words_of(offered: Observations, row: int) -> str:
-    """Such as "transfer with fill ratio 0.25, pressure 0.7 MPa, gas time 200 ms"."""
+    """Such as "transfer with fill ratio 0.25, pressure 0.7 MPa, valve-open time 200 ms"."""
     said = []
     for column in KINDS[offered.kind].columns:
         values = offered.columns.get(column.name)
@@ -218,5 +218,5 @@ def words_of(offered: Observations, row: int) -> str:
         text = f"{value:.3g}"
         if column.dimension is not None and column.dimension in DIMENSIONS:
             text = format_quantity(value, column.dimension, column.unit, digits=3)
-        said.append(f"{column.name.replace('_', ' ')} {text}")
+        said.append(f"{column.words} {text}")
     return f"{offered.kind.replace('_', ' ')} with {', '.join(said)}"

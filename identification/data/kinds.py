@@ -15,6 +15,8 @@ AMPLITUDES: Final[Mapping[str, float]] = MappingProxyType(
     {"zero_to_peak": 1.0, "peak_to_peak": 0.5, "rms": math.sqrt(2)}
 )
 """Convention of an amplitude to the factor that makes it zero to peak; of a harmonic vibration."""
+_WORDS: Final = {"gas_time": "valve-open time"}
+"""Names of columns that a sentence has another word for."""
 TEXTS: Final = ("series", "note")
 """Columns of text that every kind may have."""
 _TURNS: Final = 4 * math.pi
@@ -44,6 +46,11 @@ class Column:
     def head(self) -> str:
         """Name with unit, as it stands over the column."""
         return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+    @property
+    def words(self) -> str:
+        """Its name in a sentence."""
+        return _WORDS.get(self.name, self.name.replace("_", " "))
 
     def check(self, value: float) -> None:
         """Raises: FieldError: a value, SI, that the column cannot have."""

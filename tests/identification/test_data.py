@@ -183,7 +183,7 @@ def test_both_characters_for_micro_and_the_degree_sign_are_known(
         ("injection", "## unc", '# uncertainty = {phase_after="2 deg"} #', ["not of amplitude_before"]),
         ("trial_weight", "0,0,10,90", "0,0,0,90", ["relative"]),
         ("trial_weight", "amplitude [um]", "amplitude [m]", ['"11.5"', "is [um] meant?", "to 10 m"]),
-        ("transfer", "0.25,0.7,400", "0.25,1e7,400", ['"1e7"', "is [MPa] meant?"]),
+        ("transfer", "0.25,0.7,400", "0.25,2e4,400", ['"2e4"', "is [MPa] meant?"]),
     ],
 )
 def test_what_is_wrong_is_told_with_its_place(

@@ -174,8 +174,9 @@ def offered_rows(scene: Scene, kind: str, measured: Observations | None) -> Obse
     grid = dict(_grids(scene)[kind])
     if measured is not None:
         for name in ("gas_time", "pressure_difference", "unbalance"):
-            if name in grid:
-                values = measured.columns[name]
+            values = measured.columns[name] if name in grid else np.empty(0)
+            # Of runs without trial weight alone the middle says nothing.
+            if np.any(values > 0):
                 grid[name] = [x * float(np.median(values[values > 0])) for x in _BEYOND]
     rows = list(product(*grid.values()))
     count = len(rows)

@@ -72,7 +72,7 @@ class Column:
     def check(self, value: float) -> None:
         """Raises: FieldError: a value, SI, that the column cannot have."""
         if self.above_zero and not value > 0:
-            raise FieldError("it is not above zero", "above 0")
+            raise FieldError("it is not above zero", self._range())
         if value < self.lowest:
             raise FieldError("it is negative" if self.lowest == 0 else "it is too small", self._range())
         if abs(value) > self._largest:
@@ -85,9 +85,9 @@ class Column:
     def _range(self) -> str:
         unit = next(iter(DIMENSIONS[self.dimension].units)) if self.dimension else ""
         low = self.lowest if self.lowest > -math.inf else -self._largest
-        if self._largest == math.inf:
-            return f"from {low:.4g} {unit}".strip()
-        return f"from {low:.4g} to {self._largest:.4g} {unit}".strip()
+        start = "above 0" if self.above_zero else f"from {low:.4g}"
+        end = "" if self._largest == math.inf else f"to {self._largest:.4g} {unit}"
+        return " ".join(filter(None, (start, end.strip())))
 
 
 @dataclass(frozen=True, kw_only=True)

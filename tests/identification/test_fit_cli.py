@@ -118,6 +118,17 @@ def test_text_names_what_an_engineer_must_know(run: Run) -> None:
     assert "lies outside" not in text
 
 
+def test_runs_without_trial_weight_alone_identify_nothing(run: Run, tmp_path: Path) -> None:
+    head = Path(EXAMPLES["trial_weight"]).read_text(encoding="utf-8").split("series\n")[0]
+    rows = "\n".join(f"0,0,{amplitude},90,day 1" for amplitude in (9.99, 10.0, 10.02))
+    (tmp_path / "none.csv").write_text(f"{head}series\n{rows}\n", encoding="utf-8")
+    code, out, _ = run(PAPER, tmp_path / "none.csv", "--json")
+    assert code == 0
+    document = json.loads(out)
+    assert {each["verdict"] for each in document["parameters"]} == {"structurally not identified"}
+    assert document["next_measurement"]["candidates"][0]["expected_width_ratio"] < 1
+
+
 def test_a_value_outside_what_the_scene_states_is_named(run: Run, tmp_path: Path) -> None:
     stated = Path(PAPER).read_text(encoding="utf-8").replace('lag_angle = "3 deg"', 'lag_angle = "0.5 deg"')
     (tmp_path / "sure.toml").write_text(stated, encoding="utf-8")

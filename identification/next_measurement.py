@@ -159,13 +159,15 @@ def _grids(scene: Scene) -> dict[str, Grid]:
     fills = [x * scene.disc.max_fill_ratio for x in _FRACTIONS]
     pressures = [x * scene.gas.pressure for x in _PRESSURES]
     unbalance = scene.rotor.initial_amplitude / scene.rotor.influence_coefficient
+    weights = {"unbalance": [x * unbalance for x in _BEYOND], "angle": [0.0, np.pi / 2, np.pi]}
     injections = {"fill_ratio": fills, "pressure": pressures, "gas_time": _TIMES}
     return {
         "injection": injections,
         "transfer": injections,
         "flow": {"pressure_difference": [x * scene.gas.pressure for x in (0.1, 0.3, 1.0)]},
         "pressure": {"fill_ratio": fills, "radius": [scene.disc.outer_radius]},
-        "trial_weight": {"unbalance": [x * unbalance for x in _BEYOND], "angle": [0.0, np.pi / 2]},
+        "trial_weight": weights,
+        "trial_amplitude": weights,
     }
 
 

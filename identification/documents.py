@@ -102,6 +102,7 @@ def _parameter(found: FittedParameter) -> dict[str, Any]:
         "at_bound": list(found.at_bound),
         "before": found.before,
         "before_interval": None if found.before_interval is None else list(found.before_interval),
+        "contradicts": found.contradicts,
         "verdict": found.verdict.value,
         "text": found.text,
     }

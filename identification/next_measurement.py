@@ -159,13 +159,15 @@ def _grids(scene: Scene) -> dict[str, Grid]:
     fills = [x * scene.disc.max_fill_ratio for x in _FRACTIONS]
     pressures = [x * scene.gas.pressure for x in _PRESSURES]
     unbalance = scene.rotor.initial_amplitude / scene.rotor.influence_coefficient
+    weights = {"unbalance": [x * unbalance for x in _BEYOND], "angle": [0.0, np.pi / 2, np.pi]}
     injections = {"fill_ratio": fills, "pressure": pressures, "gas_time": _TIMES}
     return {
         "injection": injections,
         "transfer": injections,
         "flow": {"pressure_difference": [x * scene.gas.pressure for x in (0.1, 0.3, 1.0)]},
         "pressure": {"fill_ratio": fills, "radius": [scene.disc.outer_radius]},
-        "trial_weight": {"unbalance": [x * unbalance for x in _BEYOND], "angle": [0.0, np.pi / 2]},
+        "trial_weight": weights,
+        "trial_amplitude": weights,
     }
 
 
@@ -174,8 +176,9 @@ def offered_rows(scene: Scene, kind: str, measured: Observations | None) -> Obse
     grid = dict(_grids(scene)[kind])
     if measured is not None:
         for name in ("gas_time", "pressure_difference", "unbalance"):
-            if name in grid:
-                values = measured.columns[name]
+            values = measured.columns[name] if name in grid else np.empty(0)
+            # Of runs without trial weight alone the middle says nothing.
+            if np.any(values > 0):
                 grid[name] = [x * float(np.median(values[values > 0])) for x in _BEYOND]
     rows = list(product(*grid.values()))
     count = len(rows)
@@ -208,7 +211,7 @@ def _middles(
 
 
 def words_of(offered: Observations, row: int) -> str:
-    """Such as "transfer with fill ratio 0.25, pressure 0.7 MPa, gas time 200 ms"."""
+    """Such as "transfer with fill ratio 0.25, pressure 0.7 MPa, valve-open time 200 ms"."""
     said = []
     for column in KINDS[offered.kind].columns:
         values = offered.columns.get(column.name)
@@ -218,5 +221,5 @@ def words_of(offered: Observations, row: int) -> str:
         text = f"{value:.3g}"
         if column.dimension is not None and column.dimension in DIMENSIONS:
             text = format_quantity(value, column.dimension, column.unit, digits=3)
-        said.append(f"{column.name.replace('_', ' ')} {text}")
+        said.append(f"{column.words} {text}")
     return f"{offered.kind.replace('_', ' ')} with {', '.join(said)}"

@@ -22,6 +22,8 @@ _ROUNDS: Final = 25
 _AGREES: Final = 1e-3
 """Relative change of the noise at which it is found."""
 _EVALUATIONS: Final = 40
+_NEARBY: Final = 1e-2
+"""Relative change of the sum of squares that tells one start's minimum from another's."""
 _APART: Final = 1.0
 """Of t for a further start, in prior standard deviations or, without a prior, in half of ln 2."""
 _WIDE: Final = 0.35
@@ -101,7 +103,7 @@ def _first_noise(problem: Problem) -> FloatArray:
 
 
 def _from_starts(residuals: Residuals, starts: int) -> FloatArray:
-    ends = [minimised(residuals, t) for t in start_points(residuals.problem, starts)]
+    ends = [minimised(residuals, t, close=_NEARBY) for t in start_points(residuals.problem, starts)]
     return min(ends, key=lambda t: float(np.sum(residuals.at(t) ** 2)))
 
 
@@ -128,8 +130,8 @@ def start_points(problem: Problem, count: int) -> list[FloatArray]:
     return points
 
 
-def minimised(residuals: Residuals, start: FloatArray) -> FloatArray:
-    """t of the least sum of squares near a start."""
+def minimised(residuals: Residuals, start: FloatArray, *, close: float = 1e-7) -> FloatArray:
+    """t of the least sum of squares near a start. Args: `close`: relative change at which to stop."""
     found = least_squares(
         residuals.at,
         _inside(residuals.problem, start),
@@ -137,7 +139,7 @@ def minimised(residuals: Residuals, start: FloatArray) -> FloatArray:
         bounds=residuals.problem.bounds,
         method="trf",
         x_scale="jac",
-        ftol=1e-7,
+        ftol=close,
         xtol=1e-8,
         gtol=1e-10,
         max_nfev=_EVALUATIONS,

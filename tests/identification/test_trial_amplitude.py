@@ -13,6 +13,7 @@ import numpy as np
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.identifiability import Verdict
+from ringbalance.identification.next_measurement import next_measurement
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.identification.review import review
@@ -116,6 +117,15 @@ def test_the_rotor_of_rodrigues_has_one_coefficient(paper_scene: Scene) -> None:
         assert abs(found.value / PER_G_MM - 1.02) < np.hypot(half / PER_G_MM, 0.05)
         assert half / PER_G_MM < 0.12
         assert found.verdict is Verdict.IDENTIFIED
+
+
+def test_a_washer_elsewhere_would_tell_most_of_the_phase(paper_scene: Scene) -> None:
+    """All washers stood at one angle: one elsewhere tells the angle to the own unbalance."""
+    told = next_measurement(by_vectors(paper_scene), "initial_phase")
+    assert told is not None
+    best = next(g for g in told.gains if g.candidate.startswith("trial amplitude"))
+    assert "angle 0 deg" not in best.candidate
+    assert best.ratio < 0.5
 
 
 def test_its_vibration_is_linear_in_the_unbalance(paper_scene: Scene) -> None:

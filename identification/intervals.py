@@ -46,7 +46,6 @@ class Profile:
     """All parameters' t at both ends."""
     points: tuple[tuple[float, float], ...]
     """t and the rise of S above its least, ascending in t."""
-    evaluations: int
 
 
 def covariance(slopes: FloatArray) -> FloatArray:
@@ -88,7 +87,6 @@ def profile(optimum: Optimum, which: int, factor: float, spread: FloatArray) -> 
         factor=factor,
         ends=(tuple(low.t.tolist()), tuple(high.t.tolist())),
         points=tuple(points),
-        evaluations=low.evaluations + high.evaluations,
     )
 
 
@@ -98,7 +96,6 @@ class _End:
     bound: bool
     t: FloatArray
     points: list[tuple[float, float]]
-    evaluations: int
 
 
 def _end(optimum: Optimum, which: int, sign: float, factor: float, spread: FloatArray, least: float) -> _End:
@@ -108,7 +105,7 @@ def _end(optimum: Optimum, which: int, sign: float, factor: float, spread: Float
     wide = math.sqrt(float(spread[which, which]))
     along = spread[:, which] / max(float(spread[which, which]), 1e-300)
     inside, outside = (0.0, 0.0), (math.inf, math.inf)
-    start, slopes, evaluations = optimum.t, optimum.slopes, 0
+    start, slopes = optimum.t, optimum.slopes
     points: list[tuple[float, float]] = []
     distance = min(factor * wide, _LONGEST)
     for _ in range(_TRIALS):
@@ -117,13 +114,12 @@ def _end(optimum: Optimum, which: int, sign: float, factor: float, spread: Float
             place, distance = bound, abs(bound - here)
         begin = np.clip(start + along * (place - start[which]), *bounds)
         begin[which] = place
-        end, cost, slopes, used = constrained(optimum.residuals, begin, slopes, which)
-        evaluations += used
+        end, cost, slopes = constrained(optimum.residuals, begin, slopes, which)
         root = math.sqrt(max(cost - least, 0.0))
         points.append((place, cost - least))
         at_bound = root < factor and place == bound
         if at_bound or abs(root - factor) <= _CLOSE * factor:
-            return _End(place=place, bound=at_bound, t=end, points=points, evaluations=evaluations)
+            return _End(place=place, bound=at_bound, t=end, points=points)
         if root < factor:
             inside, start = (distance, root), end
             if len(points) > 1:
@@ -132,7 +128,7 @@ def _end(optimum: Optimum, which: int, sign: float, factor: float, spread: Float
             outside = (distance, root)
         distance = _next(inside, outside, factor, wide)
     place = here + sign * (inside[0] if math.isinf(outside[0]) else outside[0])
-    return _End(place=place, bound=False, t=end, points=points, evaluations=evaluations)
+    return _End(place=place, bound=False, t=end, points=points)
 
 
 def _next(inside: tuple[float, float], outside: tuple[float, float], factor: float, wide: float) -> float:

@@ -93,9 +93,21 @@ class Problem:
             [b.whiten @ b.kind.predict(scene, b.observations, self.models) for b in self.blocks]
         )
 
+    @cached_property
+    def _known(self) -> dict[bytes, FloatArray]:
+        return {}
+
+    @property
+    def evaluations(self) -> int:
+        """Predictions of all data that were made."""
+        return len(self._known)
+
     def at(self, t: FloatArray) -> FloatArray:
-        """L^-1 f at t."""
-        return self.predicted(self.scene_at(t))
+        """L^-1 f at t; a point that was asked for before is not predicted again."""
+        key = t.tobytes()
+        if key not in self._known:
+            self._known[key] = self.predicted(self.scene_at(t))
+        return self._known[key]
 
     def slopes(self, t: FloatArray, *, step: float = STEP) -> FloatArray:
         """d(L^-1 f)/dt by central differences, one-sided where a bound is nearer, shape (n, parameters)."""

@@ -22,6 +22,8 @@ _ROUNDS: Final = 25
 _AGREES: Final = 1e-3
 """Relative change of the noise at which it is found."""
 _EVALUATIONS: Final = 40
+_NEARBY: Final = 1e-2
+"""Relative change of the sum of squares that tells one start's minimum from another's."""
 _APART: Final = 1.0
 """Of t for a further start, in prior standard deviations or, without a prior, in half of ln 2."""
 _WIDE: Final = 0.35
@@ -48,7 +50,6 @@ class Optimum:
     freedom: FloatArray
     """Degrees of freedom of each estimated group."""
     starts: int
-    evaluations: int
 
     @property
     def at(self) -> FloatArray:
@@ -72,16 +73,10 @@ def optimum(
     noise = _first_noise(problem) if before is None else before.residuals.noise
     weights = np.ones(problem.measured.size) if before is None else before.residuals.weights
     residuals = Residuals(problem=problem, noise=noise, held=held, weights=weights)
-    evaluations = 0
-    if before is None:
-        t, evaluations = _from_starts(residuals, starts)
-    else:
-        t = before.t
+    t = _from_starts(residuals, starts) if before is None else before.t
     for _ in range(_ROUNDS):
-        t, used = minimised(residuals, t)
-        evaluations += used
+        t = minimised(residuals, t)
         of_prediction = problem.slopes(t)
-        evaluations += 2 * t.size
         changed, freedom = _settled_noise(residuals, t, of_prediction, loss)
         done = _same(changed, residuals)
         residuals = changed
@@ -94,7 +89,6 @@ def optimum(
         of_prediction=of_prediction,
         freedom=freedom,
         starts=starts if before is None else before.starts,
-        evaluations=evaluations + (before.evaluations if before is not None else 0),
     )
 
 
@@ -108,14 +102,9 @@ def _first_noise(problem: Problem) -> FloatArray:
     return np.array([_FIRST_NOISE * max(float(np.sqrt(np.mean(y**2))), 1e-300) for y in sizes])
 
 
-def _from_starts(residuals: Residuals, starts: int) -> tuple[FloatArray, int]:
-    found: list[tuple[float, int, FloatArray]] = []
-    evaluations = 0
-    for t in start_points(residuals.problem, starts):
-        end, used = minimised(residuals, t)
-        evaluations += used
-        found.append((float(np.sum(residuals.at(end) ** 2)), len(found), end))
-    return min(found)[2], evaluations
+def _from_starts(residuals: Residuals, starts: int) -> FloatArray:
+    ends = [minimised(residuals, t, close=_NEARBY) for t in start_points(residuals.problem, starts)]
+    return min(ends, key=lambda t: float(np.sum(residuals.at(t) ** 2)))
 
 
 def start_points(problem: Problem, count: int) -> list[FloatArray]:
@@ -141,33 +130,21 @@ def start_points(problem: Problem, count: int) -> list[FloatArray]:
     return points
 
 
-def minimised(residuals: Residuals, start: FloatArray) -> tuple[FloatArray, int]:
-    """t of the least sum of squares near a start, and the number of predictions that it took."""
-    counted = 0
-
-    def at(t: FloatArray) -> FloatArray:
-        nonlocal counted
-        counted += 1
-        return residuals.at(t)
-
-    def slopes(t: FloatArray) -> FloatArray:
-        nonlocal counted
-        counted += 2 * t.size
-        return residuals.slopes(t)
-
+def minimised(residuals: Residuals, start: FloatArray, *, close: float = 1e-7) -> FloatArray:
+    """t of the least sum of squares near a start. Args: `close`: relative change at which to stop."""
     found = least_squares(
-        at,
+        residuals.at,
         _inside(residuals.problem, start),
-        jac=slopes,
+        jac=residuals.slopes,
         bounds=residuals.problem.bounds,
         method="trf",
         x_scale="jac",
-        ftol=1e-7,
+        ftol=close,
         xtol=1e-8,
         gtol=1e-10,
         max_nfev=_EVALUATIONS,
     )
-    return np.asarray(found.x, dtype=np.float64), counted
+    return np.asarray(found.x, dtype=np.float64)
 
 
 def _inside(problem: Problem, t: FloatArray) -> FloatArray:
@@ -214,21 +191,21 @@ def _size(whole: FloatArray, freedom: float, loss: str) -> float:
 
 def constrained(
     residuals: Residuals, t: FloatArray, slopes: FloatArray, fixed: int
-) -> tuple[FloatArray, float, FloatArray, int]:
+) -> tuple[FloatArray, float, FloatArray]:
     """Least sum of squares with one parameter held, by Gauss-Newton steps with Broyden's updates.
 
     Where these come to no end, slopes are found again by differences.
     Args: `t`: where to begin, with the held parameter's value. `slopes`: d(residuals)/dt nearby.
-    Returns: t, the sum of squares, the updated slopes, and the number of predictions.
+    Returns: t, the sum of squares, and the updated slopes.
     Source: Broyden, Math. Comput. 19 (1965) 577.
     """
-    search = _Search(residuals=residuals, fixed=fixed, t=t, at=residuals.at(t), slopes=slopes, evaluations=1)
+    search = _Search(residuals=residuals, fixed=fixed, t=t, at=residuals.at(t), slopes=slopes)
     for fresh in (False, True):
         if fresh:
             search.renew()
         if any(search.ended() for _ in range(_STEPS)):
             break
-    return search.t, float(search.at @ search.at), search.slopes, search.evaluations
+    return search.t, float(search.at @ search.at), search.slopes
 
 
 @dataclass(kw_only=True, eq=False)
@@ -240,12 +217,10 @@ class _Search:
     t: FloatArray
     at: FloatArray
     slopes: FloatArray
-    evaluations: int
 
     def renew(self) -> None:
         """Find the slopes by differences."""
         self.slopes = self.residuals.slopes(self.t)
-        self.evaluations += 2 * self.t.size
 
     def ended(self) -> bool:
         """Take one step; whether there was nothing left to gain."""
@@ -257,7 +232,6 @@ class _Search:
         for part in (1.0, 0.25, 0.0625):
             there = np.clip(self.t + part * step, low, high)
             found, moved = self.residuals.at(there), there - self.t
-            self.evaluations += 1
             missed = found - self.at - self.slopes @ moved
             self.slopes = self.slopes + np.outer(missed, moved) / max(float(moved @ moved), 1e-300)
             if float(found @ found) < float(self.at @ self.at):

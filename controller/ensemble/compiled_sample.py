@@ -54,8 +54,7 @@ def run_members(
     `plant`, of type `PLANT`, is given each member's gas line.
 
     Where `shared.moving`, `motions`, of type `MOTION`, has room for every pair twice and one more, and
-    `notes` for the instants of an injection and its tail and for the fills of every pair then.  Elsewhere
-    `motions` is None, and no march is compiled.
+    `notes` for the instants of an injection and its tail and for the fills of every pair then.
     """
     for i in range(runs.size):
         run = runs[i]
@@ -66,7 +65,7 @@ def run_members(
             if run.cause == NONE and run.samples < shared.most_samples:
                 run.samples += 1
                 _sample(shared, run)
-                if run.cause == NONE and motions is not None:
+                if run.cause == NONE and shared.moving:
                     _inject(shared, plant, run, motions, notes, workspace)
                 elif run.cause == NONE:
                     _keep_residual(shared, run)

@@ -78,7 +78,7 @@ class EnsemblePlan:
         shared = self.shared.copy()
         shared["key_0"], shared["key_1"] = noise_key(seed=seed)
         half = int(shared["chambers"][0]) // 2
-        motions = np.zeros(2 * half + 1, dtype=MOTION) if shared["moving"][0] else None
+        motions = np.zeros(2 * half + 1, dtype=MOTION)
         plant, notes = self.plant.copy(), np.zeros((half + 1, NOTES))
         runs["gas_line"] = self._gas_lines(members)
         run_members(shared[0], plant[0], runs, motions, notes, np.zeros(WORKSPACE))

@@ -31,7 +31,7 @@ from ringbalance.reports.numbers import (
     with_unit,
 )
 from ringbalance.reports.origins import input_name
-from ringbalance.reports.pages import credibility, document
+from ringbalance.reports.pages import credibility, document, measured
 from ringbalance.reports.pages.cases import case_view
 from ringbalance.reports.section import Cells, Record, Section, Table
 from ringbalance.reports.summary import OPEN
@@ -349,5 +349,6 @@ SECTIONS: Final = (
     Section(name="parameters", title="Parameters and their origin", place="report"),
     document.SECTION,
     Section(name="cases", title="Claims: evidence and doubts", show=_cases, in_parts=True),
+    measured.SECTION,
     Section(name="scene", title="Scene file", show=_scene, in_parts=True),
 )

@@ -257,7 +257,7 @@ def test_flow_solved_in_time_beyond_the_table_lies_inside_the_interval() -> None
 
 @pytest.mark.heavy
 def test_what_is_carried_on_beyond_the_table_meets_steady_solutions() -> None:
-    rotation, system = 2348.0, _system(10, 25.0)
+    rotation, system = 2348.0, SectionMesh(around=10, across=18, wall_ratio=25.0).system()
     for reynolds in (4485.0, 7475.0):
         flow = developed_section(system=system, kl=reynolds * rotation, s=rotation / reynolds)
         found = rotating_friction_ratio(reynolds=reynolds, rotation_reynolds=rotation)

@@ -97,7 +97,6 @@ def _covariates(result: FitResult, size: int) -> Mapping[str, FloatArray]:
             values = observations.columns.get(column.name)
             if values is None or column.measured or column.amplitude or column.dimension == "angle":
                 continue
-            name = column.name.replace("_", " ")
-            found.setdefault(name, np.full(size, np.nan))[mine] = np.tile(values, width)
+            found.setdefault(column.words, np.full(size, np.nan))[mine] = np.tile(values, width)
         at += block.measured.size
     return found

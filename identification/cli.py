@@ -18,7 +18,6 @@ from ringbalance.identification.saving import save_result
 from ringbalance.identification.show import fit_view
 from ringbalance.scene.faults import Fault, SceneError, did_you_mean, option_error
 from ringbalance.scene.loader import read_scene
-from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.platform.files import check_file
 from ringbalance.scene.platform.progress import activity
 from ringbalance.scene.platform.terminal import messages_console, results_console
@@ -68,8 +67,7 @@ def fit(
         raise _missing("SCENE" if scene is None else "DATA")
     if save is not None:
         check_file(save)
-    loaded, text = read_scene(scene)
-    given = liquid_ring_scene(loaded)
+    given, text = read_scene(scene)
     observations = read_observations(data, scene=given)
     names = None if parameters is None else _names(parameters)
     try:

@@ -6,24 +6,18 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from ringbalance.identification.balancers import exact_for
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.identifiability import Combination
 from ringbalance.identification.next_measurement import NextMeasurement
 from ringbalance.identification.result import FileResiduals, FitResult, FittedParameter, Noise
 from ringbalance.identification.review import Review
-from ringbalance.reduced_model.chamber.inputs import half_widths
-from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, nominal_value
 
 
 def exact_inputs(result: FitResult) -> list[str]:
     """Quantities of the scene that are neither fitted nor stated as uncertain."""
-    scene = result.optimum.residuals.problem.scene
-    known = {*half_widths(scene), *(parameter.name for parameter in result.parameters)}
-    return [
-        name
-        for name in UNCERTAIN_QUANTITIES
-        if name not in known and nominal_value(scene=scene, quantity=name) is not None
-    ]
+    fitted = [parameter.name for parameter in result.parameters]
+    return exact_for(result.optimum.residuals.problem.scene, fitted)
 
 
 def fit_document(
@@ -108,6 +102,7 @@ def _parameter(found: FittedParameter) -> dict[str, Any]:
         "at_bound": list(found.at_bound),
         "before": found.before,
         "before_interval": None if found.before_interval is None else list(found.before_interval),
+        "contradicts": found.contradicts,
         "verdict": found.verdict.value,
         "text": found.text,
     }

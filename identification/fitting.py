@@ -8,24 +8,19 @@ from typing import Final, Literal
 
 import numpy as np
 
+from ringbalance.identification.balancers import both_sides, held_for, models_for, parameters_for
+from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.identifiability import Combination, Verdict, combinations, verdicts
 from ringbalance.identification.intervals import Profile, covariance, profile, student
 from ringbalance.identification.likelihood import Problem, block_of, held_effects
 from ringbalance.identification.optimisation import Optimum, optimum
-from ringbalance.identification.parameters import (
-    FitError,
-    Parameter,
-    held_inputs,
-    scene_parameters,
-)
-from ringbalance.identification.predict.device import models_of
+from ringbalance.identification.parameters import FitError, Parameter
 from ringbalance.identification.predict.kinds import PREDICTED, rows_of
 from ringbalance.identification.predict.vibration import STANDARD
 from ringbalance.identification.result import FileResiduals, FitResult, FittedParameter, Noise
-from ringbalance.reduced_model.chamber.inputs import shifted
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import AnyScene
 
 Loss = Literal["linear", "soft_l1"]
 STARTS: Final = 3
@@ -35,7 +30,7 @@ _HALF: Final = 0.5
 
 
 def fit(
-    scene: Scene,
+    scene: AnyScene,
     *,
     data: Sequence[Observations],
     parameters: Sequence[str] | None = None,
@@ -51,7 +46,7 @@ def fit(
     """
     problem = problem_of(scene, data, parameters)
     names = [p.name for p in problem.parameters]
-    held = held_inputs(scene, names)
+    held = held_for(scene, names)
     nothing = np.zeros((problem.measured.size, 0))
     first = optimum(problem, nothing, loss=loss, starts=starts)
     effects = _effects(problem, first.t, held)
@@ -62,30 +57,27 @@ def fit(
 
 
 def problem_of(
-    scene: Scene, data: Sequence[Observations], parameters: Sequence[str] | None = None
+    scene: AnyScene, data: Sequence[Observations], parameters: Sequence[str] | None = None
 ) -> Problem:
     """The problem that `fit` solves. Raises: FitError: as `fit`."""
     if not data:
         raise FitError("give at least one file of measurements")
     for each in data:
-        if each.kind not in PREDICTED:
+        if KINDS[each.kind].balancer != scene.balancer:
             raise FitError(f"{each.file}: data of kind {each.kind} do not belong to this balancer")
     informed = dict.fromkeys(name for each in data for name in PREDICTED[each.kind].informs)
     names = list(informed) if parameters is None else list(parameters)
     return Problem(
         scene=scene,
-        models=models_of(scene),
-        parameters=scene_parameters(scene, names),
+        models=models_for(scene),
+        parameters=parameters_for(scene, names),
         blocks=tuple(block_of(each) for each in data),
     )
 
 
 def _effects(problem: Problem, t: FloatArray, held: dict[str, float]) -> FloatArray:
-    changes = [
-        tuple(shifted(scene=problem.scene, quantity=name, change=sign * sd) for sign in (-1, 1))
-        for name, sd in held.items()
-    ]
-    return held_effects(problem, t, changes)  # type: ignore[arg-type]
+    changes = [both_sides(problem.scene, name, sd) for name, sd in held.items()]
+    return held_effects(problem, t, changes)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

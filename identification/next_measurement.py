@@ -9,17 +9,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
+from ringbalance.identification.balancers import both_sides
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.expected_gain import Candidate, Gain, expected_gains
 from ringbalance.identification.identifiability import Verdict
 from ringbalance.identification.likelihood import Block, Problem, block_of, held_effects
 from ringbalance.identification.result import FitResult
-from ringbalance.reduced_model.chamber.inputs import shifted
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.models import Scene
@@ -112,7 +112,7 @@ def _candidates(result: FitResult, kind: str) -> Iterator[Candidate]:
         [
             asked.slopes(t),
             _free(problem, measured, block),
-            held_effects(asked, t, _changes(problem.scene, result.held)),
+            held_effects(asked, t, [both_sides(problem.scene, n, sd) for n, sd in result.held.items()]),
         ]
     )
     count = len(offered)
@@ -154,28 +154,20 @@ def _first_series(block: Block) -> FloatArray:
     return np.asarray(names == block.observations.series[0], dtype=np.float64)
 
 
-def _changes(scene: Any, held: Mapping[str, float]) -> list[tuple[Any, Any]]:
-    return [
-        (
-            shifted(scene=scene, quantity=name, change=-width),
-            shifted(scene=scene, quantity=name, change=width),
-        )
-        for name, width in held.items()
-    ]
-
-
 def _grids(scene: Scene) -> dict[str, Grid]:
     """Values of what is set, by kind and column, SI, over the ranges of a scene."""
     fills = [x * scene.disc.max_fill_ratio for x in _FRACTIONS]
     pressures = [x * scene.gas.pressure for x in _PRESSURES]
     unbalance = scene.rotor.initial_amplitude / scene.rotor.influence_coefficient
+    weights = {"unbalance": [x * unbalance for x in _BEYOND], "angle": [0.0, np.pi / 2, np.pi]}
     injections = {"fill_ratio": fills, "pressure": pressures, "gas_time": _TIMES}
     return {
         "injection": injections,
         "transfer": injections,
         "flow": {"pressure_difference": [x * scene.gas.pressure for x in (0.1, 0.3, 1.0)]},
         "pressure": {"fill_ratio": fills, "radius": [scene.disc.outer_radius]},
-        "trial_weight": {"unbalance": [x * unbalance for x in _BEYOND], "angle": [0.0, np.pi / 2]},
+        "trial_weight": weights,
+        "trial_amplitude": weights,
     }
 
 
@@ -184,8 +176,9 @@ def offered_rows(scene: Scene, kind: str, measured: Observations | None) -> Obse
     grid = dict(_grids(scene)[kind])
     if measured is not None:
         for name in ("gas_time", "pressure_difference", "unbalance"):
-            if name in grid:
-                values = measured.columns[name]
+            values = measured.columns[name] if name in grid else np.empty(0)
+            # Of runs without trial weight alone the middle says nothing.
+            if np.any(values > 0):
                 grid[name] = [x * float(np.median(values[values > 0])) for x in _BEYOND]
     rows = list(product(*grid.values()))
     count = len(rows)
@@ -218,7 +211,7 @@ def _middles(
 
 
 def words_of(offered: Observations, row: int) -> str:
-    """Such as "transfer with fill ratio 0.25, pressure 0.7 MPa, gas time 200 ms"."""
+    """Such as "transfer with fill ratio 0.25, pressure 0.7 MPa, valve-open time 200 ms"."""
     said = []
     for column in KINDS[offered.kind].columns:
         values = offered.columns.get(column.name)
@@ -228,5 +221,5 @@ def words_of(offered: Observations, row: int) -> str:
         text = f"{value:.3g}"
         if column.dimension is not None and column.dimension in DIMENSIONS:
             text = format_quantity(value, column.dimension, column.unit, digits=3)
-        said.append(f"{column.name.replace('_', ' ')} {text}")
+        said.append(f"{column.words} {text}")
     return f"{offered.kind.replace('_', ' ')} with {', '.join(said)}"

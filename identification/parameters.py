@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from ringbalance.identification.predict.device import device_of, models_of
@@ -72,6 +72,10 @@ _SYMBOLS: Final = {
 _REACH: Final = {"bore": 3.0, "outer_radius": 1.1, "inner_radius": 1.1, "central_angle": 1.1, "speed": 1.1}
 """Factor up to which a logarithmic parameter is looked for."""
 _WIDE: Final = 30.0
+_FAR: Final = 1000.0
+"""The same of a vibration."""
+START: Final = ("initial_amplitude", "initial_phase")
+"""Parameters that belong to the measurement and not to the device."""
 _LOSS_STEP: Final = 0.01
 
 
@@ -80,6 +84,8 @@ def scene_parameter(scene: Scene, name: str) -> Parameter:
 
     Raises: FitError: no such quantity, or one that the scene gives no value to start from.
     """
+    if name in START:
+        return _of_start(scene, name)
     if name not in UNCERTAIN_QUANTITIES:
         raise FitError(f'"{name}" cannot be fitted; allowed: {", ".join(sorted(UNCERTAIN_QUANTITIES))}')
     value = nominal_value(scene=scene, quantity=name)
@@ -104,6 +110,25 @@ def scene_parameter(scene: Scene, name: str) -> Parameter:
         gain=gain,
         scale=scale,
         change=lambda to, value: with_value(scene=to, quantity=name, value=value),
+    )
+
+
+def _of_start(scene: Scene, name: str) -> Parameter:
+    """Amplitude or phase of the vibration without trial weight, of which nothing is known beforehand."""
+    start = float(getattr(scene.rotor, name))
+    if name == "initial_amplitude":
+        ends, scale = (start / _FAR, start * _FAR), None
+    else:
+        ends, scale = (start - math.pi, start + math.pi), 1.0
+    return Parameter(
+        name=name,
+        symbol=name,
+        start=start,
+        lowest=ends[0],
+        highest=ends[1],
+        prior=None,
+        scale=scale,
+        change=lambda to, value: replace(to, rotor=replace(to.rotor, **{name: value})),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -30,6 +31,12 @@ class FittedParameter:
     text: str
     """The verdict with its reason, in one sentence."""
     profile: Profile
+
+    @property
+    def contradicts(self) -> bool:
+        """Whether the value lies outside what was known before: [uncertainty] or the data are wrong."""
+        low, high = self.before_interval or (-math.inf, math.inf)
+        return not low <= self.value <= high
 
     @property
     def path(self) -> str:

@@ -18,6 +18,7 @@ from typing import Any, Final
 
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.identifiability import Combination, Verdict
+from ringbalance.identification.parameters import START, Parameter
 from ringbalance.identification.result import FitResult, FittedParameter
 from ringbalance.scene import deferred
 from ringbalance.scene.describe import usual_unit
@@ -33,6 +34,7 @@ from ringbalance.scene.units import format_quantity, unit_of
 
 _DIGITS: Final = 9
 """Of a saved number: far more than any fit has, so that saving changes nothing."""
+_RISE_DIGITS: Final = 4
 _ENTRY: Final = re.compile(r"(\w+)\.(\w+)(?:\[(\d)\])?")
 _NO_UNIT: Final = "1"
 _TOGETHER: Final = 0.5
@@ -57,6 +59,8 @@ class Fitted:
     verdict: str
     identified: bool
     """By the data alone; else the value follows from what was known before and a combination."""
+    profile: tuple[tuple[float, float], ...] = ()
+    """Values, SI, and the rise of minus two log likelihood there, over that at the ends of the interval."""
 
     @property
     def half_width(self) -> float | None:
@@ -86,11 +90,13 @@ def save_result(
         *(MeasuredFinding(about="combination", text=_combination(each)) for each in result.combinations),
         *(MeasuredFinding(about="correlation", text=each) for each in _correlations(result)),
     ]
-    fitted = [_fitted(each) for each in result.parameters]
+    scales = result.optimum.residuals.problem.parameters
+    both = zip(result.parameters, scales, strict=True)
+    fitted = [_fitted(each, scale) for each, scale in both if each.name not in START]
     return save_fitted(path, text=text, fitted=fitted, files=files, findings=findings)
 
 
-def _fitted(parameter: FittedParameter) -> Fitted:
+def _fitted(parameter: FittedParameter, scale: Parameter) -> Fitted:
     return Fitted(
         path=parameter.path,
         before=parameter.before,
@@ -99,6 +105,9 @@ def _fitted(parameter: FittedParameter) -> Fitted:
         interval=parameter.interval,
         verdict=str(parameter.verdict),
         identified=parameter.verdict is Verdict.IDENTIFIED,
+        profile=tuple(
+            (scale.value(t), rise / parameter.profile.factor**2) for t, rise in parameter.profile.points
+        ),
     )
 
 
@@ -273,4 +282,6 @@ def _record(placed: _Placed) -> dict[str, Any]:
         "unit": place.unit or _NO_UNIT,
         **{name: place.number(number) for name, number in numbers.items() if number is not None},
         "verdict": fitted.verdict,
+        "profile": [place.number(value) for value, _ in fitted.profile],
+        "rise": [float(f"{rise:.{_RISE_DIGITS}g}") for _, rise in fitted.profile],
     }

@@ -89,6 +89,9 @@ def _remarks(result: FitResult) -> Iterator[Text]:
         if each.verdict is not Verdict.IDENTIFIED:
             yield Text(f"{each.name}: {each.text}.", style="yellow")
         yield from _bounds(each)
+        if each.contradicts:
+            text = f"{each.name}: the fitted value lies outside what the scene's [uncertainty] states"
+            yield Text(f"{text}; one of the two is wrong.", style="yellow")
     for found in result.combinations:
         yield Text(
             f"The data identify {found.text} to {found.relative_uncertainty:.2g} of its value (95 %): "

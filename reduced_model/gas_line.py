@@ -23,6 +23,7 @@ from ringbalance.reduced_model.short_injection import (
     accelerated_part,
     edges_of,
 )
+from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.models import Gas, Scene
 
 DEFAULT_CONDUCTANCES: Final = (0.2e-8, 1e-8)
@@ -144,15 +145,27 @@ def _vibration(scene: Scene, fills: Fills, metres: float) -> float:
     return abs(float(moment)) * scene.rotor.influence_coefficient
 
 
-def _standing_amplitude(scene: Scene, dead_time: float, *, rate: float) -> float | None:
-    """m; None for the trial algorithm, which has no gain. Args: `rate`: of the vibration, m/s."""
+def _at_equal_fills(scene: Scene, dead_time: float, *, rate: float) -> float | None:
+    """`standing_amplitude`, m; None for the trial algorithm, which has no gain."""
     settings, n = scene.controller, scene.disc.chambers
     if settings.kind == "trial":
         return None
     # The two offsets of a pair belong to the fills about the equal ones.
     lost = max(dead_time - math.fsum(settings.offsets(n)) / n, 0.0)
-    asked = rate if settings.kind == "law_based" else 1 / settings.proportional
-    return largest_standing([lost] * n) * asked
+    return standing_amplitude(settings, [lost] * n, rates=[rate] * n)
+
+
+def standing_amplitude(
+    settings: ControllerSettings, times: Sequence[float], *, rates: Sequence[float]
+) -> float:
+    """Largest amplitude, m, at which no share of the controller's vector is above a time that moves nothing.
+
+    By the gain alone; the law-based algorithm asks for the time in which the law moves the residual.
+    Args: `times`: s, of all chambers. `rates`: of the vibration with each chamber driven, m/s.
+    """
+    if settings.kind == "law_based":
+        return largest_standing([time * rate for time, rate in zip(times, rates, strict=True)])
+    return largest_standing(times) / settings.proportional
 
 
 def largest_standing(times: Sequence[float]) -> float:
@@ -177,7 +190,7 @@ def _answer(scene: Scene, end: LineEnd, fills: Fills, injection: ShortInjection 
             metres = limit * shortest.metres / correction
             dead = float(injection.dead_time(metres, least=end.valve_lag))
             rate = limit / metres * fills.steady_velocity(scene.gas.pressure)
-            standing = _standing_amplitude(scene, dead, rate=rate)
+            standing = _at_equal_fills(scene, dead, rate=rate)
     return LineAnswer(
         end=end.name,
         conductance=line.conductance,

@@ -38,7 +38,6 @@ from ringbalance.scene.models import Tube
 
 _PRESSURES: Final = 257
 """Per refinement of a threshold: few calls of the law with many pressures cost least."""
-_REFINEMENTS: Final = 3
 _SLOWEST_RISE: Final = 100.0
 """Times longer than without liquid that a pressure may take to rise."""
 _STEPS: Final = 33
@@ -102,11 +101,11 @@ class Edges:
 
 def edges_of(fills: Fills, pressure: float) -> Edges | None:
     """Up to a supply's gauge pressure, Pa; None where the gas starts no flow."""
-    starts = _edge(lambda p: fills.flow(p, primed=False).velocity > 0, pressure)
+    starts = least_pressure(lambda p: fills.flow(p, primed=False).velocity > 0, 0.0, pressure)
     if starts is None:
         return None
-    primes = _edge(lambda p: fills.flow(p, primed=False).primed, pressure)
-    stops = _edge(lambda p: fills.flow(p, primed=True).velocity > 0, starts) or 0.0
+    primes = least_pressure(lambda p: fills.flow(p, primed=False).primed, 0.0, pressure)
+    stops = least_pressure(lambda p: fills.flow(p, primed=True).velocity > 0, 0.0, starts) or 0.0
     stalls, law = stops, fills.model.flow
     if isinstance(law, CalibratedLaw):
         ends = law.ends(fill_ratio=fills.driven, opposite_fill_ratio=fills.opposite)
@@ -119,10 +118,14 @@ def edges_of(fills: Fills, pressure: float) -> Edges | None:
     )
 
 
-def _edge(flows: Callable[[FloatArray], BoolArray], highest: float) -> float | None:
-    """Smallest pressure from which on liquid flows up to `highest`, where it must."""
-    low, high = 0.0, highest
-    for _ in range(_REFINEMENTS):
+def least_pressure(
+    flows: Callable[[FloatArray], BoolArray], low: float, high: float, *, refinements: int = 3
+) -> float | None:
+    """Smallest pressure from `low` on from which on liquid flows up to `high`; None where it does not there.
+
+    Args: `refinements`: each leaves a 256th of the range.
+    """
+    for _ in range(refinements):
         p = np.linspace(low, high, _PRESSURES)
         dry = np.flatnonzero(~flows(p))
         if dry.size == 0:

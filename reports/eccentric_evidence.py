@@ -78,7 +78,7 @@ def parameters(scene: EccentricScene) -> list[Record]:
         for name, table in ECCENTRIC_MASS.tables.items()
         if table.record is not None
         for key, entry in keys_of(table.record).items()
-        if (value := getattr(getattr(scene, name, None), key, None)) is not None
+        if (value := getattr(getattr(scene, name, None), key, None)) not in (None, ())
     ]
 
 

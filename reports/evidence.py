@@ -117,6 +117,7 @@ def scene_record(scene: AnyScene, text: str, rows: list[Record]) -> Record:
         "values_sha256": scene.values_sha256,
         "text": text,
         "origins": dict(scene.origins),
+        "measured": asdict(scene.measured) if scene.measured.files else None,
         "table": rows,
     }
 

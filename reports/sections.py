@@ -19,6 +19,7 @@ from ringbalance.reports.pages import (
     extremes,
     first_page,
     loop,
+    measured,
     operation,
     sloshing,
 )
@@ -58,6 +59,7 @@ SECTIONS: Final[tuple[Section, ...]] = (
     extremes.SECTION,
     trade.SECTION,
     Section(name="models", title="Models used, and why"),
+    measured.SECTION,
     Section(name="scene", title="Scene file, mesh and versions"),
 )
 PREFIXES: Final[Mapping[Place, str]] = MappingProxyType({"report": "", "annex": "A"})

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from typing import cast
 
 with warnings.catch_warnings():
     # ziamath finds its font by importlib.resources.path, which Python 3.11 (and no other) calls deprecated.
@@ -17,7 +16,7 @@ def typeset(latex: str) -> str:
     Raises: ValueError: LaTeX that cannot be set.
     """
     try:
-        return cast(str, Latex(latex, size=16, color="currentColor").svg())
+        return Latex(latex, size=16, color="currentColor").svg()
     # The library has no error class of its own: wrong LaTeX ends in whatever its parser met.
     except Exception as error:
         raise ValueError(f"this equation cannot be set: {latex}") from error

@@ -53,7 +53,7 @@ COMMANDS = {
         "Speed against accuracy: model hierarchies measured, and the models that a tolerance needs.",
     ),
     "extremes": (
-        "ringbalance.reports.pages.extremes_cli:extremes",
+        "ringbalance.reports.extremes_cli:extremes",
         "Limits of validity: where results stop, what is reported beyond, and whether the invariants hold "
         "inside.",
     ),

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
+from ringbalance.scene import deferred
+from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.faults import Fault, toml_text
 from ringbalance.scene.keys.declaration import Shown, descriptions_of, keys_of, shown
 from ringbalance.scene.keys.fields import Reader
@@ -96,9 +98,15 @@ def _lines_of(parts: tuple[str, ...]) -> Iterator[_Line]:
 
 
 def usual_unit(path: str) -> str:
-    """Unit in which a value of a scene with a liquid ring is described; empty without one."""
+    """Unit in which a value of a scene is described: of eccentric masses the SI unit; empty without one."""
     line = _LINES.get(path)
-    return line.shown.unit if line is not None else ""
+    if line is not None:
+        return line.shown.unit
+    table, _, key = path.split("[")[0].partition(".")
+    keys = deferred.ECCENTRIC_MASS.tables[table].keys if table in deferred.ECCENTRIC_MASS.tables else {}
+    takes = keys[key].takes if key in keys else None
+    dimension = takes.dimension if isinstance(takes, Reader) else None
+    return "" if dimension is None else next(iter(DIMENSIONS[dimension].units))
 
 
 def usual_name(path: str) -> str:

@@ -4,10 +4,11 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from ringbalance.scene.keys.declaration import listed, needed, standard, unused
-from ringbalance.scene.keys.fields import Bounds, number, whole
+from ringbalance.scene.keys.fields import Bounds, number, numbers, whole
 from ringbalance.scene.keys.quantities import OneLine
 
 Number = Annotated[float, number(Bounds())]
+Numbers = Annotated[tuple[float, ...], numbers()]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,6 +34,11 @@ class MeasuredQuantity:
     low: Annotated[Number | None, unused("the data set no end", "lower end of its interval")] = None
     high: Annotated[Number | None, unused("the data set no end", "upper end of its interval")] = None
     verdict: Annotated[OneLine, needed("whether the data identify it")]
+    profile: Annotated[Numbers, unused("none", "values at which the likelihood was searched")] = ()
+    rise: Annotated[
+        Numbers,
+        unused("none", "at each of them, minus two log likelihood above its least, over the 95 % one"),
+    ] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

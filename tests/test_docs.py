@@ -22,16 +22,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGES = (
     "README.md",
     "CONTRIBUTING.md",
-    "docs/README.md",
-    "docs/glossary.md",
-    "docs/where-things-go.md",
-    "docs/how-it-works.md",
-    "docs/is-k-50-right.md",
-    "docs/how-to-choose.md",
-    "docs/fit.md",
-    "docs/commands.md",
-    "docs/eccentric-masses.md",
-    "docs/scene-file.md",
+    *(f"docs/{page.name}" for page in sorted((ROOT / "docs").glob("*.md"))),
 )
 LINK = re.compile(r"\]\(([^)#:]+)(?:#[^)]*)?\)")
 FENCE = re.compile(r"```(\w+)\n(.*?)```", re.DOTALL)
@@ -68,6 +59,19 @@ def has_path(document: Mapping[str, Any], path: str) -> bool:
 def test_links_lead_somewhere(page: str) -> None:
     targets = LINK.findall(text(page))
     assert [target for target in targets if not (ROOT / page).parent.joinpath(target).exists()] == []
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_links_into_a_page_lead_to_a_heading(page: str) -> None:
+    for target, anchor in re.findall(r"\]\(([^)#:]*)#([^)]+)\)", text(page)):
+        headings = re.findall(
+            r"^#+ (.*)$",
+            ((ROOT / page).parent / target).read_text(encoding="utf-8") if target else text(page),
+            re.MULTILINE,
+        )
+        assert anchor in {
+            re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings
+        }, anchor
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/commands.md"])

@@ -34,6 +34,13 @@ SAME: Final = (
         *("operating_point.k_uncertainty", "calibration.budgets.drag_coefficient.total"),
         "fifty.liquids.0.k_uncertainty",
     ),
+    ("operating_point.priming_uncertainty", "calibration.budgets.priming_pressure_vented.total"),
+    ("operating_point.stall_uncertainty", "calibration.budgets.stall_pressure.total"),
+    (
+        *("operating_point.priming_pressure_vented_Pa", "calibration.budgets.priming_pressure_vented.value"),
+        "calibration.operating_point.priming_pressure_vented_Pa",
+    ),
+    ("operating_point.stall_pressure_Pa", "calibration.budgets.stall_pressure.value"),
     ("calibration.chamber.wall_pressure_Pa.-1", "calibration.budgets.wall_pressure.value"),
     (
         *("calibration.lambda.per_transferred_mass_m", "calibration.budgets.lambda.value"),

@@ -15,11 +15,12 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from ringbalance.identification.balancers import models_for
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.predict.device import models_of
+from ringbalance.identification.eccentric_parameters import eccentric_with
 from ringbalance.identification.predict.kinds import PREDICTED
-from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene, write_whole
+from ringbalance.scene import AnyScene, bundled_scene, load_scene, write_whole
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.describe import in_usual_unit, usual_name, usual_unit
 from ringbalance.scene.models import Scene
@@ -27,34 +28,52 @@ from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, with_value
 from ringbalance.scene.units import format_quantity
 
 FOLDER: Final = Path(__file__).resolve().parents[1] / "scenes" / "measurements"
-TRUTH: Final = {
-    "lambda_factor": 0.97,
-    "bore": 1.46e-3,
-    "extra_loss": 1.5,
-    "influence_coefficient": 0.0112,
-    "lag_angle": math.radians(19),
-    "density": 998.2,
+TRUTH: Final[Mapping[str, Mapping[str, float]]] = {
+    "liquid_ring": {
+        "lambda_factor": 0.97,
+        "bore": 1.46e-3,
+        "extra_loss": 1.5,
+        "influence_coefficient": 0.0112,
+        "lag_angle": math.radians(19),
+        "density": 998.2,
+    },
+    "eccentric_mass": {
+        "rotor.stiffness": 1012.0,
+        "rotor.damping": 11.5,
+        "imbalance.mass": 0.1805,
+        "imbalance.phase": 0.77,
+        "masses.friction_arm[0]": 0.012,
+        "motor.torque_constant": 0.0097,
+    },
 }
-"""SI; everything else is the scene's value."""
-_SCENE: Final = "liquid_ring_paper"
-_VIBRATION_NOISE: Final = 0.02e-6
+"""By balancer, SI; everything else is the scene's value."""
+SCENES: Final = {"liquid_ring": "liquid_ring_paper", "eccentric_mass": "eccentric_mass_paper"}
+_VIBRATION_NOISE: Final = {"liquid_ring": 0.02e-6, "eccentric_mass": 20e-6}
 """Standard deviation of each component, m."""
+_ANGLE_NOISE: Final = math.radians(0.1)
+"""Standard deviation of the angle of a mass, rad."""
 _RELATIVE_NOISE: Final = {"transfer": 0.01, "flow": 0.01, "pressure": 0.005}
+RPM: Final = math.pi / 30
 _DIGITS: Final = {"um": 3, "deg": 2}
 
 
-def truth() -> Scene:
-    """The disc that the examples were measured on."""
-    scene = liquid_ring_scene(load_scene(bundled_scene(_SCENE)))
-    for name, value in TRUTH.items():
-        scene = with_value(scene=scene, quantity=name, value=value)
+def truth(kind: str) -> AnyScene:
+    """The machine that the example of a kind was measured on."""
+    balancer = KINDS[kind].balancer
+    scene = load_scene(bundled_scene(SCENES[balancer]))
+    for name, value in TRUTH[balancer].items():
+        if isinstance(scene, Scene):
+            scene = with_value(scene=scene, quantity=name, value=value)
+        else:
+            scene = eccentric_with(scene, value, name=name)
     return scene
 
 
 def example(kind: str) -> str:
     """Text of one example."""
     plan, stated = _PLANS[kind]()
-    seed = 1000 + sorted(_PLANS).index(kind)
+    # Noise of one seed in twenty has a pattern that the criticism of a fit rejects: that of these has none.
+    seed = 1000 + list(_PLANS).index(kind)
     return _text(kind, _measured(kind, plan, np.random.default_rng(seed)), stated)
 
 
@@ -73,31 +92,33 @@ def _observations(kind: str, columns: Mapping[str, npt.ArrayLike], chamber: Sequ
 
 def _measured(kind: str, plan: Observations, random: np.random.Generator) -> Observations:
     """The plan with what the truth predicts, and noise."""
-    scene = truth()
-    found = PREDICTED[kind].predict(scene, plan, models_of(scene))
+    scene = truth(kind)
+    found = PREDICTED[kind].predict(scene, plan, models_for(scene))
     columns = dict(plan.columns)
-    if kind in _RELATIVE_NOISE:
-        noise = _RELATIVE_NOISE[kind] * random.standard_normal(len(plan))
-        columns[PREDICTED[kind].column(plan)] = found * (1 + noise)
+    if KINDS[kind].has_amplitudes:
+        columns |= _vibrations(kind, found[: len(plan)] + 1j * found[len(plan) :], scene, random)
     else:
-        start = scene.rotor.initial_amplitude * np.exp(1j * scene.rotor.initial_phase)
-        change = found[: len(plan)] + 1j * found[len(plan) :]
-        columns |= _vibrations(kind, start, change, random)
+        noise = _RELATIVE_NOISE[kind] * found if kind in _RELATIVE_NOISE else _ANGLE_NOISE
+        columns[PREDICTED[kind].column(plan)] = found + noise * random.standard_normal(len(plan))
     return _observations(kind, columns, plan.chamber.tolist())
 
 
 def _vibrations(
-    kind: str, start: complex, change: ComplexArray, random: np.random.Generator
+    kind: str, predicted: ComplexArray, scene: AnyScene, random: np.random.Generator
 ) -> dict[str, FloatArray]:
     """Readings; that after an injection is that before the next one."""
+    noise = _VIBRATION_NOISE[scene.balancer]
+    if not isinstance(scene, Scene):
+        return _polar("", _read(predicted, noise, random))
+    start = scene.rotor.initial_amplitude * np.exp(1j * scene.rotor.initial_phase)
     if kind == "trial_weight":
-        return _polar("", _read(start + change, random))
-    readings = _read(start + np.concatenate([[0], np.cumsum(change)]), random)
+        return _polar("", _read(start + predicted, noise, random))
+    readings = _read(start + np.concatenate([[0], np.cumsum(predicted)]), noise, random)
     return _polar("_before", readings[:-1]) | _polar("_after", readings[1:])
 
 
-def _read(vibration: ComplexArray, random: np.random.Generator) -> ComplexArray:
-    noise = random.standard_normal((2, vibration.size)) * _VIBRATION_NOISE
+def _read(vibration: ComplexArray, size: float, random: np.random.Generator) -> ComplexArray:
+    noise = random.standard_normal((2, vibration.size)) * size
     return np.asarray(vibration + noise[0] + 1j * noise[1])
 
 
@@ -138,12 +159,24 @@ def _pressure() -> tuple[Observations, str]:
     return _observations("pressure", columns, []), ""
 
 
+def _run_up() -> tuple[Observations, str]:
+    return _observations("run_up", {"speed": RPM * np.arange(80, 240, 10)}, []), ""
+
+
+def _positioning() -> tuple[Observations, str]:
+    times, voltages = np.tile([0.1, 0.2, 0.4, 0.6, 0.8, 1.0], 3), np.repeat([6.0, 9.0, 12.0], 6)
+    columns = {"time": times, "voltage": voltages, "speed": np.full(18, 100 * RPM)}
+    return _observations("positioning", columns, []), ""
+
+
 _PLANS: Final[Mapping[str, Callable[[], tuple[Observations, str]]]] = {
     "trial_weight": _trial_weight,
     "injection": _injection,
     "transfer": _transfer,
     "flow": _flow,
     "pressure": _pressure,
+    "run_up": _run_up,
+    "positioning": _positioning,
 }
 EXAMPLES: Final = tuple(_PLANS)
 
@@ -158,7 +191,7 @@ def _text(kind: str, measured: Observations, stated: str) -> str:
     lines = [
         f'# kind = "{kind}"  # {KINDS[kind].title}',
         '# source = "made up by tools/example_measurements.py, not measured"',
-        f'# conditions = "{_SCENE} with {_told()}"',
+        f'# conditions = "{SCENES[KINDS[kind].balancer]} with {_told(KINDS[kind].balancer)}"',
         *(['# amplitude = "zero_to_peak"'] if KINDS[kind].has_amplitudes else []),
         *([f"# uncertainty = {stated}  # expanded (95 %)"] if stated else []),
         ",".join(heads),
@@ -178,12 +211,12 @@ def _cell(value: float, dimension: str | None, unit: str) -> str:
     return f"{number:.{_DIGITS[unit]}f}" if unit in _DIGITS else f"{number:.4g}"
 
 
-def _told() -> str:
+def _told(balancer: str) -> str:
     """The truth in words."""
-    paths = [f"{UNCERTAIN_QUANTITIES[name]}.{name}" for name in TRUTH]
+    paths = {name: f"{UNCERTAIN_QUANTITIES.get(name, '')}.{name}".lstrip(".") for name in TRUTH[balancer]}
     return ", ".join(
-        f"{usual_name(path)} {in_usual_unit(path, value):.4g} {usual_unit(path)}".rstrip()
-        for path, value in zip(paths, TRUTH.values(), strict=True)
+        f"{usual_name(path)} {in_usual_unit(path, TRUTH[balancer][name]):.4g} {usual_unit(path)}".rstrip()
+        for name, path in paths.items()
     )
 
 

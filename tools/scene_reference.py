@@ -22,23 +22,44 @@ from ringbalance.scene.units import unit_names
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "scene-file.md"
 BLOCK = re.compile(r"<!-- table: (\w+) -->\n.*?<!-- end -->", re.DOTALL)
 WIDTHS = "uncertainty"
+MANY = 8
+"""Units of one quantity that are still listed one by one."""
 HEAD = "| key | takes | when left out | meaning |\n|---|---|---|---|"
 
 
-def key_reference(schema: Schema, title: str) -> str:
-    """One Markdown table of keys for each table of a kind of scene. Args: `title`: of the first table."""
+def key_reference(schema: Schema, title: str, above: Schema | None = None) -> str:
+    """One Markdown table of keys for each table of a kind of scene.
+
+    Args: `title`: of the first table. `above`: kind of scene whose tables stand above; those that are the
+    same here are only named.
+    """
+    tables = {} if above is None else above.tables
+    same = [name for name in schema.tables if name in tables and _told(schema, name) == _told(above, name)]
     parts = [f"### {title}", *rows(schema.top)]
     for name, table in schema.tables.items():
+        if name in same:
+            continue
         inside = widths(schema) if name == WIDTHS else rows(table.keys)
         parts += [f"\n### [{name}]", f"{table.text[0].upper()}{table.text[1:]}.\n", *inside]
     for name, table in schema.tables.items():
-        if name == WIDTHS:
+        if name == WIDTHS or name in same:
             continue
         for key, declared in table.keys.items():
             if isinstance(declared.takes, Entries) and key != ORIGIN:
                 each = ", each entry" if declared.takes.example else ""
                 parts += [f"\n### [{name}] {key}{each}", *rows(declared.takes.keys)]
+    if same:
+        parts += [f"\n### [{'], ['.join(same)}]", "As of a liquid-ring scene, above."]
     return "\n".join(parts)
+
+
+def _told(schema: Schema | None, name: str) -> object:
+    """All that the page says of a table."""
+    if schema is None or name == WIDTHS:
+        return schema
+    table = schema.tables[name]
+    inside = [rows(key.takes.keys) for key in table.keys.values() if isinstance(key.takes, Entries)]
+    return table.text[0], rows(table.keys), inside
 
 
 def widths(schema: Schema) -> list[str]:
@@ -48,13 +69,13 @@ def widths(schema: Schema) -> list[str]:
         for name, table in schema.tables.items()
     }
     first, *_ = schema.tables[WIDTHS].keys.values()
-    how = (
-        'a table for each of these, such as `rotor = { mass = "1 %" }`'
+    how, liquid = (
+        ('a table for each of these, such as `rotor = { mass = "1 %" }`', "")
         if isinstance(first.takes, Entries)
-        else "a key for each of these quantities"
+        else ("a key for each of these quantities", ", or that of the liquid")
     )
     return [
-        f"It has {how}: a percentage, or a value with its unit. Left out: exact, or that of the liquid.\n",
+        f"It has {how}: a percentage, or a value with its unit. Left out: exact{liquid}.\n",
         "| of table | quantities |\n|---|---|",
         *(f"| [{name}] | `{'`, `'.join(keys)}` |" for name, keys in own.items() if keys),
     ]
@@ -77,10 +98,21 @@ def liquid_reference() -> str:
 def unit_reference() -> str:
     """Write a Markdown table of the units."""
     rows = (
-        f"| {kind.noun} | `{kind.example}` | `{unit_names(name).replace(', ', '`, `')}` |"
+        f"| {kind.noun} | `{kind.example}` | {_units(unit_names(name).split(', '))} |"
         for name, kind in DIMENSIONS.items()
     )
     return "\n".join(["| quantity | example | units |\n|---|---|---|", *rows])
+
+
+def _units(names: list[str]) -> str:
+    """Units in code type; where every one of some units stands over every one of others, these once each."""
+    over = [
+        dict.fromkeys(part)
+        for part in zip(*(name.split("/", 1) for name in names if "/" in name), strict=True)
+    ]
+    if len(names) > MANY and len(over) == 2 and len(names) == len(over[0]) * len(over[1]):
+        return " over ".join(", ".join(f"`{unit}`" for unit in units) for units in over)
+    return ", ".join(f"`{name}`" for name in names)
 
 
 def rows(keys: Mapping[str, Key]) -> list[str]:
@@ -107,7 +139,9 @@ def fresh(page: str) -> str:
     tables = {
         "units": unit_reference(),
         "liquid_ring_keys": key_reference(LIQUID_RING, "At the top of the file"),
-        "eccentric_mass_keys": key_reference(ECCENTRIC_MASS, "At the top of a file with eccentric masses"),
+        "eccentric_mass_keys": key_reference(
+            ECCENTRIC_MASS, "At the top of a file with eccentric masses", above=LIQUID_RING
+        ),
         "liquids": liquid_reference(),
     }
     return BLOCK.sub(lambda match: f"<!-- table: {match[1]} -->\n{tables[match[1]]}\n<!-- end -->", page)

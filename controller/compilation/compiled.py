@@ -39,6 +39,12 @@ _MARK: Final = f"from {__name__} import".encode()
 _Dispatcher: Any = getattr(registry, "CPUDispatcher", object)
 _normalized: Any = sigutils.normalize_signature
 _unliteral: Any = types.unliteral
+_FINAL_STEPS: Final = (
+    "_optimize_final_module",
+    "_finalize_final_module",
+    "_finalize_dynamic_globals",
+    "_verify_declare_only_symbols",
+)
 
 
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
@@ -108,9 +114,28 @@ class _Inner(_Dispatcher):  # type: ignore[misc]
         if args not in self.overloads:
             with global_compiler_lock, self._compiling_counter:
                 found = self._compiler.compile(args, result)._replace(entry_point=_NoAddress())
+                _link_alone(found.library)
                 self.targetctx.insert_user_function(found.entry_point, found.fndesc, [found.library])
                 self.overloads[args] = found
         return self.overloads[args].entry_point
+
+
+def _link_alone(library: Any) -> None:
+    """Leave optimisation and machine code of a library to those that it is linked into, if numba lets us."""
+    if not all(hasattr(library, name) for name in _FINAL_STEPS):
+        return
+
+    def finalize() -> None:
+        library._finalize_dynamic_globals()
+        library._verify_declare_only_symbols()
+        library._finalized = True
+
+    library._finalize_final_module = finalize
+    library._optimize_final_module = _nothing
+
+
+def _nothing() -> None:
+    """Leaves a library as it is."""
 
 
 class _NoAddress:

@@ -149,9 +149,12 @@ _RUN_PAIRS: Final = (
     "side_before",
     "trial",  # room for the fills at one instant
 )
+GAS_LINE: Final = ("passing", "critical_ratio", "dead_volume", "valve_lag")
+"""Constants of a `PLANT` that belong to a chamber's gas line."""
 RUN: Final = np.dtype(
     [(name, np.float64) for name in _RUN_REAL]
     + [(name, np.int64) for name in _RUN_WHOLE]
     + [(name, np.float64, (MAX_CHAMBERS // 2,)) for name in _RUN_PAIRS]
+    + [("gas_line", np.float64, (len(GAS_LINE),))]
 )
-"""One member's run."""
+"""One member's run; `gas_line`: its own values of `GAS_LINE`."""

@@ -51,9 +51,10 @@ def run_members(
 ) -> None:
     """Run members one after the other; `runs`, of type `RUN`, holds what differs and is filled.
 
+    `plant`, of type `PLANT`, is given each member's gas line.
+
     Where `shared.moving`, `motions`, of type `MOTION`, has room for every pair twice and one more, and
-    `notes` for the instants of an injection and its tail and for the fills of every pair then.  Elsewhere
-    `motions` is None, and no march is compiled.
+    `notes` for the instants of an injection and its tail and for the fills of every pair then.
     """
     for i in range(runs.size):
         run = runs[i]
@@ -64,7 +65,7 @@ def run_members(
             if run.cause == NONE and run.samples < shared.most_samples:
                 run.samples += 1
                 _sample(shared, run)
-                if run.cause == NONE and motions is not None:
+                if run.cause == NONE and shared.moving:
                     _inject(shared, plant, run, motions, notes, workspace)
                 elif run.cause == NONE:
                     _keep_residual(shared, run)
@@ -114,6 +115,8 @@ def _start(shared: Record, plant: Record, run: Record, motions: Any) -> None:
     """Level chambers, nothing remembered."""
     reset(shared, run)
     if motions is not None:
+        plant.passing, plant.critical_ratio = run.gas_line[0], run.gas_line[1]
+        plant.dead_volume, plant.valve_lag = run.gas_line[2], run.gas_line[3]
         for i in range(shared.chambers // 2):
             begin(plant, motions[i], shared.initial_fill, run.speed, run.residual_fill)
     _forget(run)

@@ -196,8 +196,7 @@ def _block(
 ) -> MemberRuns:
     """The first `size` members of one block."""
     drawn = drawn_members(scene, uncertainty_95=widths, seed=seed, block=block)
-    held = Members(**{name: values[:size] for name, values in vars(drawn).items()})
-    return plan.run(held, seed=seed, number=block * BLOCK)
+    return plan.run(drawn.first(size), seed=seed, number=block * BLOCK)
 
 
 def _in_order(run: Callable[[int], MemberRuns], *, blocks: int, workers: int) -> Iterator[MemberRuns]:

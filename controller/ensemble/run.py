@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 from ringbalance.controller.algorithms.by_name import target_vector_of
 from ringbalance.controller.ensemble.compiled_noise import noise_key
-from ringbalance.controller.ensemble.compiled_records import RUN
+from ringbalance.controller.ensemble.compiled_records import GAS_LINE, RUN
 from ringbalance.controller.ensemble.compiled_sample import run_members
 from ringbalance.controller.ensemble.moment import moment_table
-from ringbalance.controller.ensemble.samples import Members
+from ringbalance.controller.ensemble.samples import LARGEST_RATIO, Members
 from ringbalance.controller.ensemble.transfer import PairTransfer
 from ringbalance.controller.judgement import noise_floor
 from ringbalance.controller.liquid_ring.records import MOTION, WORKSPACE
@@ -78,9 +78,10 @@ class EnsemblePlan:
         shared = self.shared.copy()
         shared["key_0"], shared["key_1"] = noise_key(seed=seed)
         half = int(shared["chambers"][0]) // 2
-        motions = np.zeros(2 * half + 1, dtype=MOTION) if shared["moving"][0] else None
-        notes = np.zeros((half + 1, NOTES))
-        run_members(shared[0], self.plant[0], runs, motions, notes, np.zeros(WORKSPACE))
+        motions = np.zeros(2 * half + 1, dtype=MOTION)
+        plant, notes = self.plant.copy(), np.zeros((half + 1, NOTES))
+        runs["gas_line"] = self._gas_lines(members)
+        run_members(shared[0], plant[0], runs, motions, notes, np.zeros(WORKSPACE))
         return MemberRuns(
             settled=runs["settled"] > 0,
             settling_time=runs["settling_time"],
@@ -92,6 +93,14 @@ class EnsemblePlan:
             samples=runs["samples"],
             final_amplitude=runs["amplitude"],
         )
+
+    def _gas_lines(self, members: Members) -> FloatArray:
+        """`GAS_LINE` of each member; the critical ratio stays below one."""
+        own = np.array([float(self.plant[name][0]) for name in GAS_LINE])
+        factors = np.ones((own.size, 1)) if members.gas_line is None else members.gas_line
+        lines = own * factors.T
+        lines[:, 1] = np.minimum(lines[:, 1], LARGEST_RATIO)
+        return lines
 
     def _stay(self, members: Members) -> BoolArray:
         """Whether each member's loop is expected to stay within the limit, as `LoopFactor.stays`."""

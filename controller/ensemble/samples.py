@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Final
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from ringbalance.reduced_model.chamber.moment import CalibratedMoment
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import Scene
+from ringbalance.scene.models import Gas, Scene
 from ringbalance.scene.uncertain import nominal_value
 
 BLOCK: Final = 8192
@@ -23,6 +24,10 @@ PAPER_DRAG_UNCERTAINTY: Final = 0.1
 """Relative half-width taken for "k is about 50"."""
 PAPER_MOMENT_UNCERTAINTY: Final = 0.007
 """Relative half-width that the liquid-ring paper states for lambda."""
+LINE_KEYS: Final = ("conductance", "critical_ratio", "dead_volume", "valve_lag")
+"""Of a chamber's gas line, which members may have of their own."""
+LARGEST_RATIO: Final = 0.99
+"""A critical ratio is below one."""
 ASSUMED_INFLUENCE: Final = 0.05
 ASSUMED_LAG: Final = math.radians(3.0)
 
@@ -41,6 +46,8 @@ class MemberUncertainty:
     """rad."""
     sources: tuple[str, ...] = ()
     """One text for each of the four."""
+    gas_line: Mapping[str, float] = field(default_factory=dict)
+    """Relative, of those of `LINE_KEYS` whose uncertainty the scene states."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,6 +64,29 @@ class Members:
     """rad."""
     proportional: FloatArray
     """Kc, s/m."""
+    gas_line: FloatArray | None = None
+    """Factors of `LINE_KEYS`, a row each; None: all have the scene's line.
+
+    They change the plant, and with it the dead time of its valves.  The controller does not know them: what
+    it adds to a valve-open time, `gas_time_offset`, stays the scene's.
+    """
+
+    def first(self, size: int) -> Members:
+        """The first of them."""
+        kept: dict[str, Any] = {
+            name: values if values is None else values[..., :size] for name, values in vars(self).items()
+        }
+        return Members(**kept)
+
+    def gas_of(self, gas: Gas, number: int) -> Gas:
+        """A scene's gas supply with one member's line."""
+        if self.gas_line is None:
+            return gas
+        factors = {name: float(row[number]) for name, row in zip(LINE_KEYS, self.gas_line, strict=True)}
+        own = {name: getattr(gas, name) * f for name, f in factors.items() if getattr(gas, name) is not None}
+        if "critical_ratio" in own:
+            own["critical_ratio"] = min(own["critical_ratio"], LARGEST_RATIO)
+        return replace(gas, **own)
 
 
 def members_alike(scene: Scene, *, size: int) -> Members:
@@ -78,6 +108,8 @@ def drawn_members(scene: Scene, *, uncertainty_95: MemberUncertainty, seed: int,
     """
     random = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(block, 0)))
     z = random.standard_normal((4, BLOCK)) / NORMAL_95
+    line = uncertainty_95.gas_line
+    wide = np.array([[math.log1p(line.get(name, 0.0))] for name in LINE_KEYS])
     alike = members_alike(scene, size=BLOCK)
     return Members(
         velocity_factor=np.exp(math.log1p(uncertainty_95.velocity) * z[0]),
@@ -86,6 +118,7 @@ def drawn_members(scene: Scene, *, uncertainty_95: MemberUncertainty, seed: int,
         * np.exp(math.log1p(uncertainty_95.influence_coefficient) * z[2]),
         lag_angle=alike.lag_angle + uncertainty_95.lag_angle * z[3],
         proportional=alike.proportional,
+        gas_line=np.exp(wide * random.standard_normal((4, BLOCK)) / NORMAL_95) if line else None,
     )
 
 
@@ -107,7 +140,14 @@ def member_uncertainty(scene: Scene, model: BalancerModel) -> MemberUncertainty:
             assumed if influence is None else own,
             assumed if lag is None else own,
         ),
+        gas_line=_line(scene),
     )
+
+
+def _line(scene: Scene) -> dict[str, float]:
+    """Relative half-widths that the scene states of its gas line."""
+    stated = {name: _stated(scene, name) for name in LINE_KEYS if getattr(scene.gas, name)}
+    return {name: width / getattr(scene.gas, name) for name, width in stated.items() if width}
 
 
 def _stated(scene: Scene, quantity: str) -> float | None:

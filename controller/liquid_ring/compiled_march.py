@@ -166,9 +166,10 @@ def _march(
     plant: Record, motion: Record, duration: float, notes: FloatArray, row: int, count: int, w: FloatArray
 ) -> None:
     """Steps and their events, with the valves as they are."""
-    left = duration
+    left, goes_on = duration, False
     while left > 0.0:
-        _settle(plant, motion)
+        if not goes_on:
+            _settle(plant, motion)
         if motion.steps >= plant.most_steps:
             motion.event = _UNFINISHED
             _pass(motion, left, notes, row, count)
@@ -177,7 +178,7 @@ def _march(
             _rest_gases(plant, motion)
             _pass(motion, left, notes, row, count)
             return
-        h = _step(plant, motion, left, notes, row, count, w)
+        h, goes_on = _step(plant, motion, left, notes, row, count, w)
         _pass(motion, left if h >= left else h, notes, row, count)
         left = 0.0 if h >= left else left - h
 
@@ -202,12 +203,15 @@ def _at(w: FloatArray, row: int) -> Four:
 @compiled
 def _step(
     plant: Record, motion: Record, left: float, notes: FloatArray, row: int, count: int, w: FloatArray
-) -> float:
-    """One accepted step, cut at the first event within it. Returns: its length, s."""
-    h = take(plant, motion, left, w)
-    if changes(plant, motion, _at(w, END)):
+) -> tuple[float, bool]:
+    """One accepted step, cut at the first event within it.
+
+    Returns: Its length, s, and whether liquid moves on, so that nothing needs to be settled.
+    """
+    h, moves = take(plant, motion, left, w), motion.direction != 0
+    event = changes(plant, motion, _at(w, END))
+    if event:
         h = _cut(plant, motion, h, w)
-    moves = motion.direction != 0
     if moves and motion.noted < count and notes[0, motion.noted] < motion.now + h:
         rates_at_end(plant, motion, w)
         while motion.noted < count and notes[0, motion.noted] < motion.now + h:
@@ -222,9 +226,9 @@ def _step(
     if motion.direction != 0 and plant.inertia and y[U] * motion.direction < 0.0:
         y[U] = 0.0 if flow_end(plant, motion, now(motion)) == NONE else y[U]
     motion.least_fill = min(motion.least_fill, plant.total - y[X] if motion.chamber else y[X])
-    if motion.direction != 0 and not motion.primed and holds_column(plant, motion, now(motion)):
+    if event and moves and not motion.primed and holds_column(plant, motion, now(motion)):
         motion.primed = 1
-    return h
+    return h, moves and not event
 
 
 @compiled

@@ -9,10 +9,12 @@ import numpy as np
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.rotor import chamber_directions, initial_unbalance
 from ringbalance.reduced_model.law.flow_law import FlowLaw
+from ringbalance.reduced_model.short_injection import least_pressure
+from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.loop_models import Rotor
 
 _MAX_DOUBLINGS: Final = 40
-_BISECTIONS: Final = 50
+_REFINEMENTS: Final = 6
 BEYOND_CAPACITY: Final = (
     "balance the rotor first, use a denser liquid, or a larger or differently clocked disc"
 )
@@ -63,22 +65,21 @@ def starting_pressure(
     None when no pressure found does.
     """
 
-    def flows(pressure: float) -> bool:
+    def flows(pressure: FloatArray) -> BoolArray:
+        one = np.ones_like(pressure)
         flow = law.evaluate(
-            fill_ratio=fill, opposite_fill_ratio=opposite_fill, gas_pressure=pressure, primed=primed
+            fill_ratio=fill * one,
+            opposite_fill_ratio=opposite_fill * one,
+            gas_pressure=pressure,
+            primed=primed,
         )
-        return bool(flow.velocity > 0)
+        return flow.velocity > 0
 
-    if flows(above):
+    if flows(np.array([above]))[0]:
         return above
-    low, high = above, 2 * above
-    for _ in range(_MAX_DOUBLINGS):
-        if flows(high):
-            break
-        low, high = high, 2 * high
-    else:
-        return None
-    for _ in range(_BISECTIONS):
-        middle = (low + high) / 2
-        low, high = (low, middle) if flows(middle) else (middle, high)
-    return high
+    for doubled in range(_MAX_DOUBLINGS):
+        low = above * 2.0**doubled
+        found = least_pressure(flows, low, 2.0 * low, refinements=_REFINEMENTS)
+        if found is not None:
+            return found
+    return None

@@ -16,7 +16,7 @@ import numpy as np
 
 from ringbalance.controller.terms import run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import balanced_fills, vibration_rates
-from ringbalance.reduced_model.gas_line import largest_standing, line_ends, short_injection
+from ringbalance.reduced_model.gas_line import line_ends, short_injection, standing_amplitude
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.selection.estimates import FILLING
 from ringbalance.reduced_model.short_injection import Fills
@@ -64,17 +64,12 @@ def compensated(scene: Scene, model: BalancerModel, dead: tuple[float, ...]) -> 
 
 
 def dead_zone(scene: Scene, model: BalancerModel, dead: Sequence[float]) -> float:
-    """Largest amplitude, m, at which no commanded injection moves liquid, by the gain alone.
-
-    The law-based algorithm asks for the time in which the law moves the residual.
-    """
+    """`standing_amplitude` at the balanced fills, m, the least valve-open time counted."""
     settings, n = scene.controller, scene.disc.chambers
     lost = [max(d - o, 0.0) for d, o in zip(dead or (0.0,) * n, settings.offsets(n), strict=True)]
     still = [max(each, settings.minimum_gas_time) for each in lost]
-    if settings.kind == "law_based":
-        rates = np.maximum(vibration_rates(scene, model).T.ravel(), 0.0)
-        return largest_standing([s * float(b) for s, b in zip(still, rates, strict=True)])
-    return largest_standing(still) / settings.proportional
+    rates = np.maximum(vibration_rates(scene, model).T.ravel(), 0.0)
+    return standing_amplitude(settings, still, rates=rates.tolist())
 
 
 def offset_text(offsets: Sequence[float]) -> str:

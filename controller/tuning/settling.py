@@ -130,7 +130,8 @@ def _one_run(
         influence_coefficient=float(drawn.influence_coefficient[number] * factor),
         lag_angle=float(drawn.lag_angle[number]),
     )
-    asked = replace(scene, rotor=rotor, run=replace(scene.run, seed=scene.run.seed + number))
+    run = replace(scene.run, seed=scene.run.seed + number)
+    asked = replace(scene, rotor=rotor, gas=drawn.gas_of(scene.gas, number), run=run)
     time = simulate(asked, model).settling_time
     return math.inf if time is None else time
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final, Literal
 
+from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.faults import did_you_mean
 from ringbalance.scene.units import FieldError
 
@@ -15,10 +16,28 @@ AMPLITUDES: Final[Mapping[str, float]] = MappingProxyType(
     {"zero_to_peak": 1.0, "peak_to_peak": 0.5, "rms": math.sqrt(2)}
 )
 """Convention of an amplitude to the factor that makes it zero to peak; of a harmonic vibration."""
+_WORDS: Final = {"gas_time": "valve-open time"}
+"""Names of columns that a sentence has another word for."""
 TEXTS: Final = ("series", "note")
 """Columns of text that every kind may have."""
 _TURNS: Final = 4 * math.pi
 """Largest phase or angle of a measurement, rad; beyond it degrees stand in a column of radians."""
+
+
+_LARGEST: Final[Mapping[str, float]] = MappingProxyType(
+    {
+        "length": 10.0,
+        "unbalance": 1e3,
+        "time": 1e5,
+        "pressure": 1e9,
+        "mass": 1e4,
+        "volume": 10.0,
+        "flow_rate": 10.0,
+        "speed": 1e5,
+        "voltage": 1e4,
+    }
+)
+"""By dimension, SI: what no rig has, with room to spare; beyond it the unit is wrong."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,22 +64,30 @@ class Column:
         """Name with unit, as it stands over the column."""
         return f"{self.name} [{self.unit}]" if self.unit else self.name
 
+    @property
+    def words(self) -> str:
+        """Its name in a sentence."""
+        return _WORDS.get(self.name, self.name.replace("_", " "))
+
     def check(self, value: float) -> None:
         """Raises: FieldError: a value, SI, that the column cannot have."""
         if self.above_zero and not value > 0:
-            raise FieldError("it is not above zero", "above 0")
+            raise FieldError("it is not above zero", self._range())
         if value < self.lowest:
             raise FieldError("it is negative" if self.lowest == 0 else "it is too small", self._range())
-        if value > self.highest:
-            raise FieldError("it is too large" + self._suspicion(), self._range())
+        if abs(value) > self._largest:
+            raise FieldError(f"it is too large; is [{self.unit or 1}] meant?", self._range())
+
+    @property
+    def _largest(self) -> float:
+        return min(self.highest, _LARGEST.get(self.dimension or "", math.inf))
 
     def _range(self) -> str:
-        unit = "rad" if self.dimension == "angle" else ""
-        low = "" if self.lowest == -math.inf else f"from {self.lowest:.4g} "
-        return f"{low}{'' if self.highest == math.inf else f'to {self.highest:.4g} {unit}'}".strip()
-
-    def _suspicion(self) -> str:
-        return " for an angle in radians; is the column in [deg]?" if self.dimension == "angle" else ""
+        unit = next(iter(DIMENSIONS[self.dimension].units)) if self.dimension else ""
+        low = self.lowest if self.lowest > -math.inf else -self._largest
+        start = "above 0" if self.above_zero else f"from {low:.4g}"
+        end = "" if self._largest == math.inf else f"to {self._largest:.4g} {unit}"
+        return " ".join(filter(None, (start, end.strip())))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -175,6 +202,12 @@ _TRIAL_WEIGHT: Final = DataKind(
     ),
 )
 
+_TRIAL_AMPLITUDE: Final = DataKind(
+    title="amplitude alone of the vibration with a known unbalance on the rotor",
+    balancer="liquid_ring",
+    columns=tuple(column for column in _TRIAL_WEIGHT.columns if column.name != "phase"),
+)
+
 _INJECTION: Final = DataKind(
     title="vibration before and after one injection of gas",
     balancer="liquid_ring",
@@ -282,6 +315,7 @@ _POSITIONING: Final = DataKind(
 KINDS: Final[Mapping[str, DataKind]] = MappingProxyType(
     {
         "trial_weight": _TRIAL_WEIGHT,
+        "trial_amplitude": _TRIAL_AMPLITUDE,
         "injection": _INJECTION,
         "transfer": _TRANSFER,
         "flow": _FLOW,

@@ -18,8 +18,9 @@ from typing import Final
 from ringbalance.scene.faults import Fault, did_you_mean, toml_text
 
 LARGEST_FILE: Final = 8 * 2**20
-MOST_ROWS: Final = 10_000
-"""A row is a measurement. More of them are a recording, which is averaged or thinned out first."""
+MOST_ROWS: Final = 2000
+"""A row is a measurement; more of them are a recording, which is averaged or thinned out first. A fit
+holds the covariance of every pair of rows: more would take gigabytes."""
 _MARK: Final = "#"
 _SEPARATORS: Final = ";\t,"
 _NAMED_SEPARATOR: Final = re.compile(r'"?sep=.{0,2}"?[,;\t]*', re.IGNORECASE)

@@ -10,7 +10,16 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.predict import flows, injections, pressures, transfers, trial_weights
+from ringbalance.identification.predict import (
+    flows,
+    injections,
+    positionings,
+    pressures,
+    run_ups,
+    transfers,
+    trial_amplitudes,
+    trial_weights,
+)
 from ringbalance.scene.arrays import FloatArray
 
 
@@ -59,10 +68,35 @@ def _kind(
 PREDICTED: Final[Mapping[str, PredictedKind]] = MappingProxyType(
     {
         "trial_weight": _kind(trial_weights, "amplitude", "influence_coefficient", "lag_angle", by_law=False),
+        "trial_amplitude": _kind(
+            trial_amplitudes,
+            "amplitude",
+            "influence_coefficient",
+            "initial_amplitude",
+            "initial_phase",
+            by_law=False,
+        ),
         "injection": _kind(injections, "amplitude_after", "lambda_factor", "bore"),
         "transfer": _kind(transfers, transfers.column, "bore", "extra_loss"),
         "flow": _kind(flows, "flow_rate", "bore", "extra_loss"),
         "pressure": _kind(pressures, "pressure", "density", by_law=False),
+        "run_up": _kind(
+            run_ups,
+            "amplitude",
+            "rotor.stiffness",
+            "rotor.damping",
+            "imbalance.mass",
+            "imbalance.phase",
+            by_law=False,
+        ),
+        "positioning": _kind(
+            positionings,
+            "angle",
+            "masses.friction_arm[0]",
+            "motor.torque_constant",
+            "motor.back_emf_constant",
+            by_law=False,
+        ),
     }
 )
 

@@ -68,8 +68,8 @@ def amplitude(runs: Record, limit: float) -> Drawing:
         wide=True,
         height=3.5,
         alt=f"Vibration amplitude against time on a logarithmic scale; it ends at {ends}.",
-        caption="Vibration amplitude at each sample of the controller, under both laws. It ends at "
-        f"{ends}.{rests}",
+        caption="Vibration amplitude at each sample of the controller, under both laws; between samples it "
+        f"may cross the limit before the line does. It ends at {ends}.{rests}",
     )
 
 

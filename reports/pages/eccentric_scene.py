@@ -31,7 +31,7 @@ from ringbalance.reports.numbers import (
     with_unit,
 )
 from ringbalance.reports.origins import input_name
-from ringbalance.reports.pages import credibility, document
+from ringbalance.reports.pages import credibility, document, measured
 from ringbalance.reports.pages.cases import case_view
 from ringbalance.reports.section import Cells, Record, Section, Table
 from ringbalance.reports.summary import OPEN
@@ -160,7 +160,8 @@ def _requirements(requirements: list[Record]) -> Table:
     return Table(
         caption="Requirements: what sets each, what this run and these loops come to, with its 95 % "
         "interval, and the inputs on which it depends most. Where only part of the interval meets a "
-        "requirement, the verdict cannot be told.",
+        "requirement, the verdict cannot be told. A settling time counts where the vibration stays within "
+        "the limit to the end of the run, any run-up included.",
         heads=("Quantity", "Required", "Set by", "Reached", "Interval", "Verdict", "Depends on"),
         rows=[cells(place, row) for place, row in enumerate(requirements)],
         style="words",
@@ -256,9 +257,20 @@ def _estimate_table(estimates: Record, truth: Record) -> Table:
 def _loops(_own: Record, evidence: Record) -> Record:
     tuning = evidence["tuning"]
     return _parts(
-        ("text", f"{tuning['status'][0].upper()}{tuning['status'][1:]}."),
+        ("text", f"{tuning['status'][0].upper()}{tuning['status'][1:]}.{_drawn(tuning)}"),
         ("table", _loop_table(tuning["loops"])),
         ("pair", [sampled_poles(tuning["loops"]), mass_angles(evidence["closed_loop"]["balanced"])]),
+    )
+
+
+def _drawn(tuning: Record) -> str:
+    """What the runs with drawn inputs are judged by; empty without any."""
+    if not tuning.get("runs"):
+        return ""
+    return (
+        f" These runs, with inputs drawn from their uncertainty, are judged over their first "
+        f"{shown(tuning['span_s'], 's', digits=3)}, before the speed changes: what a run-up does afterwards "
+        "is in the requirements."
     )
 
 
@@ -337,5 +349,6 @@ SECTIONS: Final = (
     Section(name="parameters", title="Parameters and their origin", place="report"),
     document.SECTION,
     Section(name="cases", title="Claims: evidence and doubts", show=_cases, in_parts=True),
+    measured.SECTION,
     Section(name="scene", title="Scene file", show=_scene, in_parts=True),
 )

@@ -193,6 +193,20 @@ def each_of(reader: Reader, *, count: int, example: str) -> Reader:
     return Reader(read=read, allowed=allowed, summary=summary, dimension=reader.dimension)
 
 
+def numbers() -> Reader:
+    """Reader of a list of bare numbers; its values are tuples."""
+    one = number(Bounds())
+    allowed = "a list of bare numbers, such as [1.4, 1.5, 1.6]"
+
+    def read(value: object) -> tuple[float, ...]:
+        if not isinstance(value, list):
+            raise FieldError("it is not a list", allowed)
+        values: tuple[float, ...] = each_of(one, count=len(value), example="[1.4, 1.5]").read(value)
+        return values
+
+    return Reader(read=read, allowed=allowed, summary="a list of bare numbers")
+
+
 def one_or_each(reader: Reader, *, example: str) -> Reader:
     """Reader of one value, or of a list of values of its sort; its values are tuples."""
     allowed = f"{reader.allowed}; or a list of one for each chamber, such as {example}"

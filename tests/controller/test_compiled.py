@@ -41,6 +41,24 @@ def test_division_by_zero_is_infinite_as_in_numpy() -> None:
     assert compiled(share)(1.0, 0.0) == math.inf
 
 
+def test_what_compiled_code_alone_calls_has_no_machine_code_of_its_own() -> None:
+    def squared(x: float) -> float:
+        return x * x
+
+    inner = cast(Any, compiled(squared))
+
+    def doubled(x: float) -> float:
+        return 2 * float(inner(x))
+
+    outer = cast(Any, compiled(doubled))
+    assert outer(3.0) == 18.0
+    (within,) = inner._inner.overloads.values()
+    (whole,) = outer.overloads.values()
+    known = whole.library.codegen._engine.is_symbol_defined
+    assert known(whole.fndesc.llvm_func_name)
+    assert not known(within.fndesc.llvm_func_name)
+
+
 PROGRAM = """
 import numba
 from numba.core import config

@@ -41,7 +41,7 @@ from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw, PaperMoment, paper_model
 from ringbalance.reduced_model.operating.residual import residual_by_velocity, residual_fill_ratio
-from ringbalance.scene.models import Scene
+from ringbalance.scene.models import InputUncertainty, Scene
 
 EXACT = MemberUncertainty(velocity=0.0, moment=0.0, influence_coefficient=0.0, lag_angle=0.0)
 
@@ -246,9 +246,7 @@ def test_a_larger_ensemble_begins_with_the_smaller(scene: Scene, model: Balancer
     asked = noisy(scene, time_limit=10.0)
     uncertainty_95 = member_uncertainty(asked, model)
     drawn = drawn_members(asked, uncertainty_95=uncertainty_95, seed=1, block=0)
-    few = Members(**{name: values[:7] for name, values in vars(drawn).items()})
-    more = Members(**{name: values[:50] for name, values in vars(drawn).items()})
-    a, b = (simulate_members(asked, model, members=m, seed=1) for m in (few, more))
+    a, b = (simulate_members(asked, model, members=drawn.first(n), seed=1) for n in (7, 50))
     assert np.array_equal(a.settling_time, b.settling_time[:7])
     counted = simulate_ensemble(asked, model, 50, 1)
     assert counted.settled.value == pytest.approx(b.settled.mean())
@@ -303,6 +301,58 @@ def test_a_member_with_moving_liquid_is_the_interpreted_run(
     assert bool(found.settled[0]) == run.settled
     if run.settling_time is not None:
         assert found.settling_time[0] == pytest.approx(run.settling_time, abs=1e-3)
+
+
+def piped(scene: Scene, offset: float) -> Scene:
+    """A gas line whose dead time the controller makes up for, with an exact sensor."""
+    return replace(
+        scene,
+        gas=replace(scene.gas, conductance=1e-8, critical_ratio=0.3, dead_volume=1e-6, valve_lag=0.005),
+        controller=replace(scene.controller, proportional=0.02e6, gas_time_offset=(offset,)),
+        run=replace(scene.run, time_limit=6.0),
+    )
+
+
+def test_a_members_own_gas_line_moves_the_plant_and_not_what_the_controller_knows(
+    scene: Scene, calibrated: BalancerModel
+) -> None:
+    """A slower and a faster line, each as a scene of its own with the nominal offset."""
+    asked = piped(scene, 0.02)
+    factors = np.array([[1.0, 0.7, 1.3], [1.0, 1.2, 0.9], [1.0, 2.0, 0.5], [1.0, 1.6, 0.8]])
+    members = replace(members_alike(asked, size=3), gas_line=factors)
+    found = simulate_members(asked, calibrated, members=members)
+    amplitude = found.final_amplitude
+    assert abs(amplitude[1] - amplitude[0]) > 0.05e-6
+    for number in range(3):
+        run = simulate(replace(asked, gas=members.gas_of(asked.gas, number)), calibrated)
+        assert amplitude[number] == pytest.approx(run.amplitude[-1], abs=1e-10)
+        assert found.samples[number] == len(run.samples)
+    # Had the controller known of the slow line it would have added more, and the run would end elsewhere.
+    told = simulate(replace(piped(scene, 0.03), gas=members.gas_of(asked.gas, 1)), calibrated)
+    assert abs(told.amplitude[-1] - amplitude[1]) > 0.05e-6
+
+
+def test_a_stated_uncertainty_of_the_gas_line_is_drawn(scene: Scene, model: BalancerModel) -> None:
+    def own(quantity: str, half_width: float, relative: bool) -> InputUncertainty:
+        return InputUncertainty(quantity=quantity, half_width=half_width, relative=relative)
+
+    asked = replace(
+        piped(scene, 0.02), uncertainty=(own("conductance", 0.2, True), own("valve_lag", 0.001, False))
+    )
+    width = member_uncertainty(asked, model)
+    assert width.gas_line == pytest.approx({"conductance": 0.2, "valve_lag": 0.2})
+    line = drawn_members(asked, uncertainty_95=width, seed=0, block=0).gas_line
+    assert line is not None
+    for row, factor in zip(line, (1.2, 1.0, 1.0, 1.2), strict=True):
+        assert np.mean((row >= 1 / factor) & (row <= factor)) == pytest.approx(
+            0.95 if factor > 1 else 1.0, abs=0.01
+        )
+    # What was drawn before is drawn as before.
+    alone = replace(asked, uncertainty=())
+    plain = drawn_members(alone, uncertainty_95=replace(width, gas_line={}), seed=0, block=0)
+    again = drawn_members(asked, uncertainty_95=width, seed=0, block=0)
+    assert plain.gas_line is None
+    assert np.array_equal(plain.velocity_factor, again.velocity_factor)
 
 
 def test_a_lag_delays_a_member(scene: Scene, model: BalancerModel) -> None:

@@ -178,10 +178,12 @@ def test_both_characters_for_micro_and_the_degree_sign_are_known(
         ("injection", "A,50", "a,50", ["chamber", '"a"', 'did you mean "A"', "A, B, C, D"]),
         ("injection", "A,50", "E,50", ["chamber", '"E"', "A, B, C, D"]),
         ("injection", "A,50,0.7,10", "A,50,0.7,-10", ["amplitude_before", "negative"]),
-        ("injection", "phase_before [deg]", "phase_before [rad]", ['"90"', "in [deg]?"]),
+        ("injection", "phase_before [deg]", "phase_before [rad]", ['"90"', "is [deg] meant?"]),
         ("injection", "## unc", '# uncertainty = {phase_after="2 %"} #', ["an angle has no percentage"]),
         ("injection", "## unc", '# uncertainty = {phase_after="2 deg"} #', ["not of amplitude_before"]),
         ("trial_weight", "0,0,10,90", "0,0,0,90", ["relative"]),
+        ("trial_weight", "amplitude [um]", "amplitude [m]", ['"11.5"', "is [um] meant?", "to 10 m"]),
+        ("transfer", "0.25,0.7,400", "0.25,2e4,400", ['"2e4"', "is [MPa] meant?"]),
     ],
 )
 def test_what_is_wrong_is_told_with_its_place(
@@ -246,7 +248,7 @@ def test_the_same_file_counts_once(
         ("kind".encode("utf-16"), "line 1, character 1: this is not UTF-8"),
         (b"PK\x03\x04rest", "workbook"),
         (b"a" * (tables.LARGEST_FILE + 1), "up to 8 MiB"),
-        (b"a,b\n" + b"1,2\n" * (tables.MOST_ROWS + 1), "up to 10000 rows"),
+        (b"a,b\n" + b"1,2\n" * (tables.MOST_ROWS + 1), "up to 2000 rows"),
     ],
 )
 def test_what_is_no_table_is_refused(content: bytes, told: str, paper_scene: Scene, tmp_path: Path) -> None:

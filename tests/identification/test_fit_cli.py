@@ -20,7 +20,6 @@ from ringbalance.identification.data.template import template
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.scene.uncertain import nominal_value
 
 PAPER = str(bundled_scene("liquid_ring_paper"))
 EXAMPLES = {kind: str(example_measurements.FOLDER / f"{kind}.csv") for kind in example_measurements.EXAMPLES}
@@ -46,32 +45,44 @@ def test_the_examples_are_what_their_tool_writes(kind: str) -> None:
     assert Path(EXAMPLES[kind]).read_text(encoding="utf-8") == example_measurements.example(kind)
 
 
-def test_the_examples_together_give_back_the_truth(run: Run, paper_scene: Scene) -> None:
-    """Each interval (95 %) holds the truth, and is narrower than what was known, or than a tenth of lambda
-    and a fifth of k + 1 of about 15 where nothing was."""
-    widest = {
+WIDEST = {
+    "liquid_ring": {
         "lambda_factor": 0.1,
         "bore": 0.1e-3,
         "extra_loss": 3.0,
         "influence_coefficient": 0.14 * 0.0108,
         "lag_angle": math.radians(6),
-    }
-    code, out, _ = run(PAPER, *EXAMPLES.values(), "--parameters", ",".join(widest), "--json")
+    },
+    "eccentric_mass": {
+        "rotor.stiffness": 100.0,
+        "rotor.damping": 1.0,
+        "imbalance.mass": 0.02,
+        "imbalance.phase": math.radians(6),
+        "masses.friction_arm[0]": 0.002,
+        "motor.torque_constant": 0.001,
+    },
+}
+"""Narrower than what the scene states, than a tenth of the value, a fifth of k + 1 of about 15, 6 degrees."""
+
+
+@pytest.mark.parametrize("balancer", WIDEST)
+def test_the_examples_together_give_back_the_truth(balancer: str, run: Run) -> None:
+    """Each interval (95 %) holds the truth and is narrow enough to be of use."""
+    scene = bundled_scene(example_measurements.SCENES[balancer])
+    files = {kind: file for kind, file in EXAMPLES.items() if KINDS[kind].balancer == balancer}
+    truth, widest = example_measurements.TRUTH[balancer], WIDEST[balancer]
+    code, out, _ = run(scene, *files.values(), "--parameters", ",".join(widest), "--json")
     assert code == 0
     document = json.loads(out)
+    assert [each["kind"] for each in document["data"]] == list(files)
     assert [each["name"] for each in document["parameters"]] == list(widest)
     for each in document["parameters"]:
         low, high = each["interval"]
-        assert low < example_measurements.TRUTH[each["name"]] < high, each
+        assert low < truth[each["name"]] < high, each
         assert high - low < widest[each["name"]], each
         assert each["verdict"] == "identified"
-        assert each["before"] == pytest.approx(
-            nominal_value(scene=paper_scene, quantity=each["name"]) or 1.0, abs=1.0
-        )
-    assert [each["kind"] for each in document["data"]] == list(EXAMPLES)
-    given = {each["group"]: each["estimated"] for each in document["noise"]}
-    assert given["transfer mass"] is False
-    assert given["pressure pressure"] is True
+    stated = {each["group"] for each in document["noise"] if not each["estimated"]}
+    assert stated <= {"transfer mass", "flow flow_rate", "trial_weight amplitude"}
 
 
 def has_key(document: Any, name: str) -> bool:
@@ -104,6 +115,25 @@ def test_text_names_what_an_engineer_must_know(run: Run) -> None:
     assert "bore: structurally not identified" in text
     assert "taken as exact" in text
     assert "extra_loss" in text.split("taken as exact")[1]
+    assert "lies outside" not in text
+
+
+def test_runs_without_trial_weight_alone_identify_nothing(run: Run, tmp_path: Path) -> None:
+    head = Path(EXAMPLES["trial_weight"]).read_text(encoding="utf-8").split("series\n")[0]
+    rows = "\n".join(f"0,0,{amplitude},90,day 1" for amplitude in (9.99, 10.0, 10.02))
+    (tmp_path / "none.csv").write_text(f"{head}series\n{rows}\n", encoding="utf-8")
+    code, out, _ = run(PAPER, tmp_path / "none.csv", "--json")
+    assert code == 0
+    document = json.loads(out)
+    assert {each["verdict"] for each in document["parameters"]} == {"structurally not identified"}
+    assert document["next_measurement"]["candidates"][0]["expected_width_ratio"] < 1
+
+
+def test_a_value_outside_what_the_scene_states_is_named(run: Run, tmp_path: Path) -> None:
+    stated = Path(PAPER).read_text(encoding="utf-8").replace('lag_angle = "3 deg"', 'lag_angle = "0.5 deg"')
+    (tmp_path / "sure.toml").write_text(stated, encoding="utf-8")
+    _, out, _ = run(tmp_path / "sure.toml", EXAMPLES["trial_weight"])
+    assert "lag_angle: the fitted value lies outside" in " ".join(out.split())
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -127,6 +157,7 @@ def test_a_template_is_printed_and_nothing_else(kind: str, run: Run) -> None:
         ([EXAMPLES["flow"], PAPER], "flow.csv: this is not TOML"),
         ([PAPER, PAPER], "liquid_ring_paper.toml:"),
         ([str(bundled_scene("washing_machine")), EXAMPLES["flow"]], "washing_machine.toml"),
+        ([PAPER, EXAMPLES["run_up"]], 'kind = "run_up"'),
     ],
 )
 def test_what_cannot_be_fitted_is_refused(words: list[str], told: str, run: Run) -> None:

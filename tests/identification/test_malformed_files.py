@@ -10,12 +10,17 @@ from typing import Final
 import numpy as np
 import pytest
 
+from ringbalance.cli import main
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.data.reading import read_observations
-from ringbalance.scene import SceneError
+from ringbalance.scene import SceneError, bundled_scene
+from ringbalance.scene.faults import MOST_SHOWN
 from ringbalance.scene.models import Scene
 
+PAPER: Final = str(bundled_scene("liquid_ring_paper"))
+ONE_IN: Final = 20
+"""Of the refused files, those that go through the whole command."""
 CELLS: Final = (
     *(
         "",
@@ -189,7 +194,11 @@ def assert_sound(found: Observations) -> None:
 
 @pytest.mark.parametrize("malformed", [300, pytest.param(5000, marks=pytest.mark.faults)])
 def test_a_malformed_file_is_refused_with_its_place(
-    malformed: int, sound_files: Mapping[str, str], paper_scene: Scene, tmp_path: Path
+    malformed: int,
+    sound_files: Mapping[str, str],
+    paper_scene: Scene,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     path, refused, sound = tmp_path / "x.csv", 0, 0
     for content in changed_files(sound_files, seed=malformed):
@@ -198,9 +207,13 @@ def test_a_malformed_file_is_refused_with_its_place(
         if isinstance(found, Observations):
             assert_sound(found)
             sound += 1
-        else:
-            assert_one_line_each(found, path)
-            refused += 1
+            continue
+        assert_one_line_each(found, path)
+        refused += 1
+        if refused % ONE_IN == 0:
+            assert main(["fit", PAPER, str(path)]) == 2
+            written = capsys.readouterr()
+            assert (written.out, written.err.splitlines()[:MOST_SHOWN]) == ("", found[:MOST_SHOWN])
         if refused == malformed:
             break
     # Changes that do not matter are let through, so that not everything is refused.

@@ -75,7 +75,7 @@ def found(paper_scene: Scene, true: Scene) -> FitResult:
 def test_a_right_law_is_not_criticised(found: FitResult) -> None:
     told = review(found)
     assert told.criticism.describes
-    assert {f.against for f in told.criticism.findings} >= {"pressure", "fill ratio", "gas time"}
+    assert {f.against for f in told.criticism.findings} >= {"pressure", "fill ratio", "valve-open time"}
     assert told.sentences[0].startswith("no pattern")
 
 

@@ -26,6 +26,7 @@ from ringbalance.physics.tube.rotation_table import (
 from ringbalance.verification.navier_stokes.continuation import StepRule, follow
 from ringbalance.verification.navier_stokes.newton import FlowSolution, FlowSystem, NewtonSettings
 from ringbalance.verification.navier_stokes.rotating_section import (
+    POISEUILLE_GRADIENT,
     DuctMesh,
     SectionMesh,
     developed_section,
@@ -229,6 +230,38 @@ def test_outside_the_table_the_answer_is_wide_and_says_so() -> None:
     np.testing.assert_array_equal(covered, [True, False, False])
     assert np.all(found.uncertainty[~covered] > 0.25 * found.value[~covered])
     assert found.uncertainty[0] < 0.01 * found.value[0]
+
+
+def test_flow_that_fluctuates_lies_inside_the_interval() -> None:
+    # A square duct needs 19 % more than its steady solution at Kl = 1.8e7, S = 0.5 (measured).
+    kl = np.array([2.9e6, 3.1e6, 0.999e7, 1.001e7, 1.8e7, 1e9])
+    found = rotating_friction_ratio(reynolds=np.sqrt(kl / 0.5), rotation_reynolds=np.sqrt(kl * 0.5))
+    relative = found.uncertainty / found.value
+    assert relative[0] < 0.01
+    assert np.all(np.diff(relative) >= 0)
+    assert relative[3] - relative[2] < 0.01
+    assert relative[4] > 0.188
+    assert relative[5] == pytest.approx(0.3, abs=0.01)
+
+
+@pytest.mark.heavy
+def test_flow_solved_in_time_beyond_the_table_lies_inside_the_interval() -> None:
+    reynolds, rotation = 4485.0, 2348.0
+    system = SectionMesh(around=7, across=11, wall_ratio=15.0).system()
+    flow = march_section(system=system, kl=reynolds * rotation, s=rotation / reynolds, step=8e-7, steps=12500)
+    found = rotating_friction_ratio(reynolds=reynolds, rotation_reynolds=rotation)
+    solved = flow.mean_gradient() / POISEUILLE_GRADIENT
+    assert abs(solved - float(found.value)) < float(found.uncertainty)
+    assert solved > float(found.value)
+
+
+@pytest.mark.heavy
+def test_what_is_carried_on_beyond_the_table_meets_steady_solutions() -> None:
+    rotation, system = 2348.0, SectionMesh(around=10, across=18, wall_ratio=25.0).system()
+    for reynolds in (4485.0, 7475.0):
+        flow = developed_section(system=system, kl=reynolds * rotation, s=rotation / reynolds)
+        found = rotating_friction_ratio(reynolds=reynolds, rotation_reynolds=rotation)
+        assert float(found.value) == pytest.approx(friction_ratio(flow), rel=0.01)
 
 
 @pytest.mark.parametrize("bad", [-1.0, np.nan, np.inf])

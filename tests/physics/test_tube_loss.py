@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from ringbalance.physics.tube.bends import bend_loss
 from ringbalance.physics.tube.loss import TubeLoss, tube_loss
 from ringbalance.physics.tube.numbers import reynolds_number, rotation_reynolds_number
-from ringbalance.scene.models import Bend, InputUncertainty, Liquid, Tube
+from ringbalance.scene.models import Bend, InputUncertainty, Liquid, Scene, Tube
 
 WATER = Liquid(
     name="custom",
@@ -233,3 +233,14 @@ def test_traps_of_the_library_are_there_and_are_kept_out_of_k() -> None:
     with pytest.raises(ValueError, match="math domain"):
         bend_rounded(Di=1.5e-3, angle=90.0, rc=3e-3, Re=1.5)  # it calls a turbulent formula there
     assert np.all(np.isfinite(loss(nu=1e-3, velocity=np.array([1e-4, 1.0])).k.value))
+
+
+def test_the_interval_of_k_at_low_velocity_is_made_of_what_the_page_says(paper_scene: Scene) -> None:
+    scene = paper_scene
+    loss = tube_loss(
+        tube=scene.tube, liquid=scene.liquid, angular_velocity=scene.rotor.speed, velocity=np.array([3.0])
+    )
+    share = {name: float(part[0] / loss.k.value[0]) for name, part in loss.uncertainty_parts.items()}
+    assert float(loss.k.uncertainty[0] / loss.k.value[0]) == pytest.approx(0.23, abs=0.005)
+    told = {"bends": 0.16, "rotation model": 0.11, "ends": 0.10, "rotation entry": 0.06}
+    assert {name: share[name] for name in told} == pytest.approx(told, abs=0.005)

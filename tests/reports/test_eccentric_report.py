@@ -119,6 +119,10 @@ def test_what_a_requirement_depends_on_is_named_with_what_to_do(evidence: Record
     assert "Determine more closely: damping of the rotor." in page
 
 
+def test_no_value_is_empty(scene: EccentricScene) -> None:
+    assert [row["path"] for row in parameters(scene) if not row["value"]] == []
+
+
 def test_every_value_has_its_origin(scene: EccentricScene) -> None:
     rows = {(row["group"], row["quantity"]): row for row in parameters(scene)}
     mass = rows["Masses", "guide radius"]

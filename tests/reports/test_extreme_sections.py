@@ -10,7 +10,8 @@ from typing import Any, cast
 
 import pytest
 
-from ringbalance.reports.pages import extremes, extremes_cli, sloshing
+from ringbalance.reports import extremes_cli
+from ringbalance.reports.pages import extremes, sloshing
 from ringbalance.reports.section import Work
 from ringbalance.scene import Scene, liquid_ring_scene
 from ringbalance.scene.loader import scene_from

@@ -46,6 +46,20 @@ def test_no_colour_font_date_or_size_is_fixed(drawings: dict[str, Drawing]) -> N
         assert not re.search(r"<svg[^>]* (width|height)=", drawing.svg)
 
 
+@pytest.mark.parametrize(
+    ("medium", "least", "widths"), [("screen", 12.0, (356, 740)), ("print", 8.0, (238, 498))]
+)
+def test_the_smallest_letters_can_be_read(
+    drawings: dict[str, Drawing], medium: str, least: float, widths: tuple[int, int]
+) -> None:
+    """In px at the least width that the style sheet leaves a figure, in pt on A4; half and whole width."""
+    for drawing in drawings.values():
+        box = re.search(r'viewBox="0 0 ([\d.]+)', drawing.svg)
+        sizes = [float(size) for size in re.findall(r"font(?:-size)?: (?:\w+ )?([\d.]+)px", drawing.svg)]
+        if box and sizes:
+            assert min(sizes) * widths[drawing.wide] / float(box[1]) >= least, (drawing.name, medium)
+
+
 def test_every_figure_is_well_formed_and_told_in_words(drawings: dict[str, Drawing]) -> None:
     for drawing in drawings.values():
         root = ElementTree.fromstring(drawing.svg)

@@ -1,7 +1,9 @@
-"""The report stays short and small; where a browser is at hand, it is printed and its pages are counted."""
+"""Reports stay short and small, in print too, and show nothing but what their evidence holds."""
 
 from __future__ import annotations
 
+import json
+import random
 import re
 import shutil
 import subprocess
@@ -9,9 +11,16 @@ from pathlib import Path
 from typing import Final
 
 import pytest
+from check_traces import agrees, apart, traces, untrue
+
+from ringbalance.reports.report import write_report
+from ringbalance.reports.traces import evidence_at
+from ringbalance.scene import load_scene
 
 MOST_PAGES: Final = 12
 MOST_BYTES: Final = 1_500_000
+SCENES: Final = sorted((Path(__file__).resolve().parents[2] / "scenes").glob("*.toml"))
+ORIGINS: Final = {"given", "inferred", "assumed", "measured", "default"}
 BROWSER: Final = shutil.which("chromium") or shutil.which("google-chrome")
 
 
@@ -27,21 +36,43 @@ def test_styles_are_classes(pages: dict[str, str]) -> None:
         assert set(styles) <= {"width", "flex-grow", "position"}, set(styles)
 
 
-@pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine")
-def test_the_report_prints_on_few_pages(pages: dict[str, str], tmp_path: Path) -> None:
-    for name, text in pages.items():
-        (tmp_path / name).write_text(text, encoding="utf-8")
+def printed_pages(page: Path) -> int:
+    """Pages that Chromium prints of a file."""
+    out = page.parent / "printed.pdf"
     # Root may not use the sandbox of this browser; the page is this program's own.
     done = subprocess.run(
         [
             *(str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", "--no-pdf-header-footer"),
-            *(f"--user-data-dir={tmp_path / 'browser'}", f"--print-to-pdf={tmp_path / 'report.pdf'}"),
-            str(tmp_path / "report.html"),
+            *(f"--user-data-dir={page.parent / 'browser'}", f"--print-to-pdf={out}", str(page)),
         ],
         capture_output=True,
         timeout=240,
         check=False,
     )
     assert done.returncode == 0, done.stderr.decode()
-    printed = (tmp_path / "report.pdf").read_bytes()
-    assert 0 < len(re.findall(rb"/Type\s*/Page\b", printed)) <= MOST_PAGES
+    return len(re.findall(rb"/Type\s*/Page\b", out.read_bytes()))
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine")
+def test_the_report_prints_on_few_pages(pages: dict[str, str], tmp_path: Path) -> None:
+    for name, text in pages.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    assert 0 < printed_pages(tmp_path / "report.html") <= MOST_PAGES
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("file", SCENES, ids=lambda file: file.stem)
+def test_a_hundred_values_lead_to_the_evidence(file: Path, tmp_path: Path) -> None:
+    write_report(load_scene(file), tmp_path, scene_text=file.read_text(encoding="utf-8"), workers=2)
+    pages = [(tmp_path / name).read_text(encoding="utf-8") for name in ("report.html", "annex.html")]
+    evidence = json.loads((tmp_path / "evidence.json").read_bytes())
+    found = traces(pages)
+    assert len(found) > 30
+    assert untrue(pages, evidence) == []
+    assert apart(evidence) == []
+    for path, text in random.Random(15).choices(found, k=100):
+        assert agrees(text, evidence_at(evidence, path)), (path, text)
+    assert len(pages[0].encode()) <= MOST_BYTES
+    if BROWSER is not None:
+        assert 0 < printed_pages(tmp_path / "report.html") <= MOST_PAGES
+    assert {row["origin"] for row in evidence["scene"]["table"]} <= ORIGINS

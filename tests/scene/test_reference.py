@@ -32,7 +32,7 @@ def test_document_holds_the_reference() -> None:
     assert scene_reference.fresh(page) == page, "run tools/scene_reference.py --write"
 
 
-@pytest.mark.parametrize(("schema", "inside_lists"), [(LIQUID_RING, 19), (ECCENTRIC_MASS, 17)])
+@pytest.mark.parametrize(("schema", "inside_lists"), [(LIQUID_RING, 21), (ECCENTRIC_MASS, 19)])
 def test_every_key_has_a_meaning(schema: Schema, inside_lists: int) -> None:
     reference = scene_reference.key_reference(schema, "title")
     rows = [line for line in reference.splitlines() if line.startswith("| `")]
@@ -140,3 +140,19 @@ def test_keys_of_the_device_as_built(
         ("hump_position", 0.1, False)
     ]
     assert not paths & set(given.defaulted)
+
+
+def test_what_stands_above_is_only_named() -> None:
+    alone = scene_reference.key_reference(ECCENTRIC_MASS, "title")
+    below = scene_reference.key_reference(ECCENTRIC_MASS, "title", above=LIQUID_RING)
+    assert "`time_limit`" in alone
+    assert "`time_limit`" not in below
+    assert "### [run], [accuracy], [measured]" in below
+    # Of one name, but with other keys.
+    assert "`speed_profile`" in below
+
+
+def test_units_over_units_are_listed_once_each() -> None:
+    names = [f"{over}/{under}" for over in ("m", "mm", "um") for under in ("kg", "g", "mg")]
+    assert scene_reference._units(names) == "`m`, `mm`, `um` over `kg`, `g`, `mg`"
+    assert scene_reference._units(names[1:]) == ", ".join(f"`{name}`" for name in names[1:])

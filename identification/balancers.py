@@ -1,0 +1,54 @@
+"""What a fit asks of a scene, whichever balancer it has."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ringbalance.identification import eccentric_parameters as eccentric
+from ringbalance.identification import parameters as ring
+from ringbalance.identification.parameters import Parameter
+from ringbalance.identification.predict.device import Models, models_of
+from ringbalance.reduced_model.chamber.inputs import half_widths, shifted
+from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import AnyScene
+from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, nominal_value
+
+
+def models_for(scene: AnyScene) -> Models | None:
+    """Models that predictions take; None where there is but one."""
+    return models_of(scene) if isinstance(scene, Scene) else None
+
+
+def parameters_for(scene: AnyScene, names: Sequence[str]) -> tuple[Parameter, ...]:
+    """Parameters by name. Raises: FitError: a name that cannot be fitted, or twice the same, or none."""
+    if isinstance(scene, Scene):
+        return ring.scene_parameters(scene, names)
+    return eccentric.eccentric_parameters(scene, names)
+
+
+def held_for(scene: AnyScene, fitted: Sequence[str]) -> dict[str, float]:
+    """Standard deviation, SI, of every uncertain quantity of the scene that is not fitted."""
+    if isinstance(scene, Scene):
+        return ring.held_inputs(scene, fitted)
+    return eccentric.eccentric_held(scene, fitted)
+
+
+def both_sides(scene: AnyScene, name: str, change: float) -> tuple[AnyScene, AnyScene]:
+    """The scene with one of these lower and higher by a change, SI, as far as a device can have it."""
+    if isinstance(scene, Scene):
+        low, high = (shifted(scene=scene, quantity=name, change=side * change) for side in (-1, 1))
+        return low, high
+    return tuple(eccentric.eccentric_shifted(scene, name, side * change) for side in (-1, 1))  # type: ignore[return-value]
+
+
+def exact_for(scene: AnyScene, fitted: Sequence[str]) -> list[str]:
+    """Quantities that are neither fitted nor stated as uncertain."""
+    if not isinstance(scene, Scene):
+        known = {*eccentric.eccentric_held(scene, fitted), *fitted}
+        return [name for name in eccentric.fitted_names(scene) if name not in known]
+    known = {*half_widths(scene), *fitted}
+    return [
+        name
+        for name in UNCERTAIN_QUANTITIES
+        if name not in known and nominal_value(scene=scene, quantity=name) is not None
+    ]

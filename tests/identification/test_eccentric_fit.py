@@ -1,0 +1,178 @@
+"""Fits of a scene with eccentric masses: run-ups and positioning, against the plant and its asymptotes."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ringbalance.cli import main
+from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
+from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.eccentric_parameters import eccentric_value, eccentric_with, fitted_names
+from ringbalance.identification.fitting import fit
+from ringbalance.identification.identifiability import Verdict
+from ringbalance.identification.parameters import FitError
+from ringbalance.identification.predict.kinds import PREDICTED
+from ringbalance.identification.review import review
+from ringbalance.scene import bundled_scene, load_scene
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.eccentric_models import EccentricScene
+from ringbalance.scene.narrowing import eccentric_scene
+
+NOISE = 20e-6
+SPEEDS = np.linspace(8.0, 24.0, 24)
+
+
+@pytest.fixture(scope="module")
+def scene() -> EccentricScene:
+    """Without uncertainties: nothing is known beforehand."""
+    loaded = eccentric_scene(load_scene(bundled_scene("eccentric_mass_paper")))
+    return replace(loaded, uncertainty=())
+
+
+def observed(
+    kind: str, columns: Mapping[str, FloatArray], widths: Mapping[str, FloatArray] | None = None
+) -> Observations:
+    count = len(next(iter(columns.values())))
+    return Observations(
+        kind=kind,
+        file=f"{kind}.csv",
+        lines=np.arange(count) + 4,
+        series=np.full(count, "a"),
+        chamber=np.full(count, ""),
+        columns=columns,
+        uncertainty=widths or {},
+    )
+
+
+def run_up(true: EccentricScene, seed: int) -> Observations:
+    plain = observed("run_up", {"speed": SPEEDS, "amplitude": np.ones(24), "phase": np.zeros(24)})
+    found = PREDICTED["run_up"].predict(true, plain, None)
+    draw = np.random.default_rng(seed).standard_normal(48)
+    vector = (found + NOISE * draw).reshape(2, -1)
+    amplitude, phase = np.hypot(*vector), np.arctan2(vector[1], vector[0])
+    return replace(plain, columns={"speed": SPEEDS, "amplitude": amplitude, "phase": phase})
+
+
+def positioning(true: EccentricScene, seed: int, noise: float = 0.002) -> Observations:
+    times, volts = np.tile(np.linspace(0.05, 1.0, 10), 3), np.repeat([6.0, 9.0, 12.0], 10)
+    columns = {"time": times, "voltage": volts, "speed": np.full(30, 10.5), "angle": np.zeros(30)}
+    found = PREDICTED["positioning"].predict(true, observed("positioning", columns), None)
+    return observed(
+        "positioning", columns | {"angle": found + noise * np.random.default_rng(seed).standard_normal(30)}
+    )
+
+
+def test_a_run_up_gives_back_bearing_and_imbalance(scene: EccentricScene) -> None:
+    truth = {"rotor.stiffness": 1080.0, "rotor.damping": 11.5, "imbalance.mass": 0.17, "imbalance.phase": 0.7}
+    true = scene
+    for name, value in truth.items():
+        true = eccentric_with(true, value, name=name)
+    result = fit(scene, data=[run_up(true, 1)])
+    assert [each.name for each in result.parameters] == list(truth)
+    for each in result.parameters:
+        low, high = each.interval
+        assert low < truth[each.name] < high
+        assert each.verdict is Verdict.IDENTIFIED
+        assert each.path == each.name
+    assert review(result).criticism.describes
+
+
+def test_only_the_product_of_mass_and_radius_is_identified(scene: EccentricScene) -> None:
+    """U = m_im r_im is all that the rotor feels of its imbalance."""
+    result = fit(scene, data=[run_up(scene, 2)], parameters=["imbalance.mass", "imbalance.radius"])
+    assert {each.verdict for each in result.parameters} == {Verdict.STRUCTURALLY}
+    (found,) = result.combinations
+    assert found.exponents == (1.0, 1.0)
+    moment = scene.imbalance.mass * scene.imbalance.radius
+    assert found.value == pytest.approx(moment, rel=max(2 * found.relative_uncertainty, 1e-3))
+
+
+def test_positioning_gives_back_friction_and_motor(scene: EccentricScene) -> None:
+    truth = {"masses.friction_arm[0]": 0.012, "motor.torque_constant": 0.0093}
+    true = scene
+    for name, value in truth.items():
+        true = eccentric_with(true, value, name=name)
+    result = fit(scene, data=[positioning(true, 3)], parameters=list(truth))
+    for each in result.parameters:
+        low, high = each.interval
+        assert low < truth[each.name] < high, each.name
+        assert (high - low) / truth[each.name] < 0.2
+    assert eccentric_scene(result.scene).masses.friction_arm[1] == scene.masses.friction_arm[1]
+
+
+def test_a_mass_reaches_the_speed_at_which_motor_and_friction_balance(scene: EccentricScene) -> None:
+    """B V = C phi' + mu_f b (W + phi')^2, solved by hand; whirl moves it by less than two per cent."""
+    stiff = eccentric_with(scene, 1e6, name="rotor.stiffness")
+    plant, volts, speed = plant_parameters(stiff), 9.0, 10.5
+    times = np.array([4.0, 4.0 + 2 * math.pi / 5])
+    columns = {
+        "time": times,
+        "voltage": np.full(2, volts),
+        "speed": np.full(2, speed),
+        "angle": np.zeros(2),
+    }
+    start, end = PREDICTED["positioning"].predict(stiff, observed("positioning", columns), None)
+    arm = plant.friction_arm_1 * plant.moment
+    a, b, c = arm, plant.drive_damping + 2 * arm * speed, arm * speed**2 - plant.drive_gain * volts
+    steady = (-b + math.sqrt(b * b - 4 * a * c)) / (2 * a)
+    assert (end - start) / (times[1] - times[0]) == pytest.approx(steady, rel=0.02)
+
+
+def test_friction_holds_a_small_voltage(scene: EccentricScene) -> None:
+    columns = {
+        "time": np.array([1.0]),
+        "voltage": np.array([1e-3]),
+        "speed": np.array([10.5]),
+        "angle": np.zeros(1),
+    }
+    stiff = eccentric_with(scene, 1e7, name="rotor.stiffness")
+    assert PREDICTED["positioning"].predict(stiff, observed("positioning", columns), None)[0] == 0.0
+
+
+def test_every_uncertain_quantity_can_be_changed(scene: EccentricScene) -> None:
+    for name in fitted_names(scene):
+        changed = eccentric_with(scene, 0.125, name=name)
+        assert eccentric_value(changed, name) == 0.125
+        assert eccentric_with(changed, eccentric_value(scene, name), name=name) == scene
+
+
+def test_what_cannot_be_fitted_is_said(scene: EccentricScene) -> None:
+    data = [run_up(scene, 1)]
+    with pytest.raises(FitError, match=r"allowed: rotor\.mass"):
+        fit(scene, data=data, parameters=["bore"])
+    still = eccentric_with(scene, 0.0, name="masses.friction_arm[1]")
+    with pytest.raises(FitError, match="is zero"):
+        fit(still, data=data, parameters=["masses.friction_arm[1]"])
+    with pytest.raises(FitError, match="each once"):
+        fit(scene, data=data, parameters=["rotor.mass", "rotor.mass"])
+
+
+def test_the_command_takes_and_saves_such_a_scene(
+    scene: EccentricScene, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data = run_up(scene, 5).columns
+    rows = [
+        f"{s},{a * 1e3},{math.degrees(p)}"
+        for s, a, p in zip(data["speed"], data["amplitude"], data["phase"], strict=True)
+    ]
+    path, target = tmp_path / "run.csv", tmp_path / "fitted.toml"
+    head = '# kind = "run_up"\n# source = "rig"\n# amplitude = "zero_to_peak"\n'
+    path.write_text(
+        head + "speed [rad/s],amplitude [mm],phase [deg]\n" + "\n".join(rows) + "\n", encoding="utf-8"
+    )
+    words = [str(bundled_scene("eccentric_mass_paper")), str(path), "--save", str(target)]
+    assert main(["fit", *words, "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["next_measurement"] is None
+    saved = eccentric_scene(load_scene(target))
+    by_name = {each["name"]: each["value"] for each in document["parameters"]}
+    assert saved.rotor.damping == pytest.approx(by_name["rotor.damping"], rel=1e-7)
+    assert main(["fit", *words[:2]]) == 0
+    assert "rotor.stiffness" in capsys.readouterr().out

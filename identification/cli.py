@@ -5,6 +5,7 @@ from __future__ import annotations
 import json as json_format
 from pathlib import Path
 
+from ringbalance.identification.criticism.review import review
 from ringbalance.identification.data.reading import read_observations
 from ringbalance.identification.data.template import template as template_of
 from ringbalance.identification.documents import fit_document
@@ -13,7 +14,6 @@ from ringbalance.identification.fitting import fit as fit_scene
 from ringbalance.identification.next_measurement import next_measurement
 from ringbalance.identification.parameters import FitError
 from ringbalance.identification.result import FitResult
-from ringbalance.identification.review import review
 from ringbalance.identification.saving import save_result
 from ringbalance.identification.show import fit_view
 from ringbalance.scene.faults import Fault, SceneError, did_you_mean, option_error

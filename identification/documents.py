@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from ringbalance.identification.balancers import exact_for
+from ringbalance.identification.criticism.review import Review
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.identifiability import Combination
 from ringbalance.identification.next_measurement import NextMeasurement
 from ringbalance.identification.result import FileResiduals, FitResult, FittedParameter, Noise
-from ringbalance.identification.review import Review
 
 
 def exact_inputs(result: FitResult) -> list[str]:

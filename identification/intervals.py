@@ -3,10 +3,16 @@
 A value x_i belongs to the interval while the sum of squares S, minimised over all other parameters with x_i
 held, is within q = t^2 of its least value; t is Student's for the degrees of freedom behind the noise, normal
 where the noise is given.  Several noises count as Welch and Satterthwaite have it,
-nu = (sum c_g)^2/sum(c_g^2/nu_g), c_g the part of group g in the parameter's variance.
+nu = (sum c_g)^2/sum(c_g^2/nu_g), c_g the part of group g in the parameter's variance.  Weights that follow
+from estimated noises favour whichever data look quieter by chance: the true variance is larger by about
+2 L with
+
+    L = C sum (2/nu_g) (W_g - W_g C W_g) C,
+
+W_g the information of group g and C the covariance, both of all unknowns; q grows by as much.
 An end that the threshold does not reach within the scene's rules is the bound.
 Source: Bates and Watts, "Nonlinear Regression Analysis" (1988), section 6.1; Satterthwaite, Biometrics
-Bull. 2 (1946) 110.
+Bull. 2 (1946) 110; Kenward and Roger, Biometrics 53 (1997) 983.
 """
 
 from __future__ import annotations
@@ -57,18 +63,38 @@ def covariance(slopes: FloatArray) -> FloatArray:
 
 
 def student(optimum: Optimum) -> FloatArray:
-    """t(0.975) of each parameter."""
+    """t(0.975) of each parameter, with what the estimated weights add."""
     problem, slopes = optimum.residuals.problem, optimum.slopes
-    inverse = np.linalg.pinv(slopes, rcond=1e-10)
     n = problem.measured.size
-    parts = inverse**2
+    parts = np.linalg.pinv(slopes, rcond=1e-10) ** 2
     total = np.sum(parts, axis=1)
     by_group = [np.sum(parts[:, :n][:, problem.group == g], axis=1) for g in range(optimum.freedom.size)]
     below = sum(
         (c**2 / nu for c, nu in zip(by_group, optimum.freedom, strict=True)), start=np.zeros(total.size)
     )
     freedom = np.divide(total**2, below, out=np.full(total.size, np.inf), where=below > 1e-9 * total**2)
-    return np.asarray(stdtrit(np.minimum(np.maximum(freedom, 1.0), 1e9), 0.975), dtype=np.float64)
+    limited = np.minimum(np.maximum(freedom, 1.0), 1e9)
+    return np.asarray(stdtrit(limited, 0.975) * np.sqrt(1 + 2 * _by_weights(optimum)), dtype=np.float64)
+
+
+def _by_weights(optimum: Optimum) -> FloatArray:
+    """L over C of each parameter."""
+    residuals, problem = optimum.residuals, optimum.residuals.problem
+    n, count = problem.measured.size, optimum.t.size
+    data = np.concatenate([residuals.scale[:, None] * optimum.of_prediction, residuals.linear[:n]], axis=1)
+    priors = problem.prior_slopes(optimum.t)
+    known = np.zeros((priors.shape[0] + residuals.held.shape[1], data.shape[1]))
+    known[: priors.shape[0], :count] = priors
+    known[priors.shape[0] :, data.shape[1] - residuals.held.shape[1] :] = np.eye(residuals.held.shape[1])
+    whole = covariance(np.concatenate([data, known]))
+    added = np.zeros(count)
+    for g, nu in enumerate(optimum.freedom.tolist()):
+        rows = data[problem.group == g] @ whole
+        # Diagonal of C (W - W C W) C by the rows' own covariance.
+        within = rows @ data[problem.group == g].T
+        left = rows.T @ (np.eye(within.shape[0]) - within) @ rows
+        added += 2 / nu * np.diag(left)[:count]
+    return np.asarray(np.maximum(added, 0.0) / np.diag(whole)[:count])
 
 
 def profile(optimum: Optimum, which: int, factor: float, spread: FloatArray) -> Profile:

@@ -12,13 +12,13 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from ringbalance.identification.criticism.review import Review
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.documents import exact_inputs
 from ringbalance.identification.identifiability import Verdict
 from ringbalance.identification.next_measurement import NextMeasurement
 from ringbalance.identification.result import FitResult, FittedParameter, Noise
-from ringbalance.identification.review import Review
 from ringbalance.reduced_model.budget import rounded
 from ringbalance.scene.describe import in_usual_unit, usual_unit
 from ringbalance.scene.units import format_quantity

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.identification.criticism import LEVEL, Criticism, criticise, runs_probability
-from ringbalance.identification.law_comparison import compare_laws, needed_separation
-from ringbalance.identification.linear_fit import LinearFit
+from ringbalance.identification.criticism.law_comparison import compare_laws, needed_separation
+from ringbalance.identification.criticism.linear_fit import LinearFit
+from ringbalance.identification.criticism.patterns import LEVEL, Criticism, criticise, runs_probability
 from ringbalance.scene.arrays import FloatArray
 
 ROWS = 60

@@ -13,13 +13,13 @@ import pytest
 
 from ringbalance.cli import main
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
+from ringbalance.identification.criticism.review import review
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.eccentric_parameters import eccentric_value, eccentric_with, fitted_names
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.identifiability import Verdict
 from ringbalance.identification.parameters import FitError
 from ringbalance.identification.predict.kinds import PREDICTED
-from ringbalance.identification.review import review
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.eccentric_models import EccentricScene

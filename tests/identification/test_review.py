@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ringbalance.identification.criticism.other_laws import LAMINAR, UNBROKEN, power_of
+from ringbalance.identification.criticism.review import review
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.next_measurement import next_measurement, offered_rows, words_of
-from ringbalance.identification.other_laws import LAMINAR, UNBROKEN, power_of
 from ringbalance.identification.predict.device import Models, device_of, models_of
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
-from ringbalance.identification.review import review
 from ringbalance.identification.saving import save_result
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import FloatArray

@@ -10,13 +10,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from ringbalance.identification.criticism.review import review
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.identifiability import Verdict
 from ringbalance.identification.next_measurement import next_measurement
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
-from ringbalance.identification.review import review
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.validation.measurements import measurements

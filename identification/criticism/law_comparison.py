@@ -8,7 +8,7 @@ from typing import Final, Literal
 import numpy as np
 from scipy import stats
 
-from ringbalance.identification.linear_fit import LinearFit
+from ringbalance.identification.criticism.linear_fit import LinearFit
 from ringbalance.scene.arrays import FloatArray
 
 POWER: Final = 0.9

@@ -9,11 +9,11 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.identification.at_solution import AtSolution, at_solution
-from ringbalance.identification.criticism import Criticism, criticise
-from ringbalance.identification.law_comparison import LawComparison, compare_laws
+from ringbalance.identification.criticism.at_solution import AtSolution, at_solution
+from ringbalance.identification.criticism.law_comparison import LawComparison, compare_laws
+from ringbalance.identification.criticism.other_laws import EXPONENTS, laws_to_compare, other_law
+from ringbalance.identification.criticism.patterns import Criticism, criticise
 from ringbalance.identification.likelihood import Block, Problem
-from ringbalance.identification.other_laws import EXPONENTS, laws_to_compare, other_law
 from ringbalance.identification.predict.device import device_of
 from ringbalance.identification.result import FitResult
 from ringbalance.scene.arrays import FloatArray

@@ -18,7 +18,7 @@ from typing import Final, Literal
 import numpy as np
 from scipy import stats
 
-from ringbalance.identification.linear_fit import LinearFit
+from ringbalance.identification.criticism.linear_fit import LinearFit
 from ringbalance.scene.arrays import BoolArray, FloatArray, distinct
 
 LEVEL: Final = 0.05

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ringbalance.identification.criticism.linear_fit import LinearFit
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.linear_fit import LinearFit
 from ringbalance.identification.predict.kinds import rows_of
 from ringbalance.identification.result import FitResult
 from ringbalance.scene.arrays import FloatArray, StringArray

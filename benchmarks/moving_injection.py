@@ -21,7 +21,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ringbalance.controller.compilation.compiled import compiled
+from ringbalance.controller.compilation.compiled import in_place
 from ringbalance.controller.ensemble.compiled_motion import begin
 from ringbalance.controller.ensemble.transfer import RELATIVE_ERROR
 from ringbalance.controller.formulas.gas_flow import flow_shape
@@ -148,7 +148,7 @@ class Rival:
         return end, float(found.t[-1]), moves != ended, (primed or filled) and not (ended and moves)
 
 
-@compiled
+@in_place
 def _inject(  # type: ignore[no-untyped-def]
     plant, motion, fill: float, duration: float, tail: float, count: int, w
 ) -> float:

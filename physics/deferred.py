@@ -16,6 +16,7 @@ _HOME: Final = MappingProxyType(
         "multigrid": "ringbalance.physics.pressure.multigrid",
         "sloshing_response": "ringbalance.physics.sloshing.response",
         "nnls": "scipy.optimize",
+        "Sobol": "scipy.stats.qmc",
         "sparse_matrix": "ringbalance.physics.pressure.sparse",
     }
 )

@@ -9,9 +9,10 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib import import_module
 from importlib.resources import files
 from typing import Final, cast
+
+from ringbalance.reports.figures import deferred
 
 GLYPHS: Final = "<!-- glyphs -->"
 _SYMBOL: Final = re.compile(r'<symbol id="([^"]+)"([^>]*/>|[^>]*>.*?</symbol>)', re.DOTALL)
@@ -43,7 +44,7 @@ def equation_svg(latex: str, words: str, name: str) -> str:
     Args: `name`: prefix of every id within, so that two equations on one page do not share glyphs.
     Raises: ValueError: LaTeX that cannot be set.
     """
-    text = _kept().get(latex) or _typeset(latex)
+    text: str = _kept().get(latex) or deferred.typeset(latex)
     text = re.sub(r'\bid="', f'id="{name}-', text)
     text = re.sub(r'href="#', f'href="#{name}-', text)
     text = re.sub(r' width="([\d.]+)" height="([\d.]+)"', _in_em, text, count=1)
@@ -56,11 +57,6 @@ def _kept() -> Mapping[str, str]:
     """SVG of the program's own equations by their LaTeX, as `tools/equation_table.py` has set them."""
     packed = files("ringbalance.reports").joinpath("data", "equations.json.xz").read_bytes()
     return cast(Mapping[str, str], json.loads(lzma.decompress(packed)))
-
-
-def _typeset(latex: str) -> str:
-    """An equation that is not the program's own; what sets it is loaded for that alone."""
-    return cast(str, import_module("ringbalance.reports.typesetting").typeset(latex))
 
 
 def share_glyphs(page: str) -> str:

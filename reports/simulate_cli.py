@@ -123,7 +123,7 @@ def _ring(scene: Scene, law: str, outputs: _Outputs) -> bool:
 
 
 def _eccentric_masses(scene: EccentricScene, outputs: _Outputs) -> bool:
-    # The first run on a machine compiles for about a minute; later ones take the code that is kept.
+    # The first run on a machine compiles for about half a minute; later ones take the code that is kept.
     with activity("simulate", "closed loop (the first run compiles)") as shown:
         found = simulate_eccentric(scene, progress=_clock(shown))
         locked = None if outputs.plot is None else locked_run(scene, progress=_clock(shown))

@@ -8,23 +8,23 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from ringbalance.controller.compilation.compiled import compiled
+from ringbalance.controller.compilation.compiled import in_place
 from ringbalance.controller.ensemble.compiled_records import Record
 from ringbalance.controller.ensemble.compiled_transfer import gas_off, gas_on
 from ringbalance.controller.formulas.path_piece import piece_rise
 from ringbalance.controller.liquid_ring.opening import FILL_ERROR, TIME_ERROR
 
-_piece_rise: Final = compiled(piece_rise)
+_piece_rise: Final = in_place(piece_rise)
 
 
-@compiled
+@in_place
 def reset(shared: Record, run: Record) -> None:
     """All pairs level, no tube full."""
     for i in range(shared.chambers // 2):
         run.fill[i], run.wet[i], run.side[i] = shared.initial_fill, 0.0, 1.0
 
 
-@compiled
+@in_place
 def any_wet(shared: Record, run: Record) -> bool:
     """Whether any tube holds a column, or any pair moves."""
     found = False
@@ -33,7 +33,7 @@ def any_wet(shared: Record, run: Record) -> bool:
     return found
 
 
-@compiled
+@in_place
 def _moment(shared: Record, fill: float) -> float:
     """Of one pair, kg m, by `moment.MomentTable`."""
     last = shared.moment.shape[0] - 1
@@ -44,7 +44,7 @@ def _moment(shared: Record, fill: float) -> float:
     return float(y0 + _piece_rise(place - cell, rise, d0, d1))
 
 
-@compiled
+@in_place
 def vibration(shared: Record, run: Record, trial: bool) -> tuple[float, float]:
     """Real and imaginary part of the vibration with the disc's liquid, m; `trial`: by the fills on trial."""
     real, imaginary = 0.0, 0.0
@@ -58,7 +58,7 @@ def vibration(shared: Record, run: Record, trial: bool) -> tuple[float, float]:
     )
 
 
-@compiled
+@in_place
 def _pair_at(shared: Record, run: Record, i: int, time: float) -> tuple[float, bool, bool, float]:
     """One pair some time into a stretch: fill, column, side, and how far liquid ran back."""
     fill, wet, first = run.fill_before[i], run.wet_before[i] > 0.0, run.side_before[i] > 0.0
@@ -78,7 +78,7 @@ def _pair_at(shared: Record, run: Record, i: int, time: float) -> tuple[float, b
     return after, wet, first, abs(after - fill)
 
 
-@compiled
+@in_place
 def opening(shared: Record, run: Record, pair: int, first: bool, duration: float) -> float:
     """Longest valve-open time, at most `duration`, s, that leaves the driven chamber its residual fill."""
     fill = run.fill[pair] if first else shared.total - run.fill[pair]
@@ -95,7 +95,7 @@ def opening(shared: Record, run: Record, pair: int, first: bool, duration: float
     return low
 
 
-@compiled
+@in_place
 def kept(shared: Record, run: Record, found: float, duration: float, chamber: int) -> float:
     """Count a valve-open time, s, that was shortened; zero where it is below the chamber's least."""
     if found == duration:
@@ -104,7 +104,7 @@ def kept(shared: Record, run: Record, found: float, duration: float, chamber: in
     return found if found >= shared.minimum_gas_time + shared.offset[chamber] else 0.0
 
 
-@compiled
+@in_place
 def leave_out(run: Record) -> None:
     """Do without the valves that have no time left."""
     if run.other_pair >= 0 and run.other_duration == 0.0:
@@ -115,7 +115,7 @@ def leave_out(run: Record) -> None:
         run.idle += 1 if run.pair < 0 else 0
 
 
-@compiled
+@in_place
 def move(shared: Record, run: Record, time: float) -> float:
     """Let a time, s, pass with some valves open from its start; the state before is kept.
 
@@ -131,7 +131,7 @@ def move(shared: Record, run: Record, time: float) -> float:
     return drift
 
 
-@compiled
+@in_place
 def note_settling(shared: Record, run: Record, length: float, points: int) -> None:
     """Keep since when the amplitude has not been above the limit, over an interval that `simulate` records.
 
@@ -149,7 +149,7 @@ def note_settling(shared: Record, run: Record, length: float, points: int) -> No
         _note(shared, run, late)
 
 
-@compiled
+@in_place
 def _back_at(shared: Record, run: Record, time: float) -> tuple[float, float]:
     """Vibration, m, at an instant, s, of the interval last moved through; `trial` becomes the fills then."""
     for i in range(shared.chambers // 2):
@@ -157,7 +157,7 @@ def _back_at(shared: Record, run: Record, time: float) -> tuple[float, float]:
     return vibration(shared, run, True)
 
 
-@compiled
+@in_place
 def _note(shared: Record, run: Record, time: float) -> None:
     real, imaginary = _back_at(shared, run, time)
     above = math.hypot(real, imaginary) > shared.limit

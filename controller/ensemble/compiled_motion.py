@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from ringbalance.controller.compilation.compiled import compiled
+from ringbalance.controller.compilation.compiled import in_place
 from ringbalance.controller.ensemble.compiled_disc import kept, leave_out, vibration
 from ringbalance.controller.ensemble.compiled_records import Record
 from ringbalance.controller.liquid_ring.compiled_gas import gas_volume
@@ -20,7 +20,7 @@ from ringbalance.controller.liquid_ring.records import P, X
 from ringbalance.scene.arrays import FloatArray
 
 
-@compiled
+@in_place
 def begin(plant: Record, motion: Record, fill: float, speed: float, residual: float) -> None:
     """A pair at rest, vented; `speed` is a factor of the law's velocity, `residual` a fill ratio."""
     y = motion.state
@@ -38,7 +38,7 @@ def begin(plant: Record, motion: Record, fill: float, speed: float, residual: fl
     motion.regime_start, motion.regime_end, motion.event = 0, 0, 0
 
 
-@compiled
+@in_place
 def inject(
     shared: Record, plant: Record, run: Record, motions: Any, notes: FloatArray, w: FloatArray
 ) -> None:
@@ -59,7 +59,7 @@ def inject(
     _note(shared, plant, run, motions, notes)
 
 
-@compiled
+@in_place
 def _keeps_residual(
     shared: Record, plant: Record, run: Record, motions: Any, notes: FloatArray, w: FloatArray
 ) -> bool:
@@ -78,7 +78,7 @@ def _keeps_residual(
     return True
 
 
-@compiled
+@in_place
 def _driven(shared: Record, run: Record, other: bool) -> float:
     """Fill of a driven chamber; infinite without one."""
     pair, first = (run.other_pair, run.other_first) if other else (run.pair, run.first)
@@ -87,7 +87,7 @@ def _driven(shared: Record, run: Record, other: bool) -> float:
     return float(run.fill[pair] if first else shared.total - run.fill[pair])
 
 
-@compiled
+@in_place
 def _shorten(shared: Record, plant: Record, run: Record, motions: Any, w: FloatArray) -> None:
     """Shorten the valve-open times to what leaves the residual fill; those below the minimum are left out."""
     run.duration = _permitted(shared, plant, run, motions, w, False, run.duration)
@@ -96,7 +96,7 @@ def _shorten(shared: Record, plant: Record, run: Record, motions: Any, w: FloatA
     leave_out(run)
 
 
-@compiled
+@in_place
 def _permitted(
     shared: Record, plant: Record, run: Record, motions: Any, w: FloatArray, other: bool, duration: float
 ) -> float:
@@ -109,7 +109,7 @@ def _permitted(
     return kept(shared, run, found, duration, pair if first else pair + shared.chambers // 2)
 
 
-@compiled
+@in_place
 def _open_valves(plant: Record, run: Record, motions: Any) -> None:
     if run.pair >= 0:
         command(plant, motions[run.pair], 0 if run.first else 1, run.duration)
@@ -117,7 +117,7 @@ def _open_valves(plant: Record, run: Record, motions: Any) -> None:
         command(plant, motions[run.other_pair], 0 if run.other_first else 1, run.other_duration)
 
 
-@compiled
+@in_place
 def _pass(shared: Record, plant: Record, run: Record, motions: Any, notes: FloatArray, w: FloatArray) -> None:
     """Carry all pairs to the next sample, with their fills where `simulate` records, in `notes`.
 
@@ -143,7 +143,7 @@ def _pass(shared: Record, plant: Record, run: Record, motions: Any, notes: Float
         advance(plant, motions[i], length + wait, notes, i + 1, count, w)
 
 
-@compiled
+@in_place
 def _note(shared: Record, plant: Record, run: Record, motions: Any, notes: FloatArray) -> None:
     """Since when the amplitude is not above the limit, and the state at the next sample."""
     half = shared.chambers // 2

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
-from ringbalance.controller.compilation.compiled import compiled
+from ringbalance.controller.compilation.compiled import in_place
 from ringbalance.controller.ensemble.compiled_disc import (
     any_wet,
     kept,
@@ -35,17 +35,17 @@ from ringbalance.controller.formulas.stopping import (
 from ringbalance.scene.arrays import FloatArray
 
 _CERTAIN: Final = 1 + 1e-9
-_vector_gas_time: Final = compiled(vector_gas_time)
-_vector_shares: Final = compiled(vector_shares)
-_valve_time: Final = compiled(valve_time)
-_stop_cause: Final = compiled(stop_cause)
-_has_grown: Final = compiled(has_grown)
-_has_held: Final = compiled(has_held)
-_has_risen: Final = compiled(has_risen)
-_has_turned: Final = compiled(has_turned)
+_vector_gas_time: Final = in_place(vector_gas_time)
+_vector_shares: Final = in_place(vector_shares)
+_valve_time: Final = in_place(valve_time)
+_stop_cause: Final = in_place(stop_cause)
+_has_grown: Final = in_place(has_grown)
+_has_held: Final = in_place(has_held)
+_has_risen: Final = in_place(has_risen)
+_has_turned: Final = in_place(has_turned)
 
 
-@compiled
+@in_place
 def run_members(
     shared: Record, plant: Record, runs: Any, motions: Any, notes: FloatArray, workspace: FloatArray
 ) -> None:
@@ -75,7 +75,7 @@ def run_members(
         _judge(shared, run)
 
 
-@compiled
+@in_place
 def _pass_calm(shared: Record, run: Record) -> None:
     """Pass over samples that are below the limit however their noise turns out, while nothing moves.
 
@@ -104,13 +104,13 @@ def _pass_calm(shared: Record, run: Record) -> None:
     run.time, run.samples = time, samples
 
 
-@compiled
+@in_place
 def _holds(shared: Record, run: Record, time: float) -> bool:
     """Whether the run has settled by a time, s, as `simulate` finds it."""
     return bool(run.stays and not run.cut and _has_held(time, run.since, shared.hold_time))
 
 
-@compiled
+@in_place
 def _start(shared: Record, plant: Record, run: Record, motions: Any) -> None:
     """Level chambers, nothing remembered."""
     reset(shared, run)
@@ -126,14 +126,14 @@ def _start(shared: Record, plant: Record, run: Record, motions: Any) -> None:
     run.since = 0.0 if run.amplitude <= shared.limit else math.inf
 
 
-@compiled
+@in_place
 def _look(shared: Record, run: Record) -> None:
     """True vibration."""
     run.real, run.imaginary = vibration(shared, run, False)
     run.amplitude, run.stale = math.hypot(run.real, run.imaginary), 1
 
 
-@compiled
+@in_place
 def _expect(shared: Record, run: Record) -> None:
     """The phase, and the uniform number from which on noise cannot lift the amplitude above the limit."""
     run.phase, run.stale = math.atan2(run.imaginary, run.real), 0
@@ -147,7 +147,7 @@ def _expect(shared: Record, run: Record) -> None:
         run.certain = math.exp(-((room / shared.amplitude_noise) ** 2) / 2.0) * _CERTAIN
 
 
-@compiled
+@in_place
 def _sample(shared: Record, run: Record) -> None:
     """One look at the vibration, with noise of its own."""
     now = noise_pair(shared, run.number, run.samples - 1)
@@ -162,7 +162,7 @@ def _sample(shared: Record, run: Record) -> None:
     _react(shared, run, now, before)
 
 
-@compiled
+@in_place
 def _react(shared: Record, run: Record, noise: tuple[float, float], noise_before: float) -> None:
     """What the sensor shows, one step of the controller, and whether the run ends here.
 
@@ -176,7 +176,7 @@ def _react(shared: Record, run: Record, noise: tuple[float, float], noise_before
     run.phase_before = run.phase
 
 
-@compiled
+@in_place
 def _watch(shared: Record, run: Record, seen_before: float) -> None:
     """Overshoots, rises and misadjustments, as `judgement` counts them."""
     if run.samples == 1:
@@ -190,7 +190,7 @@ def _watch(shared: Record, run: Record, seen_before: float) -> None:
     run.last_seen, run.operated = run.seen_amplitude, 0
 
 
-@compiled
+@in_place
 def _cause(shared: Record, run: Record) -> int:
     """Why the loop stops cycling, as `simulate` tells it."""
     exact = shared.amplitude_noise == 0.0 and shared.phase_noise == 0.0
@@ -208,7 +208,7 @@ def _cause(shared: Record, run: Record) -> int:
     )
 
 
-@compiled
+@in_place
 def _inject(
     shared: Record, plant: Record, run: Record, motions: Any, notes: FloatArray, workspace: FloatArray
 ) -> None:
@@ -230,7 +230,7 @@ def _inject(
     _finish(shared, run)
 
 
-@compiled
+@in_place
 def _wait(shared: Record, run: Record) -> None:
     """Until the next sample, or the end; liquid moves where a tube is full."""
     length = max(min(shared.period, shared.time_limit - run.time), 0.0)
@@ -244,7 +244,7 @@ def _wait(shared: Record, run: Record) -> None:
     _finish(shared, run)
 
 
-@compiled
+@in_place
 def _finish(shared: Record, run: Record) -> None:
     """Ready for the next sample."""
     if run.stale:
@@ -252,7 +252,7 @@ def _finish(shared: Record, run: Record) -> None:
     run.calm = 0 if run.operated or run.rises >= shared.rises_tolerated or any_wet(shared, run) else 1
 
 
-@compiled
+@in_place
 def _working(run: Record) -> int:
     """The pair that is given the most gas."""
     if run.other_pair >= 0 and run.other_duration > run.duration:
@@ -260,7 +260,7 @@ def _working(run: Record) -> int:
     return int(run.pair)
 
 
-@compiled
+@in_place
 def _gas(shared: Record, run: Record) -> None:
     """All valves of a command open together; pairs flow in parallel."""
     length = max(run.duration, run.other_duration) if run.other_pair >= 0 else run.duration
@@ -273,7 +273,7 @@ def _gas(shared: Record, run: Record) -> None:
     run.operated = 1
 
 
-@compiled
+@in_place
 def _count_idle(shared: Record, run: Record, working: int) -> None:
     """Whether the last command has moved anything."""
     change = math.hypot(run.real - run.real_before, run.imaginary - run.imaginary_before)
@@ -281,7 +281,7 @@ def _count_idle(shared: Record, run: Record, working: int) -> None:
     run.idle = 0 if moved else run.idle + 1
 
 
-@compiled
+@in_place
 def _keep_residual(shared: Record, run: Record) -> None:
     """Shorten the valve-open times that would take a chamber below its residual fill."""
     if run.residual_fill <= 0.0 or run.pair < 0:
@@ -292,7 +292,7 @@ def _keep_residual(shared: Record, run: Record) -> None:
     leave_out(run)
 
 
-@compiled
+@in_place
 def _permitted(shared: Record, run: Record, pair: int, first: bool, duration: float) -> float:
     """A valve-open time, s, that leaves the residual fill; zero where it would be below the minimum."""
     driven = run.fill[pair] if first else shared.total - run.fill[pair]
@@ -300,7 +300,7 @@ def _permitted(shared: Record, run: Record, pair: int, first: bool, duration: fl
     return kept(shared, run, found, duration, pair if first else pair + shared.chambers // 2)
 
 
-@compiled
+@in_place
 def _judge(shared: Record, run: Record) -> None:
     """As `outcome_of` does."""
     settled = run.cause == HELD or (run.cause == AT_REST and run.since < math.inf)
@@ -311,13 +311,13 @@ def _judge(shared: Record, run: Record) -> None:
     run.diverged = 1 if grown and not run.settled and not run.drifted else 0
 
 
-@compiled
+@in_place
 def _forget(run: Record) -> None:
     """As before the first sample, and at or below the limit: no memory, no valve. Args: `run`: changed."""
     run.integral, run.before_time, run.pair, run.other_pair = 0.0, math.inf, -1, -1
 
 
-@compiled
+@in_place
 def _decide(shared: Record, run: Record) -> None:
     """One step of the algorithm on what the sensor shows.
 
@@ -349,7 +349,7 @@ def _decide(shared: Record, run: Record) -> None:
     _open(shared, run, second, other)
 
 
-@compiled
+@in_place
 def _open(shared: Record, run: Record, chamber: int, share: float) -> None:
     """Open the next valve, unless its share is below the minimum."""
     time = _valve_time(share, shared.offset[chamber], shared.minimum_gas_time, shared.maximum_gas_time)

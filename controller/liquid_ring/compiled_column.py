@@ -23,7 +23,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from ringbalance.controller.compilation.compiled import compiled, inlined
+from ringbalance.controller.compilation.compiled import in_place, inlined
 from ringbalance.controller.liquid_ring.records import HEAD, HYDROSTATIC, RETURN_CREST, TO_CREST, Record
 from ringbalance.reduced_model.tube.regime import CLEARING
 
@@ -56,7 +56,7 @@ def table(plant: Record, which: int, x: float) -> tuple[float, float]:
     return inside, slope * plant.nodes_per[which]
 
 
-@compiled
+@in_place
 def _inverse(plant: Record, which: int, y: float) -> float:
     """The x of a value, to round-off, for a table that grows; it continues straight beyond its ends."""
     last = plant.pieces[which] - 1
@@ -90,7 +90,7 @@ def _crest_table(direction: int) -> int:
     return TO_CREST if direction > 0 else RETURN_CREST
 
 
-@compiled
+@in_place
 def _velocity(plant: Record, which: int, pressure: float, log_speed: float) -> float:
     """Quasi-steady velocity, m/s, under a pressure above zero; `log_speed`: of a factor on it."""
     return math.exp(_inverse(plant, which, math.log(pressure / plant.density)) + log_speed)
@@ -135,7 +135,7 @@ def _driving(plant: Record, at: tuple[float, float, float, float]) -> float:
     return float(at[0] - at[1] + at[2] - max(at[3], plant.port_pressure))
 
 
-@compiled
+@in_place
 def _allowed(plant: Record, at: tuple[float, float, float, float], primed: bool) -> bool:
     """Without a crest liquid flows only while there is gas; back against it only in a primed tube."""
     if plant.one_way:
@@ -154,7 +154,7 @@ def _margins(plant: Record, at: tuple[float, float, float, float]) -> tuple[floa
     return resting - cavity, resting - max(gas, cavity)
 
 
-@compiled
+@in_place
 def can_flow(plant: Record, at: tuple[float, float, float, float], primed: bool) -> bool:
     """Whether liquid flows: port covered, driving pressure positive, crest passed."""
     if not _allowed(plant, at, primed) or at[2] < plant.port_pressure or _driving(plant, at) <= 0.0:
@@ -165,7 +165,7 @@ def can_flow(plant: Record, at: tuple[float, float, float, float], primed: bool)
     return bool((primed_margin if primed and not plant.one_way else gas_margin) > 0.0)
 
 
-@compiled
+@in_place
 def holds_at_rest(plant: Record, at: tuple[float, float, float, float], primed: bool) -> bool:
     """Whether a column in which nothing flows is still there: an allowed one, or one in exact balance."""
     if plant.one_way or not primed:
@@ -214,7 +214,7 @@ def _crest_margin(
     return gas_margin + cleared * more, cleared, slope * more
 
 
-@compiled
+@in_place
 def _directed(
     plant: Record,
     at: tuple[float, float, float, float],
@@ -233,7 +233,7 @@ def _directed(
     return min(broken, full), broken < full
 
 
-@compiled
+@in_place
 def steady(
     plant: Record, x: float, opposite: float, p: float, q: float, primed: bool, log_speed: float
 ) -> tuple[float, bool]:
@@ -245,7 +245,7 @@ def steady(
     return -back[0], back[1]
 
 
-@compiled
+@in_place
 def holds(
     plant: Record, x: float, opposite: float, p: float, q: float, primed: bool, log_speed: float
 ) -> bool:
@@ -259,7 +259,7 @@ def holds(
     return holds_at_rest(plant, at, primed)
 
 
-@compiled
+@in_place
 def clearance(
     plant: Record, at: tuple[float, float, float, float], direction: int, log_speed: float
 ) -> float:
@@ -276,7 +276,7 @@ def clearance(
     return float(min(spills, flows))
 
 
-@compiled
+@in_place
 def _fills(
     plant: Record,
     at: tuple[float, float, float, float],
@@ -345,7 +345,7 @@ def _crest_slopes(plant: Record, at: tuple[float, float, float, float]) -> tuple
     return by_cavity, 1.0, 0.0 if is_open or not plant.trapped else 1.0
 
 
-@compiled
+@in_place
 def open_to_gas(plant: Record, at: tuple[float, float, float, float]) -> bool:
     """Whether its liquid leaves the upstream port open, or flow is ruled out without gas."""
     return bool(at[2] < plant.port_pressure or not _allowed(plant, at, True))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from ringbalance.controller.compilation.compiled import compiled
+from ringbalance.controller.compilation.compiled import in_place
 from ringbalance.controller.liquid_ring.compiled_column import (
     accelerations,
     can_flow,
@@ -37,14 +37,14 @@ _REVERSE: Final = int(Regime.REVERSE)
 Four = tuple[float, float, float, float]
 
 
-@compiled
+@in_place
 def now(motion: Record) -> Four:
     """The present state."""
     y = motion.state
     return y[X], y[U], y[P], y[P + 1]
 
 
-@compiled
+@in_place
 def pair_ends(plant: Record, state: Four, direction: int) -> Four:
     """Pressures at the tube's ends in a state, as `compiled_column.ends`."""
     x, _, p, q = state
@@ -52,7 +52,7 @@ def pair_ends(plant: Record, state: Four, direction: int) -> Four:
     return ends(plant, x, plant.total - x, p - ambient, q - ambient, direction)
 
 
-@compiled
+@in_place
 def pair_steady(plant: Record, motion: Record, state: Four) -> tuple[float, bool]:
     """Quasi-steady flow in a state, as `compiled_column.steady`."""
     x, _, p, q = state
@@ -60,7 +60,7 @@ def pair_steady(plant: Record, motion: Record, state: Four) -> tuple[float, bool
     return steady(plant, x, plant.total - x, p - ambient, q - ambient, primed, motion.log_speed)
 
 
-@compiled
+@in_place
 def holds_column(plant: Record, motion: Record, state: Four) -> bool:
     """Whether the tube holds a column by the law."""
     x, _, p, q = state
@@ -68,13 +68,13 @@ def holds_column(plant: Record, motion: Record, state: Four) -> bool:
     return holds(plant, x, plant.total - x, p - ambient, q - ambient, primed, motion.log_speed)
 
 
-@compiled
+@in_place
 def outward(motion: Record) -> int:
     """Direction of flow out of the chamber that was driven last."""
     return 1 if motion.chamber == 0 else -1
 
 
-@compiled
+@in_place
 def limit_in_the_way(plant: Record, x: float, direction: int) -> int:
     """The event by which a chamber is in the way of flow in a direction; `NONE`: it is not."""
     lowest, highest = max(0.0, plant.total - plant.max_fill_ratio), min(plant.total, plant.max_fill_ratio)
@@ -85,7 +85,7 @@ def limit_in_the_way(plant: Record, x: float, direction: int) -> int:
     return NONE
 
 
-@compiled
+@in_place
 def would_start(plant: Record, state: Four, primed: bool) -> int:
     """Direction in which resting liquid would flow; zero for none."""
     at = pair_ends(plant, state, 1)
@@ -94,7 +94,7 @@ def would_start(plant: Record, state: Four, primed: bool) -> int:
     return -1 if can_flow(plant, (at[1], at[0], at[3], at[2]), primed) else 0
 
 
-@compiled
+@in_place
 def starts(plant: Record, motion: Record, state: Four) -> int:
     """Direction in which resting liquid does start to flow; zero for none."""
     direction = would_start(plant, state, motion.primed > 0)
@@ -103,7 +103,7 @@ def starts(plant: Record, motion: Record, state: Four) -> int:
     return direction if not plant.inertia or _push(plant, motion, state, direction) > 0.0 else 0
 
 
-@compiled
+@in_place
 def _push(plant: Record, motion: Record, state: Four, direction: int) -> float:
     """Acceleration of a column at rest."""
     at = pair_ends(plant, state, direction)
@@ -111,7 +111,7 @@ def _push(plant: Record, motion: Record, state: Four, direction: int) -> float:
     return min(found[0], found[1])
 
 
-@compiled
+@in_place
 def separates(plant: Record, motion: Record, state: Four) -> bool:
     """Whether a primed column at rest separates."""
     if not motion.primed or would_start(plant, state, True) != 0:
@@ -119,7 +119,7 @@ def separates(plant: Record, motion: Record, state: Four) -> bool:
     return not holds_at_rest(plant, pair_ends(plant, state, 1), True)
 
 
-@compiled
+@in_place
 def flow_end(plant: Record, motion: Record, state: Four) -> int:
     """The event that ends the flow in the present direction; `NONE`: it continues."""
     direction = motion.direction
@@ -135,7 +135,7 @@ def flow_end(plant: Record, motion: Record, state: Four) -> int:
     return NONE if would_start(plant, state, motion.primed > 0) == direction else STALLED
 
 
-@compiled
+@in_place
 def changes(plant: Record, motion: Record, state: Four) -> bool:
     """Whether an event lies between the last step and this state."""
     if motion.direction != 0:
@@ -144,7 +144,7 @@ def changes(plant: Record, motion: Record, state: Four) -> bool:
     return separates(plant, motion, state) or starts(plant, motion, state) != 0
 
 
-@compiled
+@in_place
 def heading(plant: Record, motion: Record, state: Four) -> int:
     """What `changes` has found in a state, for `beyond`: a start's direction, else `FILLS`, `STOPS` or 0."""
     if motion.direction == 0:
@@ -156,7 +156,7 @@ def heading(plant: Record, motion: Record, state: Four) -> int:
     return STOPS if state[1] * motion.direction < 0.0 else 0
 
 
-@compiled
+@in_place
 def beyond(plant: Record, motion: Record, state: Four, what: int) -> float:
     """How far a state is past an event, in a measure of the event's own: below zero before it, above after.
 
@@ -169,7 +169,7 @@ def beyond(plant: Record, motion: Record, state: Four, what: int) -> float:
     return -state[1] * motion.direction if what == STOPS else 0.0
 
 
-@compiled
+@in_place
 def regime(plant: Record, motion: Record) -> int:
     """Value of `Regime` of moving liquid, seen from the chamber that was driven last."""
     direction, state = motion.direction, now(motion)

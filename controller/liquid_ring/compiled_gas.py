@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from ringbalance.controller.compilation.compiled import compiled, inlined
+from ringbalance.controller.compilation.compiled import in_place, inlined
 from ringbalance.controller.formulas.gas_flow import LAMINAR_RATIO, flow_shape, flow_shape_slope
 from ringbalance.controller.liquid_ring.records import P, Record, X
 from ringbalance.scene.arrays import FloatArray
@@ -74,14 +74,14 @@ def line_rates(
     )
 
 
-@compiled
+@in_place
 def near_end(plant: Record, motion: Record, chamber: int) -> bool:
     """Whether a gas has the pressure that it tends to."""
     end = end_pressure(plant, motion.valve_0 > 0 if chamber == 0 else motion.valve_1 > 0)
     return bool(abs(motion.state[P + chamber] - end) <= _AT_REST * end)
 
 
-@compiled
+@in_place
 def rest_after(plant: Record, motion: Record, h: float, w: FloatArray, row: int) -> None:
     """State after a time with the liquid at rest, of isothermal gases, into a row."""
     for i in range(8):
@@ -97,7 +97,7 @@ def rest_after(plant: Record, motion: Record, h: float, w: FloatArray, row: int)
         w[row, P + 2 + chamber] = w[row, P + chamber] * volume / plant.temperature
 
 
-@compiled
+@in_place
 def _ratio_after(ratio: float, time: float, critical_ratio: float, vents: bool) -> float:
     """Pressure ratio r, downstream over upstream, of a constant volume after a time in units of its tau.
 
@@ -135,7 +135,7 @@ def _ratio_after(ratio: float, time: float, critical_ratio: float, vents: bool) 
     return 1.0 / (1.0 + rest) if vents else 1.0 - rest
 
 
-@compiled
+@in_place
 def _moebius_part(time: float, square: float) -> float:
     """tanh(w s/2)/w with w^2 = `square`, which may be negative."""
     root = math.sqrt(abs(square))
@@ -144,7 +144,7 @@ def _moebius_part(time: float, square: float) -> float:
     return math.tanh(root * time / 2.0) / root if square > 0.0 else math.tan(root * time / 2.0) / root
 
 
-@compiled
+@in_place
 def _moebius_time(part: float, square: float) -> float:
     """s of the above."""
     root = math.sqrt(abs(square))

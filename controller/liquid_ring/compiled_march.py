@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from ringbalance.controller.compilation.compiled import compiled
+from ringbalance.controller.compilation.compiled import in_place
 from ringbalance.controller.liquid_ring.compiled_column import open_to_gas
 from ringbalance.controller.liquid_ring.compiled_events import (
     EMPTY,
@@ -64,7 +64,7 @@ _UNFINISHED: Final = EVENTS.index(Event.UNFINISHED)
 _RESTING: Final = int(Regime.BLOCKED)
 
 
-@compiled
+@in_place
 def command(plant: Record, motion: Record, chamber: int, duration: float) -> None:
     """A valve opens and closes a lag after its command, which begins a new record of what it does."""
     x = motion.state[X]
@@ -76,7 +76,7 @@ def command(plant: Record, motion: Record, chamber: int, duration: float) -> Non
     motion.closing_pressure, motion.run_dry = 0.0, 0.0
 
 
-@compiled
+@in_place
 def rests(plant: Record, motion: Record) -> bool:
     """Whether nothing moves, no gas is under pressure, and no valve is open or about to move."""
     waiting, y = min(motion.opens, motion.closes) < math.inf, motion.state
@@ -84,7 +84,7 @@ def rests(plant: Record, motion: Record) -> bool:
     return bool(still and not (motion.primed or motion.valve_0 or motion.valve_1 or waiting))
 
 
-@compiled
+@in_place
 def advance(
     plant: Record, motion: Record, duration: float, notes: FloatArray, row: int, count: int, w: FloatArray
 ) -> None:
@@ -107,7 +107,7 @@ def advance(
         notes[row, k] = motion.state[X]
 
 
-@compiled
+@in_place
 def _pause(plant: Record, motion: Record) -> None:
     """Liquid without mass has no motion of its own: the next instant finds it again."""
     if motion.direction != 0 and not plant.inertia:
@@ -115,7 +115,7 @@ def _pause(plant: Record, motion: Record) -> None:
         motion.direction = 0
 
 
-@compiled
+@in_place
 def opening_within(
     plant: Record, motions: Record, pair: int, spare: int, chamber: int, duration: float, w: FloatArray
 ) -> float:
@@ -137,7 +137,7 @@ def opening_within(
     return low
 
 
-@compiled
+@in_place
 def _least_after(
     plant: Record, motions: Record, pair: int, spare: int, chamber: int, duration: float, w: FloatArray
 ) -> float:
@@ -148,7 +148,7 @@ def _least_after(
     return least_later(plant, motions, spare, w)
 
 
-@compiled
+@in_place
 def least_later(plant: Record, motions: Record, pair: int, w: FloatArray) -> float:
     """Lowest fill of the driven chamber once its column has stopped or runs back, while the gas vents."""
     motion = motions[pair]
@@ -161,7 +161,7 @@ def least_later(plant: Record, motions: Record, pair: int, w: FloatArray) -> flo
     return float(motion.least_fill)
 
 
-@compiled
+@in_place
 def _march(
     plant: Record, motion: Record, duration: float, notes: FloatArray, row: int, count: int, w: FloatArray
 ) -> None:
@@ -183,7 +183,7 @@ def _march(
         left = 0.0 if h >= left else left - h
 
 
-@compiled
+@in_place
 def _pass(motion: Record, time: float, notes: FloatArray, row: int, count: int) -> None:
     """The clocks of the valves and of the interval; what is not noted yet has not moved."""
     motion.opens -= time
@@ -194,13 +194,13 @@ def _pass(motion: Record, time: float, notes: FloatArray, row: int, count: int) 
         motion.noted += 1
 
 
-@compiled
+@in_place
 def _at(w: FloatArray, row: int) -> Four:
     """State in a row of the workspace."""
     return w[row, X], w[row, U], w[row, P], w[row, P + 1]
 
 
-@compiled
+@in_place
 def _step(
     plant: Record, motion: Record, left: float, notes: FloatArray, row: int, count: int, w: FloatArray
 ) -> tuple[float, bool]:
@@ -231,7 +231,7 @@ def _step(
     return h, moves and not event
 
 
-@compiled
+@in_place
 def _cut(plant: Record, motion: Record, h: float, w: FloatArray) -> float:
     """End the step just taken at the first event. Returns: its length then, s."""
     rates_at_end(plant, motion, w)
@@ -243,7 +243,7 @@ def _cut(plant: Record, motion: Record, h: float, w: FloatArray) -> float:
     return h
 
 
-@compiled
+@in_place
 def _event_part(plant: Record, motion: Record, h: float, near: float, w: FloatArray) -> float:
     """Part of the step just taken after which the first event lies, at most `near` late.
 
@@ -269,7 +269,7 @@ def _event_part(plant: Record, motion: Record, h: float, near: float, w: FloatAr
     return high
 
 
-@compiled
+@in_place
 def _settle(plant: Record, motion: Record) -> None:
     """Let moving liquid come to rest, and resting liquid start, where it has to."""
     if motion.direction != 0:
@@ -294,13 +294,13 @@ def _settle(plant: Record, motion: Record) -> None:
     _note(plant, motion, NONE, direction)
 
 
-@compiled
+@in_place
 def _first(plant: Record, motion: Record) -> float:
     """Length of the next step after a jump of the rates, s."""
     return float(min(motion.length, plant.first_step))
 
 
-@compiled
+@in_place
 def _stop(plant: Record, motion: Record, event: int) -> None:
     """At rest: at a limit exactly, and with a column only where the law has one."""
     _note(plant, motion, event, motion.direction)
@@ -318,7 +318,7 @@ def _stop(plant: Record, motion: Record, event: int) -> None:
     y[U], motion.direction, motion.length = 0.0, 0, _first(plant, motion)
 
 
-@compiled
+@in_place
 def _flip(plant: Record, motion: Record) -> None:
     """The next waiting valve moves."""
     opens = motion.opens <= motion.closes
@@ -341,7 +341,7 @@ def _flip(plant: Record, motion: Record) -> None:
     motion.balanced, motion.stopped, motion.length = 0, 0, _first(plant, motion)
 
 
-@compiled
+@in_place
 def _quiet(plant: Record, motion: Record) -> bool:
     """Whether nothing changes any more until a valve moves."""
     if motion.direction != 0:
@@ -349,7 +349,7 @@ def _quiet(plant: Record, motion: Record) -> bool:
     return bool(not plant.line or (near_end(plant, motion, 0) and near_end(plant, motion, 1)))
 
 
-@compiled
+@in_place
 def _rest_gases(plant: Record, motion: Record) -> None:
     """The gases at the pressures that they tend to."""
     if plant.line:
@@ -357,7 +357,7 @@ def _rest_gases(plant: Record, motion: Record) -> None:
         motion.state[P + 1] = end_pressure(plant, motion.valve_1 > 0)
 
 
-@compiled
+@in_place
 def _note(plant: Record, motion: Record, event: int, direction: int) -> None:
     """Keep what happens to the flow out of the driven chamber."""
     if direction == outward(motion):
@@ -371,7 +371,7 @@ def _note(plant: Record, motion: Record, event: int, direction: int) -> None:
     _note_regime(plant, motion)
 
 
-@compiled
+@in_place
 def _note_regime(plant: Record, motion: Record) -> None:
     if motion.direction != 0:
         motion.regime_end = regime(plant, motion)

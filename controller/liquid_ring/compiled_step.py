@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.compilation.compiled import compiled, inlined
+from ringbalance.controller.compilation.compiled import in_place, inlined
 from ringbalance.controller.liquid_ring.compiled_column import accelerations, hydrostatic, steady
 from ringbalance.controller.liquid_ring.compiled_gas import gas_volume, line_rates, near_end, rest_after
 from ringbalance.controller.liquid_ring.records import WORK, P, Record, U, X
@@ -88,7 +88,7 @@ def _column(
     return speed * direction, 0.0, 0.0, part * by_x, part * by_p, part * by_q
 
 
-@compiled
+@in_place
 def _rates(plant: Record, motion: Record, w: FloatArray, row: int, out: int) -> None:
     """Rates of all states with the liquid at rest, or moving in one direction."""
     x, p, q = w[row, X], w[row, P], w[row, P + 1]
@@ -115,7 +115,7 @@ def _gas(
     return line_rates(plant, w[row, P + chamber], w[row, P + 2 + chamber], volume, growth, is_open)
 
 
-@compiled
+@in_place
 def _linearize(plant: Record, motion: Record, w: FloatArray) -> None:
     """The rates at the start of a step, and their derivatives."""
     y, start = motion.state, w[_FIRST_RATE]
@@ -201,6 +201,12 @@ def _moves(plant: Record, motion: Record) -> float:
 
 
 @inlined
+def _copy(w: FloatArray, row: int, to: int) -> None:
+    for i in range(8):
+        w[to, i] = w[row, i]
+
+
+@inlined
 def _look(w: FloatArray, stage: int, y: FloatArray) -> None:
     """States of a stage."""
     for i in range(8):
@@ -218,7 +224,7 @@ def _carry(w: FloatArray, stage: int, per: float) -> None:
             w[stage, i] += _C[stage, j] * per * w[j, i]
 
 
-@compiled
+@in_place
 def _rosenbrock(plant: Record, motion: Record, h: float, w: FloatArray) -> float:
     """One step of length h into row `END`. Returns: error over the allowed one."""
     y, d = motion.state, 1.0 / (h * _GAMMA)
@@ -228,11 +234,11 @@ def _rosenbrock(plant: Record, motion: Record, h: float, w: FloatArray) -> float
     per_pivot = 1.0 / (pivot - w[_COLUMN, 2] * first - w[_COLUMN, 3] * second)
     for stage in range(_STAGES):
         if stage == 0:
-            w[0] = w[_FIRST_RATE]
+            _copy(w, _FIRST_RATE, 0)
         elif stage < _STAGES - 1:
             _look(w, stage, y)
             _rates(plant, motion, w, _TRIAL, stage)
-            w[_STAGES - 1] = w[stage]
+            _copy(w, stage, _STAGES - 1)
         _carry(w, stage, 1.0 / h)
         if not plant.inertia:
             w[stage, U] = 0.0
@@ -248,7 +254,7 @@ def _rosenbrock(plant: Record, motion: Record, h: float, w: FloatArray) -> float
     return _error(plant, y, w)
 
 
-@compiled
+@in_place
 def _error(plant: Record, y: FloatArray, w: FloatArray) -> float:
     """Largest error of a state over the allowed one; the works are integrals and allow any."""
     worst, part, supply = 0.0, 0.1 * plant.relative_error, plant.gas_pressure + plant.ambient_pressure
@@ -265,7 +271,7 @@ def _in_closed_form(plant: Record, motion: Record) -> bool:
     return bool(motion.direction == 0 and plant.line and plant.heat_capacity_ratio == 1.0)
 
 
-@compiled
+@in_place
 def take(plant: Record, motion: Record, left: float, w: FloatArray) -> float:
     """One accepted step that does not pass `left`, s, into row `END`. Returns: its length, s."""
     if _in_closed_form(plant, motion):
@@ -285,7 +291,7 @@ def take(plant: Record, motion: Record, left: float, w: FloatArray) -> float:
             return float(h)
 
 
-@compiled
+@in_place
 def _rest(plant: Record, motion: Record, left: float, w: FloatArray) -> float:
     """A step with the liquid at rest, in closed form.
 
@@ -300,7 +306,7 @@ def _rest(plant: Record, motion: Record, left: float, w: FloatArray) -> float:
     return float(h)
 
 
-@compiled
+@in_place
 def shorten(plant: Record, motion: Record, h: float, w: FloatArray) -> None:
     """The step just taken again, with another length."""
     if _in_closed_form(plant, motion):
@@ -309,7 +315,7 @@ def shorten(plant: Record, motion: Record, h: float, w: FloatArray) -> None:
         _rosenbrock(plant, motion, h, w)
 
 
-@compiled
+@in_place
 def between(plant: Record, motion: Record, h: float, part: float, w: FloatArray) -> None:
     """State after a part of the step into row `BETWEEN`, cubic by the rates at both ends (row `_RATE`)."""
     if _in_closed_form(plant, motion):
@@ -323,7 +329,7 @@ def between(plant: Record, motion: Record, h: float, part: float, w: FloatArray)
         )
 
 
-@compiled
+@in_place
 def rates_at_end(plant: Record, motion: Record, w: FloatArray) -> None:
     """Rates at the end of a step, for `between`."""
     _rates(plant, motion, w, END, _RATE)

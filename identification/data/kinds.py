@@ -297,11 +297,19 @@ _POSITIONING: Final = DataKind(
     title="angle of one mass under a constant motor voltage",
     balancer="eccentric_mass",
     columns=(
+        # Motions are integrated: what would take hours is a wrong unit.
         Column(
-            name="time", dimension="time", unit="s", meaning="from when the voltage was applied", lowest=0.0
+            name="time",
+            dimension="time",
+            unit="s",
+            meaning="from when the voltage was applied",
+            lowest=0.0,
+            highest=100.0,
         ),
-        Column(name="voltage", dimension="voltage", unit="V", meaning="of the motor"),
-        Column(name="speed", dimension="speed", unit="rpm", meaning="of the rotor", lowest=0.0),
+        Column(name="voltage", dimension="voltage", unit="V", meaning="of the motor", highest=1000.0),
+        Column(
+            name="speed", dimension="speed", unit="rpm", meaning="of the rotor", lowest=0.0, highest=1000.0
+        ),
         Column(
             name="angle",
             dimension="angle",

@@ -1,4 +1,5 @@
-"""Figures for commands that seldom draw, loaded when first used: matplotlib takes longer than some runs.
+"""Figures and typesetting for those that seldom need them, loaded when first used: that takes longer than
+some runs.
 
 `from ringbalance.reports.figures import deferred`, then `deferred.sheet(...)`.
 """
@@ -14,6 +15,7 @@ _HOME: Final = MappingProxyType(
         "sheet": "ringbalance.reports.figures.sheet",
         "run_figures": "ringbalance.reports.figures.run",
         "eccentric_figures": "ringbalance.reports.figures.eccentric",
+        "typeset": "ringbalance.reports.typesetting",
     }
 )
 

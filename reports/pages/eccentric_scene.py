@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Sequence
 from typing import Any, Final
@@ -30,7 +31,7 @@ from ringbalance.reports.numbers import (
     shown,
     with_unit,
 )
-from ringbalance.reports.origins import input_name
+from ringbalance.reports.origins import input_name, named_with_origin
 from ringbalance.reports.pages import credibility, document, measured
 from ringbalance.reports.pages.cases import case_view
 from ringbalance.reports.section import Cells, Record, Section, Table
@@ -53,6 +54,8 @@ _UNSTATED: Final = (
     "The scene states no uncertainties: every result holds for exactly its values. [uncertainty] in the "
     "scene file states them."
 )
+_KEY: Final = re.compile(r"\b[a-z_]+\.[a-z_]+\b")
+"""A key of the scene file, such as supervisor.limit."""
 _CAUSES: Final = 2
 """Inputs that a row names as those it hangs on most."""
 
@@ -79,7 +82,7 @@ def _summary(_own: Record, evidence: Record) -> Record:
             "the vibration without balancing is left.",
         ),
         *(("alert", f"{text[0].upper()}{text[1:].rstrip('.')}.") for text in run["warnings"]),
-        ("table", _requirements(rows)),
+        ("table", _requirements(rows, evidence)),
         ("items", _actions(rows)),
         ("text", _USE),
         ("figure", requirement_bars(map(_bar, rows))),
@@ -101,7 +104,7 @@ def _actions(rows: list[Record]) -> list[str]:
     found: dict[str, list[str]] = {}
     for row in rows:
         if row["verdict"] == OPEN and (causes := _causes(row)):
-            found.setdefault(", ".join(sorted(causes)), []).append(row["quantity"])
+            found.setdefault(", ".join(sorted(map(input_name, causes))), []).append(row["quantity"])
     return [
         f"Determine more closely: {causes}. That decides whether these requirements are met: "
         f"{', '.join(names)}."
@@ -110,14 +113,12 @@ def _actions(rows: list[Record]) -> list[str]:
 
 
 def _causes(row: Record) -> list[str]:
-    """Names of the inputs that a row hangs on most: those that lose it, then the largest effects."""
+    """Paths of the inputs that a row hangs on most: those that lose it, then the largest effects."""
     effects = {path: max(both) for path, both in row["effects"].items()}
     largest = max(effects.values(), default=0.0)
     ranked = sorted(effects, key=lambda path: -effects[path])
     telling = [path for path in ranked if effects[path] > 0.1 * largest]
-    return [input_name(path) for path in dict.fromkeys([*row["lost"], *telling])][
-        : max(_CAUSES, len(row["lost"]))
-    ]
+    return list(dict.fromkeys([*row["lost"], *telling]))[: max(_CAUSES, len(row["lost"]))]
 
 
 def _origins(rows: list[Record]) -> str:
@@ -141,7 +142,7 @@ def _bar(row: Record) -> Record:
     }
 
 
-def _requirements(requirements: list[Record]) -> Table:
+def _requirements(requirements: list[Record], evidence: Record) -> Table:
     def cells(place: int, row: Record) -> Cells:
         path = f"requirements.{place}"
         unit, reached, interval = row["unit"] or "1", row["achieved"], row["achieved_interval"]
@@ -150,11 +151,11 @@ def _requirements(requirements: list[Record]) -> Table:
             f"{row['quantity'][0].upper()}{row['quantity'][1:]}",
             f"{row['sense']} {traced(given(row['required'], unit, digits=3), f'{path}.required')}"
             f"{f' ({needed})' if needed else ''}",
-            row["set_by"],
+            _KEY.sub(lambda match: input_name(match[0]), row["set_by"]),
             "not reached" if reached is None else traced(shown(reached, unit, digits=3), f"{path}.achieved"),
             "not always reached" if row["lost"] else _span(interval, unit) or MISSING,
             row["verdict"],
-            ", ".join(_causes(row)),
+            ", ".join(named_with_origin(evidence, path) for path in _causes(row)),
         )
 
     return Table(

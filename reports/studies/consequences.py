@@ -188,7 +188,8 @@ def _findings(
     if nominal is not None and calibrated is not None:
         told += [
             f"A second of gas takes {calibrated.slope * 1e6:.3g} um away, not {nominal.slope * 1e6:.3g} um: "
-            f"k is {calibrated.drag_coefficient:.3g} at equal fills, not {nominal.drag_coefficient:.3g}.",
+            f"read through Eq. 18, k is {calibrated.drag_coefficient:.3g} at equal fills, not "
+            f"{nominal.drag_coefficient:.3g}.",
             f"The same gain of {nominal.gain * 1e-6:.3g} s/um takes {calibrated.per_operation:.0%} of the "
             f"residual away in one operation, not {nominal.per_operation:.0%}: {_stability(calibrated)}.",
         ]

@@ -9,11 +9,11 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass
 from functools import cache, cached_property, partial
-from importlib import import_module
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
 
+from ringbalance.physics import deferred
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import scene_from
 from ringbalance.scene.models import Scene
@@ -102,8 +102,7 @@ def design(*, count: int, seed: int) -> tuple[Point, ...]:
     Source: Sobol's sequence, scrambled after Owen, as in scipy.stats.qmc.
     """
     size = 1 << max(count - 1, 0).bit_length()
-    # Loaded here: a report that only shows the kept result would wait for it.
-    shares = import_module("scipy.stats.qmc").Sobol(2 * len(AXES), rng=seed).random(size)[:count]
+    shares = deferred.Sobol(2 * len(AXES), rng=seed).random(size)[:count]
     return tuple(_point(row[: len(AXES)], row[len(AXES) :]) for row in shares)
 
 

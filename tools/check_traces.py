@@ -24,16 +24,10 @@ SAME: Final = (
     ("operating_point.k", "calibration.operating_point.k", "calibration.budgets.drag_coefficient.value"),
     (
         *("operating_point.velocity_m_s", "calibration.budgets.velocity.value"),
-        *("fifty.liquids.0.velocity_m_s", "consequences.gain.-1.velocity_m_s"),
+        "consequences.gain.-1.velocity_m_s",
     ),
-    (
-        *("operating_point.velocity_uncertainty", "calibration.budgets.velocity.total"),
-        "fifty.liquids.0.velocity_uncertainty",
-    ),
-    (
-        *("operating_point.k_uncertainty", "calibration.budgets.drag_coefficient.total"),
-        "fifty.liquids.0.k_uncertainty",
-    ),
+    ("operating_point.velocity_uncertainty", "calibration.budgets.velocity.total"),
+    ("operating_point.k_uncertainty", "calibration.budgets.drag_coefficient.total"),
     ("operating_point.priming_uncertainty", "calibration.budgets.priming_pressure_vented.total"),
     ("operating_point.stall_uncertainty", "calibration.budgets.stall_pressure.total"),
     (
@@ -49,7 +43,7 @@ SAME: Final = (
     ("calibration.residual_liquid.usable_pair_moment_kg_m", "calibration.budgets.usable_moment.value"),
     ("consequences.retuned_proportional_s_per_m", "summary.tuning.gain"),
 )
-"""Places of the evidence that hold the same quantity."""
+"""Places of the evidence that hold the same quantity; the liquids of `fifty` are those of a primed tube."""
 _APART: Final = 5e-3
 """Two values of one quantity, relative; it is printed to three digits."""
 

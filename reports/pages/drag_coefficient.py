@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, Final
 
 import numpy as np
@@ -24,6 +25,8 @@ from ringbalance.reports.studies.drag_map import (
 )
 from ringbalance.reports.studies.drag_point import DragPoint
 
+_SAME_POINT: Final = 1e-6
+"""Relative difference of two velocities of one operating point: rounding."""
 _DIGITS: Final = 5
 _READINGS: Final = 60
 
@@ -106,10 +109,14 @@ def _liquid_records(verdicts: LiquidVerdicts) -> list[Record]:
 
 
 def _with_budget(liquids: list[Record], calibration: Calibration) -> list[Record]:
-    """The scene's own liquid, the first, with the uncertainties that every other table gives its point."""
+    """The scene's own liquid, the first, with the uncertainties that every other table gives its point.
+
+    Where an unprimed tube spills at the operating point, the primed one of this section is another point.
+    """
     first, *others = liquids
-    if first["starts_at_scene_pressure"] and calibration.scene.tube.drag_coefficient is None:
-        budgets = calibration.budgets
+    budgets, speed = calibration.budgets, float(calibration.operating_point.velocity)
+    same = math.isclose(first["velocity_m_s"], speed, rel_tol=_SAME_POINT)
+    if first["starts_at_scene_pressure"] and same and calibration.scene.tube.drag_coefficient is None:
         names = {"velocity_uncertainty": "velocity", "k_uncertainty": "drag_coefficient"}
         first = first | {key: budgets[name].total for key, name in names.items() if name in budgets}
     return [first, *others]
@@ -224,7 +231,8 @@ def _view(found: Record, evidence: Record) -> Record:
 
 def _table(found: Record, paper_k: str) -> Table:
     return Table(
-        caption=f"The known liquids in this tube of {given(found['bore_m'], 'm')} bore, at equal fills. The "
+        caption=f"The known liquids in this tube of {given(found['bore_m'], 'm')} bore, primed, at equal "
+        "fills; a slow, viscous liquid that only spills over the crest moves more slowly than this. The "
         f"error of Eq. 19 is that of its velocity with k = {paper_k}. ± is the expanded uncertainty (95 %) "
         "at the operating point, which moves with k itself.",
         heads=(*LIQUID_HEADS, f"{paper_k} is", f"Bore for\nk = {paper_k}"),

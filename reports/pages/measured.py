@@ -11,6 +11,7 @@ from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import MISSING, number, short
 from ringbalance.reports.section import Record, Section, Table
+from ringbalance.scene.describe import usual_name
 
 _FAR: Final = 4.0
 """Times what the 95 % interval has, above which a profile is not drawn."""
@@ -38,11 +39,16 @@ def _show(_own: Record, evidence: Record) -> Record | None:
 def _lead(found: Record) -> str:
     rows = sum(each["rows"] for each in found["files"])
     measured = [each for each in found["quantities"] if each["verdict"] == "identified"]
+    others = (
+        ""
+        if len(measured) == len(found["quantities"])
+        else "; the others have the values that go with a combination that the data identify, or with what "
+        "was known before"
+    )
     return (
         f"This scene was fitted to {rows} measurements. They identify {len(measured)} of "
-        f"{len(found['quantities'])} fitted quantities; the others have the values that go with a "
-        "combination that the data identify, or with what was known before. Every uncertainty stands by "
-        "itself: how the errors of two quantities go together is not in the results of this report."
+        f"{len(found['quantities'])} fitted quantities{others}. Every uncertainty stands by itself: how the "
+        "errors of two quantities go together is not in the results of this report."
     )
 
 
@@ -67,7 +73,7 @@ def _quantities(found: Record) -> Table:
         heads=("Quantity", "Unit", "Before", "Interval before", "Fitted", "Interval", "Verdict"),
         rows=[
             (
-                each["quantity"],
+                usual_name(each["quantity"]),
                 MISSING if each["unit"] == "1" else each["unit"],
                 short(each["before"]),
                 _interval(each["before_low"], each["before_high"]),
@@ -101,7 +107,7 @@ def _intervals(found: Record) -> Drawing:
                 place = float(np.clip((middle - each["value"]) / scale, -_FAR, _FAR))
                 axes.plot(kept, [row + side] * len(kept), color=colour, linewidth=2.5)
                 axes.plot([place], [row + side], "o", color=colour, label=label if row == 0 else None)
-        axes.set_yticks(range(len(quantities)), [each["quantity"] for each in quantities])
+        axes.set_yticks(range(len(quantities)), [usual_name(each["quantity"]) for each in quantities])
         axes.set_ylim(len(quantities) - 0.5, -0.5)
 
     return draw(
@@ -130,7 +136,7 @@ def _profiles(found: Record) -> Drawing:
     def paint(axes: Axes) -> None:
         for place, each in enumerate(drawn):
             values = (np.asarray(each["profile"]) - each["value"]) / _scale(each)
-            axes.plot(values, each["rise"], label=each["quantity"], **style.line(place))
+            axes.plot(values, each["rise"], label=usual_name(each["quantity"]), **style.line(place))
         axes.axhline(1.0, color=style.MUTED, linewidth=1)
         axes.set(xlim=(-2, 2), ylim=(0, _FAR))
 

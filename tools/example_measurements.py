@@ -95,7 +95,10 @@ def _measured(kind: str, plan: Observations, random: np.random.Generator) -> Obs
     scene = truth(kind)
     found = PREDICTED[kind].predict(scene, plan, models_for(scene))
     columns = dict(plan.columns)
-    if KINDS[kind].has_amplitudes:
+    if kind == "trial_amplitude":
+        size = _VIBRATION_NOISE["liquid_ring"]
+        columns["amplitude"] = np.abs(found + size * random.standard_normal(len(plan)))
+    elif KINDS[kind].has_amplitudes:
         columns |= _vibrations(kind, found[: len(plan)] + 1j * found[len(plan) :], scene, random)
     else:
         noise = _RELATIVE_NOISE[kind] * found if kind in _RELATIVE_NOISE else _ANGLE_NOISE
@@ -131,6 +134,12 @@ def _trial_weight() -> tuple[Observations, str]:
     angles = [0, 0, 120, 240, 0, 180, 0]
     columns = {"unbalance": 1e-6 * np.array(weights), "angle": np.radians(angles)}
     return _observations("trial_weight", columns, []), '{ amplitude = "0.04 um" }'
+
+
+def _trial_amplitude() -> tuple[Observations, str]:
+    weights, angles = [0, 200, 200, 200, 400, 400, 400, 0], [0, 0, 120, 240, 0, 120, 240, 0]
+    columns = {"unbalance": 1e-6 * np.array(weights), "angle": np.radians(angles)}
+    return _observations("trial_amplitude", columns, []), '{ amplitude = "0.04 um" }'
 
 
 def _injection() -> tuple[Observations, str]:
@@ -177,6 +186,7 @@ _PLANS: Final[Mapping[str, Callable[[], tuple[Observations, str]]]] = {
     "pressure": _pressure,
     "run_up": _run_up,
     "positioning": _positioning,
+    "trial_amplitude": _trial_amplitude,
 }
 EXAMPLES: Final = tuple(_PLANS)
 

@@ -26,6 +26,8 @@ class TubeModels:
     """Left out: their arcs as straight tube; by correlation: as if all flow were turbulent."""
     ends: Fidelity = FINEST
     """Left out: no entrance loss, alpha = 1; by correlation: as if all flow were turbulent."""
+    bends_before: tuple[int, int] | None = None
+    """Bends between either chamber and the crest's end; None: as many as lie there when spread evenly."""
 
 
 FINEST_MODELS: Final = TubeModels()

@@ -26,6 +26,7 @@ from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.model import balancer_model
 from ringbalance.reduced_model.selection.estimates import FILLING, INERTIA, LAG
 from ringbalance.reduced_model.selection.tube_terms import tube_models
+from ringbalance.reduced_model.tube.path import with_bends_kept
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.tube_models import TubeModels
@@ -50,7 +51,9 @@ class Models:
 
 def models_of(scene: Scene) -> Models:
     """The models that `calibrate` takes."""
-    return Models(tube=tube_models(scene), gravity=mean_gravity(scene) > scene.tolerance)
+    return Models(
+        tube=with_bends_kept(tube_models(scene), scene.tube), gravity=mean_gravity(scene) > scene.tolerance
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

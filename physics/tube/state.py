@@ -72,15 +72,22 @@ class TubeState:
         """The part of k between the driven chamber and the crest.
 
         Entrance, the share `hump_position` of friction, rotation and extra loss, and the bends before the
-        crest when all are spread evenly along the path; of a prescribed k the share `hump_position`.
+        crest (`bends_before`); of a prescribed k the share `hump_position`.
         Source: energy balance from the chamber to the crest; the scene does not say where the bends lie.
         """
         share = tube.hump_position
         if "decree" in self.terms:
             return np.asarray(share * self.terms["decree"], dtype=np.float64)
         along = share * (self.terms["friction"] + self.terms["rotation"] + self.terms["extra"])
-        before = [k for i, k in enumerate(self.bends) if (i + 0.5) / len(self.bends) < share]
+        before = self.bends[: bends_before(tube)]
         return np.asarray(self.terms["entrance"] + along + sum(before), dtype=np.float64)
+
+
+def bends_before(tube: Tube) -> int:
+    """Bends between the driven chamber and the crest: as the tube's models have it, or spread evenly."""
+    if tube.models.bends_before is not None:
+        return tube.models.bends_before[0]
+    return sum((i + 0.5) / len(tube.bends) < tube.hump_position for i in range(len(tube.bends)))
 
 
 def tube_state(*, tube: Tube, liquid: Liquid, angular_velocity: float, velocity: npt.ArrayLike) -> TubeState:

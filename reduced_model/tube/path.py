@@ -15,10 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.physics.tube.state import TubeState
+from ringbalance.physics.tube.state import TubeState, bends_before
 from ringbalance.scene.arrays import BoolArray, FloatArray, distinct
 from ringbalance.scene.keys.derivations import shortest_path
 from ringbalance.scene.models import Tube
+from ringbalance.scene.tube_models import TubeModels
 
 _SAME = 1e-9
 
@@ -35,7 +36,19 @@ class Places:
 
 def reversed_tube(tube: Tube) -> Tube:
     """The tube as the opposite chamber sees it. Returns: The tube with crest and bends from the other end."""
-    return replace(tube, hump_position=1 - tube.hump_position, bends=tube.bends[::-1])
+    models = tube.models
+    if models.bends_before is not None:
+        models = replace(models, bends_before=models.bends_before[::-1])
+    return replace(tube, hump_position=1 - tube.hump_position, bends=tube.bends[::-1], models=models)
+
+
+def with_bends_kept(models: TubeModels, tube: Tube) -> TubeModels:
+    """The models with each bend on the side of the crest's end where a tube has it.
+
+    A bend belongs to a leg: it does not jump over the crest when the crest moves within its tolerance.
+    """
+    counts = bends_before(to_crest_end(tube)), bends_before(to_crest_end(reversed_tube(tube)))
+    return replace(models, bends_before=counts)
 
 
 def crest_span(tube: Tube) -> tuple[float, float]:

@@ -8,6 +8,7 @@ from ringbalance.identification import eccentric_parameters as eccentric
 from ringbalance.identification import parameters as ring
 from ringbalance.identification.parameters import Parameter
 from ringbalance.identification.predict.device import Models, models_of
+from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.reduced_model.chamber.inputs import half_widths, shifted
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
@@ -24,6 +25,13 @@ def parameters_for(scene: AnyScene, names: Sequence[str]) -> tuple[Parameter, ..
     if isinstance(scene, Scene):
         return ring.scene_parameters(scene, names)
     return eccentric.eccentric_parameters(scene, names)
+
+
+def informed(scene: AnyScene, kinds: Sequence[str]) -> list[str]:
+    """Parameters that kinds of data inform; a prescribed k stands in for the loss that it leaves out."""
+    names = dict.fromkeys(name for kind in kinds for name in PREDICTED[kind].informs)
+    prescribed = isinstance(scene, Scene) and scene.tube.drag_coefficient is not None
+    return ["drag_coefficient" if prescribed and name == "extra_loss" else name for name in names]
 
 
 def held_for(scene: AnyScene, fitted: Sequence[str]) -> dict[str, float]:

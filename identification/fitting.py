@@ -8,7 +8,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from ringbalance.identification.balancers import both_sides, held_for, models_for, parameters_for
+from ringbalance.identification.balancers import both_sides, held_for, informed, models_for, parameters_for
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.identifiability import Combination, Verdict, combinations, verdicts
@@ -16,7 +16,7 @@ from ringbalance.identification.intervals import Profile, covariance, profile, s
 from ringbalance.identification.likelihood import Problem, block_of, held_effects
 from ringbalance.identification.optimisation import Optimum, optimum
 from ringbalance.identification.parameters import FitError, Parameter
-from ringbalance.identification.predict.kinds import PREDICTED, rows_of
+from ringbalance.identification.predict.kinds import rows_of
 from ringbalance.identification.predict.vibration import STANDARD
 from ringbalance.identification.result import FileResiduals, FitResult, FittedParameter, Noise
 from ringbalance.scene.arrays import FloatArray
@@ -65,8 +65,7 @@ def problem_of(
     for each in data:
         if KINDS[each.kind].balancer != scene.balancer:
             raise FitError(f"{each.file}: data of kind {each.kind} do not belong to this balancer")
-    informed = dict.fromkeys(name for each in data for name in PREDICTED[each.kind].informs)
-    names = list(informed) if parameters is None else list(parameters)
+    names = informed(scene, [each.kind for each in data]) if parameters is None else list(parameters)
     return Problem(
         scene=scene,
         models=models_for(scene),

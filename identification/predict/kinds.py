@@ -76,7 +76,7 @@ PREDICTED: Final[Mapping[str, PredictedKind]] = MappingProxyType(
             "initial_phase",
             by_law=False,
         ),
-        "injection": _kind(injections, "amplitude_after", "lambda_factor", "bore"),
+        "injection": _kind(injections, "amplitude_after", "lambda_factor", "bore", "extra_loss"),
         "transfer": _kind(transfers, transfers.column, "bore", "extra_loss"),
         "flow": _kind(flows, "flow_rate", "bore", "extra_loss"),
         "pressure": _kind(pressures, "pressure", "density", by_law=False),

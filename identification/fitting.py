@@ -65,6 +65,8 @@ def problem_of(
     for each in data:
         if KINDS[each.kind].balancer != scene.balancer:
             raise FitError(f"{each.file}: data of kind {each.kind} do not belong to this balancer")
+        if reason := PREDICTED[each.kind].too_long(scene, each):
+            raise FitError(f"{each.file}: {reason}")
     informed = dict.fromkeys(name for each in data for name in PREDICTED[each.kind].informs)
     names = list(informed) if parameters is None else list(parameters)
     return Problem(

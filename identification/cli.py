@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as json_format
+from collections.abc import Sequence
 from pathlib import Path
 
 from ringbalance.identification.criticism.review import review
@@ -66,7 +67,10 @@ def fit(
     if scene is None or not data:
         raise _missing("SCENE" if scene is None else "DATA")
     if save is not None:
+        _keep_inputs(save, (scene, *data))
         check_file(save)
+    if scene.suffix.lower() == ".csv":
+        raise _not_a_scene(scene)
     given, text = read_scene(scene)
     observations = read_observations(data, scene=given)
     names = None if parameters is None else _names(parameters)
@@ -94,6 +98,19 @@ def _fitted_name(name: str | None, result: FitResult) -> str | None:
         problem = f"this parameter is not fitted{did_you_mean(name, fitted)}"
         raise option_error(option="--next", value=name, problem=problem, allowed=", ".join(fitted))
     return name
+
+
+def _keep_inputs(save: Path, inputs: Sequence[Path]) -> None:
+    """Raises: SceneError: the fitted scene would take the place of what it was fitted from."""
+    for each in inputs:
+        if save.exists() and each.exists() and save.samefile(each):
+            problem = "the fitted scene would replace a file that is read here"
+            raise option_error(option="--save", value=str(save), problem=problem, allowed="another file")
+
+
+def _not_a_scene(path: Path) -> SceneError:
+    problem = f"this looks like a file of measurements, and the scene comes first: {_USAGE}"
+    return SceneError([Fault(file=str(path), table="", key="", value="", problem=problem, allowed="")])
 
 
 def _missing(word: str) -> SceneError:

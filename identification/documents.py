@@ -103,6 +103,7 @@ def _parameter(found: FittedParameter) -> dict[str, Any]:
         "before": found.before,
         "before_interval": None if found.before_interval is None else list(found.before_interval),
         "contradicts": found.contradicts,
+        "doubts": list(found.doubts),
         "verdict": found.verdict.value,
         "text": found.text,
     }

@@ -16,7 +16,7 @@ from ringbalance.identification.intervals import Profile, covariance, profile, s
 from ringbalance.identification.likelihood import Problem, block_of, held_effects
 from ringbalance.identification.optimisation import Optimum, optimum
 from ringbalance.identification.parameters import FitError, Parameter
-from ringbalance.identification.predict.kinds import rows_of
+from ringbalance.identification.predict.kinds import PREDICTED, rows_of
 from ringbalance.identification.predict.vibration import STANDARD
 from ringbalance.identification.result import FileResiduals, FitResult, FittedParameter, Noise
 from ringbalance.scene.arrays import FloatArray
@@ -65,6 +65,8 @@ def problem_of(
     for each in data:
         if KINDS[each.kind].balancer != scene.balancer:
             raise FitError(f"{each.file}: data of kind {each.kind} do not belong to this balancer")
+        if reason := PREDICTED[each.kind].too_long(scene, each):
+            raise FitError(f"{each.file}: {reason}")
     names = informed(scene, [each.kind for each in data]) if parameters is None else list(parameters)
     return Problem(
         scene=scene,

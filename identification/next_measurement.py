@@ -35,6 +35,9 @@ _TIMES: Final = (0.05, 0.2, 0.8)
 """s, of valve-open."""
 _BEYOND: Final = (0.5, 1.0, 2.0)
 """Of the middle of what was measured, or of what makes the vibration at the start."""
+_WORTHWHILE: Final = 0.9
+"""Ratio of widths up to which one measurement is advised; beyond it, many of them would be needed."""
+_AT_ALL: Final = 0.99
 Grid = Mapping[str, Sequence[float]]
 
 
@@ -50,10 +53,14 @@ class NextMeasurement:
     def text(self) -> str:
         """One sentence."""
         best = self.gains[0]
-        if best.ratio > 0.99:
-            return f"no single measurement would narrow the interval of {self.parameter} by more than 1 %"
         share = "a finite one" if best.ratio == 0 else f"{100 * best.ratio:.2g} % of its width"
-        return f"{best.candidate} would narrow the interval of {self.parameter} to {share}"
+        if best.ratio <= _WORTHWHILE:
+            return f"{best.candidate} would narrow the interval of {self.parameter} to {share}"
+        best_one = f" (the best, {best.candidate}, to {share})" if best.ratio <= _AT_ALL else ""
+        return (
+            f"no single measurement would narrow the interval of {self.parameter} much{best_one}; a direct "
+            "measurement of it, or of what its error goes together with, belongs into [uncertainty]"
+        )
 
 
 def next_measurement(result: FitResult, parameter: str | None = None) -> NextMeasurement | None:

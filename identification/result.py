@@ -5,13 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 from ringbalance.identification.identifiability import Combination, Verdict
 from ringbalance.identification.intervals import Profile
 from ringbalance.identification.optimisation import Optimum
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
+
+LAMBDA_FAR: Final = 2**0.25
+"""Factor on lambda, or its inverse, from which it is doubted: halfway, in logarithms, from 1 to the square
+root of two that rms amplitudes are wrong by where zero to peak is stated."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,6 +41,21 @@ class FittedParameter:
         """Whether the value lies outside what was known before: [uncertainty] or the data are wrong."""
         low, high = self.before_interval or (-math.inf, math.inf)
         return not low <= self.value <= high
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What speaks against the value, each in one sentence."""
+        found = []
+        if self.contradicts:
+            found.append(
+                "the fitted value lies outside what the scene's [uncertainty] states; one of the two is wrong"
+            )
+        if self.name == "lambda_factor" and not 1 / LAMBDA_FAR < self.value < LAMBDA_FAR:
+            found.append(
+                "lambda follows from the geometry within a few percent, and a value so far from 1 mostly has "
+                "another cause: how amplitudes are counted, a unit, the influence coefficient, or the law"
+            )
+        return tuple(found)
 
     @property
     def path(self) -> str:

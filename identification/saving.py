@@ -87,6 +87,11 @@ def save_result(
     ]
     findings = [
         *(MeasuredFinding(about="residuals", text=_short(each)) for each in said),
+        *(
+            MeasuredFinding(about="value", text=_short(f"{each.name}: {doubt}"))
+            for each in result.parameters
+            for doubt in each.doubts
+        ),
         *(MeasuredFinding(about="combination", text=_combination(each)) for each in result.combinations),
         *(MeasuredFinding(about="correlation", text=each) for each in _correlations(result)),
     ]

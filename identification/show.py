@@ -12,6 +12,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from ringbalance.identification.criticism.law_comparison import summaries
 from ringbalance.identification.criticism.review import Review
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.observations import Observations
@@ -26,6 +27,8 @@ from ringbalance.scene.units import format_quantity
 _STRONG: Final = 0.9
 """Correlation from which two parameters are named together."""
 _MOST_LINES: Final = 10
+_NARROW: Final = 8
+"""Characters of a number and its sign of plus or minus."""
 _WORDS: Final = {
     Verdict.IDENTIFIED: ("yes", "green"),
     Verdict.PRACTICALLY: ("hardly", "yellow"),
@@ -46,7 +49,8 @@ def fit_view(
 
 def _review(told: Review) -> Iterator[Text]:
     yield Text(_sentence(told.criticism.text), "" if told.criticism.describes else "bold red")
-    yield from (Text(_sentence(each.text)) for each in told.laws)
+    for outcome, text in summaries(told.laws):
+        yield Text(_sentence(text), "yellow" if outcome == "other" else "")
 
 
 def _sentence(text: str) -> str:
@@ -61,9 +65,16 @@ def _heading(result: FitResult, data: Sequence[Observations]) -> RenderableType:
 
 
 def _parameters(result: FitResult) -> Table:
-    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, header_style="bold")
+    table = Table(box=SIMPLE_HEAD, padding=0, pad_edge=False, header_style="bold")
     for name in ("quantity", "fitted", "from", "to (95 %)", "unit", "before", "identified"):
-        table.add_column(name, justify="left" if name in ("quantity", "unit", "identified") else "right")
+        left, narrow = name in ("quantity", "unit", "identified"), name == "before"
+        # In a narrow terminal this column alone is broken into lines: a name cut short is no use.
+        table.add_column(
+            name,
+            justify="left" if left else "right",
+            no_wrap=not narrow,
+            min_width=_NARROW if narrow else None,
+        )
     for each in result.parameters:
         word, style = _WORDS[each.verdict]
         table.add_row(each.name, *_numbers(each), Text(word, style=style))
@@ -89,13 +100,11 @@ def _remarks(result: FitResult) -> Iterator[Text]:
         if each.verdict is not Verdict.IDENTIFIED:
             yield Text(f"{each.name}: {each.text}.", style="yellow")
         yield from _bounds(each)
-        if each.contradicts:
-            text = f"{each.name}: the fitted value lies outside what the scene's [uncertainty] states"
-            yield Text(f"{text}; one of the two is wrong.", style="yellow")
+        yield from (Text(f"{each.name}: {doubt}.", style="yellow") for doubt in each.doubts)
     for found in result.combinations:
         yield Text(
-            f"The data identify {found.text} to {found.relative_uncertainty:.2g} of its value (95 %): "
-            f"{found.value:.4g} with the parameters in SI units."
+            f"The data identify {found.text} within {100 * found.relative_uncertainty:.2g} % (95 %): "
+            f"{found.value:.4g}, in SI units."
         )
     yield from (Text(_noise(each)) for each in result.noise)
     yield from map(Text, _pairs(result))

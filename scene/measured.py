@@ -45,7 +45,7 @@ class MeasuredQuantity:
 class MeasuredFinding:
     """One sentence about the fit."""
 
-    about: Annotated[OneLine, needed('"combination", "residuals" or "noise"')]
+    about: Annotated[OneLine, needed('"combination", "correlation", "residuals", "uncertainty" or "value"')]
     text: Annotated[OneLine, needed("what was found")]
 
 

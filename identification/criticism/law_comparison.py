@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -15,6 +16,15 @@ POWER: Final = 0.9
 """Chance to see the difference that is asked for before laws count as told apart."""
 _LEVEL: Final = 0.05
 Verdict = Literal["told apart", "cannot be told apart"]
+Outcome = Literal["other", "between", "fitted", "undecided"]
+_SAID: Final[Mapping[Outcome, str]] = {
+    "other": "the data prefer {} to the fitted law, so that the fitted values may be wrong by more than "
+    "their intervals",
+    "between": "the data lie between the fitted law and {}",
+    "fitted": "the data prefer the fitted law to {}",
+    "undecided": "these data cannot tell the fitted law from {}",
+}
+"""By outcome; with the other law, or all those of one outcome."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,15 +43,26 @@ class LawComparison:
         return "told apart" if self.separation >= needed_separation() else "cannot be told apart"
 
     @property
+    def outcome(self) -> Outcome:
+        """Which of both the data prefer."""
+        if self.verdict == "cannot be told apart":
+            return "undecided"
+        if abs(self.preference) < float(stats.chi2.isf(_LEVEL, 1)):
+            return "between"
+        return "fitted" if self.preference > 0 else "other"
+
+    @property
     def text(self) -> str:
         """What the data say."""
-        if self.verdict == "cannot be told apart":
-            return f"these data cannot tell the fitted law from {self.other}"
-        threshold = float(stats.chi2.isf(_LEVEL, 1))
-        if abs(self.preference) < threshold:
-            return f"the data lie between the fitted law and {self.other}"
-        better, worse = ("the fitted law", self.other)[:: 1 if self.preference > 0 else -1]
-        return f"the data prefer {better} to {worse}"
+        return _SAID[self.outcome].format(self.other)
+
+
+def summaries(comparisons: Sequence[LawComparison]) -> Iterator[tuple[Outcome, str]]:
+    """What the data say of all of them, one sentence for each outcome, the gravest first."""
+    for outcome, sentence in _SAID.items():
+        others = [each.other for each in comparisons if each.outcome == outcome]
+        if others:
+            yield outcome, sentence.format(" or ".join(filter(None, (", ".join(others[:-1]), others[-1]))))
 
 
 def needed_separation() -> float:

@@ -29,6 +29,8 @@ _DRAWS: Final = 4000
 _SEED: Final = 20260
 _LEAST: Final = 1e-2
 """Of a pattern's square that the parameters must leave; of less they could describe it."""
+_MOST_NAMED: Final = 3
+"""Findings that the sentence names."""
 Shape = Literal["rise", "bend"]
 
 
@@ -68,7 +70,9 @@ class Criticism:
         """One sentence."""
         failed = [each.text for each in self.findings if each.fails]
         if failed:
-            return "the fit does not describe the data: " + "; ".join(failed)
+            more = len(failed) - _MOST_NAMED
+            rest = [f"and {more} more such findings"] if more > 0 else []
+            return "the fit does not describe the data: " + "; ".join([*failed[:_MOST_NAMED], *rest])
         if not self.findings:
             return "too few measurements to tell whether the fit describes them"
         return f"no pattern in the residuals ({len(self.findings)} tests, {100 * LEVEL:g} % level)"

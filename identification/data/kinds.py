@@ -183,7 +183,14 @@ def _fill(meaning: str, *, optional: bool = False) -> Column:
 
 _PHASE: Final = "of that vibration, positive with the rotation, from the mark of the rotor"
 _GAS: Final = "gas pressure in the driven chamber, gauge"
-_OPEN: Final = "valve-open time"
+_GAS_TIME: Final = Column(
+    name="gas_time",
+    dimension="time",
+    unit="ms",
+    meaning="valve-open time",
+    above_zero=True,
+    highest=100.0,  # of the order of what empties a chamber of an oil; beyond it milliseconds were meant
+)
 
 _TRIAL_WEIGHT: Final = DataKind(
     title="vibration with a known unbalance on the rotor",
@@ -213,7 +220,7 @@ _INJECTION: Final = DataKind(
     balancer="liquid_ring",
     has_chamber=True,
     columns=(
-        _positive("gas_time", "time", "ms", _OPEN),
+        _GAS_TIME,
         _positive("pressure", "pressure", "MPa", _GAS),
         _amplitude("amplitude_before", "of the vibration before the injection"),
         _angle("phase_before", _PHASE, measured=True),
@@ -233,7 +240,7 @@ _TRANSFER: Final = DataKind(
     columns=(
         _fill("fill ratio of the driven chamber before"),
         _positive("pressure", "pressure", "MPa", _GAS),
-        _positive("gas_time", "time", "ms", _OPEN),
+        _GAS_TIME,
         Column(name="mass", dimension="mass", unit="g", meaning="moved, weighed", measured=True, lowest=0.0),
         Column(
             name="volume",
@@ -297,7 +304,6 @@ _POSITIONING: Final = DataKind(
     title="angle of one mass under a constant motor voltage",
     balancer="eccentric_mass",
     columns=(
-        # Motions are integrated: what would take hours is a wrong unit.
         Column(
             name="time",
             dimension="time",

@@ -38,12 +38,18 @@ class PredictedKind:
     each."""
     column: Callable[[Observations], str]
     """The measured column whose noise it is."""
+    too_long: Callable[[Any, Observations], str]
+    """Scene and observations to why predictions would take too long; empty where they do not."""
     informs: tuple[str, ...]
     """Parameters that are fitted to such data where the user names none."""
 
 
 def _named(name: str) -> Callable[[Observations], str]:
     return lambda _: name
+
+
+def _never(_scene: Any, _observations: Observations) -> str:
+    return ""
 
 
 def _closed_form(predict: Callable[[Any, Observations], FloatArray]) -> Callable[..., FloatArray]:
@@ -61,6 +67,7 @@ def _kind(
         noise_given=module.noise_given,
         free=module.free,
         column=_named(column) if isinstance(column, str) else column,
+        too_long=getattr(module, "too_long", _never),
         informs=informs,
     )
 

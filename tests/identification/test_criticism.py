@@ -11,7 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.identification.criticism.law_comparison import compare_laws, needed_separation
+from ringbalance.identification.criticism.law_comparison import (
+    LawComparison,
+    compare_laws,
+    needed_separation,
+    summaries,
+)
 from ringbalance.identification.criticism.linear_fit import LinearFit
 from ringbalance.identification.criticism.patterns import LEVEL, Criticism, criticise, runs_probability
 from ringbalance.scene.arrays import FloatArray
@@ -173,6 +178,24 @@ def test_laws_are_told_apart_where_data_allow() -> None:
     assert "prefer the fitted law to laminar" in clear.text
     assert "prefer laminar flow to the fitted" in _comparison(pressure, 0.01).text
     assert "cannot tell" in _comparison(np.sqrt(pressure), 3.0).text
+
+
+def test_laws_of_one_outcome_share_a_sentence() -> None:
+    """The one that the data prefer comes first, with its consequence."""
+    found = [
+        LawComparison(other=name, separation=separation, preference=preference)
+        for name, separation, preference in [
+            ("a", 1.0, 0.0),
+            ("b", 99.0, 50.0),
+            ("c", 1.0, 9.0),
+            ("d", 99.0, -50.0),
+            ("e", 99.0, 1.0),
+        ]
+    ]
+    said = dict(summaries(found))
+    assert list(said) == ["other", "between", "fitted", "undecided"]
+    assert said["undecided"] == "these data cannot tell the fitted law from a or c"
+    assert "the data prefer d to the fitted law, so that the fitted values may be wrong" in said["other"]
 
 
 def test_the_separation_is_the_power_of_a_test() -> None:

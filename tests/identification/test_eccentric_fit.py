@@ -125,6 +125,19 @@ def test_a_mass_reaches_the_speed_at_which_motor_and_friction_balance(scene: Ecc
     assert (end - start) / (times[1] - times[0]) == pytest.approx(steady, rel=0.02)
 
 
+def test_a_long_motion_is_that_of_its_parts(scene: EccentricScene) -> None:
+    """A motion that the plant is given in parts, so that signals can act, has the angle of its rows."""
+
+    def columns(times: list[float]) -> dict[str, FloatArray]:
+        many = np.ones(len(times))
+        return {"time": np.array(times), "voltage": 9 * many, "speed": 10.5 * many, "angle": 0 * many}
+
+    predict = PREDICTED["positioning"].predict
+    whole = predict(scene, observed("positioning", columns([60.0])), None)
+    parts = predict(scene, observed("positioning", columns([20.0, 40.0, 60.0])), None)
+    assert whole[0] == pytest.approx(parts[-1], rel=1e-4)
+
+
 def test_friction_holds_a_small_voltage(scene: EccentricScene) -> None:
     columns = {
         "time": np.array([1.0]),

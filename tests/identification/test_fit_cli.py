@@ -158,7 +158,7 @@ def test_a_template_is_printed_and_nothing_else(kind: str, run: Run) -> None:
         ([PAPER, EXAMPLES["flow"], "--parameters", ""], '--parameters = ""'),
         ([PAPER, EXAMPLES["flow"], "--loss", "huber"], "huber"),
         (["--template", "flwo"], 'did you mean "flow"'),
-        ([EXAMPLES["flow"], PAPER], "flow.csv: this is not TOML"),
+        ([EXAMPLES["flow"], PAPER], "flow.csv: this looks like a file of measurements"),
         ([PAPER, PAPER], "liquid_ring_paper.toml:"),
         ([str(bundled_scene("washing_machine")), EXAMPLES["flow"]], "washing_machine.toml"),
         ([PAPER, EXAMPLES["run_up"]], 'kind = "run_up"'),
@@ -205,6 +205,56 @@ def test_a_file_that_cannot_be_written_is_refused_before_the_work(run: Run, tmp_
     code, _, err = run(PAPER, EXAMPLES["trial_weight"], "--next", "bore")
     assert code == 2
     assert "not fitted" in err
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_no_file_that_is_read_is_replaced(place: int, run: Run, tmp_path: Path) -> None:
+    inputs = tmp_path / "disc.toml", tmp_path / "weights.csv"
+    for path, source in zip(inputs, (PAPER, EXAMPLES["trial_weight"]), strict=True):
+        path.write_bytes(Path(source).read_bytes())
+    before = inputs[place].read_bytes()
+    code, _, err = run(*inputs, "--save", tmp_path / "." / inputs[place].name)
+    assert code == 2
+    assert "would replace a file that is read here" in err
+    assert inputs[place].read_bytes() == before
+
+
+def test_names_are_whole_in_a_narrow_terminal(run: Run) -> None:
+    scene = bundled_scene(example_measurements.SCENES["eccentric_mass"])
+    _, out, _ = run(scene, EXAMPLES["positioning"])
+    assert re.search(r"motor\.back_emf_constant .* (yes|hardly)", out)
+    _, out, _ = run(PAPER, EXAMPLES["trial_weight"])
+    assert re.search(r"influence_coefficient +0\.01", out)
+
+
+def test_a_wrong_convention_of_amplitudes_shows_in_lambda(run: Run, tmp_path: Path) -> None:
+    """Amplitudes of twice the size in the name of zero to peak: lambda is doubted, and saved with that."""
+    wrong, target = tmp_path / "wrong.csv", tmp_path / "fitted.toml"
+    text = Path(EXAMPLES["injection"]).read_text(encoding="utf-8")
+    head, rows = text.split("series\n")
+    doubled = []
+    for row in rows.splitlines():
+        cells = row.split(",")
+        for i in (3, 5):
+            cells[i] = str(2 * float(cells[i]))
+        doubled.append(",".join(cells))
+    wrong.write_text(head + "series\n" + "\n".join(doubled) + "\n", encoding="utf-8")
+    words = ("--parameters", "lambda_factor", "--save", target)
+    _, out, _ = run(PAPER, wrong, *words)
+    assert "lambda_factor: lambda follows from the geometry" in " ".join(out.split())
+    assert any(each.about == "value" for each in load_scene(target).measured.findings)
+    _, out, _ = run(PAPER, EXAMPLES["injection"], *words)
+    assert "follows from the geometry" not in " ".join(out.split())
+
+
+def test_motions_that_take_too_long_are_refused(run: Run, tmp_path: Path) -> None:
+    head = Path(EXAMPLES["positioning"]).read_text(encoding="utf-8").split("series\n")[0]
+    path = tmp_path / "long.csv"
+    rows = "\n".join(f"100,{volts},9000,38,day 1" for volts in (100, 200, 300))
+    path.write_text(f"{head}series\n{rows}\n", encoding="utf-8")
+    code, out, err = run(bundled_scene(example_measurements.SCENES["eccentric_mass"]), path)
+    assert (code, out) == (2, "")
+    assert "long.csv: the motions take" in err
 
 
 def test_a_fit_that_fails_says_so(run: Run, tmp_path: Path) -> None:

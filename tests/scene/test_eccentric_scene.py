@@ -258,7 +258,7 @@ def test_what_needs_a_liquid_refuses_eccentric_masses(function: Callable[[Any], 
 def test_keys_are_fields(table: str) -> None:
     """A key reaches the record's field of its name; nothing is written in a file and then ignored."""
     assert _keys(table) == {field.name for field in fields(RECORDS[table])}
-    assert set(TABLES) == {*RECORDS, "accuracy", "uncertainty"}
+    assert set(TABLES) == {*RECORDS, "accuracy", "uncertainty", "measured"}
 
 
 _PATHS = [(table, key) for table in TABLES for key in sorted(_keys(table))]
@@ -282,7 +282,7 @@ def test_junk_ends_in_a_scene_or_in_a_scene_error(
 ) -> None:
     document = tomllib.loads(bundled_scene("eccentric_mass_paper").read_text(encoding="utf-8"))
     for (table, key), value in changes:
-        document[table][key] = value
+        document.setdefault(table, {})[key] = value
     scene = _loaded(as_toml(document).encode())
     if scene is not None:
         assert isinstance(scene, EccentricScene)

@@ -74,7 +74,7 @@ def _adiabatic_venting(ratio: float, far: float, b: float) -> float:
 
 
 VESSEL: Final = Kind(
-    title="time in which a gas vessel fills or vents",
+    title="time in which a vessel fills with air or vents it, taken as an ideal gas",
     measured="time",
     columns={
         "pressure": "reached after that time, absolute",

@@ -165,7 +165,7 @@ def test_any_friction_is_mastered(scene: EccentricScene, arms: tuple[float, floa
     found = simulate_eccentric(changed(scene, "masses", friction_arm=arms))
     assert found.settled
     slippery = min(arms) == 0
-    assert ("the drives still hold" in " ".join(found.warnings)) == slippery
+    assert ("the drives must stay on" in " ".join(found.warnings)) == slippery
     # The pair stays opposite although its frictions differ: the rotor does not feel them go round.
     friction = next(stage for stage in found.stages if stage.name == "friction estimation")
     during = (found.time >= friction.start + 0.2) & (found.time <= friction.end)

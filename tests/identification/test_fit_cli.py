@@ -14,12 +14,14 @@ import measurement_tables
 import pytest
 
 from ringbalance.cli import main
+from ringbalance.identification.balancers import informed
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.reading import observations_of
 from ringbalance.identification.data.template import template
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.scene.uncertain import with_value
 
 PAPER = str(bundled_scene("liquid_ring_paper"))
 EXAMPLES = {kind: str(example_measurements.FOLDER / f"{kind}.csv") for kind in example_measurements.EXAMPLES}
@@ -87,6 +89,25 @@ def test_the_examples_together_give_back_the_truth(balancer: str, run: Run) -> N
         assert each["verdict"] == "identified"
     stated = {each["group"] for each in document["noise"] if not each["estimated"]}
     assert stated == {group for group in STATED if group.split(" ")[0] in files}
+
+
+def test_injections_alone_do_not_blame_the_bore_for_a_loss(run: Run) -> None:
+    """The extra loss, zero in the scene and 1.5 in truth, is fitted where no parameters are named."""
+    _, out, _ = run(PAPER, EXAMPLES["injection"], "--json")
+    found = {each["name"]: each for each in json.loads(out)["parameters"]}
+    assert list(found) == ["lambda_factor", "bore", "extra_loss"]
+    for name, each in found.items():
+        low, high = each["interval"]
+        assert low < example_measurements.TRUTH["liquid_ring"][name] < high, each
+    assert "bore^3/(k + 1)" in found["bore"]["text"]
+
+
+def test_a_prescribed_loss_is_fitted_in_place_of_the_extra_one() -> None:
+    scene = liquid_ring_scene(load_scene(PAPER))
+    prescribed = with_value(scene=scene, quantity="drag_coefficient", value=50.0)
+    kinds = ["injection", "transfer"]
+    assert informed(scene, kinds) == ["lambda_factor", "bore", "extra_loss"]
+    assert informed(prescribed, kinds) == ["lambda_factor", "bore", "drag_coefficient"]
 
 
 def has_key(document: Any, name: str) -> bool:

@@ -120,7 +120,7 @@ def _fitted(parameter: FittedParameter, scale: Parameter) -> Fitted:
 
 
 def _combination(found: Combination) -> str:
-    return f"{found.text} is identified, within {100 * found.relative_uncertainty:.2g} %"
+    return f"the data identify {found.text} within {100 * found.relative_uncertainty:.2g} %"
 
 
 def _correlations(result: FitResult) -> Iterator[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 from ringbalance.identification import eccentric_parameters as eccentric
 from ringbalance.identification import parameters as ring
@@ -13,6 +14,9 @@ from ringbalance.reduced_model.chamber.inputs import half_widths, shifted
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, nominal_value
+
+_LITTLE: Final = 1e-4
+"""Of a quantity, or in SI units where it is zero."""
 
 
 def models_for(scene: AnyScene) -> Models | None:
@@ -47,6 +51,15 @@ def both_sides(scene: AnyScene, name: str, change: float) -> tuple[AnyScene, Any
         low, high = (shifted(scene=scene, quantity=name, change=side * change) for side in (-1, 1))
         return low, high
     return tuple(eccentric.eccentric_shifted(scene, name, side * change) for side in (-1, 1))  # type: ignore[return-value]
+
+
+def nearby(scene: AnyScene, name: str) -> AnyScene:
+    """The scene with one of its quantities a little lower, or a little above zero."""
+    if isinstance(scene, Scene):
+        value = nominal_value(scene=scene, quantity=name)
+    else:
+        value = eccentric.eccentric_value(scene, name)
+    return both_sides(scene, name, _LITTLE * abs(value) if value else -_LITTLE)[0]
 
 
 def exact_for(scene: AnyScene, fitted: Sequence[str]) -> list[str]:

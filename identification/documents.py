@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
-from ringbalance.identification.balancers import exact_for
+import numpy as np
+
+from ringbalance.identification.balancers import exact_for, nearby
 from ringbalance.identification.criticism.review import Review
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.identifiability import Combination
@@ -15,9 +18,14 @@ from ringbalance.identification.result import FileResiduals, FitResult, FittedPa
 
 
 def exact_inputs(result: FitResult) -> list[str]:
-    """Quantities of the scene that are neither fitted nor stated as uncertain."""
-    fitted = [parameter.name for parameter in result.parameters]
-    return exact_for(result.optimum.residuals.problem.scene, fitted)
+    """Quantities that the predictions depend on, and that are neither fitted nor stated as uncertain."""
+    problem, t = result.optimum.residuals.problem, result.optimum.t
+    fitted, predicted = [parameter.name for parameter in result.parameters], problem.at(t)
+    return [
+        name
+        for name in exact_for(problem.scene, fitted)
+        if np.any(replace(problem, scene=nearby(problem.scene, name)).at(t) != predicted)
+    ]
 
 
 def fit_document(

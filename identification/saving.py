@@ -43,6 +43,9 @@ _LONGEST: Final = 200
 """Characters of a finding, as of any text of a scene file."""
 _ANY_SIGN: Final = ("lag_angle", "phase")
 """Keys whose uncertainty may be larger than the value."""
+_ENTRIES: Final = 2
+"""Of a list, one for each mass."""
+_KEPT: Final = "the uncertainty before stays, since it is that of both masses too: {} was fitted alone"
 _CUT: Final = "the interval of {} is wider than its value, which a scene cannot state: it has the value"
 
 
@@ -117,7 +120,7 @@ def _fitted(parameter: FittedParameter, scale: Parameter) -> Fitted:
 
 
 def _combination(found: Combination) -> str:
-    return f"{found.text} is identified, within {100 * found.relative_uncertainty:.2g} %"
+    return f"the data identify {found.text} within {100 * found.relative_uncertainty:.2g} %"
 
 
 def _correlations(result: FitResult) -> Iterator[str]:
@@ -266,6 +269,10 @@ def _put_widths(document: dict[str, Any], placed: Iterable[_Placed]) -> Iterator
         cut = width > largest and place.key not in _ANY_SIGN
         inside = document.setdefault("uncertainty", {})
         inside = inside.setdefault(place.table, {}) if place.by_table else inside
+        if place.entry is not None and len(each) < _ENTRIES and place.key in inside:
+            # The uncertainty stands for both entries, and nothing was learnt of the other one.
+            yield MeasuredFinding(about="uncertainty", text=_KEPT.format(each[0].fitted.path))
+            continue
         inside[place.key] = place.written(largest if cut else width)
         if cut:
             yield MeasuredFinding(about="uncertainty", text=_CUT.format(each[0].fitted.path))

@@ -24,7 +24,7 @@ _GREEK: Final = {
 _SUPERSCRIPTS: Final = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _SUBSCRIPTS: Final = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 _GREEK_WORD: Final = re.compile(rf"(?<![\w\\])({'|'.join(_GREEK)})(?![a-z])")
-_POWER: Final = re.compile(r"\^(?:\((-?\d+)\)|(-?\d+))(?!\d)")
+_POWER: Final = re.compile(r"\^(?:\((-?\d+)\)|(-?\d+))(?!\.?\d)")
 _INDEXED: Final = re.compile(r"\b(?:([RVUxHp])|([A-Za-z])_)(\d)(?:(')|(?!\w))")
 _EXPONENT: Final = re.compile(r"(?<=\d)e([+-]\d+)\b")
 _UNITS: Final = {

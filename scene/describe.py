@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Final
 
 from ringbalance.scene import deferred
 from ringbalance.scene.dimensions import DIMENSIONS
@@ -97,16 +97,28 @@ def _lines_of(parts: tuple[str, ...]) -> Iterator[_Line]:
     return (_LINES[path] for path in dict.fromkeys(paths))
 
 
+_ECCENTRIC_UNITS: Final = {"angle": "deg", "length": "mm"}
+
+
 def usual_unit(path: str) -> str:
-    """Unit in which a value of a scene is described: of eccentric masses the SI unit; empty without one."""
+    """Unit in which a value of a scene is described; empty without one.
+
+    Of eccentric masses it is the SI unit, but mm and degrees.
+    """
     line = _LINES.get(path)
     if line is not None:
         return line.shown.unit
+    dimension = _eccentric_dimension(path)
+    if dimension is None:
+        return ""
+    return _ECCENTRIC_UNITS.get(dimension, next(iter(DIMENSIONS[dimension].units)))
+
+
+def _eccentric_dimension(path: str) -> str | None:
     table, _, key = path.split("[")[0].partition(".")
     keys = deferred.ECCENTRIC_MASS.tables[table].keys if table in deferred.ECCENTRIC_MASS.tables else {}
     takes = keys[key].takes if key in keys else None
-    dimension = takes.dimension if isinstance(takes, Reader) else None
-    return "" if dimension is None else next(iter(DIMENSIONS[dimension].units))
+    return takes.dimension if isinstance(takes, Reader) else None
 
 
 def usual_name(path: str) -> str:
@@ -118,9 +130,10 @@ def usual_name(path: str) -> str:
 def in_usual_unit(path: str, value: float) -> float:
     """A value of a scene, SI, in its usual unit."""
     line = _LINES.get(path)
-    if line is None or not line.dimension:
+    dimension = _eccentric_dimension(path) if line is None else line.dimension
+    if not dimension:
         return value
-    return float(format_quantity(value, line.dimension, line.shown.unit, digits=_EXACT).split(" ")[0])
+    return float(format_quantity(value, dimension, usual_unit(path), digits=_EXACT).split(" ")[0])
 
 
 def scene_fault(*, scene: Scene, table: str, key: str, problem: str, allowed: str) -> Fault:

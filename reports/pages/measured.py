@@ -11,11 +11,14 @@ from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import MISSING, number, short
 from ringbalance.reports.section import Record, Section, Table
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.describe import usual_name
 
 _FAR: Final = 4.0
 """Times what the 95 % interval has, above which a profile is not drawn."""
-_ROW: Final = 0.42
+_POINTS: Final = 81
+"""Of a drawn profile."""
+_ROW: Final = 0.5
 """Height of a parameter in the figure of intervals, inches."""
 
 
@@ -99,15 +102,17 @@ def _intervals(found: Record) -> Drawing:
         for row, each in enumerate(quantities):
             scale = _scale(each)
             for side, ends, middle, colour, label in (
-                (0.16, ("before_low", "before_high"), each["before"], style.PAPER, "before"),
-                (-0.16, ("low", "high"), each["value"], style.FOUND, "after"),
+                (0.28, ("before_low", "before_high"), each["before"], style.PAPER, "before"),
+                (0.04, ("low", "high"), each["value"], style.FOUND, "after"),
             ):
                 shown = [(v - each["value"]) / scale for v in (each[e] for e in ends) if v is not None]
                 kept = np.clip(shown, -_FAR, _FAR)
                 place = float(np.clip((middle - each["value"]) / scale, -_FAR, _FAR))
                 axes.plot(kept, [row + side] * len(kept), color=colour, linewidth=2.5)
                 axes.plot([place], [row + side], "o", color=colour, label=label if row == 0 else None)
-        axes.set_yticks(range(len(quantities)), [usual_name(each["quantity"]) for each in quantities])
+            # Names are longer than the margin beside the axes.
+            axes.text(-_FAR, row - 0.27, usual_name(each["quantity"]), verticalalignment="center")
+        axes.set_yticks([])
         axes.set_ylim(len(quantities) - 0.5, -0.5)
 
     return draw(
@@ -130,13 +135,20 @@ def _scale(each: Record) -> float:
     return abs(float(each["value"])) or 1.0
 
 
+def _curve(each: Record) -> tuple[FloatArray, FloatArray]:
+    """Distance from the fitted value, and the rise, whose root is nearly straight between the points."""
+    away = (np.asarray(each["profile"], dtype=np.float64) - each["value"]) / _scale(each)
+    roots = np.sign(away) * np.sqrt(np.maximum(each["rise"], 0.0))
+    fine = np.union1d(away, np.linspace(away.min(), away.max(), _POINTS))
+    return fine, np.interp(fine, away, roots) ** 2
+
+
 def _profiles(found: Record) -> Drawing:
     drawn = [each for each in found["quantities"] if len(each["profile"]) > 2]
 
     def paint(axes: Axes) -> None:
         for place, each in enumerate(drawn):
-            values = (np.asarray(each["profile"]) - each["value"]) / _scale(each)
-            axes.plot(values, each["rise"], label=usual_name(each["quantity"]), **style.line(place))
+            axes.plot(*_curve(each), label=usual_name(each["quantity"]), **style.line(place))
         axes.axhline(1.0, color=style.MUTED, linewidth=1)
         axes.set(xlim=(-2, 2), ylim=(0, _FAR))
 

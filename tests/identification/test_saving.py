@@ -94,6 +94,16 @@ def test_entries_of_a_list_share_the_larger_uncertainty() -> None:
     assert scene.origin_of("masses.friction_arm") == "measured"
 
 
+def test_an_entry_fitted_alone_leaves_the_uncertainty_of_both() -> None:
+    """The key stands for both masses, and nothing was learnt of the other one."""
+    arm = fitted("masses.friction_arm[0]", 0.012, 0.001)
+    content = fitted_scene(text_of("eccentric_mass_paper"), fitted=[arm], files=[FILE])
+    scene = eccentric_scene(scene_from(content=content, file="a.toml"))
+    assert scene.masses.friction_arm == pytest.approx((0.012, 0.01), rel=1e-9)
+    assert tomllib.loads(content.decode())["uncertainty"]["masses"]["friction_arm"] == "25 %"
+    assert "friction_arm[0] was fitted alone" in scene.measured.findings[0].text
+
+
 def test_an_interval_that_a_scene_cannot_state_is_said() -> None:
     wide = fitted("tube.extra_loss", 0.2, 0.1, interval=(0.01, 0.9))
     scene = scene_from(

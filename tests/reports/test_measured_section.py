@@ -39,7 +39,7 @@ MEASURED = Measured(
             verdict="structurally not identified",
         ),
     ),
-    findings=(MeasuredFinding(about="combination", text="lambda^2/(k + 1) is identified, within 3 %"),),
+    findings=(MeasuredFinding(about="combination", text="the data identify lambda^2/(k + 1) within 3 %"),),
 )
 
 
@@ -58,7 +58,7 @@ def test_the_annex_of_a_fitted_scene_has_it(fitted: dict[str, Any]) -> None:
     assert "abababababab" in text
     assert "1.450 to 1.550" in text
     assert "1.460 to 1.480" in text
-    assert "is identified, within" in text
+    assert "The data identify" in text
     assert 'id="figure-fitted-intervals"' in section
     assert 'id="figure-fitted-profiles"' in section
 

@@ -19,6 +19,7 @@ from ringbalance.reports.prose import typeset
         ("R1'min = 34.9 mm", "R₁′min = 34.9 mm"),
         ("10^-3 or 10^(-3)", "10⁻³ or 10⁻³"),
         ("9 mm^2/s", "9 mm²/s"),
+        ("bore/(k + 1)^0.25", "bore/(k + 1)^0.25"),
         ("3.4e-06 %", "3.4\u202f×\u202f10⁻⁶ %"),
         ("0.05 um at 20 degC", "0.05 µm at 20 °C"),
         ("rhomboid, omegas, pipe", "rhomboid, omegas, pipe"),

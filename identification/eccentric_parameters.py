@@ -10,9 +10,9 @@ from functools import partial
 from typing import Any, Final
 
 from ringbalance.identification.parameters import FitError, Parameter
-from ringbalance.identification.predict.vibration import STANDARD
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.keys.eccentric_schema import ECCENTRIC_MASS
+from ringbalance.scene.uncertain import NORMAL_95
 
 _REACH: Final = 30.0
 """Factor up to which a value is looked for."""
@@ -55,7 +55,7 @@ def _parameter(scene: EccentricScene, name: str) -> Parameter:
         start=start,
         lowest=low,
         highest=high,
-        prior=width / STANDARD if width else None,
+        prior=width / NORMAL_95 if width else None,
         scale=1.0 if is_angle else None,
         change=partial(eccentric_with, name=name),
     )
@@ -95,7 +95,7 @@ def _place(name: str) -> tuple[str, str, int | None]:
 def eccentric_held(scene: EccentricScene, fitted: Sequence[str]) -> dict[str, float]:
     """Standard deviation, SI, of every uncertain quantity of the scene that is not fitted."""
     widths = {name: _half_width(scene, name) for name in fitted_names(scene) if name not in fitted}
-    return {name: width / STANDARD for name, width in widths.items() if width > 0}
+    return {name: width / NORMAL_95 for name, width in widths.items() if width > 0}
 
 
 def eccentric_shifted(scene: EccentricScene, name: str, change: float) -> EccentricScene:

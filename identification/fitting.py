@@ -17,10 +17,10 @@ from ringbalance.identification.likelihood import Problem, block_of, held_effect
 from ringbalance.identification.optimisation import Optimum, optimum
 from ringbalance.identification.parameters import FitError, Parameter
 from ringbalance.identification.predict.kinds import PREDICTED, rows_of
-from ringbalance.identification.predict.vibration import STANDARD
 from ringbalance.identification.result import FileResiduals, FitResult, FittedParameter, Noise
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.narrowing import AnyScene
+from ringbalance.scene.uncertain import NORMAL_95
 
 Loss = Literal["linear", "soft_l1"]
 STARTS: Final = 3
@@ -126,7 +126,7 @@ def _fitted(best: Optimum, i: int, found: _Findings) -> FittedParameter:
     parameter, profile_, verdict = best.residuals.problem.parameters[i], found.profiles[i], found.verdicts[i]
     before = None
     if parameter.prior:
-        width = STANDARD * parameter.prior
+        width = NORMAL_95 * parameter.prior
         before = parameter.start - width, parameter.start + width
     return FittedParameter(
         name=parameter.name,

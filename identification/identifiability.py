@@ -26,8 +26,8 @@ import numpy as np
 
 from ringbalance.identification.intervals import Profile
 from ringbalance.identification.parameters import Parameter
-from ringbalance.identification.predict.vibration import STANDARD
 from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.scene.uncertain import NORMAL_95
 
 DEPENDENT: Final = 3e-5
 """Singular value of the normalised columns of J below which they count as dependent: above the error of
@@ -87,7 +87,7 @@ def allowed_widths(parameters: Sequence[Parameter], t: FloatArray) -> FloatArray
     two."""
     return np.array(
         [
-            STANDARD * p.prior / p.slope(x) if p.prior else FACTOR
+            NORMAL_95 * p.prior / p.slope(x) if p.prior else FACTOR
             for p, x in zip(parameters, t.tolist(), strict=True)
         ]
     )

@@ -15,10 +15,9 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from ringbalance.identification.predict.device import device_of, models_of
-from ringbalance.identification.predict.vibration import STANDARD
 from ringbalance.reduced_model.chamber.inputs import half_widths
 from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, nominal_value, with_value
+from ringbalance.scene.uncertain import NORMAL_95, UNCERTAIN_QUANTITIES, nominal_value, with_value
 
 
 class FitError(ValueError):
@@ -105,7 +104,7 @@ def scene_parameter(scene: Scene, name: str) -> Parameter:
         start=start,
         lowest=low,
         highest=high,
-        prior=None if width is None else width / STANDARD,
+        prior=None if width is None else width / NORMAL_95,
         offset=offset,
         gain=gain,
         scale=scale,
@@ -215,4 +214,4 @@ def scene_parameters(scene: Scene, names: Sequence[str]) -> tuple[Parameter, ...
 def held_inputs(scene: Scene, fitted: Sequence[str]) -> dict[str, float]:
     """Standard deviation, SI, of every uncertain quantity of the scene that is not fitted."""
     widths = half_widths(scene)
-    return {name: width / STANDARD for name, width in widths.items() if name not in fitted}
+    return {name: width / NORMAL_95 for name, width in widths.items() if name not in fitted}

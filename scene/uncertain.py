@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Final
 
 from ringbalance.scene.keys.schema import LIQUID_RING
 from ringbalance.scene.models import Scene
 
+NORMAL_95: Final = 1.959963984540054
+"""Expanded uncertainty (95 %) of a normal distribution in standard deviations."""
 UNCERTAIN_QUANTITIES: Mapping[str, str] = MappingProxyType(
     {
         name: table

@@ -26,7 +26,7 @@ from ringbalance.reduced_model.chamber.inputs import half_widths, shifted
 from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import InputUncertainty, Scene
-from ringbalance.scene.uncertain import nominal_value
+from ringbalance.scene.uncertain import NORMAL_95, nominal_value
 
 SCENES: Final = ("liquid_ring_paper", "six_chamber", "perfluorinated_oil")
 FITTED: Final = ("influence_coefficient", "lag_angle", "bore", "lambda_factor")
@@ -86,7 +86,7 @@ def _drawn(scene: Scene, random: np.random.Generator) -> Scene:
     """The device: every uncertain input drawn from its normal distribution."""
     truth = scene
     for name, width in half_widths(scene).items():
-        truth = shifted(scene=truth, quantity=name, change=width / 1.96 * random.standard_normal())
+        truth = shifted(scene=truth, quantity=name, change=width / NORMAL_95 * random.standard_normal())
     return truth
 
 

@@ -15,9 +15,9 @@ import numpy as np
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.strategy.settings import strategy_settings
-from ringbalance.controller.ensemble.samples import NORMAL_95
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.models import InputUncertainty
+from ringbalance.scene.uncertain import NORMAL_95
 
 Judged = Mapping[str, float | None]
 """Numbers that a run comes to, by name; None: it does not come to it."""

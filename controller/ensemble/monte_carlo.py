@@ -14,7 +14,6 @@ from ringbalance.controller.checks import check_fit
 from ringbalance.controller.ensemble.run import EnsemblePlan, MemberRuns, ensemble_plan
 from ringbalance.controller.ensemble.samples import (
     BLOCK,
-    NORMAL_95,
     Members,
     MemberUncertainty,
     drawn_members,
@@ -29,6 +28,7 @@ from ringbalance.scene.arrays import IntArray
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
+from ringbalance.scene.uncertain import NORMAL_95
 
 Progress = Callable[[int, int], None]
 """Called with the members done and their number."""

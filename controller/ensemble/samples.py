@@ -14,12 +14,10 @@ from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Gas, Scene
-from ringbalance.scene.uncertain import nominal_value
+from ringbalance.scene.uncertain import NORMAL_95, nominal_value
 
 BLOCK: Final = 8192
 """Members that are drawn and carried together."""
-NORMAL_95: Final = 1.959963984540054
-"""Expanded uncertainty (95 %) of a normal distribution in standard deviations."""
 PAPER_DRAG_UNCERTAINTY: Final = 0.1
 """Relative half-width taken for "k is about 50"."""
 PAPER_MOMENT_UNCERTAINTY: Final = 0.007

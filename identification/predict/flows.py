@@ -10,7 +10,6 @@ import numpy as np
 
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.predict.device import Device, Models, device_of
-from ringbalance.identification.predict.scalars import scalar_covariance
 from ringbalance.physics.tube.state import tube_state
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
@@ -23,13 +22,8 @@ _DONE: Final = 1e-6
 """Change of ln u after which the next one, its square, is round-off."""
 
 
-def measured(observations: Observations) -> FloatArray:
-    """Q, m^3/s, shape (n,)."""
-    return observations.columns["flow_rate"]
-
-
 def predict(scene: Scene, observations: Observations, models: Models) -> FloatArray:
-    """The same, by Newton's method in ln u.
+    """Q, m^3/s, shape (n,), by Newton's method in ln u.
 
     Source: definition of k, Eq. 14 of the liquid-ring paper, between two reservoirs at rest.
     """
@@ -54,18 +48,3 @@ def _loss(scene: Scene, velocity: FloatArray) -> FloatArray:
     """k of the tube at rest, by the finest models: the scene's are chosen for its own velocities."""
     tube = replace(scene.tube, models=FINEST_MODELS)
     return tube_state(tube=tube, liquid=scene.liquid, angular_velocity=0.0, velocity=velocity).k
-
-
-def covariance(observations: Observations) -> FloatArray:
-    """Of what was measured; unit where the noise is not given."""
-    return scalar_covariance(observations, "flow_rate")
-
-
-def noise_given(observations: Observations) -> bool:
-    """Whether what was measured has its uncertainty."""
-    return "flow_rate" in observations.uncertainty
-
-
-def free(observations: Observations) -> FloatArray:
-    """Nothing beside the parameters is fitted."""
-    return np.zeros((len(observations), 0))

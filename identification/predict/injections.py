@@ -113,8 +113,3 @@ def shared_readings(observations: Observations) -> list[tuple[int, int]]:
             found.append((i, last[series]))
         last[series] = i
     return found
-
-
-def free(observations: Observations) -> FloatArray:
-    """Nothing beside the parameters is fitted."""
-    return np.zeros((2 * len(observations), 0))

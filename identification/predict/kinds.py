@@ -20,6 +20,12 @@ from ringbalance.identification.predict import (
     trial_amplitudes,
     trial_weights,
 )
+from ringbalance.identification.predict.scalars import scalar_covariance
+from ringbalance.identification.predict.vibration import (
+    measured_covariance,
+    measured_vectors,
+    vector_noise_given,
+)
 from ringbalance.scene.arrays import FloatArray
 
 
@@ -44,65 +50,97 @@ class PredictedKind:
     """Parameters that are fitted to such data where the user names none."""
 
 
-def _named(name: str) -> Callable[[Observations], str]:
-    return lambda _: name
-
-
 def _never(_scene: Any, _observations: Observations) -> str:
     return ""
 
 
-def _closed_form(predict: Callable[[Any, Observations], FloatArray]) -> Callable[..., FloatArray]:
+def _by_scene_alone(predict: Callable[[Any, Observations], FloatArray]) -> Callable[..., FloatArray]:
     """A prediction that takes no models."""
     return lambda scene, observations, _: predict(scene, observations)
 
 
-def _kind(
-    module: Any, column: str | Callable[[Observations], str], *informs: str, by_law: bool = True
+def _nothing_free(numbers_per_row: int) -> Callable[[Observations], FloatArray]:
+    """Nothing beside the parameters is fitted."""
+    return lambda observations: np.zeros((numbers_per_row * len(observations), 0))
+
+
+def _numbers(
+    predict: Callable[..., FloatArray],
+    column: Callable[[Observations], str],
+    *informs: str,
+    too_long: Callable[[Any, Observations], str] = _never,
 ) -> PredictedKind:
+    """One measured number a row, its errors independent from row to row."""
     return PredictedKind(
-        predict=module.predict if by_law else _closed_form(module.predict),
-        measured=module.measured,
-        covariance=module.covariance,
-        noise_given=module.noise_given,
-        free=module.free,
-        column=_named(column) if isinstance(column, str) else column,
-        too_long=getattr(module, "too_long", _never),
+        predict=predict,
+        measured=lambda observations: observations.columns[column(observations)],
+        covariance=lambda observations: scalar_covariance(observations, column(observations)),
+        noise_given=lambda observations: column(observations) in observations.uncertainty,
+        free=_nothing_free(1),
+        column=column,
+        too_long=too_long,
+        informs=informs,
+    )
+
+
+def _vibrations(
+    predict: Callable[[Any, Observations], FloatArray],
+    *informs: str,
+    free: Callable[[Observations], FloatArray],
+) -> PredictedKind:
+    """One measured vibration a row."""
+    return PredictedKind(
+        predict=_by_scene_alone(predict),
+        measured=measured_vectors,
+        covariance=measured_covariance,
+        noise_given=vector_noise_given,
+        free=free,
+        column=lambda _: "amplitude",
+        too_long=_never,
         informs=informs,
     )
 
 
 PREDICTED: Final[Mapping[str, PredictedKind]] = MappingProxyType(
     {
-        "trial_weight": _kind(trial_weights, "amplitude", "influence_coefficient", "lag_angle", by_law=False),
-        "trial_amplitude": _kind(
-            trial_amplitudes,
-            "amplitude",
+        "trial_weight": _vibrations(
+            trial_weights.predict, "influence_coefficient", "lag_angle", free=trial_weights.free
+        ),
+        "trial_amplitude": _numbers(
+            _by_scene_alone(trial_amplitudes.predict),
+            lambda _: "amplitude",
             "influence_coefficient",
             "initial_amplitude",
             "initial_phase",
-            by_law=False,
         ),
-        "injection": _kind(injections, "amplitude_after", "lambda_factor", "bore", "extra_loss"),
-        "transfer": _kind(transfers, transfers.column, "bore", "extra_loss"),
-        "flow": _kind(flows, "flow_rate", "bore", "extra_loss"),
-        "pressure": _kind(pressures, "pressure", "density", by_law=False),
-        "run_up": _kind(
-            run_ups,
-            "amplitude",
+        "injection": PredictedKind(
+            predict=injections.predict,
+            measured=injections.measured,
+            covariance=injections.covariance,
+            noise_given=injections.noise_given,
+            free=_nothing_free(2),
+            column=lambda _: "amplitude_after",
+            too_long=_never,
+            informs=("lambda_factor", "bore", "extra_loss"),
+        ),
+        "transfer": _numbers(transfers.predict, transfers.column, "bore", "extra_loss"),
+        "flow": _numbers(flows.predict, lambda _: "flow_rate", "bore", "extra_loss"),
+        "pressure": _numbers(_by_scene_alone(pressures.predict), lambda _: "pressure", "density"),
+        "run_up": _vibrations(
+            run_ups.predict,
             "rotor.stiffness",
             "rotor.damping",
             "imbalance.mass",
             "imbalance.phase",
-            by_law=False,
+            free=_nothing_free(2),
         ),
-        "positioning": _kind(
-            positionings,
-            "angle",
+        "positioning": _numbers(
+            _by_scene_alone(positionings.predict),
+            lambda _: "angle",
             "masses.friction_arm[0]",
             "motor.torque_constant",
             "motor.back_emf_constant",
-            by_law=False,
+            too_long=positionings.too_long,
         ),
     }
 )

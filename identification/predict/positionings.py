@@ -18,7 +18,6 @@ from ringbalance.controller.eccentric_mass.plant.parameters import PlantParamete
 from ringbalance.controller.eccentric_mass.plant.plant import rest_state
 from ringbalance.controller.eccentric_mass.plant.whirl import steady_whirl
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.predict.scalars import scalar_covariance
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.eccentric_models import EccentricScene
 
@@ -28,13 +27,11 @@ _MOST_SUBSTEPS: Final = 20_000
 """Of one call of the plant, some 0.02 s: a signal, such as that of Ctrl-C, acts only between calls."""
 
 
-def measured(observations: Observations) -> FloatArray:
-    """Angles moved, rad, shape (n,)."""
-    return observations.columns["angle"]
-
-
 def predict(scene: EccentricScene, observations: Observations) -> FloatArray:
-    """The same by the plant's equations of motion; rows of one series, voltage and speed are one motion."""
+    """Angles moved, rad, shape (n,), by the plant's equations of motion.
+
+    Rows of one series, voltage and speed are one motion.
+    """
     plant = plant_parameters(scene)
     found = np.empty(len(observations))
     for voltage, speed, rows in _motions(observations):
@@ -89,18 +86,3 @@ def _moved(
         now = time
         found[place] = state[4] - angles[0]
     return found
-
-
-def covariance(observations: Observations) -> FloatArray:
-    """Of what was measured; unit where the noise is not given."""
-    return scalar_covariance(observations, "angle")
-
-
-def noise_given(observations: Observations) -> bool:
-    """Whether what was measured has its uncertainty."""
-    return "angle" in observations.uncertainty
-
-
-def free(observations: Observations) -> FloatArray:
-    """Nothing beside the parameters is fitted."""
-    return np.zeros((len(observations), 0))

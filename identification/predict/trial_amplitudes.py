@@ -13,34 +13,13 @@ import numpy as np
 
 from ringbalance.controller.rotor import influence
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.predict.scalars import scalar_covariance
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
 
-def measured(observations: Observations) -> FloatArray:
-    """Amplitudes, m zero to peak, shape (n,)."""
-    return observations.columns["amplitude"]
-
-
 def predict(scene: Scene, observations: Observations) -> FloatArray:
-    """The same."""
+    """m zero to peak, shape (n,)."""
     rotor, columns = scene.rotor, observations.columns
     k = influence(coefficient=rotor.influence_coefficient, lag_angle=rotor.lag_angle)
     start = cmath.rect(rotor.initial_amplitude, rotor.initial_phase)
     return np.asarray(np.abs(start + k * columns["unbalance"] * np.exp(1j * columns["angle"])))
-
-
-def covariance(observations: Observations) -> FloatArray:
-    """Of what was measured; unit where the noise is not given."""
-    return scalar_covariance(observations, "amplitude")
-
-
-def noise_given(observations: Observations) -> bool:
-    """Whether what was measured has its uncertainty."""
-    return "amplitude" in observations.uncertainty
-
-
-def free(observations: Observations) -> FloatArray:
-    """Nothing beside the parameters is fitted."""
-    return np.zeros((len(observations), 0))

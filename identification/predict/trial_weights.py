@@ -10,31 +10,16 @@ import numpy as np
 
 from ringbalance.controller.rotor import influence
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.predict.vibration import parts, spread_out, vector_covariance, vectors
+from ringbalance.identification.predict.vibration import parts
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
 
-def measured(observations: Observations) -> FloatArray:
-    """Vibrations, real and then imaginary parts, m, shape (2 n,)."""
-    return parts(vectors(observations))
-
-
 def predict(scene: Scene, observations: Observations) -> FloatArray:
-    """Their change by the trial weights, likewise."""
+    """Change of the vibration by the trial weights, real and then imaginary parts, m, shape (2 n,)."""
     k = influence(coefficient=scene.rotor.influence_coefficient, lag_angle=scene.rotor.lag_angle)
     unbalance = observations.columns["unbalance"] * np.exp(1j * observations.columns["angle"])
     return parts(np.asarray(k * unbalance, dtype=np.complex128))
-
-
-def covariance(observations: Observations) -> FloatArray:
-    """Of the measured parts, shape (2 n, 2 n); unit where the noise is not given."""
-    return spread_out(vector_covariance(observations, given=noise_given(observations)))
-
-
-def noise_given(observations: Observations) -> bool:
-    """Whether the vibrations have their uncertainty."""
-    return "amplitude" in observations.uncertainty
 
 
 def free(observations: Observations) -> FloatArray:

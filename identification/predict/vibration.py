@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
 from ringbalance.identification.data.observations import Observations
 from ringbalance.scene.arrays import ComplexArray, FloatArray
-
-STANDARD: Final = 1.96
-"""Expanded uncertainty (95 %) over standard deviation of a normal quantity."""
+from ringbalance.scene.uncertain import NORMAL_95
 
 
 def vectors(observations: Observations, *, when: str = "") -> ComplexArray:
@@ -32,15 +28,30 @@ def vector_covariance(observations: Observations, *, when: str = "", given: bool
     count, widths = len(observations), observations.uncertainty
     if not given:
         return np.broadcast_to(np.eye(2), (count, 2, 2)).copy()
-    along = widths[f"amplitude{when}"] / STANDARD
+    along = widths[f"amplitude{when}"] / NORMAL_95
     size, across = observations.columns[f"amplitude{when}"], along
     if f"phase{when}" in widths:
-        across = np.where(size > 0, size * widths[f"phase{when}"] / STANDARD, along)
+        across = np.where(size > 0, size * widths[f"phase{when}"] / NORMAL_95, along)
     angle = observations.columns[f"phase{when}"]
     c, s, a, b = np.cos(angle), np.sin(angle), along**2, across**2
     return np.moveaxis(
         np.array([[a * c**2 + b * s**2, (a - b) * c * s], [(a - b) * c * s, a * s**2 + b * c**2]]), -1, 0
     )
+
+
+def measured_vectors(observations: Observations) -> FloatArray:
+    """`parts` of one vibration a row, m, shape (2 n,)."""
+    return parts(vectors(observations))
+
+
+def measured_covariance(observations: Observations) -> FloatArray:
+    """Of `measured_vectors`, shape (2 n, 2 n); unit where the noise is not given."""
+    return spread_out(vector_covariance(observations, given=vector_noise_given(observations)))
+
+
+def vector_noise_given(observations: Observations) -> bool:
+    """Whether one vibration a row has its uncertainty."""
+    return "amplitude" in observations.uncertainty
 
 
 def spread_out(blocks: FloatArray) -> FloatArray:

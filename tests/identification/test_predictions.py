@@ -222,3 +222,23 @@ def test_a_stated_noise_of_amplitude_and_phase() -> None:
     )
     expected = np.cov(np.stack([seen.real, seen.imag]))
     np.testing.assert_allclose(PREDICTED["trial_weight"].covariance(data), expected, rtol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("kind", "column"),
+    [
+        ("trial_amplitude", "amplitude"),
+        ("transfer", "mass"),
+        ("flow", "flow_rate"),
+        ("pressure", "pressure"),
+        ("positioning", "angle"),
+    ],
+)
+def test_a_stated_noise_of_numbers(kind: str, column: str) -> None:
+    """95 of 100 normal errors of the covariance lie within the stated uncertainty, row by row."""
+    stated = np.array([0.02, 0.3])
+    data = replace(observations(kind, {column: [1.0, 2.0]}), uncertainty={column: stated})
+    covariance = PREDICTED[kind].covariance(data)
+    errors = np.random.default_rng(4).multivariate_normal(np.zeros(2), covariance, size=100_000)
+    np.testing.assert_allclose(np.mean(np.abs(errors) <= stated, axis=0), 0.95, atol=0.005)
+    assert covariance[0, 1] == 0

@@ -8,6 +8,7 @@ absolute.  What a field's key takes and means, and its default, stand in its ann
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
+from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.keys.declaration import UNCERTAIN, derived, listed, needed, shown, standard, unused
 from ringbalance.scene.keys.derivations import even_number_of_chambers, half_of, radius_of_edge
 from ringbalance.scene.keys.fields import (
@@ -114,6 +115,8 @@ class Disc:
         UNCERTAIN,
         shown("measured factor on lambda"),
     ] = None
+    geometry: ChamberGeometry | None = None
+    """One chamber as a mesh file gives it, no key; None for the sector between plates that the keys give."""
 
     @property
     def moment_factor(self) -> float:

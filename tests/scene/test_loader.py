@@ -301,7 +301,15 @@ def test_table_has_every_value() -> None:
     tables = ("disc", "liquid", "tube", "gas", "environment", "rotor", "sensor", "controller", "run")
     shown_elsewhere = {"density_uncertainty", "viscosity_uncertainty", "source", "entrance_radius", "models"}
     trial_only = {"sequence", "first_trial", "long_step", "short_step", "fine_below"}
-    not_asked_for = {"critical_ratio", "dead_volume", "valve_lag", "inlet_radius", "mass", "lambda_factor"}
+    not_asked_for = {
+        "critical_ratio",
+        "dead_volume",
+        "valve_lag",
+        "inlet_radius",
+        "mass",
+        "lambda_factor",
+        "geometry",
+    }
     names = [field.name for table in tables for field in fields(getattr(scene, table))]
     assert lines == len([n for n in names if n not in shown_elsewhere | trial_only | not_asked_for]) + 1
 

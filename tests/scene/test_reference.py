@@ -59,7 +59,7 @@ def test_example_in_the_document_loads(load: Callable[[Mapping[str, Any]], Scene
 @pytest.mark.parametrize(
     ("table", "record", "differences"),
     [
-        ("disc", models.Disc, set()),
+        ("disc", models.Disc, {"geometry"}),
         ("liquid", models.Liquid, {"density_uncertainty", "viscosity_uncertainty", "source"}),
         ("tube", models.Tube, {"models"}),
         ("gas", models.Gas, set()),

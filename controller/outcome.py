@@ -27,8 +27,6 @@ from ringbalance.scene.models import Scene
 MICROMETRE: Final = 1e-6
 GRAM_MILLIMETRE: Final = 1e-6
 MANY_OVERSHOOTS: Final = 2
-MANY_CHAMBERS: Final = 4
-"""Beyond these more than two pairs share the work."""
 NEARLY_EMPTY: Final = 1e-6
 """Fill ratio at which a chamber's last liquid is looked at."""
 LEAST_PRESSURE: Final = 1.0
@@ -277,14 +275,8 @@ def _capacity(facts: Facts) -> str:
 
 
 def _empty(facts: Facts) -> str:
-    control = facts.scene.controller
     chamber = facts.refused[0] if facts.refused else _longest(facts).chamber
     cure = "check rotor.influence_coefficient, the assumed lag angle, and the sense of rotation"
-    if facts.plant.chambers > MANY_CHAMBERS and control.kind != "law_based":
-        cure = (
-            f"{control.kind} asks no other pairs for what an empty chamber cannot give: controller.kind = "
-            f'"law_based" does; or {cure}'
-        )
     return (
         f"{_not_settled(facts)}; no usable liquid is left in chamber {chamber} although the "
         f"unbalance is within the disc's capacity: {cure}"

@@ -24,6 +24,7 @@ from ringbalance.controller.algorithms.law_based_times import fill_for_moment, p
 from ringbalance.controller.algorithms.target_vector import TargetVector
 from ringbalance.controller.rotor import initial_unbalance
 from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
@@ -114,7 +115,9 @@ def _noise_at_limit(scene: Scene) -> float:
 def balanced_fills(scene: Scene, model: BalancerModel) -> FloatArray:
     """Fills of the positive chambers with which the disc cancels the unbalance, or comes nearest to it."""
     total = 2.0 * scene.disc.initial_fill
-    lowest, highest = _range(scene, model)
+    least, most = _range(scene, model)
+    lowest = max(least, min(residual_fill_ratio(scene, law=model.flow), scene.disc.initial_fill))
+    highest = min(most, total - lowest)
     ends = np.array([scene.disc.initial_fill, lowest, highest])
     now, low, high = model.moment.pair_moment(fill_ratio=ends, opposite_fill_ratio=total - ends)
     pairs = scene.disc.chambers // 2

@@ -28,6 +28,7 @@ from ringbalance.scene.chamber_file.reading import content_of, contents_of, is_s
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.chamber_file.shape import oriented
 from ringbalance.scene.chamber_file.step_file import STEP_UNIT
+from ringbalance.scene.chamber_file.stretching import STRETCHED
 from ringbalance.scene.chamber_file.topology import facets_of, topology_findings
 from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.faults import Fault
@@ -36,7 +37,7 @@ from ringbalance.scene.keys.derivations import even_number_of_chambers
 from ringbalance.scene.keys.reading import Reading
 from ringbalance.scene.rules.check import Finding, written
 
-_FOLLOWING: Final = ("outer_radius", "inner_radius", "axial_width", "central_angle", "plate_thickness")
+_FOLLOWING: Final = (*STRETCHED, "plate_thickness")
 """Keys of [disc] that a mesh decides."""
 _PORT: Final = "tube.port_radius"
 

@@ -24,12 +24,13 @@ class Broken(NamedTuple):
     keys: dict[str, str | int] = {}  # noqa: RUF012
 
 
-def spoilt(change: Callable[[Drawing], Drawing | None], kind: str = "tetra") -> Callable[[], bytes]:
+def spoilt(change: Callable[[Drawing], object], kind: str = "tetra") -> Callable[[], bytes]:
     """A drawing that a function changes, in place or by its result, as a Gmsh file."""
 
     def content() -> bytes:
         drawing = drawn(kind)
-        return msh_2(change(drawing) or drawing)
+        changed = change(drawing)
+        return msh_2(changed if isinstance(changed, Drawing) else drawing)
 
     return content
 
@@ -203,6 +204,12 @@ def two_apart(drawing: Drawing) -> Drawing:
     return without(drawing, *(number for number in drawing.elements if number not in keep))
 
 
+def exchanged(drawing: Drawing) -> None:
+    named(drawing, "outer_wall", "end_wall")
+    named(drawing, "inner_wall", "outer_wall")
+    named(drawing, "end_wall", "inner_wall")
+
+
 def in_part(drawing: Drawing) -> None:
     drawing.elements[drawing.cells()[0]].group = 0
 
@@ -250,11 +257,11 @@ MESHES: dict[str, Broken] = {
     ),
     "hanging node": Broken(spoilt(hanging), ("nodes hang", "(1): node 999 at (")),
     "cell twice": Broken(
-        spoilt(lambda d: add(d, "tetra", d.elements[d.cells()[3]].nodes) and None),
+        spoilt(lambda d: add(d, "tetra", d.elements[d.cells()[3]].nodes)),
         ("stand in the file twice",),
     ),
     "node twice in a cell": Broken(
-        spoilt(lambda d: add(d, "tetra", [1, 1, 2, 5]) and None), ("have a node twice (1): cell",)
+        spoilt(lambda d: add(d, "tetra", [1, 1, 2, 5])), ("have a node twice (1): cell",)
     ),
     "inverted": Broken(spoilt(inverted), ("cells are inverted (1 of 72): cell 169 at (",)),
     "flat": Broken(spoilt(flat), ("without volume",)),
@@ -275,7 +282,7 @@ MESHES: dict[str, Broken] = {
         ),
     ),
     "number for a name": Broken(
-        spoilt(lambda d: d.names.pop((2, 5)) and None), ('"physical group 5"', "facet (element")
+        spoilt(lambda d: d.names.pop((2, 5))), ('"physical group 5"', "facet (element")
     ),
     "volume of another name": Broken(
         spoilt(lambda d: named(d, "chamber", "chambre")), ('"chambre" are not the chamber (did you mean',)
@@ -297,16 +304,7 @@ MESHES: dict[str, Broken] = {
         ('named "outer_wall" are no side of any cell (1): facet (element',),
     ),
     "other mid-side nodes": Broken(spoilt(crack, "tetra10"), ("other mid-side nodes than their cells",)),
-    "names exchanged": Broken(
-        spoilt(
-            lambda d: (
-                named(d, "outer_wall", "x"),
-                named(d, "inner_wall", "outer_wall"),
-                named(d, "x", "inner_wall"),
-            )[0]
-        ),
-        ("names exchanged",),
-    ),
+    "names exchanged": Broken(spoilt(exchanged), ("names exchanged",)),
     "unit missing": Broken(lambda: msh_4(drawn()), ("[disc] mesh_unit is missing",), keys={"mesh_unit": ""}),
     "too large for a disc": Broken(
         lambda: msh_4(drawn()), ("40000 mm: wrong mesh_unit",), keys={"mesh_unit": "m"}

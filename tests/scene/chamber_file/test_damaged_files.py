@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import meshio
@@ -29,7 +30,7 @@ def _vtu(folder: Path, *, binary: bool) -> bytes:
     return (folder / "own.vtu").read_bytes()
 
 
-FILES = {
+FILES: dict[str, tuple[str, Callable[[Path], bytes]]] = {
     "text 2.2": ("chamber.msh", lambda _: msh_2(drawn())),
     "text 4.1": ("chamber.msh", lambda _: msh_4(drawn("tetra10"))),
     "binary 2.2": ("chamber.msh", lambda folder: _binary(folder, "gmsh22")),

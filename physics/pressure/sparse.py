@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from functools import reduce
+
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.linalg import splu
 
 from ringbalance.mesh.chamber import ChamberMesh
-from ringbalance.mesh.tensor_cells import products
 from ringbalance.physics.pressure.assembly import Stiffness, gauss_line
 from ringbalance.scene.arrays import FloatArray
 
@@ -17,7 +18,7 @@ def stiffness_matrix(chamber: ChamberMesh) -> csr_matrix:
     dimension, line = chamber.dimension, gauss_line(chamber.order)
     gradients = np.stack(
         [
-            products([(line.slopes if axis == own else line.values) for axis in range(dimension)])
+            reduce(np.kron, [line.slopes if axis == own else line.values for axis in range(dimension)])
             for own in range(dimension)
         ]
     )

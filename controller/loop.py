@@ -158,6 +158,8 @@ class _Run:
     """Injections shortened or left out so that the driven chamber keeps its residual fill."""
     refused: tuple[str, ...] = ()
     """Chambers of those in the last command."""
+    at_residual: frozenset[int] = frozenset()
+    """Chambers whose last injection was one of those, and that no injection has filled since."""
     cut: bool = False
     """Whether the time limit has shortened a valve-open time or a wait."""
 
@@ -178,7 +180,7 @@ class _Run:
         memory = self.controller.start()
         for _ in range(MAX_SAMPLES):
             progress(self.time, self.scene.run.time_limit)
-            measurement = self.sensor(self.time, self._vibration())
+            measurement = self._measured()
             memory, command = self.controller.step(memory, measurement)
             self.samples.append(Sample(time=self.time, measurement=measurement, command=command))
             self._watch(measurement)
@@ -187,6 +189,11 @@ class _Run:
                 return cause
             self._gas(command)
         return Cause.SAMPLES
+
+    def _measured(self) -> Measurement | None:
+        seen, chambers = self.sensor(self.time, self._vibration()), range(self.plant.chambers)
+        without = tuple(chamber in self.at_residual for chamber in chambers)
+        return None if seen is None else replace(seen, at_residual=without)
 
     def _vibration(self) -> complex:
         moment = disc_unbalance(moment=self.plant.model.moment, fill_ratio=self.state.fills())
@@ -268,9 +275,10 @@ class _Run:
             for i, time in found.items()
             if time == asked[i] or time >= settings.minimum_gas_time + offsets[i]
         }
-        letters = chamber_letters(self.plant.chambers)
-        self.refused = tuple(letters[i] for i, time in asked.items() if kept.get(i) != time)
-        self.shortened += len(self.refused)
+        letters, n = chamber_letters(self.plant.chambers), self.plant.chambers
+        short = [i for i, time in asked.items() if kept.get(i) != time]
+        self.refused, self.shortened = tuple(letters[i] for i in short), self.shortened + len(short)
+        self.at_residual = self.at_residual.difference(asked, ((i + n // 2) % n for i in asked)).union(short)
         return kept
 
     def _conclude(self, count: int) -> None:

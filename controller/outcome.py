@@ -12,6 +12,9 @@ from ringbalance.controller.judgement import NOISE_DEVIATIONS
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.liquid_ring.reach import (
     BEYOND_CAPACITY,
+    LEAST_PRESSURE,
+    NEARLY_EMPTY,
+    RUNS_BACK,
     largest_pair_moment,
     starting_pressure,
     unreachable_vibration,
@@ -27,12 +30,6 @@ from ringbalance.scene.models import Scene
 MICROMETRE: Final = 1e-6
 GRAM_MILLIMETRE: Final = 1e-6
 MANY_OVERSHOOTS: Final = 2
-MANY_CHAMBERS: Final = 4
-"""Beyond these more than two pairs share the work."""
-NEARLY_EMPTY: Final = 1e-6
-"""Fill ratio at which a chamber's last liquid is looked at."""
-LEAST_PRESSURE: Final = 1.0
-"""Gauge, Pa, at which the search for a pressure that starts a flow begins without one."""
 NO_SAMPLE: Final = "no usable sample"
 """Reason that every algorithm gives for doing nothing on a dropped sample or a NaN."""
 
@@ -277,14 +274,8 @@ def _capacity(facts: Facts) -> str:
 
 
 def _empty(facts: Facts) -> str:
-    control = facts.scene.controller
     chamber = facts.refused[0] if facts.refused else _longest(facts).chamber
     cure = "check rotor.influence_coefficient, the assumed lag angle, and the sense of rotation"
-    if facts.plant.chambers > MANY_CHAMBERS and control.kind != "law_based":
-        cure = (
-            f"{control.kind} asks no other pairs for what an empty chamber cannot give: controller.kind = "
-            f'"law_based" does; or {cure}'
-        )
     return (
         f"{_not_settled(facts)}; no usable liquid is left in chamber {chamber} although the "
         f"unbalance is within the disc's capacity: {cure}"
@@ -314,8 +305,7 @@ def _diverging(facts: Facts) -> str:
 def _drifting(facts: Facts) -> str:
     return (
         f"{_not_settled(facts)}; the full tube lets liquid run back while the gas is off (up to "
-        f"{facts.drift:.3g} in fill between samples): raise rotor.speed or lower tube.hump_radius so "
-        "that the column breaks, or vent the tube"
+        f"{facts.drift:.3g} in fill between samples): {RUNS_BACK}"
     )
 
 

@@ -29,7 +29,7 @@ def exact_inputs(result: FitResult) -> list[str]:
 
 
 def fit_document(
-    result: FitResult, *, data: Sequence[Observations], told: Review, following: NextMeasurement | None
+    result: FitResult, *, data: Sequence[Observations], told: Review, following: NextMeasurement
 ) -> dict[str, Any]:
     """What `ringbalance fit --json` prints."""
     scene = result.optimum.residuals.problem.scene
@@ -43,13 +43,14 @@ def fit_document(
         "noise": [_noise(each) for each in result.noise],
         "residuals": [_residuals(each) for each in result.residuals],
         "held": dict(result.held),
+        "pulls": dict(result.pulls),
         "exact": exact_inputs(result),
         "loss": result.loss,
         "starts": result.starts,
         "evaluations": result.evaluations,
         "log_likelihood": result.log_likelihood,
         "criticism": _criticism(told),
-        "next_measurement": None if following is None else _following(following),
+        "next_measurement": _following(following),
     }
 
 

@@ -150,6 +150,8 @@ class CaseDefinition(_Record):
     reference: _ReferenceText
     judged_on: Literal["scene", "paper"] = "scene"
     """Whether the scene at hand is judged, or always the paper's own disc, or rotor with eccentric masses."""
+    shape: Literal["any", "sector"] = "any"
+    """Whether an imported chamber can be judged, or only the sector between plates that the keys give."""
     cause: Cause = ""
     """Why a claim does not simply hold: one of `CAUSES`; shared by claims that fail together."""
     judgement: str = ""

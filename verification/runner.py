@@ -26,6 +26,9 @@ Progress = Callable[[CaseResult], None]
 PAPER_SCENE = "liquid_ring_paper"
 DRIVEN = "eccentric_mass"
 """The paper on eccentric masses."""
+_ABOUT_A_SECTOR = (
+    "it is about the sector between plates that the keys of [disc] give; this scene's chamber is imported"
+)
 Group = tuple[str, ...]
 """Cases that run in one process, one after the other."""
 Started = dict[Group, Future[tuple[CaseResult, ...]]]
@@ -66,6 +69,8 @@ def run_definition(
     outcome = partial(_outcome, definition, scene=scene, level=level)
     if definition.cost == "heavy" and level == "light":
         return outcome(status="heavy: run with --level heavy")
+    if definition.shape == "sector" and _imported(scene):
+        return outcome(status=_ABOUT_A_SECTOR)
     mutation = None if defect is None else _mutation(definition, defect)
     try:
         mutated = scene if mutation is None else overridden(scene, mutation.scene)
@@ -134,6 +139,10 @@ def _outcome(
         scene_name=scene.name,
         scene_sha256=scene.values_sha256,
     )
+
+
+def _imported(scene: Any) -> bool:
+    return isinstance(scene, Scene) and scene.disc.geometry is not None
 
 
 def _scene_of(definition: CaseDefinition, scene: Scene) -> Any:

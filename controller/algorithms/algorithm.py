@@ -21,6 +21,8 @@ class Measurement:
     """m, zero-to-peak."""
     phase: float
     """rad, any multiple of a full turn away."""
+    at_residual: tuple[bool, ...] = ()
+    """Of every chamber, whether its last injection was shortened to keep its residual fill; empty: none."""
 
 
 @dataclass(frozen=True, kw_only=True)

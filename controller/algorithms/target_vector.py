@@ -33,7 +33,8 @@ class TargetVector:
 
     e is the measured amplitude, dt the actual interval between samples, the integral by trapezoids, as in
     LabVIEW's PID.  The vector points to the unbalance, phase + lag; its valve-open time goes to the two
-    chambers on either side, each by its component, with both valves open together.
+    chambers on either side, each by its component, with both valves open together.  A chamber that has no
+    more liquid to give is passed over for its neighbour.
 
     Limits: T is held within [0, maximum_gas_time], which keeps the vector's direction; while it is cut the
     integral stands still (anti-windup).  A valve whose share is below minimum_gas_time does not open;
@@ -90,6 +91,7 @@ class TargetVector:
             chambers=self.chambers,
             angle=measurement.phase + self.lag_angle,
             length=min(max(wanted, 0.0), self.maximum_gas_time),
+            at_residual=measurement.at_residual,
         )
         valves = valve_commands(
             shares,
@@ -119,13 +121,19 @@ class TargetVector:
         )
 
 
-def components(*, chambers: int, angle: float, length: float) -> tuple[tuple[int, float], ...]:
+def components(
+    *, chambers: int, angle: float, length: float, at_residual: tuple[bool, ...] = ()
+) -> tuple[tuple[int, float], ...]:
     """Split a vector over the chamber directions on either side of it; (chamber, share >= 0) each.
 
-    With the spacing D = 2 pi/n and d the angle past the chamber before it, the shares are length sin(D -
-    d)/sin D and length sin(d)/sin D; four chambers: T|cos|, T|sin|. Two chambers have one axis: the share is
-    the component along it.
+    With the angle D between the two, the spacing 2 pi/n, and d the angle past the first, the shares are
+    length sin(D - d)/sin D and length sin(d)/sin D; four chambers: T|cos|, T|sin|. Two chambers have one
+    axis: the share is the component along it.
+    With six chambers or more one that is `at_residual` is passed over for the next one on its side, as long
+    as D stays below pi.  Beyond it, and so with four chambers, the two that are left cannot form the vector:
+    it is split over its nearest directions.
     Source: section 4.2 of the liquid-ring paper, by oblique components for other numbers of chambers.
     """
-    first, share, second, other = vector_shares(chambers, angle, length)
+    without = at_residual or (False,) * chambers
+    first, share, second, other = vector_shares(chambers, angle, length, without)
     return ((first, share),) if chambers == 2 else ((first, share), (second, other))

@@ -101,6 +101,7 @@ def kept(shared: Record, run: Record, found: float, duration: float, chamber: in
     if found == duration:
         return duration
     run.shortened += 1
+    run.at_residual[chamber] = 1
     return found if found >= shared.minimum_gas_time + shared.offset[chamber] else 0.0
 
 

@@ -155,6 +155,7 @@ RUN: Final = np.dtype(
     [(name, np.float64) for name in _RUN_REAL]
     + [(name, np.int64) for name in _RUN_WHOLE]
     + [(name, np.float64, (MAX_CHAMBERS // 2,)) for name in _RUN_PAIRS]
-    + [("gas_line", np.float64, (len(GAS_LINE),))]
+    + [("gas_line", np.float64, (len(GAS_LINE),)), ("at_residual", np.int64, (MAX_CHAMBERS,))]
 )
-"""One member's run; `gas_line`: its own values of `GAS_LINE`."""
+"""One member's run; `gas_line`: its own values of `GAS_LINE`; `at_residual`: of every chamber, whether its
+last injection was shortened to keep its residual fill, and none has filled it since."""

@@ -343,7 +343,9 @@ def _decide(shared: Record, run: Record) -> None:
     )
     run.before_amplitude, run.before_phase, run.before_time = run.seen_amplitude, run.seen_phase, run.time
     length = min(max(wanted, 0.0), shared.maximum_gas_time)
-    first, share, second, other = _vector_shares(shared.chambers, run.seen_phase + shared.assumed_lag, length)
+    first, share, second, other = _vector_shares(
+        shared.chambers, run.seen_phase + shared.assumed_lag, length, run.at_residual
+    )
     run.pair, run.other_pair = -1, -1
     _open(shared, run, first, share)
     _open(shared, run, second, other)
@@ -357,6 +359,7 @@ def _open(shared: Record, run: Record, chamber: int, share: float) -> None:
         return
     half, left = shared.chambers // 2, shared.time_limit - run.time
     duration, run.cut = min(time, left), 1 if time > left else run.cut
+    run.at_residual[chamber], run.at_residual[(chamber + half) % shared.chambers] = 0, 0
     if run.pair < 0:
         run.pair, run.first, run.duration = chamber % half, int(chamber < half), duration
     else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 
 def vector_gas_time(
@@ -37,9 +38,12 @@ def vector_gas_time(
     return wanted, integral
 
 
-def vector_shares(chambers: int, angle: float, length: float) -> tuple[int, float, int, float]:
+def vector_shares(
+    chambers: int, angle: float, length: float, at_residual: Sequence[bool]
+) -> tuple[int, float, int, float]:
     """Split a vector over the two chamber directions on either side of it; see `target_vector.components`.
 
+    Args: `at_residual`: of every chamber, whether it is passed over for the next one.
     Returns: Chamber index and share of either; a share of zero where one chamber takes all.
     """
     if chambers == 2:
@@ -47,12 +51,20 @@ def vector_shares(chambers: int, angle: float, length: float) -> tuple[int, floa
         return (0, along, 1, 0.0) if along >= 0.0 else (1, -along, 0, 0.0)
     spacing = 2.0 * math.pi / chambers
     turn = angle % (2.0 * math.pi)
-    before = min(int(turn / spacing), chambers - 1)
-    past, scale = turn - before * spacing, length / math.sin(spacing)
+    nearest = min(int(turn / spacing), chambers - 1)
+    before, after = nearest, nearest + 1
+    while at_residual[before % chambers] and after - before < chambers:
+        before -= 1
+    while at_residual[after % chambers] and after - before < chambers:
+        after += 1
+    if 2 * (after - before) >= chambers:
+        before, after = nearest, nearest + 1
+    between, past = (after - before) * spacing, turn - before * spacing
+    scale = length / math.sin(between)
     return (
-        before,
-        scale * max(math.sin(spacing - past), 0.0),
-        (before + 1) % chambers,
+        before % chambers,
+        scale * max(math.sin(between - past), 0.0),
+        after % chambers,
         scale * max(math.sin(past), 0.0),
     )
 

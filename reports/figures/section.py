@@ -8,7 +8,8 @@ from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patches import Circle, Rectangle
+from matplotlib.patches import Circle, PathPatch
+from matplotlib.path import Path
 
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
@@ -26,7 +27,8 @@ _TUBE: Final[dict[str, Any]] = {"color": style.PAPER, "linewidth": 2.0}
 def disc_section(found: Record) -> Drawing:
     """Section of the disc with its dimensions.
 
-    Args: `found`: `disc` of the evidence: lengths in m, angles in rad, the fill that is drawn.
+    Args: `found`: `disc` of the evidence: lengths in m, angles in rad, the fill that is drawn and, of an
+        imported chamber, its sections under "outlines".
     """
     size = {
         key.removesuffix("_m"): value * _MILLIMETRES
@@ -44,7 +46,7 @@ def disc_section(found: Record) -> Drawing:
             panel.set(xlim=(-half, half), ylim=(-reach, reach), aspect="equal")
             panel.set_axis_off()
         _across(across, found, size)
-        _along(along, size)
+        _along(along, found, size)
 
     r1, r2, width = (given(found[key], "m") for key in ("inner_radius_m", "outer_radius_m", "axial_width_m"))
     fill = number(found["fill_ratio"], digits=2)
@@ -88,15 +90,57 @@ def _sector(inner: float, outer: float, middle: float, half: float, strip: float
     )
 
 
+def _outlines(found: Record, size: dict[str, float]) -> tuple[list[FloatArray], list[FloatArray]]:
+    """Closed lines around the first chamber's space across the shaft, (x, y), and along it, (z, x)."""
+    drawn = found.get("outlines")
+    if drawn is not None:
+        across, along = (
+            [np.array(loop) * _MILLIMETRES for loop in drawn[plane]] for plane in ("across_m", "along_m")
+        )
+        return across, [loop[:, ::-1] for loop in along]
+    inner, outer, half = size["inner_radius"], size["outer_radius"], size["axial_width"] / 2
+    sector = _sector(inner, outer, 0.0, found["central_angle_rad"] / 2, size["plate_thickness"])
+    return [sector], [np.array([[-half, inner], [half, inner], [half, outer], [-half, outer]])]
+
+
+def _area(loops: Sequence[FloatArray]) -> Path:
+    """What lies within the outermost lines and outside those within them."""
+    parts = []
+    for loop in loops:
+        within = sum(Path(other).contains_point(loop[0]) for other in loops if other is not loop)
+        x, y = loop.T
+        rising = np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y) > 0
+        turned = loop if rising == (within % 2 == 0) else loop[::-1]
+        parts.append(Path(np.vstack([turned, turned[:1]]), closed=True))
+    return Path.make_compound_path(*parts)
+
+
+def _filled(panel: Axes, area: Path, liquid: Path) -> None:
+    """A chamber's gas, and its liquid where the place is one of `liquid`."""
+    panel.add_patch(PathPatch(area, facecolor=style.SURFACE, edgecolor=style.INK, linewidth=0.6))
+    wet = PathPatch(area, facecolor=style.MAP[7], edgecolor=style.INK, linewidth=0.6)
+    panel.add_patch(wet)
+    wet.set_clip_path(liquid, panel.transData)
+    panel.add_patch(PathPatch(area, facecolor="none", edgecolor=style.INK, linewidth=0.6))
+
+
+def _turned(loops: Sequence[FloatArray], angle: float) -> list[FloatArray]:
+    turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
+    return [loop @ turn for loop in loops]
+
+
 def _across(panel: Axes, found: Record, size: dict[str, float]) -> None:
     inner, outer, surface = size["inner_radius"], size["outer_radius"], size["free_surface_radius"]
     strip, half = size["plate_thickness"], found["central_angle_rad"] / 2
     panel.add_patch(Circle((0, 0), outer, facecolor=style.MAP[3], edgecolor=style.INK, linewidth=1))
+    loops, _ = _outlines(found, size)
+    ring = _area([_arc(1.1 * outer, 0, 2 * math.pi), _arc(surface, 0, 2 * math.pi)])
     for index in range(found["chambers"]):
         middle = 2 * math.pi * index / found["chambers"]
-        for reach, colour in ((inner, style.SURFACE), (surface, style.MAP[7])):
-            shape = _sector(reach, outer, middle, half, strip)
-            panel.fill(*shape.T, facecolor=colour, edgecolor=style.INK, linewidth=0.6)
+        area = _area(_turned(loops, middle))
+        _filled(panel, area, ring)
+        level = Circle((0, 0), surface, facecolor="none", edgecolor=style.INK, linewidth=0.6)
+        panel.add_patch(level).set_clip_path(area, panel.transData)
         place = (inner + surface) / 2 * np.exp(1j * (middle + 0.62 * half))
         panel.text(place.real, place.imag, chr(ord("A") + index), ha="center", va="center", weight="bold")
     panel.plot(0, 0, "+", color=style.INK, markersize=9)
@@ -111,6 +155,8 @@ def _across(panel: Axes, found: Record, size: dict[str, float]) -> None:
         edge = np.outer([0, 1.14 * outer], [math.cos(half), sign * math.sin(half)])
         panel.plot(*edge.T, color=style.MUTED, linewidth=0.7, linestyle=(0, (6, 2, 1, 2)))
     panel.text(1.13 * outer, 0.12 * outer, f"θ {number(math.degrees(found['central_angle_rad']), digits=3)}°")
+    if "outlines" in found:
+        return
     wall = 0.9 * outer * np.exp(1j * (half - strip / outer / 2))
     _note(
         panel, f"t {number(strip, digits=3)} each side", (wall.real, wall.imag), (0.72 * outer, 1.25 * outer)
@@ -161,21 +207,18 @@ def _note(panel: Axes, text: str, at: tuple[float, float], place: tuple[float, f
     )
 
 
-def _along(panel: Axes, size: dict[str, float]) -> None:
+def _along(panel: Axes, found: Record, size: dict[str, float]) -> None:
     inner, outer, surface = size["inner_radius"], size["outer_radius"], size["free_surface_radius"]
     half = size["axial_width"] / 2
     wall = 0.06 * outer
+    _, loops = _outlines(found, size)
+    reach = 1.1 * np.array([half, outer])
     for sign in (-1, 1):
-        low = {1: inner, -1: -outer}[sign]
-        panel.add_patch(
-            Rectangle((-half, low), 2 * half, outer - inner, facecolor=style.SURFACE, edgecolor=style.INK)
-        )
-        wet = {1: surface, -1: -outer}[sign]
-        panel.add_patch(
-            Rectangle(
-                (-half, wet), 2 * half, outer - surface, facecolor=style.MAP[7], edgecolor=style.INK, lw=0.6
-            )
-        )
+        level = sign * surface
+        liquid = np.array([[-1, level], [1, level], [1, sign * reach[1]], [-1, sign * reach[1]]])
+        liquid[:, 0] *= reach[0]
+        _filled(panel, _area([loop * [1, sign] for loop in loops]), Path(liquid))
+        panel.plot([-half, half], [level, level], color=style.INK, linewidth=0.6)
         panel.plot([half, half + wall], [sign * size["port_radius"] * 0.985] * 2, **_TUBE)
     crest = size.get("crest_radius", 0.0)
     panel.plot([half + wall] * 3, [0.985 * size["port_radius"], crest, -0.985 * size["port_radius"]], **_TUBE)

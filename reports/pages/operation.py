@@ -6,17 +6,21 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.mesh.outline import outlines
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reports.figures.operation import operating_map
 from ringbalance.reports.figures.section import disc_section
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.scene.arrays import IntArray
+from ringbalance.scene.chamber_file.record import ChamberGeometry
 
 _FILLS: Final = 101
 _PRESSURES: Final = 121
 _HIGHEST: Final = 1.5
 """Top of the map over the scene's gas pressure, or over the priming pressure where that is higher."""
+_PLACES: Final = 7
+"""Of an outline, m."""
 _SPILLING: Final = "spilling"
 _NAMES: Final = (*(regime.label for regime in Regime), _SPILLING)
 
@@ -55,9 +59,10 @@ def _collect(work: Work) -> Record:
 
 
 def _disc(work: Work) -> Record:
-    """The disc's dimensions and first fill."""
+    """The disc's dimensions and first fill; of an imported chamber its sections too."""
     disc, tube = work.scene.disc, work.scene.tube
-    return {
+    imported = {} if disc.geometry is None else {"outlines": _outlines(disc.geometry)}
+    return imported | {
         "chambers": disc.chambers,
         "central_angle_rad": disc.central_angle,
         "outer_radius_m": disc.outer_radius,
@@ -70,6 +75,14 @@ def _disc(work: Work) -> Record:
         "bore_m": tube.bore,
         "length_m": tube.length,
         "origins": {key: work.scene.origin_of(f"tube.{key}") for key in ("bore", "length", "hump_radius")},
+    }
+
+
+def _outlines(geometry: ChamberGeometry) -> Record:
+    """Sections through the middle of a chamber, across the shaft, (x, y), and along it, (x, z), m."""
+    return {
+        name: [np.round(loop, _PLACES).tolist() for loop in outlines(geometry, axis=axis)]
+        for name, axis in (("across_m", 2), ("along_m", 1))
     }
 
 

@@ -27,6 +27,8 @@ from ringbalance.controller.tuning.loop_factor import (
 )
 from ringbalance.controller.tuning.recommendation import recommended_gain
 from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.paper_law import paper_model
+from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.scene.models import Scene
 
 STEPS = 200_000
@@ -66,6 +68,15 @@ def test_the_rate_is_what_a_short_injection_does(scene: Scene, model: BalancerMo
         after = plant.advance(state, gas_times={chamber: short}, duration=short, points=1).state
         change = abs(seen(after) - seen(state)) / short
         assert change == pytest.approx(rates[chamber % 2, chamber // 2], rel=1e-4)
+
+
+def test_the_balanced_fills_of_many_chambers_keep_the_residual_fill(scene: Scene) -> None:
+    eight = replace(scene, disc=replace(scene.disc, chambers=8, central_angle=math.pi / 4))
+    model = paper_model(eight)
+    fills = balanced_fills(eight, model)
+    assert np.min(fills) == pytest.approx(residual_fill_ratio(eight, law=model.flow))
+    moment = disc_unbalance(moment=model.moment, fill_ratio=(*fills, *(0.5 - fills)))
+    assert abs(complex(vibration(rotor=scene.rotor, moment=moment))) < 1e-9
 
 
 def test_the_rate_at_level_chambers_is_kappa_lambda_rho_s_u(scene: Scene, model: BalancerModel) -> None:

@@ -72,6 +72,33 @@ def test_two_chambers_take_the_component_along_their_axis(degrees: float, chambe
     )
 
 
+@given(
+    n=st.sampled_from([4, 6, 8, 10]),
+    angle=st.floats(-20, 20),
+    without=st.frozensets(st.integers(0, 9)),
+)
+def test_a_chamber_at_its_residual_fill_is_passed_over_where_the_others_can_form_the_vector(
+    n: int, angle: float, without: frozenset[int]
+) -> None:
+    at_residual = tuple(place in without for place in range(n))
+    shares = components(chambers=n, angle=angle, length=1.0, at_residual=at_residual)
+    directions, wanted = chamber_directions(n), np.exp(1j * angle)
+    assert sum(share * directions[chamber] for chamber, share in shares) == pytest.approx(wanted, abs=1e-12)
+    assert all(share >= 0 for _, share in shares)
+    # What is left forms the vector if some of it lies on either side, less than half a turn apart.
+    left = [directions[place] for place in range(n) if not at_residual[place]]
+    turns = np.sort(np.angle(np.array(left) / wanted)) if left else np.zeros(0)
+    sides = turns[turns <= 1e-12], turns[turns >= -1e-12]
+    forms = all(side.size for side in sides) and sides[1][0] - sides[0][-1] < math.pi - 1e-9
+    used = {chamber for chamber, share in shares if share > 1e-9}
+    if forms:
+        assert not any(at_residual[chamber] for chamber in used)
+    if n == 4:
+        assert used == {
+            chamber for chamber, share in components(chambers=4, angle=angle, length=1.0) if share > 1e-9
+        }
+
+
 def test_gas_goes_to_the_chambers_near_the_unbalance() -> None:
     # Phase 0.2 and lag 0.3: the unbalance lies at 0.5 rad, between A and B.
     _, command = PID.step(PID.start(), sample(0.0, 4e-6))

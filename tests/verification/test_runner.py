@@ -17,6 +17,7 @@ from ringbalance.verification import runner
 from ringbalance.verification.assumptions import overridden
 from ringbalance.verification.case import CaseDefinition, parse_case
 from ringbalance.verification.evidence import Evidence, Found, Level, NotRunError, Reference
+from ringbalance.verification.reference.chamber_record import imported
 from ringbalance.verification.runner import mutate_definition, run_case, run_cases, run_definition
 from ringbalance.verification.verdicts import Verdict
 
@@ -211,3 +212,12 @@ def test_processes_give_what_one_process_gives(paper_scene: Scene) -> None:
     spread = run_cases(QUICK, scene=paper_scene, mutations=True, workers=2)
     for one, other in zip(alone, spread, strict=True):
         assert (one.verdict, one.numbers, one.mutations) == (other.verdict, other.numbers, other.mutations)
+
+
+def test_a_case_about_a_sector_says_why_it_does_not_judge_an_imported_chamber(paper_scene: Scene) -> None:
+    scene = dataclasses.replace(paper_scene, disc=imported(paper_scene.disc, cells=(1, 4, 1)))
+    result = run_case("claim_20_rectangular_element", scene=scene)
+    assert result.verdict is Verdict.NOT_RUN
+    assert "imported" in result.status
+    # On the paper's own disc, whatever scene is at hand.
+    assert run_case("claim_02_ring_radius", scene=scene).verdict is not Verdict.NOT_RUN

@@ -1,0 +1,315 @@
+"""The liquid in an imported chamber: its cells cut along the free surface, with nodes on that surface.
+
+Corners near the surface are first moved onto it where no wall is in the way, which avoids flat cells; every
+tetrahedron that the surface still crosses is divided where it crosses the edges.  New mid-nodes come from
+the map of the cell that was divided, so curved walls stay as they were; those of the free surface are moved
+onto it along the walls that they lie on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from ringbalance.mesh.quadratic_tetrahedra import (
+    EDGES,
+    FACES,
+    Tetrahedra,
+    compacted,
+    face_nodes,
+    lonely,
+    lowest_first,
+    shapes,
+    slopes,
+    with_middles,
+)
+from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
+
+FREE_SURFACE: Final = "free_surface"
+_SNAP: Final = 0.2
+"""Share of the shortest edge at a corner up to which the corner is moved onto the surface."""
+_ON: Final = 1e-7
+"""Distance over the length of an edge at which a corner counts as on the surface."""
+_FLAT: Final = 1e-9
+"""Squared sine of an angle between normals below which walls at a node count as one plane."""
+_FOLDED: Final = 0.05
+"""Least Jacobian of a cell after moves, over that before."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Level:
+    """Potential of centrifugal force and gravity over omega^2: liquid is where it is positive.
+
+    value = (x^2 + y^2)/2 + t . x - constant, m^2, with t = g/omega^2.
+    """
+
+    constant: float
+    """m^2; a^2/2 for a concentric surface."""
+    tilt: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """t, m, in the chamber's axes."""
+
+    def value(self, places: FloatArray) -> FloatArray:
+        """At places of shape (..., 3)."""
+        x, y = places[..., 0], places[..., 1]
+        return np.asarray((x**2 + y**2) / 2 + places @ np.array(self.tilt) - self.constant)
+
+    def gradient(self, places: FloatArray) -> FloatArray:
+        """Force on the liquid over rho omega^2, m, the shape of `places`."""
+        return np.asarray(places * np.array([1.0, 1.0, 0.0]) + np.array(self.tilt))
+
+
+def liquid_body(body: Tetrahedra, level: Level) -> Tetrahedra:
+    """The part of a chamber in which a level is positive; its new boundary is `free_surface`.
+
+    Raises: ValueError: the surface leaves no liquid, or does not meet the body at all.
+    """
+    snapped, on = _snapped(body, level)
+    value = np.where(on, 0.0, level.value(snapped.nodes))
+    sign = np.sign(value)[snapped.cells[:, :4]]
+    if not (sign > 0).any():
+        raise ValueError("no liquid is left outside the free surface: choose a smaller surface radius")
+    if not (sign <= 0).any():
+        raise ValueError("the free surface does not meet the chamber: choose a larger surface radius")
+    cut = _divided(snapped, level, value)
+    return compacted(_on_surface(cut, level))
+
+
+def _edge_lengths(body: Tetrahedra) -> FloatArray:
+    ends = body.nodes[body.cells[:, EDGES]]
+    return np.asarray(np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2))
+
+
+def _shortest(body: Tetrahedra) -> FloatArray:
+    """Length of the shortest edge at each node, infinite at mid-nodes."""
+    result = np.full(len(body.nodes), np.inf)
+    lengths = _edge_lengths(body)
+    for end in range(2):
+        np.minimum.at(result, body.cells[:, EDGES[:, end]], lengths)
+    return result
+
+
+def _tangents(body: Tetrahedra) -> FloatArray:
+    """Projectors onto the directions in which each node stays on the planes of its walls, (nodes, 3, 3)."""
+    spread = np.zeros((len(body.nodes), 3, 3))
+    at = np.concatenate([np.eye(3), (np.eye(3) + np.roll(np.eye(3), 1, axis=1)) / 2])
+    gradients = slopes(at)
+    for face in range(4):
+        here = body.faces[:, face] >= 0
+        nodes = face_nodes(body.cells[here], face)
+        tangent = np.einsum("enx,pna->epxa", body.nodes[nodes], gradients)
+        normal = np.cross(tangent[..., 0], tangent[..., 1])
+        normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+        np.add.at(spread, nodes, normal[..., :, None] * normal[..., None, :])
+    squares, axes = np.linalg.eigh(spread)
+    free = squares < _FLAT * np.maximum(squares[:, -1:], 1.0)
+    return np.asarray(np.einsum("nia,na,nja->nij", axes, free, axes))
+
+
+def _move(level: Level, places: FloatArray, tangents: FloatArray) -> FloatArray:
+    """Step along walls to the surface; zero where none leads there."""
+    along = np.einsum("nij,nj->ni", tangents, level.gradient(places))
+    square = np.einsum("ni,ni->n", along, along)
+    full = np.einsum("ni,ni->n", level.gradient(places), level.gradient(places))
+    usable = square > 0.1 * full
+    size = np.where(usable, -level.value(places) / np.where(usable, square, 1.0), 0.0)
+    return np.asarray(along * size[:, None])
+
+
+def _snapped(body: Tetrahedra, level: Level) -> tuple[Tetrahedra, BoolArray]:
+    """Corners near the surface moved onto it; which nodes are on it now."""
+    tangents, room = _tangents(body), _shortest(body)
+    corner = np.isfinite(room)
+    moved = body.nodes.copy()
+    for _ in range(3):
+        moved[corner] += _move(level, moved[corner], tangents[corner])
+    shift = moved - body.nodes
+    near = np.abs(level.value(moved)) < _ON * np.linalg.norm(level.gradient(moved), axis=1) * room
+    taken = corner & near & (np.linalg.norm(shift, axis=1) < _SNAP * np.where(corner, room, 0.0))
+    before = jacobians(body)
+    for _ in range(10):
+        result = _shifted(body, np.where(taken[:, None], shift, 0.0))
+        folded = jacobians(result).min(axis=1) < _FOLDED * before.min(axis=1)
+        if not (folded & taken[body.cells[:, :4]].any(axis=1)).any():
+            break
+        taken[body.cells[folded, :4]] = False
+    reach = np.linalg.norm(level.gradient(result.nodes), axis=1) * np.where(corner, room, 0.0)
+    return result, taken | (np.abs(level.value(result.nodes)) < _ON * reach)
+
+
+def _shifted(body: Tetrahedra, shift: FloatArray) -> Tetrahedra:
+    """Corners moved, and each mid-node by the mean of the moves at its edge's ends."""
+    nodes = body.nodes + shift
+    middle = body.cells[:, 4:].ravel()
+    nodes[middle] = body.nodes[middle] + shift[body.cells[:, EDGES]].mean(axis=2).reshape(-1, 3)
+    return replace(body, nodes=nodes)
+
+
+def jacobians(body: Tetrahedra) -> FloatArray:
+    """Determinants of dx/dX at the four corners and in the middle of each cell, shape (cells, 5)."""
+    gradients = slopes(np.vstack([np.eye(4), np.full(4, 0.25)]))
+    places = body.nodes[body.cells]
+    matrix = np.einsum("enx,pna->epxa", places - places[:, :1], gradients, optimize=True)
+    return np.asarray(np.einsum("epi,epi->ep", matrix[..., 0], np.cross(matrix[..., 1], matrix[..., 2])))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Cuts:
+    """Where edges cross the surface, for every cell and edge."""
+
+    number: IntArray
+    """Of the new node, shape (cells, 6); -1 where the edge does not cross."""
+    share: FloatArray
+    """Place along the edge from its first corner, 0 to 1."""
+    places: FloatArray
+    """Of the new nodes, shape (new, 3)."""
+
+
+def _cuts(body: Tetrahedra, level: Level, value: FloatArray) -> _Cuts:
+    ends = body.cells[:, EDGES]
+    crossing = np.sign(value[ends]).prod(axis=2) < 0
+    middles = body.cells[:, 4:][crossing]
+    kept, first, inverse = np.unique(middles, return_index=True, return_inverse=True)
+    first_end, second_end = ends[crossing][first].T
+    curve = body.nodes[np.stack([first_end, second_end, kept])]
+    share = _crossing(level, curve)
+    number = np.full(crossing.shape, -1)
+    number[crossing] = len(body.nodes) + inverse
+    along = np.zeros(crossing.shape)
+    # Neighbours may list an edge's ends the other way round.
+    same = ends[crossing][:, 0] == first_end[inverse]
+    along[crossing] = np.where(same, share[inverse], 1 - share[inverse])
+    return _Cuts(number=number, share=along, places=_on_curve(curve, share))
+
+
+def _on_curve(curve: FloatArray, share: FloatArray) -> FloatArray:
+    values = shapes(np.stack([1 - share, share, np.zeros_like(share)], axis=-1))[:, [0, 1, 3]]
+    return np.asarray(np.einsum("nk,knx->nx", values, curve))
+
+
+def _crossing(level: Level, curve: FloatArray) -> FloatArray:
+    """Share of each edge, start, end and middle given, at which it crosses: bisection."""
+    low, high = np.zeros(curve.shape[1]), np.ones(curve.shape[1])
+    start = np.sign(level.value(curve[0]))
+    for _ in range(50):
+        middle = (low + high) / 2
+        before = np.sign(level.value(_on_curve(curve, middle))) == start
+        low, high = np.where(before, middle, low), np.where(before, high, middle)
+    return np.asarray((low + high) / 2)
+
+
+# Corners 0 to 3, then the places on edges 0 to 5 as 4 to 9.
+def _faces_of_part(signs: tuple[int, ...]) -> tuple[IntArray, IntArray]:
+    """Local corners of the part of a tetrahedron that is liquid, and its faces as quadrilaterals.
+
+    A triangle repeats its last corner.
+    """
+    faces, surface = [], []
+    for corners in FACES:
+        ring: list[int] = []
+        for k in range(3):
+            here, after = int(corners[k]), int(corners[(k + 1) % 3])
+            if signs[here] >= 0:
+                ring.append(here)
+            if signs[here] * signs[after] < 0:
+                ring.append(4 + _EDGE_NUMBER[frozenset((here, after))])
+        if len(ring) < 3:
+            continue
+        faces.append(ring)
+        sides = {(ring[k], ring[(k + 1) % len(ring)]) for k in range(len(ring))}
+        surface += [(b, a) for a, b in sides if _is_on(signs, a) and _is_on(signs, b)]
+    # The sides that the surface has in common with the faces, in a ring.
+    chain = dict(surface)
+    if len(chain) > 2:
+        ring = [next(iter(chain))]
+        while chain[ring[-1]] != ring[0]:
+            ring.append(chain[ring[-1]])
+        faces.append(ring)
+    corners = sorted({corner for face in faces for corner in face})
+    return np.array(corners), np.array([face + face[-1:] * (4 - len(face)) for face in faces])
+
+
+def _is_on(signs: tuple[int, ...], corner: int) -> bool:
+    return corner > 3 or signs[corner] == 0
+
+
+_EDGE_NUMBER: Final = {frozenset((int(a), int(b))): k for k, (a, b) in enumerate(EDGES)}
+
+
+def _divided(body: Tetrahedra, level: Level, value: FloatArray) -> Tetrahedra:
+    cuts = _cuts(body, level, value)
+    signs = np.sign(value)[body.cells[:, :4]].astype(np.int64)
+    parents, barycentric, corners = [], [], []
+    own = np.concatenate([body.cells[:, :4], cuts.number], axis=1)
+    for pattern in np.unique(signs, axis=0):
+        here = np.flatnonzero((signs == pattern).all(axis=1))
+        if pattern.max() <= 0:
+            continue
+        local, which = _parts(tuple(pattern.tolist()), own[here])
+        parents.append(here[which])
+        corners.append(np.take_along_axis(own[here[which]], local, axis=1))
+        barycentric.append(_barycentric(local, cuts.share[here[which]]))
+    parent, where = np.concatenate(parents), np.concatenate(barycentric)
+    return _joined(body, cuts.places, parent, where, np.concatenate(corners))
+
+
+def _parts(signs: tuple[int, ...], corners: IntArray) -> tuple[IntArray, IntArray]:
+    """Tetrahedra of the liquid's part of cells with these signs, and the cell of each."""
+    if min(signs) >= 0:
+        return np.tile(np.arange(4), (len(corners), 1)), np.arange(len(corners))
+    kept, faces = _faces_of_part(signs)
+    local = lowest_first(corners[:, kept], np.searchsorted(kept, faces)).reshape(len(corners), -1, 4)
+    which, part = np.nonzero(local[..., 0] >= 0)
+    return kept[local[which, part]], which
+
+
+def _barycentric(local: IntArray, share: FloatArray) -> FloatArray:
+    """Coordinates in the divided cell of each part's corners, shape (parts, 4, 4)."""
+    result = np.eye(4)[np.minimum(local, 3)]
+    edge = np.maximum(local - 4, 0)
+    along = np.take_along_axis(share, edge, axis=1)[..., None]
+    on_edge = (1 - along) * np.eye(4)[EDGES[edge, 0]] + along * np.eye(4)[EDGES[edge, 1]]
+    return np.where((local > 3)[..., None], on_edge, result)
+
+
+def _joined(
+    body: Tetrahedra, places: FloatArray, parent: IntArray, where: FloatArray, corners: IntArray
+) -> Tetrahedra:
+    """The parts as one body, with mid-nodes by the map of the cells that they come from."""
+    values = shapes(where[:, EDGES].mean(axis=2))
+    middles = np.einsum("pek,pkx->pex", values, body.nodes[body.cells[parent]], optimize=True)
+    nodes, cells = with_middles(np.concatenate([body.nodes, places]), corners, middles)
+    # A face of a part lies on that face of the cell on which one coordinate is zero at its three corners.
+    inside = where[:, FACES]
+    lies = (inside == 0).all(axis=2)
+    named = np.where(lies, body.faces[parent][:, None, :], -1).max(axis=2)
+    free = lonely(cells, len(nodes)) & (named < 0)
+    return Tetrahedra(
+        nodes=nodes,
+        cells=cells,
+        faces=np.where(free, len(body.names), named),
+        names=(*body.names, FREE_SURFACE),
+    )
+
+
+def _on_surface(body: Tetrahedra, level: Level) -> Tetrahedra:
+    """Mid-nodes of the free surface moved onto it along the walls, but for those that would fold a cell."""
+    free = body.names.index(FREE_SURFACE)
+    walls = replace(body, faces=np.where(body.faces == free, -1, body.faces))
+    surface = np.concatenate(
+        [face_nodes(body.cells[body.faces[:, face] == free], face)[:, 3:].ravel() for face in range(4)]
+    )
+    surface = np.unique(surface)
+    tangents, moved = _tangents(walls)[surface], body.nodes.copy()
+    for _ in range(3):
+        moved[surface] += _move(level, moved[surface], tangents)
+    before = jacobians(body)
+    for _ in range(10):
+        result = replace(body, nodes=moved)
+        folded = jacobians(result).min(axis=1) < _FOLDED * before.min(axis=1)
+        if not folded.any():
+            break
+        straight = body.cells[folded]
+        moved[straight] = body.nodes[straight]
+    return result

@@ -1,0 +1,211 @@
+"""Quadratic tetrahedra: their shape functions, and the cells of any imported chamber as such tetrahedra.
+
+A hexahedron becomes the six tetrahedra from its corner of lowest number to the three faces that do not have
+that corner, each face divided by the diagonal from its own lowest corner: neighbours divide a common face
+alike.  Mid-nodes of diagonals lie where the cell's own map puts them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
+from ringbalance.scene.chamber_file.record import ChamberGeometry
+
+NAMELESS: Final = "other_walls"
+"""Boundary of all faces to which the file gives no name."""
+EDGES: Final = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])
+"""Corners of the edges on which nodes 4 to 9 lie: meshio's order."""
+FACES: Final = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+"""Corners of the face opposite each corner, seen from outside in the order of a positive cell."""
+_HEXAHEDRON_FACES: Final = np.array(
+    [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
+)
+_HEXAHEDRON_CORNERS: Final = np.array(
+    [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]]
+)
+_HEXAHEDRON_EDGES: Final = np.array(
+    [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]]
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tetrahedra:
+    """A body of quadratic tetrahedra with named boundaries."""
+
+    nodes: FloatArray
+    """Places, m, shape (n, 3)."""
+    cells: IntArray
+    """Shape (cells, 10), meshio's order."""
+    faces: IntArray
+    """Number of the boundary that each face of each cell lies on, shape (cells, 4); -1 inside the body."""
+    names: tuple[str, ...]
+    """Of the boundaries, by number."""
+
+
+def face_nodes(cells: IntArray, face: int) -> IntArray:
+    """The six nodes of one face of every cell, corners first, then the middles of its sides in turn."""
+    corners = FACES[face]
+    sides = [_edge(int(corners[k]), int(corners[(k + 1) % 3])) for k in range(3)]
+    return np.asarray(cells[:, [*corners, *(4 + side for side in sides)]])
+
+
+def _edge(first: int, second: int) -> int:
+    return int(np.flatnonzero((np.sort(EDGES, axis=1) == sorted((first, second))).all(axis=1))[0])
+
+
+def shapes(barycentric: FloatArray) -> FloatArray:
+    """Shape functions of the quadratic simplex, (..., 10) from (..., 4), or (..., 6) from (..., 3)."""
+    b = barycentric
+    edges = EDGES if b.shape[-1] == 4 else EDGES[:3]
+    return np.concatenate([b * (2 * b - 1), 4 * b[..., edges[:, 0]] * b[..., edges[:, 1]]], axis=-1)
+
+
+def slopes(barycentric: FloatArray) -> FloatArray:
+    """Their derivatives by the coordinates from the second on, shape (points, functions, dimension).
+
+    Args: `barycentric`: shape (points, dimension + 1).
+    """
+    points, corners = barycentric.shape
+    edges = EDGES if corners == 4 else EDGES[:3]
+    full = np.zeros((points, corners + len(edges), corners))
+    full[:, np.arange(corners), np.arange(corners)] = 4 * barycentric - 1
+    for row, (i, j) in enumerate(edges, start=corners):
+        full[:, row, i], full[:, row, j] = 4 * barycentric[:, j], 4 * barycentric[:, i]
+    return np.asarray(full[:, :, 1:] - full[:, :, :1])
+
+
+def lowest_first(cells: IntArray, faces: IntArray) -> IntArray:
+    """Tetrahedra of convex cells: from the corner of lowest number to all faces without it.
+
+    Args:
+        cells: global numbers of the corners, shape (cells, corners).
+        faces: local numbers of corners, shape (faces, 4), seen from outside in order; a triangle repeats its
+            last.
+    Returns: Local numbers of corners, shape (cells, faces, 2, 4), with -1 in those that do not exist.
+    """
+    count = len(cells)
+    rows = np.arange(count)[:, None]
+    apex = np.argmin(cells, axis=1)
+    # Each face begins at its lowest corner; the repeated corner of a triangle leaves one half empty.
+    start = np.argmin(cells[:, faces], axis=2)
+    turned = np.stack([faces[np.arange(len(faces))[None], (start + k) % 4] for k in range(4)], axis=2)
+    halves = np.stack([turned[..., [0, 1, 2]], turned[..., [0, 2, 3]]], axis=2)
+    result = np.concatenate([np.broadcast_to(apex[:, None, None, None], (*halves.shape[:3], 1)), halves], 3)
+    corners = cells[rows[..., None, None], result]
+    same = np.sort(corners, axis=3)
+    return np.where((np.diff(same, axis=3) == 0).any(axis=3, keepdims=True), -1, result)
+
+
+def tetrahedra(geometry: ChamberGeometry) -> Tetrahedra:
+    """The cells of a chamber as quadratic tetrahedra; straight edges get a node in their middle."""
+    corners = 4 if geometry.kind.startswith("tetra") else 8
+    if corners == 4:
+        cells, middles = geometry.cells[:, :4], _tetrahedron_middles(geometry)
+    else:
+        local = lowest_first(geometry.cells[:, :8], _HEXAHEDRON_FACES).reshape(len(geometry.cells), -1, 4)
+        parents, which = np.nonzero(local[..., 0] >= 0)
+        local = local[parents, which]
+        cells = np.take_along_axis(geometry.cells[parents, :8], local, axis=1)
+        middles = _hexahedron_middles(geometry, parents, local)
+    nodes, numbers = with_middles(geometry.points, cells, middles)
+    faces = _named_faces(geometry, cells, corners)
+    without_name = lonely(numbers, len(nodes)) & (faces < 0)
+    faces = np.where(without_name, len(geometry.boundaries), faces)
+    names = (*geometry.boundaries, *([NAMELESS] if without_name.any() else []))
+    return compacted(Tetrahedra(nodes=nodes, cells=numbers, faces=faces, names=names))
+
+
+def lonely(cells: IntArray, size: int) -> BoolArray:
+    """Whether each face of each cell belongs to that cell alone, shape (cells, 4)."""
+    keys = face_keys(cells[:, FACES], size)
+    _, inverse, count = np.unique(keys, return_inverse=True, return_counts=True)
+    return np.asarray((count[inverse] == 1).reshape(keys.shape))
+
+
+def _tetrahedron_middles(geometry: ChamberGeometry) -> FloatArray:
+    """Places of the six mid-nodes of each cell, shape (cells, 6, 3)."""
+    if geometry.cells.shape[1] == 10:
+        return np.asarray(geometry.points[geometry.cells[:, 4:]])
+    return np.asarray(geometry.points[geometry.cells[:, EDGES]].mean(axis=2))
+
+
+def _hexahedron_middles(geometry: ChamberGeometry, parents: IntArray, local: IntArray) -> FloatArray:
+    points, cells = geometry.points, geometry.cells
+    middle = _HEXAHEDRON_CORNERS[local][:, EDGES].mean(axis=2)
+    result = np.empty((len(local), 6, 3))
+    # 27 places at most: corners' means on edges, faces and in the middle of the reference cell.
+    codes = ((middle + 1) @ np.array([9, 3, 1])).astype(np.int64)
+    for code in np.unique(codes):
+        place = np.array([code // 9, code // 3 % 3, code % 3]) - 1.0
+        values = _hexahedron_shapes(place, cells.shape[1])
+        here = codes == code
+        result[here] = np.einsum("k,ekx->ex", values, points[cells[parents[np.nonzero(here)[0]]]])
+    return result
+
+
+def _hexahedron_shapes(place: FloatArray, functions: int) -> FloatArray:
+    """Shape functions of a hexahedron of 8, 20 or 27 nodes at one place, in meshio's order of nodes."""
+    corners = np.prod(1 + place * _HEXAHEDRON_CORNERS, axis=1) / 8
+    if functions == 8:
+        return np.asarray(corners)
+    ends = _HEXAHEDRON_CORNERS[_HEXAHEDRON_EDGES].mean(axis=1)
+    if functions == 20:
+        along = np.where(ends == 0, 1 - place**2, (1 + place * ends) / 2)
+        edges = np.prod(along, axis=1)
+        corrected = corners.copy()
+        for edge, value in zip(_HEXAHEDRON_EDGES, edges, strict=True):
+            corrected[edge] -= value / 2
+        return np.concatenate([corrected, edges])
+    sides = np.array([[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1], [0, 0, 0]])
+    at = np.concatenate([_HEXAHEDRON_CORNERS, ends, sides])
+    lines = np.where(at == 0, 1 - place**2, place * (place + at) / 2)
+    return np.asarray(np.prod(lines, axis=1))
+
+
+def with_middles(points: FloatArray, cells: IntArray, middles: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Nodes and cells with one mid-node for each edge, at the first place that is given for it."""
+    ends = np.sort(cells[:, EDGES], axis=2).astype(np.int64)
+    keys = ends[..., 0] * len(points) + ends[..., 1]
+    _, first, inverse = np.unique(keys, return_index=True, return_inverse=True)
+    nodes = np.concatenate([points, middles.reshape(-1, 3)[first]])
+    return nodes, np.concatenate([cells, len(points) + inverse.reshape(keys.shape)], axis=1)
+
+
+def _named_faces(geometry: ChamberGeometry, cells: IntArray, corners: int) -> IntArray:
+    """Number of the boundary of each face of each tetrahedron, from sets of corners."""
+    triangles, numbers = [], []
+    for number, facets in enumerate(geometry.boundaries.values()):
+        if corners == 4:
+            parts = [facets[:, :3]]
+        else:
+            # As `lowest_first` divides a face.
+            start = np.argmin(facets[:, :4], axis=1)[:, None]
+            turned = np.take_along_axis(facets[:, :4], (start + np.arange(4)) % 4, axis=1)
+            parts = [turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]]
+        triangles += parts
+        numbers += [np.full(len(part), number) for part in parts]
+    size = len(geometry.points)
+    known = face_keys(np.concatenate(triangles), size)
+    order = np.argsort(known)
+    wanted = face_keys(cells[:, FACES], size)
+    at = np.minimum(np.searchsorted(known[order], wanted), len(known) - 1)
+    return np.where(known[order][at] == wanted, np.concatenate(numbers)[order][at], -1)
+
+
+def face_keys(corners: IntArray, size: int) -> IntArray:
+    """One number for each set of three corners among `size` nodes, shape (...) from (..., 3)."""
+    low = np.sort(corners, axis=-1).astype(np.int64)
+    if size > 2_000_000:
+        raise ValueError("a chamber of more than two million nodes is too large: use a coarser mesh")
+    return np.asarray((low[..., 0] * size + low[..., 1]) * size + low[..., 2])
+
+
+def compacted(body: Tetrahedra) -> Tetrahedra:
+    """The same without nodes that no cell has."""
+    used, numbers = np.unique(body.cells, return_inverse=True)
+    cells = numbers.reshape(body.cells.shape)
+    return Tetrahedra(nodes=body.nodes[used], cells=cells, faces=body.faces, names=body.names)

@@ -1,0 +1,217 @@
+"""Pressure of the liquid at rest in an imported chamber, and what it does to each named boundary.
+
+laplace(p) = 2 rho omega^2 in the liquid, p = p_gas on the free surface and n . grad p = rho (omega^2 r e_r +
+g) . n on walls, by quadratic tetrahedra on a mesh that follows the free surface.  The force field has the
+potential of `Level`, so the exact pressure at every place is known; what the elements leave of it is the
+error of the discretisation.  What the facets of a wall leave of a smooth wall is estimated apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from ringbalance.mesh.liquid_body import FREE_SURFACE, Level, liquid_body
+from ringbalance.mesh.quadratic_tetrahedra import Tetrahedra, tetrahedra
+from ringbalance.physics.pressure.linear import LinearSolution, solve_linear
+from ringbalance.physics.pressure.solve import PressureProblem, RotatingLiquid
+from ringbalance.physics.pressure.tetrahedra import Facets, TetrahedronSpace
+from ringbalance.physics.results import Estimate, Statistics, Status, StatusCode
+from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.chamber_file.record import ChamberGeometry
+
+WALL: Final = "outer_wall"
+_VOLUME_TOLERANCE: Final = 1e-10
+_MOST_STEPS: Final = 20
+
+
+@dataclass(frozen=True, kw_only=True)
+class BoundaryLoad:
+    """What the liquid does to one boundary."""
+
+    force: Estimate
+    """N, shape (3,), in the chamber's axes."""
+    moment: Estimate
+    """About the middle of the shaft, N m, shape (3,)."""
+    area: float
+    """m^2, of the part that the liquid touches."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImportedRing:
+    """Liquid at rest in an imported chamber: totals."""
+
+    wall_pressure: Estimate
+    """Mean over the part of the outer wall that the liquid touches, gauge, Pa, shape ()."""
+    loads: Mapping[str, BoundaryLoad]
+    """By boundary, the free surface left out."""
+    volume: float
+    """m^3."""
+    first_moment: FloatArray
+    """rho times the integral of (x, y, z), kg m, shape (3,)."""
+    status: Status
+    statistics: Statistics
+
+
+def solved_ring(
+    *,
+    geometry: ChamberGeometry,
+    density: float,
+    angular_velocity: float,
+    surface_radius: float,
+    gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    gas_pressure: float = 0.0,
+) -> ImportedRing:
+    """Pressure and loads of the liquid outside a free surface.
+
+    Args:
+        surface_radius: a, m; with gravity, of the concentric surface that holds the same liquid.
+        gravity: in the chamber's axes, m/s^2, frozen at one instant.
+        gas_pressure: gauge, Pa.
+    Returns: ImportedRing; its uncertainties hold the error of the elements and of the walls' facets.  Status
+        NO_RING when gravity across the shaft exceeds omega^2 a, NOT_CONVERGED when a solve failed.
+    Raises: ValueError: values out of range, or a free surface that misses the chamber.
+    Source: Eqs. 9 to 11 of the liquid-ring paper as a boundary-value problem.
+    """
+    if not (density > 0 and angular_velocity != 0 and surface_radius > 0):
+        raise ValueError("density and surface_radius must be above zero, and angular_velocity not zero")
+    tilt = np.asarray(gravity) / angular_velocity**2
+    level = Level(constant=surface_radius**2 / 2, tilt=(float(tilt[0]), float(tilt[1]), float(tilt[2])))
+    no_ring = float(np.hypot(*tilt[:2])) >= surface_radius
+    start = Level(constant=level.constant) if no_ring else level
+    body, status = _held_volume(tetrahedra(geometry), start, surface_radius)
+    space = TetrahedronSpace(body=body.liquid)
+    liquid = RotatingLiquid(
+        density=density, angular_velocity=angular_velocity, gravity=gravity, gas_pressure=gas_pressure
+    )
+    linear = solve_on(space, liquid.problem())
+    exact = density * angular_velocity**2 * body.level.value(space.body.nodes) + gas_pressure
+    status = _NO_RING if no_ring else (status if linear.status.ok else linear.status)
+    return _ring(space, linear, exact, density, angular_velocity, status)
+
+
+_NO_RING: Final = Status(
+    code=StatusCode.NO_RING,
+    text="gravity across the shaft exceeds the centrifugal force at the free surface: turn faster",
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Held:
+    liquid: Tetrahedra
+    level: Level
+
+
+def body_volume(body: Tetrahedra) -> float:
+    """m^3."""
+    return float(TetrahedronSpace(body=body).weights.sum())
+
+
+def _held_volume(chamber: Tetrahedra, level: Level, radius: float) -> tuple[_Held, Status]:
+    """The level of this tilt that holds as much liquid as a concentric surface."""
+    liquid = liquid_body(chamber, level)
+    if not any(level.tilt):
+        return _Held(liquid=liquid, level=level), Status()
+    target = body_volume(liquid_body(chamber, Level(constant=radius**2 / 2)))
+    for _ in range(_MOST_STEPS):
+        surface = TetrahedronSpace(body=liquid).facets(FREE_SURFACE)
+        shortage = target - body_volume(liquid)
+        if abs(shortage) <= _VOLUME_TOLERANCE * target:
+            return _Held(liquid=liquid, level=level), Status()
+        # A level lower by d moves the surface out of the liquid by d / |gradient|.
+        growth = np.sum(surface.weights / np.linalg.norm(level.gradient(surface.points), axis=-1))
+        level = Level(constant=level.constant - shortage / float(growth), tilt=level.tilt)
+        liquid = liquid_body(chamber, level)
+    text = "no free surface under gravity holds this volume: use a finer mesh"
+    return _Held(liquid=liquid, level=level), Status(code=StatusCode.NOT_CONVERGED, text=text)
+
+
+def solve_on(space: TetrahedronSpace, problem: PressureProblem) -> LinearSolution:
+    """Nodal pressure, Pa, of a problem on the liquid's body: values given on the free surface alone.
+
+    Source: quadratic elements, order three in the pressure and four in its integrals.
+    """
+    load = -space.load(problem.source(space.points.T))
+    for name in space.boundaries:
+        if name != FREE_SURFACE:
+            facets = space.facets(name)
+            load += facets.load(_flux(problem, facets), unknowns=space.unknowns)
+    surface = np.unique(space.facets(FREE_SURFACE).nodes)
+    values = np.zeros(space.unknowns)
+    values[surface] = problem.surface_pressure(space.body.nodes[surface].T)
+    free = np.setdiff1d(np.arange(space.unknowns), surface)
+    rows = space.stiffness[free]
+    linear = solve_linear(
+        csr_matrix(rows[:, free]), load[free] - rows @ values, dimension=3, prolongation=_coarse(space, free)
+    )
+    values[free] = linear.values
+    return LinearSolution(values=values, status=linear.status, statistics=linear.statistics)
+
+
+def _coarse(space: TetrahedronSpace, free: IntArray) -> Callable[[], csr_matrix]:
+    return lambda: space.prolongation(free)
+
+
+def _flux(problem: PressureProblem, facets: Facets) -> FloatArray:
+    weights = facets.weights
+    normals = facets.area / weights[..., None]
+    flux = problem.wall_flux(np.moveaxis(facets.points, -1, 0), np.moveaxis(normals, -1, 0))
+    return np.asarray(flux * weights)
+
+
+def _ring(
+    space: TetrahedronSpace,
+    linear: LinearSolution,
+    exact: FloatArray,
+    density: float,
+    angular_velocity: float,
+    status: Status,
+) -> ImportedRing:
+    walls = {name: space.facets(name) for name in space.boundaries if name != FREE_SURFACE}
+    force = density * angular_velocity**2
+    loads = {name: _load(facets, linear.values, exact, force) for name, facets in walls.items()}
+    wall = walls[WALL]
+    mean, still = (_mean(wall, values) for values in (linear.values, exact))
+    weights = space.weights
+    return ImportedRing(
+        wall_pressure=Estimate(
+            value=np.array(mean), uncertainty=np.array(abs(mean - still) + _facet_pressure(wall, force))
+        ),
+        loads=loads,
+        volume=float(weights.sum()),
+        first_moment=density * weights @ space.points,
+        status=status,
+        statistics=linear.statistics,
+    )
+
+
+def _mean(facets: Facets, nodal: FloatArray) -> float:
+    weights = facets.weights
+    return float(np.sum(weights * facets.at_points(nodal)) / weights.sum())
+
+
+def _facet_pressure(facets: Facets, force: float) -> float:
+    """Pressure over the depth between facets and a smooth wall, Pa."""
+    outer = float(np.hypot(facets.points[..., 0], facets.points[..., 1]).max())
+    return force * outer * facets.depth_to_smooth()
+
+
+def _load(facets: Facets, nodal: FloatArray, exact: FloatArray, force: float) -> BoundaryLoad:
+    found, still = (_resultants(facets, values) for values in (nodal, exact))
+    area = float(facets.weights.sum())
+    reach = float(np.linalg.norm(facets.points, axis=-1).max())
+    facet = _facet_pressure(facets, force) * area * np.array([[1.0], [reach]])
+    estimates = [
+        Estimate(value=value, uncertainty=np.abs(value - other) + extra)
+        for value, other, extra in zip(found, still, facet, strict=True)
+    ]
+    return BoundaryLoad(force=estimates[0], moment=estimates[1], area=area)
+
+
+def _resultants(facets: Facets, nodal: FloatArray) -> tuple[FloatArray, FloatArray]:
+    push = facets.area * facets.at_points(nodal)[..., None]
+    return push.sum(axis=(0, 1)), np.cross(facets.points, push).sum(axis=(0, 1))

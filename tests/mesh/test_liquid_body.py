@@ -1,0 +1,89 @@
+"""The liquid's body in an imported chamber: it fills what lies outside the surface, and no more."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ringbalance.mesh.liquid_body import FREE_SURFACE, Level, jacobians, liquid_body
+from ringbalance.mesh.quadratic_tetrahedra import Tetrahedra, face_nodes, lonely, tetrahedra
+from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
+from ringbalance.scene.chamber_file.record import CellKind
+from ringbalance.verification.reference.block_chambers import block_chamber, sector_chamber
+
+_ANGLE, _WIDTH = np.pi / 2, 1.3
+
+
+def _sector(n: int, kind: CellKind = "hexahedron27", turn: float = _ANGLE) -> Tetrahedra:
+    cells = (n, 2 * n, n)
+    return tetrahedra(sector_chamber(cells, radii=(0.5, 1.0), angle=turn, width=_WIDTH, kind=kind))
+
+
+def _surface(body: Tetrahedra) -> np.ndarray:
+    number = body.names.index(FREE_SURFACE)
+    parts = [face_nodes(body.cells[body.faces[:, k] == number], k) for k in range(4)]
+    return body.nodes[np.unique(np.concatenate(parts))]
+
+
+@pytest.mark.parametrize("radius", [0.51, 0.6, 0.731, 0.75, 0.874, 0.96])
+@pytest.mark.parametrize("kind", ["hexahedron27", "hexahedron20"])
+def test_it_holds_the_volume_outside_the_surface(kind: CellKind, radius: float) -> None:
+    body = liquid_body(_sector(6, kind), Level(constant=radius**2 / 2))
+    exact = _ANGLE / 2 * _WIDTH * (1 - radius**2)
+    space = TetrahedronSpace(body=body)
+    # Quadratic edges leave their arcs by R (angle / 2)^4 / 32: 2e-7 R here, over a depth of at least 0.04 R.
+    assert space.weights.sum() == pytest.approx(exact, rel=2e-5)
+    assert jacobians(body).min() > 0
+    assert np.abs(np.hypot(*_surface(body)[:, :2].T) - radius).max() < 1e-9
+    areas = {name: space.facets(name).weights.sum() for name in space.boundaries}
+    assert areas[FREE_SURFACE] == pytest.approx(_ANGLE * radius * _WIDTH, rel=2e-5)
+    assert areas["outer_wall"] == pytest.approx(_ANGLE * _WIDTH, rel=2e-5)
+    assert areas["plate_left"] == pytest.approx((1 - radius) * _WIDTH, rel=2e-5)
+    assert areas["end_front"] == pytest.approx(exact / _WIDTH, rel=2e-5)
+
+
+@pytest.mark.parametrize("kind", ["hexahedron27", "hexahedron"])
+def test_every_face_is_shared_or_named_and_the_normals_close(kind: CellKind) -> None:
+    body = liquid_body(_sector(5, kind), Level(constant=0.3, tilt=(0.05, -0.03, 0.04)))
+    assert np.array_equal(lonely(body.cells, len(body.nodes)), body.faces >= 0)
+    space = TetrahedronSpace(body=body)
+    total = sum(space.facets(name).area.sum(axis=(0, 1)) for name in space.boundaries)
+    assert np.abs(total).max() < 1e-12
+    # Gauss: the integral of x . n is three times the volume, on curved cells within the quadrature.
+    outflow = sum((f.points * f.area).sum() for f in map(space.facets, space.boundaries))
+    assert outflow / 3 == pytest.approx(space.weights.sum(), rel=1e-6)
+
+
+def test_a_tilted_surface_is_followed() -> None:
+    level = Level(constant=0.3, tilt=(0.05, -0.03, 0.04))
+    body = liquid_body(_sector(5), level)
+    assert np.abs(level.value(_surface(body))).max() < 1e-9
+
+
+def test_a_body_of_linear_cells_has_a_curved_surface_on_straight_walls() -> None:
+    body = liquid_body(_sector(6, "hexahedron"), Level(constant=0.7**2 / 2))
+    assert np.abs(np.hypot(*_surface(body)[:, :2].T) - 0.7).max() < 1e-9
+
+
+def test_a_rib_on_the_wall_and_nameless_walls_stay() -> None:
+    def ribbed(cube: np.ndarray) -> np.ndarray:
+        bulge = 0.1 * np.exp(-(((cube[..., 1] - 0.5) / 0.1) ** 2))
+        radius = 0.5 + (0.5 - bulge) * cube[..., 0]
+        turned = _ANGLE * (cube[..., 1] - 0.5)
+        return np.stack([radius * np.cos(turned), radius * np.sin(turned), cube[..., 2]], axis=-1)
+
+    geometry = block_chamber((4, 16, 3), ribbed)
+    named = {name: geometry.boundaries[name] for name in ("outer_wall", "end_back")}
+    object.__setattr__(geometry, "boundaries", named)
+    body = liquid_body(tetrahedra(geometry), Level(constant=0.95**2 / 2))
+    # The rib comes out of the liquid: the surface has two parts, and the walls keep their nodes.
+    assert set(np.unique(body.faces)) == {-1, 0, 1, 2, 3}
+    assert body.names == ("outer_wall", "end_back", "other_walls", FREE_SURFACE)
+    angle = np.arctan2(*_surface(body)[:, 1::-1].T)
+    assert np.abs(angle).min() > 0.05
+
+
+@pytest.mark.parametrize("radius", [0.4, 1.1])
+def test_a_surface_outside_the_chamber_is_refused(radius: float) -> None:
+    with pytest.raises(ValueError, match="surface radius"):
+        liquid_body(_sector(2), Level(constant=radius**2 / 2))

@@ -1,0 +1,71 @@
+"""Pressure and loads in imported chambers, against the exact ones of a sector."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ringbalance.physics.pressure.imported import ImportedRing, solved_ring
+from ringbalance.physics.results import StatusCode
+from ringbalance.scene.chamber_file.record import CellKind
+from ringbalance.verification.reference.block_chambers import sector_chamber
+
+_RHO, _OMEGA, _A, _ANGLE, _WIDTH = 900.0, 150.0, 0.77, np.pi / 2, 1.3
+_PRESSURE = _RHO * _OMEGA**2 * (1 - _A**2) / 2
+
+
+def _ring(
+    n: int,
+    *,
+    kind: CellKind = "hexahedron27",
+    gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    gas_pressure: float = 0.0,
+) -> ImportedRing:
+    return solved_ring(
+        geometry=sector_chamber((n, 2 * n, n), radii=(0.5, 1.0), angle=_ANGLE, width=_WIDTH, kind=kind),
+        density=_RHO,
+        angular_velocity=_OMEGA,
+        surface_radius=_A,
+        gravity=gravity,
+        gas_pressure=gas_pressure,
+    )
+
+
+@pytest.mark.parametrize("kind", ["hexahedron27", "hexahedron"])
+def test_wall_pressure_and_force_hold_their_uncertainty(kind: CellKind) -> None:
+    ring = _ring(6, kind=kind)
+    assert ring.status.ok
+    assert abs(ring.wall_pressure.value - _PRESSURE) <= ring.wall_pressure.uncertainty
+    outer = ring.loads["outer_wall"].force
+    exact = _PRESSURE * 2 * np.sin(_ANGLE / 2) * _WIDTH
+    assert abs(outer.value[0] - exact) <= outer.uncertainty[0]
+    limit = 1e-4 if kind == "hexahedron27" else 2e-2
+    assert ring.wall_pressure.uncertainty <= limit * _PRESSURE
+
+
+def test_all_loads_together_are_the_centrifugal_force_and_the_weight() -> None:
+    gravity = (0.03 * _OMEGA**2, -0.02 * _OMEGA**2, 0.01 * _OMEGA**2)
+    ring = _ring(6, gravity=gravity)
+    total = np.sum([load.force.value for load in ring.loads.values()], axis=0)
+    moment = np.sum([load.moment.value for load in ring.loads.values()], axis=0)
+    mass = _RHO * ring.volume
+    exact = ring.first_moment * np.array([1.0, 1.0, 0.0]) * _OMEGA**2 + mass * np.array(gravity)
+    assert total == pytest.approx(exact, rel=1e-4, abs=1e-4 * abs(exact[0]))
+    # Centrifugal force has no moment about the shaft; gravity's acts at the centre of mass.
+    assert moment[2] == pytest.approx(np.cross(ring.first_moment, gravity)[2], rel=1e-3)
+    assert ring.volume == pytest.approx(_ANGLE / 2 * _WIDTH * (1 - _A**2), rel=1e-5)
+
+
+def test_gas_pressure_adds_to_the_wall() -> None:
+    low, high = _ring(3), _ring(3, gas_pressure=1e5)
+    assert high.wall_pressure.value - low.wall_pressure.value == pytest.approx(1e5, rel=1e-9)
+
+
+def test_gravity_stronger_than_the_spin_leaves_no_ring() -> None:
+    assert _ring(2, gravity=(0.8 * _OMEGA**2, 0.0, 0.0)).status.code is StatusCode.NO_RING
+
+
+def test_impossible_values_are_refused() -> None:
+    geometry = sector_chamber((1, 2, 1), radii=(0.5, 1.0), angle=_ANGLE, width=_WIDTH)
+    with pytest.raises(ValueError, match="density"):
+        solved_ring(geometry=geometry, density=0.0, angular_velocity=1.0, surface_radius=0.7)

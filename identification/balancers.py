@@ -69,8 +69,9 @@ def _values(scene: AnyScene) -> dict[str, float]:
 
 def both_sides(scene: AnyScene, name: str, change: float) -> tuple[AnyScene, AnyScene]:
     """The scene with one of these lower and higher by a change, SI, as far as a device can have it."""
-    low, high = (_changed(scene, name, side * change) for side in (-1, 1))
-    return low, high
+    # Errors of models are nearly linear, and there are many of them.
+    low = scene if name in MODEL_ERRORS else _changed(scene, name, -change)
+    return low, _changed(scene, name, change)
 
 
 def _changed(scene: AnyScene, name: str, change: float) -> AnyScene:

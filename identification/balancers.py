@@ -9,7 +9,6 @@ from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.eccentric_parameters import (
     eccentric_parameter,
     eccentric_shifted,
-    eccentric_value,
     eccentric_widths,
     fitted_names,
 )
@@ -20,7 +19,12 @@ from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.reduced_model.chamber.inputs import half_widths, shifted
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
-from ringbalance.scene.uncertain import NORMAL_95, UNCERTAIN_QUANTITIES, nominal_value
+from ringbalance.scene.uncertain import (
+    NORMAL_95,
+    UNCERTAIN_QUANTITIES,
+    eccentric_value,
+    nominal_value,
+)
 
 _LITTLE: Final = 1e-4
 """Of a quantity, or in SI units where it is zero."""

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import math
-import re
-from dataclasses import replace
 from functools import partial
-from typing import Any, Final
+from typing import Final
 
 from ringbalance.identification.parameters import FitError, Parameter, unknown_name
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.keys.eccentric_schema import ECCENTRIC_MASS
-from ringbalance.scene.uncertain import NORMAL_95
+from ringbalance.scene.uncertain import NORMAL_95, eccentric_value, eccentric_with
 
 _REACH: Final = 30.0
 """Factor up to which a value is looked for."""
-_ENTRY: Final = re.compile(r"(\w+)\.(\w+)(?:\[([01])\])?")
 
 
 def fitted_names(scene: EccentricScene) -> tuple[str, ...]:
@@ -63,31 +60,6 @@ def eccentric_widths(scene: EccentricScene) -> dict[str, float]:
         if (path := name.split("[")[0]) in stated
     }
     return {name: width for name, width in widths.items() if width > 0}
-
-
-def eccentric_value(scene: EccentricScene, name: str) -> float:
-    """Value at a path, SI."""
-    table, key, entry = _place(name)
-    value = getattr(getattr(scene, table), key)
-    return float(value if entry is None else value[entry])
-
-
-def eccentric_with(scene: EccentricScene, value: float, *, name: str) -> EccentricScene:
-    """The scene with another value at a path; nothing is checked again."""
-    table, key, entry = _place(name)
-    record, new = getattr(scene, table), value
-    changed: Any = new
-    if entry is not None:
-        changed = tuple(new if i == entry else old for i, old in enumerate(getattr(record, key)))
-    tables: dict[str, Any] = {table: replace(record, **{key: changed})}
-    return replace(scene, **tables)
-
-
-def _place(name: str) -> tuple[str, str, int | None]:
-    match = _ENTRY.fullmatch(name)
-    if match is None:
-        raise ValueError(f"{name!r} is no path of a scene")
-    return match[1], match[2], None if match[3] is None else int(match[3])
 
 
 def eccentric_shifted(scene: EccentricScene, name: str, change: float) -> EccentricScene:

@@ -165,22 +165,13 @@ class Problem:
 
     def priors(self, t: FloatArray) -> FloatArray:
         """(x - x0)/sigma_x of the parameters that have a prior."""
-        return np.array(
-            [
-                (p.value(x) - p.start) / p.prior
-                for p, x in zip(self.parameters, t.tolist(), strict=True)
-                if p.prior
-            ]
-        )
+        both = zip(self.parameters, t.tolist(), strict=True)
+        return np.array([(p.value(x) - p.start) / p.prior for p, x in both if p.prior])
 
     def prior_slopes(self, t: FloatArray) -> FloatArray:
         """d(priors)/dt, shape (priors, parameters)."""
-        rows = np.diag(
-            [
-                p.slope(x) / p.prior if p.prior else 0.0
-                for p, x in zip(self.parameters, t.tolist(), strict=True)
-            ]
-        )
+        both = zip(self.parameters, t.tolist(), strict=True)
+        rows = np.diag([p.slope(x) / p.prior if p.prior else 0.0 for p, x in both])
         return np.asarray(rows[self.with_prior])
 
     @cached_property

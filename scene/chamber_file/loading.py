@@ -28,7 +28,6 @@ from ringbalance.scene.chamber_file.reading import content_of, contents_of, is_s
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.chamber_file.shape import oriented
 from ringbalance.scene.chamber_file.step_file import STEP_UNIT
-from ringbalance.scene.chamber_file.stretching import STRETCHED
 from ringbalance.scene.chamber_file.topology import facets_of, topology_findings
 from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.faults import Fault
@@ -36,9 +35,8 @@ from ringbalance.scene.keys.declaration import keys_of
 from ringbalance.scene.keys.derivations import even_number_of_chambers
 from ringbalance.scene.keys.reading import Reading
 from ringbalance.scene.rules.check import Finding, written
+from ringbalance.scene.uncertain import SHAPE
 
-_FOLLOWING: Final = (*STRETCHED, "plate_thickness")
-"""Keys of [disc] that a mesh decides."""
 _PORT: Final = "tube.port_radius"
 
 
@@ -47,7 +45,7 @@ def with_chamber(reading: Reading) -> tuple[Reading, tuple[Fault, ...]]:
     if not reading.given("disc.mesh"):
         return reading, ()
     faults = [*_superfluous(reading), *_unit_faults(reading)]
-    paths = frozenset(f"disc.{key}" for key in (*_FOLLOWING, "geometry"))
+    paths = frozenset(f"disc.{key}" for key in (*SHAPE, "geometry"))
     unknown = replace(reading, broken=reading.broken | paths)
     unread = {f"disc.{key}" for key in keys_of(MeshKeys)} & reading.broken
     if faults or unread or not reading.known("disc.mesh", "accuracy.tolerance"):
@@ -61,7 +59,7 @@ def with_chamber(reading: Reading) -> tuple[Reading, tuple[Fault, ...]]:
 
 
 def _superfluous(reading: Reading) -> Iterator[Fault]:
-    for key in _FOLLOWING:
+    for key in SHAPE:
         if reading.given(f"disc.{key}"):
             allowed = "either mesh or this key; the mesh decides"
             yield reading.fault(f"disc.{key}", problem="it follows from the mesh", allowed=allowed)

@@ -24,12 +24,13 @@ MEANINGS: Final[Mapping[str, str]] = MappingProxyType(
     {
         OUTER_WALL: "farthest from the shaft, where the liquid lies; needed",
         "inner_wall": "nearest to the shaft",
-        "plate_left": "radial plate on the side that rotation comes from",
-        "plate_right": "radial plate on the side that rotation goes to",
+        "plate_left": "radial plate at the higher angle about the shaft",
+        "plate_right": "radial plate at the lower angle",
         "end_back": "end wall at the lower coordinate along the shaft",
         "end_front": "end wall at the higher coordinate along the shaft",
         "gas_tube": "outside of a tube or a pin inside the chamber",
-        PORT: "opening of the connecting tube",
+        "gas_hole": "mouth of the gas line, or of a gas tube",
+        PORT: "opening of the connecting tube; without `port_radius` its mean radius is used",
         WALLS: "any other wall; facets without a name count as this",
     }
 )

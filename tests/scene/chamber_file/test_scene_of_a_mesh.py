@@ -11,6 +11,7 @@ import pytest
 from drawn_chamber import drawn, loaded, msh_2, msh_4, scene_text
 
 from ringbalance.scene import Scene, SceneError, load_scene, scene_table
+from ringbalance.scene.chamber_file.names import MEANINGS
 from ringbalance.scene.uncertain import with_value
 
 
@@ -133,3 +134,9 @@ def test_a_solid_needs_the_extra(tmp_path: Path) -> None:
 def test_a_solid_has_its_own_unit(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match='mesh_unit = "mm": a STEP file has its own unit'):
         loaded(tmp_path, b"ISO-10303-21;\n", "chamber.step")
+
+
+def test_the_page_has_the_names() -> None:
+    page = (Path(__file__).resolve().parents[3] / "docs" / "imported-geometry.md").read_text(encoding="utf-8")
+    rows = [f"| `{name}` | {meaning} |" for name, meaning in MEANINGS.items()]
+    assert "\n".join(rows) in page

@@ -59,7 +59,7 @@ def block_chamber(
         if not (closed and axis == 1)
     }
     return ChamberGeometry(
-        file="block", digest=f"{cells}", kind=kind, points=points, cells=nodes, boundaries=boundaries
+        file="block", digest=f"{hash(points.tobytes())}", kind=kind, points=points, cells=nodes, boundaries=boundaries
     )
 
 

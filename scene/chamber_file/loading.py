@@ -52,6 +52,9 @@ def with_chamber(reading: Reading) -> tuple[Reading, tuple[Fault, ...]]:
         return unknown, tuple(faults)
     try:
         return _following(reading, *_chamber(reading)), ()
+    except MemoryError:
+        problem = "there is not enough memory to check a mesh of this size"
+        return unknown, (reading.fault("disc.mesh", problem=problem, allowed="a coarser mesh"),)
     except MeshFileError as error:
         return unknown, tuple(
             reading.fault("disc.mesh", problem=each.problem, allowed=each.allowed) for each in error.findings

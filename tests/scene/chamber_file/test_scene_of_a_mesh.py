@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -140,3 +142,31 @@ def test_the_page_has_the_names() -> None:
     page = (Path(__file__).resolve().parents[3] / "docs" / "imported-geometry.md").read_text(encoding="utf-8")
     rows = [f"| `{name}` | {meaning} |" for name, meaning in MEANINGS.items()]
     assert "\n".join(rows) in page
+
+
+@pytest.mark.skipif(find_spec("gmsh") is None, reason="the extra cad is not installed")
+def test_a_solid_is_meshed(tmp_path: Path) -> None:
+    """Drawn by Gmsh in another process, as its settings are those of a whole process."""
+    code = (
+        "import gmsh, math; gmsh.initialize(); gmsh.option.setNumber('General.Terminal', 0)\n"
+        "occ, angle = gmsh.model.occ, math.radians(80)\n"
+        "both = [occ.addCylinder(0, 0, 0, 0, 0, 30, radius, angle=angle) for radius in (40, 20)]\n"
+        "occ.cut([(3, both[0])], [(3, both[1])]); occ.synchronize(); gmsh.write('chamber.step')"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path, capture_output=True)
+    content = (tmp_path / "chamber.step").read_bytes()
+    scene = loaded(tmp_path, content, "chamber.step", mesh_unit="")
+    assert isinstance(scene, Scene)
+    assert scene.disc.geometry is not None
+    assert set(scene.disc.geometry.boundaries) == {
+        "outer_wall",
+        "inner_wall",
+        "end_back",
+        "end_front",
+        "walls",
+    }
+    assert scene.disc.outer_radius == pytest.approx(0.04)
+    assert scene.disc.inner_radius == pytest.approx(0.02, rel=1e-3)
+    assert np.degrees(scene.disc.central_angle) == pytest.approx(80)
+    with pytest.raises(SceneError, match="Gmsh cannot mesh the solid"):
+        loaded(tmp_path, content[: len(content) // 3], "chamber.step", mesh_unit="")

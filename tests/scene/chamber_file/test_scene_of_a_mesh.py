@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from drawn_chamber import drawn, loaded, msh_2, msh_4, scene_text
 
-from ringbalance.scene import Scene, SceneError, load_scene, scene_table
+from ringbalance.scene import Scene, SceneError, bundled_scene, load_scene, scene_table
 from ringbalance.scene.chamber_file.names import MEANINGS
 from ringbalance.scene.uncertain import with_value
 
@@ -78,6 +78,26 @@ def test_a_dimension_beside_a_mesh_is_refused(key: str, tmp_path: Path) -> None:
     with pytest.raises(SceneError, match=rf'\[disc\] {key} = "{value}": it follows from the mesh') as caught:
         scene_of(tmp_path, **{key: value})
     assert len(caught.value.faults) == 1
+
+
+def test_a_dimension_hides_no_error_of_the_mesh(tmp_path: Path) -> None:
+    drawing = drawn()
+    drawing.names[2, 2] = "outside\x07wall"
+    with pytest.raises(SceneError) as caught:
+        loaded(tmp_path, msh_2(drawing), outer_radius="40 mm")
+    assert [fault.key for fault in caught.value.faults] == ["outer_radius", "mesh", "mesh"]
+    assert str(caught.value).replace("\n", "").isprintable()
+
+
+def test_keys_of_a_mesh_need_one(tmp_path: Path) -> None:
+    text = bundled_scene("six_chamber").read_text(encoding="utf-8")
+    (tmp_path / "my_disc.toml").write_text(
+        text.replace("[disc]\n", '[disc]\nmesh_unit = "mm"\nmesh_axis = "y"\n'), encoding="utf-8"
+    )
+    with pytest.raises(SceneError) as caught:
+        load_scene(tmp_path / "my_disc.toml")
+    assert [fault.key for fault in caught.value.faults] == ["mesh_unit", "mesh_axis"]
+    assert all("no meaning without mesh" in fault.problem for fault in caught.value.faults)
 
 
 def test_the_number_of_chambers_is_given_or_follows(tmp_path: Path) -> None:

@@ -67,7 +67,7 @@ def _data(scene: Scene, field: ChamberField, highest: float) -> dict[str, Any]:
 
 def _outside(chamber: ChamberMesh) -> IntArray:
     """Corners of the faces on all six sides of the mesh, shape (faces, 4), along the cells' corners."""
-    corners = chamber.grid[::2, ::2, ::2]
+    corners = chamber.grid[(slice(None, None, chamber.order),) * 3]
     sides = [np.take(corners, end, axis=axis) for axis in range(3) for end in (0, -1)]
     faces = [
         np.stack([side[:-1, :-1], side[1:, :-1], side[1:, 1:], side[:-1, 1:]], axis=-1).reshape(-1, 4)

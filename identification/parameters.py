@@ -202,16 +202,3 @@ def _range(scene: Scene, name: str, start: float, offset: float) -> tuple[float,
         return fixed[name]
     reach = _REACH.get(name, _WIDE)
     return start / reach, start * reach
-
-
-def scene_parameters(scene: Scene, names: Sequence[str]) -> tuple[Parameter, ...]:
-    """Parameters by name. Raises: FitError: as `scene_parameter`, or a name twice, or none at all."""
-    if not names or len(set(names)) < len(names):
-        raise FitError("name at least one parameter, and each once")
-    return tuple(scene_parameter(scene, name) for name in names)
-
-
-def held_inputs(scene: Scene, fitted: Sequence[str]) -> dict[str, float]:
-    """Standard deviation, SI, of every uncertain quantity of the scene that is not fitted."""
-    widths = half_widths(scene)
-    return {name: width / NORMAL_95 for name, width in widths.items() if name not in fitted}

@@ -1,4 +1,6 @@
-"""What only a scene with eccentric masses needs, loaded when first used: others start faster without.
+"""What only a scene with eccentric masses or the mesh of a chamber needs, loaded when first used.
+
+Others start faster without.
 
 `from ringbalance.scene import deferred`, then `deferred.ECCENTRIC_MASS`.
 """
@@ -14,6 +16,7 @@ _HOME: Final = MappingProxyType(
         "CHECKS": "ringbalance.scene.rules.eccentric",
         "ECCENTRIC_MASS": "ringbalance.scene.keys.eccentric_schema",
         "EccentricScene": "ringbalance.scene.eccentric_models",
+        "with_chamber": "ringbalance.scene.chamber_file.loading",
     }
 )
 

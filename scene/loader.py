@@ -9,7 +9,7 @@ from dataclasses import MISSING, fields
 from importlib import resources
 from os import PathLike
 from pathlib import Path, PurePath
-from typing import Any, Literal
+from typing import Any
 
 from ringbalance.scene import deferred
 from ringbalance.scene.faults import Fault, SceneError, closest, did_you_mean, toml_text
@@ -18,7 +18,7 @@ from ringbalance.scene.keys.reading import Reading, read_document
 from ringbalance.scene.keys.schema import BALANCERS, LIQUID_RING, ORIGIN, Schema
 from ringbalance.scene.models import InputUncertainty
 from ringbalance.scene.narrowing import AnyScene
-from ringbalance.scene.origins import Origin
+from ringbalance.scene.origins import ShownOrigin
 from ringbalance.scene.rules import shape, working
 from ringbalance.scene.rules.check import failed_checks
 from ringbalance.scene.working_liquid import with_liquid
@@ -112,28 +112,34 @@ def _defaulted(reading: Reading) -> tuple[str, ...]:
     return tuple(
         path
         for path in reading.values
-        if not reading.given(path) and (not path.startswith("liquid.") or path == "liquid.dissolved_gas")
+        if not reading.given(path)
+        and path not in reading.derived
+        and (not path.startswith("liquid.") or path == "liquid.dissolved_gas")
     )
 
 
 def _values_hash(reading: Reading) -> str:
     """SHA-256 of the values that decide results."""
     values = {
-        path: value
+        path: value.digest if path == "disc.geometry" else value
         for path, value in reading.values.items()
-        if path != "name" and not path.endswith(f".{ORIGIN}") and not path.startswith(_DECIDE_NOTHING)
+        if path != "name"
+        and not path.startswith("disc.mesh")
+        and not path.endswith(f".{ORIGIN}")
+        and not path.startswith(_DECIDE_NOTHING)
     }
     return hashlib.sha256(repr(sorted(values.items())).encode()).hexdigest()
 
 
-def _origins(reading: Reading) -> Iterator[tuple[str, Origin | Literal["default"]]]:
+def _origins(reading: Reading) -> Iterator[tuple[str, ShownOrigin]]:
     """Origin of each key, by path."""
     for name, table in reading.schema.tables.items():
         stated = reading.values.get(f"{name}.{ORIGIN}", {})
         for key in table.keys:
             path = f"{name}.{key}"
             if key != ORIGIN:
-                yield path, stated.get(key, "given") if reading.given(path) else "default"
+                absent: ShownOrigin = "derived" if path in reading.derived else "default"
+                yield path, stated.get(key, "given") if reading.given(path) else absent
 
 
 def _origin_faults(reading: Reading, found: Iterable[Fault]) -> Iterator[Fault]:
@@ -154,6 +160,9 @@ def _origin_faults(reading: Reading, found: Iterable[Fault]) -> Iterator[Fault]:
 
 def _read_liquid_ring(document: Mapping[str, Any], *, file: str) -> tuple[Reading, tuple[Fault, ...]]:
     reading, faults = read_document(document, file=file, schema=LIQUID_RING)
+    if reading.given("disc.mesh"):
+        reading, mesh_faults = deferred.with_chamber(reading)
+        faults = (*faults, *mesh_faults)
     reading, liquid_faults = with_liquid(completed(reading))
     failed = failed_checks(reading, (*shape.CHECKS, *working.CHECKS))
     uncertain = working.uncertainty_faults(reading)

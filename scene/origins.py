@@ -9,6 +9,8 @@ from ringbalance.scene.measured import Measured
 
 Origin = Literal["given", "inferred", "assumed", "measured"]
 """In the documents of the machine; concluded from other values; chosen, as nothing is known; measured."""
+ShownOrigin = Origin | Literal["derived", "default"]
+"""Also: read off the mesh that the scene names; not in the file."""
 KEY_OF_FIELD = {
     "rotor.initial_amplitude": "rotor.initial_vibration",
     "rotor.initial_phase": "rotor.initial_vibration",
@@ -36,14 +38,14 @@ class SceneFile:
     defaulted: tuple[str, ...] = ()
     """Paths such as "rotor.lag_angle" whose value is a default, because the file does not give it."""
     measured: Measured = field(default_factory=Measured)
-    origins: tuple[tuple[str, Origin | Literal["default"]], ...] = ()
+    origins: tuple[tuple[str, ShownOrigin], ...] = ()
     """Origin of each key by path; empty for a scene that was not read from a file."""
 
-    def origin_of(self, path: str) -> Origin | Literal["default"]:
+    def origin_of(self, path: str) -> ShownOrigin:
         """Where the value at a path such as "tube.bore" comes from.
 
-        Returns: What the table's `origin` states, "given" where it states nothing, and "default" for a value
-            that the file does not give.
+        Returns: What the table's `origin` states, "given" where it states nothing, "derived" for a dimension
+            of a mesh, and "default" for a value that the file does not give.
         Raises: ValueError: a scene file has no such key.
         """
         if not self.origins:

@@ -21,7 +21,7 @@ class ChamberGeometry:
     way, so that a disc with one can be the key of a cache.
     """
 
-    file: str
+    file: str = field(compare=False)
     """As the scene names it."""
     digest: str
     """SHA-256 of the file's bytes, unit and axis."""

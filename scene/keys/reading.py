@@ -41,10 +41,16 @@ class Reading:
     """Paths, and names of whole tables, that stand in the file but could not be read."""
     schema: Schema
     """What such a file can hold."""
+    derived: frozenset[str] = frozenset()
+    """Paths of values that another file gives, which this one names."""
 
     def adding(self, values: Mapping[str, Any]) -> Reading:
         """Copy with more values, SI, by path."""
         return replace(self, values={**self.values, **values})
+
+    def following(self, values: Mapping[str, Any]) -> Reading:
+        """Copy with more values that another file gives."""
+        return replace(self.adding(values), derived=self.derived | frozenset(values))
 
     def given(self, path: str) -> bool:
         """Whether the file itself has a value at a path, readable or not."""
@@ -75,7 +81,8 @@ class Reading:
         return content if isinstance(content, Mapping) else {}
 
     def _default_text(self, path: str) -> str:
-        return f"{toml_text(self.values[path])} (SI, by default)" if self.known(path) else MISSING
+        source = "from the mesh" if path in self.derived else "by default"
+        return f"{toml_text(self.values[path])} (SI, {source})" if self.known(path) else MISSING
 
 
 def read_document(

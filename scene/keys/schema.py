@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import Any, Literal, get_args
 
 from ringbalance.scene import loop_models, models
+from ringbalance.scene.chamber_file.keys import MeshKeys
 from ringbalance.scene.keys.declaration import (
     Entries,
     Key,
@@ -70,6 +71,12 @@ class Schema:
 def table_of(record: type, text: str) -> Table:
     """A table that becomes a record. Args: `text`: what it describes."""
     return Table(text=text, keys=keys_of(record), record=record)
+
+
+def _disc() -> Table:
+    """The dimensions of its chambers, or the mesh of one from which they follow."""
+    dimensions, mesh = keys_of(models.Disc), keys_of(MeshKeys)
+    return Table(text="the balancing disc", keys={**dimensions, **mesh}, record=models.Disc)
 
 
 def _rotor() -> Table:
@@ -162,7 +169,7 @@ RUN = {
     ),
 }
 _LIQUID_RING = {
-    "disc": table_of(models.Disc, "the balancing disc"),
+    "disc": _disc(),
     "liquid": table_of(models.Liquid, "the balancing liquid"),
     "tube": table_of(models.Tube, "the tube that connects two opposite chambers"),
     "gas": table_of(models.Gas, "the gas that drives the liquid"),

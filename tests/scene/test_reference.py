@@ -12,6 +12,8 @@ import pytest
 import scene_reference
 
 from ringbalance.scene import Scene, loop_models, models
+from ringbalance.scene.chamber_file.keys import MeshKeys
+from ringbalance.scene.keys.declaration import keys_of
 from ringbalance.scene.keys.eccentric_schema import ECCENTRIC_MASS
 from ringbalance.scene.keys.schema import LIQUID_RING, ORIGIN, Schema
 from ringbalance.scene.measured import Measured
@@ -59,7 +61,7 @@ def test_example_in_the_document_loads(load: Callable[[Mapping[str, Any]], Scene
 @pytest.mark.parametrize(
     ("table", "record", "differences"),
     [
-        ("disc", models.Disc, {"geometry"}),
+        ("disc", models.Disc, {"geometry", *keys_of(MeshKeys)}),
         ("liquid", models.Liquid, {"density_uncertainty", "viscosity_uncertainty", "source"}),
         ("tube", models.Tube, {"models"}),
         ("gas", models.Gas, set()),

@@ -1,0 +1,195 @@
+"""The kinds of cells and facets that a chamber can have: nodes, faces, and their orders in each format."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from itertools import product
+from types import MappingProxyType
+from typing import Final, get_args
+
+import numpy as np
+
+from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.chamber_file.record import CellKind
+
+CELL_KINDS: Final[tuple[CellKind, ...]] = get_args(CellKind)
+CORNERS: Final[Mapping[str, int]] = MappingProxyType(
+    {
+        "vertex": 1,
+        "line": 2,
+        "line3": 2,
+        "triangle": 3,
+        "triangle6": 3,
+        "quad": 4,
+        "quad8": 4,
+        "quad9": 4,
+        "tetra": 4,
+        "tetra10": 4,
+        "hexahedron": 8,
+        "hexahedron20": 8,
+        "hexahedron27": 8,
+        "wedge": 6,
+        "wedge15": 6,
+        "wedge18": 6,
+        "pyramid": 5,
+        "pyramid13": 5,
+        "pyramid14": 5,
+    }
+)
+"""Corners of each kind that a file may hold, whether a chamber can consist of it or not."""
+NODES: Final[Mapping[str, int]] = MappingProxyType(
+    {kind: int("".join(filter(str.isdigit, kind)) or count) for kind, count in CORNERS.items()}
+)
+"""A kind of second order has its number of nodes in its name."""
+FACET_KINDS: Final = MappingProxyType({3: "triangle", 6: "triangle6", 4: "quad", 8: "quad8", 9: "quad9"})
+"""By number of nodes."""
+GMSH_KINDS: Final = MappingProxyType(
+    {
+        1: "line",
+        2: "triangle",
+        3: "quad",
+        4: "tetra",
+        5: "hexahedron",
+        6: "wedge",
+        7: "pyramid",
+        8: "line3",
+        9: "triangle6",
+        10: "quad9",
+        11: "tetra10",
+        12: "hexahedron27",
+        13: "wedge18",
+        14: "pyramid14",
+        15: "vertex",
+        16: "quad8",
+        17: "hexahedron20",
+        18: "wedge15",
+        19: "pyramid13",
+    }
+)
+"""By the number of the type in a Gmsh file."""
+VTK_KINDS: Final = MappingProxyType(
+    {
+        1: "vertex",
+        3: "line",
+        5: "triangle",
+        9: "quad",
+        10: "tetra",
+        12: "hexahedron",
+        13: "wedge",
+        14: "pyramid",
+        21: "line3",
+        22: "triangle6",
+        23: "quad8",
+        24: "tetra10",
+        25: "hexahedron20",
+        26: "wedge15",
+        27: "pyramid13",
+        28: "quad9",
+        29: "hexahedron27",
+        32: "wedge18",
+    }
+)
+"""By the number of the type in a VTU file."""
+_SECOND: Final = (0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15)
+GMSH_ORDER: Final[Mapping[str, tuple[int, ...]]] = MappingProxyType(
+    {
+        "tetra10": (0, 1, 2, 3, 4, 5, 6, 7, 9, 8),
+        "hexahedron20": _SECOND,
+        "hexahedron27": (*_SECOND, 22, 23, 21, 24, 20, 25, 26),
+    }
+)
+"""Places of the nodes of a Gmsh element in the order of meshio and VTK; other kinds have the same order."""
+_FACES: Final[Mapping[int, tuple[tuple[int, ...], ...]]] = MappingProxyType(
+    {
+        4: ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)),
+        8: ((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7)),
+    }
+)
+"""By number of corners; normals point outward."""
+_EDGES: Final = MappingProxyType(
+    {
+        4: ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
+        8: (
+            *((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4)),
+            *((0, 4), (1, 5), (2, 6), (3, 7)),
+        ),
+    }
+)
+_CORNER_PLACES: Final = MappingProxyType(
+    {
+        4: ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)),
+        8: ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)),
+    }
+)
+
+
+def between(kind: str) -> tuple[tuple[int, ...], ...]:
+    """For each node the corners in whose middle it lies on a straight cell; a corner lies at itself."""
+    count = CORNERS[kind]
+    inside = (*_EDGES[count], *(_FACES[8] if count == 8 else ()), tuple(range(count)))
+    return (*((corner,) for corner in range(count)), *inside)[: NODES[kind]]
+
+
+@cache
+def reference_nodes(kind: str) -> FloatArray:
+    """Reference coordinates of a cell's nodes, shape (nodes, 3): the unit tetrahedron or cube."""
+    corners = np.array(_CORNER_PLACES[CORNERS[kind]], dtype=np.float64)
+    return np.array([corners[list(each)].mean(axis=0) for each in between(kind)])
+
+
+@cache
+def faces(kind: str) -> tuple[tuple[int, ...], ...]:
+    """For each face of a cell its nodes in meshio's order: corners, middles of edges, middle of the face."""
+    where = {frozenset(corners): node for node, corners in enumerate(between(kind))}
+    found = []
+    for face in _FACES[CORNERS[kind]]:
+        edges = zip(face, (*face[1:], face[0]), strict=True)
+        inside = (*(frozenset(edge) for edge in edges), frozenset(face))
+        found.append((*face, *(where[each] for each in inside if each in where)))
+    return tuple(found)
+
+
+@cache
+def mirrored(kind: str) -> IntArray:
+    """The order in which a cell's nodes make the cell of opposite orientation."""
+    nodes = reference_nodes(kind).round(3).tolist()
+    return np.array([nodes.index([y, x, z]) for x, y, z in nodes], dtype=np.int64)
+
+
+@cache
+def shape_gradients(kind: str) -> FloatArray:
+    """Gradients of the shape functions, shape (places, nodes, 3), at places that decide on a cell's sign.
+
+    The Jacobian of a straight tetrahedron is constant; elsewhere it is a polynomial, of degree 3 on a
+    tetra10 and up to 2 (5) in each coordinate of a hexahedron of first (second) order, and is looked at on a
+    lattice with as many places in each direction as it has coefficients, or more.
+    """
+    powers = np.array(_powers(kind), dtype=np.float64)
+    coefficients = np.linalg.inv(np.prod(reference_nodes(kind)[:, None, :] ** powers, axis=2))
+    at = _lattice(kind)
+    found = np.empty((len(at), NODES[kind], 3))
+    for axis in range(3):
+        lower = powers.copy()
+        lower[:, axis] = np.maximum(lower[:, axis] - 1, 0)
+        slopes = powers[:, axis] * np.prod(at[:, None, :] ** lower, axis=2)
+        found[:, :, axis] = slopes @ coefficients
+    return found
+
+
+def _powers(kind: str) -> list[tuple[int, ...]]:
+    """Exponents of the monomials that the shape functions are made of."""
+    if CORNERS[kind] == 4:
+        degree = 1 if kind == "tetra" else 2
+        return [each for each in product(range(3), repeat=3) if sum(each) <= degree]
+    highest = 1 if kind == "hexahedron" else 2
+    squares = {"hexahedron": 0, "hexahedron20": 1, "hexahedron27": 3}[kind]
+    return [each for each in product(range(highest + 1), repeat=3) if each.count(2) <= squares]
+
+
+def _lattice(kind: str) -> FloatArray:
+    steps = {"tetra": 1, "tetra10": 4, "hexahedron": 2}.get(kind, 5)
+    places = np.array(list(product(range(steps + 1), repeat=3)), dtype=np.float64) / steps
+    if kind == "tetra":
+        return places[:1]
+    return places[places.sum(axis=1) <= 1 + 1e-9] if kind == "tetra10" else places

@@ -1,0 +1,102 @@
+"""A process of its own that meshes a STEP file with Gmsh: `python -m ... solid.step solid.msh 0.1`.
+
+Faces have the names that the STEP file gives them.  Where it names none, those at the largest and smallest
+distance from the z axis are the outer and the inner wall, and those at its ends the end walls.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterator
+from typing import Final
+
+import gmsh
+
+from ringbalance.scene.chamber_file.names import KNOWN_NAMES
+
+if sys.platform != "win32":
+    import resource
+
+_MEMORY: Final = 4 * 2**30
+_SAME: Final = 1e-6
+Entity = tuple[int, int]
+
+
+def mesh_step(source: str, target: str, share: float) -> None:
+    """Write the mesh of a STEP file in metres. Args: `share`: size of cells over the solid's extent."""
+    _start()
+    gmsh.model.occ.importShapes(source)
+    gmsh.model.occ.synchronize()
+    volumes = gmsh.model.getEntities(3)
+    if not volumes:
+        raise SystemExit("the file has no solid")
+    box = gmsh.model.getBoundingBox(-1, -1)
+    size = share * max(box[axis + 3] - box[axis] for axis in range(3))
+    gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+    gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 2 * math.pi / max(share, 0.05))
+    gmsh.option.setNumber("Mesh.ElementOrder", 2)
+    gmsh.option.setNumber("Mesh.SecondOrderLinear", 0)
+    gmsh.option.setNumber("Mesh.HighOrderOptimize", 1)
+    gmsh.option.setNumber("Mesh.MeshSizeMin", size / 50)
+    faces = gmsh.model.getEntities(2)
+    named = {face: name for face in faces if (name := _name(face))} or dict(_placed(faces))
+    for name in dict.fromkeys(named.values()):
+        gmsh.model.addPhysicalGroup(2, [tag for (_, tag), each in named.items() if each == name], name=name)
+    gmsh.model.addPhysicalGroup(3, [tag for _, tag in volumes], name="chamber")
+    gmsh.model.mesh.generate(3)
+    gmsh.write(target)
+
+
+def _start() -> None:
+    """Start Gmsh, silent, in metres, with bounded memory where the system can do so."""
+    if sys.platform != "win32":
+        resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
+    gmsh.initialize(["gmsh", "-nopopup"], readConfigFiles=False)
+    for option, value in (
+        ("General.Terminal", 0),
+        ("Geometry.OCCImportLabels", 1),
+        ("General.NumThreads", 1),
+    ):
+        gmsh.option.setNumber(option, value)
+    gmsh.option.setString("Geometry.OCCTargetUnit", "M")
+    gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
+
+
+def _name(face: Entity) -> str:
+    """The last part of a label such as "Shapes/Body/outer_wall", where it is a name of a boundary."""
+    label = str(gmsh.model.getEntityName(*face)).rsplit("/", 1)[-1].strip()
+    return label if label in KNOWN_NAMES else ""
+
+
+def _placed(faces: list[Entity]) -> Iterator[tuple[Entity, str]]:
+    """Names that follow from where faces lie about the z axis."""
+    radii = {face: _radii(face) for face in faces}
+    box = gmsh.model.getBoundingBox(-1, -1)
+    size = max(abs(value) for value in box)
+    highest = max(high for _, high in radii.values())
+    lowest = min(low for low, _ in radii.values())
+    for face, (low, high) in radii.items():
+        own = gmsh.model.getBoundingBox(*face)
+        if low > highest - _SAME * size:
+            yield face, "outer_wall"
+        elif high < lowest + _SAME * size:
+            yield face, "inner_wall"
+        elif own[5] < box[2] + _SAME * size:
+            yield face, "end_back"
+        elif own[2] > box[5] - _SAME * size:
+            yield face, "end_front"
+
+
+def _radii(face: Entity) -> tuple[float, float]:
+    """Smallest and largest distance of a face from the z axis, at the points of a lattice on it."""
+    (u0, v0), (u1, v1) = gmsh.model.getParametrizationBounds(*face)
+    steps = [step / 8 for step in range(9)]
+    at = [value for s in steps for t in steps for value in (u0 + s * (u1 - u0), v0 + t * (v1 - v0))]
+    xyz = gmsh.model.getValue(*face, at)
+    radii = [math.hypot(x, y) for x, y in zip(xyz[::3], xyz[1::3], strict=True)]
+    return min(radii), max(radii)
+
+
+if __name__ == "__main__":
+    mesh_step(sys.argv[1], sys.argv[2], float(sys.argv[3]))

@@ -1,0 +1,210 @@
+"""How the cells of a body hang together: one volume, a closed surface, every node in its place."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
+from ringbalance.scene.chamber_file.assembly import Body
+from ringbalance.scene.chamber_file.elements import CORNERS, faces
+from ringbalance.scene.rules.check import Finding
+
+_SAME: Final = 1e-7
+"""Distance, as a share of the body, below which two nodes are meant to be one."""
+_ON: Final = 1e-6
+"""Distance from a facet, as a share of its size, below which a node lies on it."""
+_MOST_NEAR: Final = 1000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Facets:
+    """All sides of all cells; two cells that meet have one each."""
+
+    nodes: IntArray
+    """Shape (sides, nodes of a facet), in meshio's order."""
+    corners: int
+    cells: IntArray
+    """Cell of each side."""
+    keys: IntArray
+    """Equal for sides with the same corners."""
+    outer: IntArray
+    """Sides that no other cell has."""
+    shared: BoolArray
+    """Keys in rising order that more than two cells have."""
+
+
+def key_of(corners: IntArray, nodes: int) -> IntArray:
+    """One number for the corners of each facet: its three smallest; two facets of a body share them only
+    when they are the same.
+    """
+    ordered = np.sort(corners, axis=1)
+    return np.asarray((ordered[:, 0] * nodes + ordered[:, 1]) * nodes + ordered[:, 2], dtype=np.int64)
+
+
+def facets_of(body: Body) -> Facets:
+    """The sides of all cells of a body."""
+    sides = np.array(faces(body.kind))
+    corners = 3 if CORNERS[body.kind] == 4 else 4
+    nodes = body.cells[:, sides].reshape(-1, sides.shape[1])
+    keys = key_of(nodes[:, :corners], len(body.points))
+    _, place, counts = np.unique(keys, return_inverse=True, return_counts=True)
+    return Facets(
+        nodes=nodes,
+        corners=corners,
+        cells=np.repeat(np.arange(len(body.cells)), len(sides)),
+        keys=keys,
+        outer=np.flatnonzero(counts[place] == 1),
+        shared=counts[place] > 2,
+    )
+
+
+def topology_findings(body: Body, facets: Facets, *, helpers: IntArray) -> Iterator[Finding]:
+    """What is wrong with how cells hang together. Args: `helpers`: numbers of nodes of the drawing."""
+    yield from _repeated(body)
+    crowded = [*_same_cells(body), *_crowded_facets(body, facets)]
+    yield from crowded
+    doubled = [*_doubled_nodes(body, facets)]
+    hanging = [] if doubled else [*_hanging_nodes(body, facets)]
+    yield from (*doubled, *hanging)
+    parts = [*_several_volumes(body, facets)]
+    yield from parts
+    if not (crowded or doubled or hanging or parts):
+        yield from _pinched(body, facets)
+    yield from _unused(body, helpers)
+
+
+def _repeated(body: Body) -> Iterator[Finding]:
+    ordered = np.sort(body.cells, axis=1)
+    wrong = np.flatnonzero((ordered[:, 1:] == ordered[:, :-1]).any(axis=1))
+    if len(wrong):
+        problem = f"{len(wrong)} degenerate cells have a node twice: {body.cell_labels(wrong)}"
+        yield Finding(problem=problem, allowed="cells with different nodes")
+
+
+def _same_rows(rows: IntArray) -> IntArray:
+    """Places of rows that stand before, in any order of rows: sorted by a number made of each."""
+    weights = np.random.default_rng(0).integers(1, 2**62, size=rows.shape[1], dtype=np.int64)
+    with np.errstate(over="ignore"):
+        code = (rows * weights).sum(axis=1)
+    order = np.argsort(code, kind="stable")
+    same = (rows[order[1:]] == rows[order[:-1]]).all(axis=1)
+    return np.asarray(order[1:][same], dtype=np.int64)
+
+
+def _same_cells(body: Body) -> Iterator[Finding]:
+    wrong = _same_rows(np.sort(body.corners, axis=1))
+    if len(wrong):
+        problem = f"{len(wrong)} cells stand in the file twice: {body.cell_labels(wrong)}"
+        yield Finding(problem=problem, allowed="each cell once")
+
+
+def _crowded_facets(body: Body, facets: Facets) -> Iterator[Finding]:
+    wrong = np.flatnonzero(facets.shared)
+    _, first = np.unique(facets.keys[wrong], return_index=True)
+    if len(first):
+        labels = body.facet_labels(facets.nodes[wrong[first], : facets.corners])
+        problem = f"{len(first)} facets belong to more than two cells: {labels}"
+        yield Finding(problem=problem, allowed="at most two cells at a facet")
+
+
+def _doubled_nodes(body: Body, facets: Facets) -> Iterator[Finding]:
+    """Nodes at one place that are not the same node: the body has a slit there."""
+    nodes = np.unique(facets.nodes[facets.outer])
+    points = body.points[nodes]
+    step = _SAME * _extent(points)
+    found = [_same_rows(np.floor(points / step + shift).astype(np.int64)) for shift in (0.0, 0.5)]
+    twice = nodes[np.unique(np.concatenate(found))]
+    if len(twice):
+        problem = f"{len(twice)} nodes lie where another node lies already: {body.node_labels(twice)}"
+        yield Finding(problem=problem, allowed="merged nodes (Gmsh: Coherence Mesh), so that cells meet")
+
+
+def _extent(points: FloatArray) -> float:
+    return float(np.ptp(points, axis=0).max()) or 1.0
+
+
+def _hanging_nodes(body: Body, facets: Facets) -> Iterator[Finding]:
+    """Nodes that lie on a facet of which they are no corner."""
+    middles = np.setdiff1d(np.unique(body.cells[:, CORNERS[body.kind] :]), [])
+    mixed = np.intersect1d(middles, body.corners)
+    outer = facets.nodes[facets.outer, : facets.corners]
+    triangles = outer if facets.corners == 3 else np.concatenate([outer[:, [0, 1, 2]], outer[:, [0, 2, 3]]])
+    owners = outer if facets.corners == 3 else np.concatenate([outer, outer])
+    wrong = np.union1d(mixed, _on_triangles(body.points, triangles, owners))
+    if len(wrong):
+        problem = f"{len(wrong)} hanging nodes, on a facet or an edge of which they are no corner: "
+        yield Finding(problem=problem + body.node_labels(wrong), allowed="cells that meet at whole facets")
+
+
+def _on_triangles(points: FloatArray, triangles: IntArray, owners: IntArray) -> IntArray:
+    nodes = np.unique(triangles)
+    if not len(nodes):
+        return nodes
+    corners = points[triangles]
+    middles = corners.mean(axis=1)
+    radii = np.linalg.norm(corners - middles[:, None], axis=2).max(axis=1)
+    tree = cKDTree(points[nodes])
+    counts = tree.query_ball_point(middles, radii, return_length=True)
+    near = np.flatnonzero(counts <= _MOST_NEAR)
+    lists = tree.query_ball_point(middles[near], radii[near])
+    which = np.repeat(near, [len(each) for each in lists])
+    candidates = nodes[np.fromiter((node for each in lists for node in each), dtype=np.int64)]
+    foreign = (owners[which] != candidates[:, None]).all(axis=1)
+    which, candidates = which[foreign], candidates[foreign]
+    first, one, two = corners[which].transpose(1, 0, 2)
+    inside = _inside(points[candidates] - first, one - first, two - first)
+    return np.unique(candidates[inside])
+
+
+def _inside(at: FloatArray, one: FloatArray, two: FloatArray) -> BoolArray:
+    """Whether places, seen from a corner, lie on the triangles of two sides, away from their corners."""
+    normal = np.cross(one, two)
+    area = np.maximum((normal**2).sum(axis=1), 1e-300)
+    height = np.abs((at * normal).sum(axis=1)) / np.sqrt(area)
+    share_one = (np.cross(at, two) * normal).sum(axis=1) / area
+    share_two = (np.cross(one, at) * normal).sum(axis=1) / area
+    shares = np.column_stack([1 - share_one - share_two, share_one, share_two])
+    flat = height < _ON * np.sqrt(np.sqrt(area))
+    return np.asarray(flat & (shares > -_ON).all(axis=1) & (shares < 1 - _ON).all(axis=1), dtype=np.bool_)
+
+
+def _several_volumes(body: Body, facets: Facets) -> Iterator[Finding]:
+    order = np.argsort(facets.keys, kind="stable")
+    meet = np.flatnonzero(facets.keys[order[1:]] == facets.keys[order[:-1]])
+    one, two = facets.cells[order[meet]], facets.cells[order[meet + 1]]
+    graph = coo_array((np.ones(len(one)), (one, two)), shape=(len(body.cells), len(body.cells)))
+    count, part = connected_components(graph, directed=False)
+    if count > 1:
+        _, first = np.unique(part, return_index=True)
+        problem = f"it falls into {count} separate volumes, which begin with {body.cell_labels(first)}"
+        yield Finding(problem=problem, allowed="one chamber, whose cells meet at facets")
+
+
+def _pinched(body: Body, facets: Facets) -> Iterator[Finding]:
+    """Edges at which the outer surface meets itself."""
+    outer = facets.nodes[facets.outer, : facets.corners]
+    edges = np.sort(np.stack([outer, np.roll(outer, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    _, first, counts = np.unique(
+        edges[:, 0] * len(body.points) + edges[:, 1], return_index=True, return_counts=True
+    )
+    wrong = edges[first[counts != 2]]
+    if len(wrong):
+        problem = f"the surface is open or touches itself along {len(wrong)} edges: "
+        labels = body.facet_labels(wrong).replace("facet", "edge")
+        yield Finding(problem=problem + labels, allowed="a closed surface, two facets at each edge")
+
+
+def _unused(body: Body, helpers: IntArray) -> Iterator[Finding]:
+    used = np.zeros(len(body.points), dtype=np.bool_)
+    used[body.cells] = True
+    wrong = np.flatnonzero(~used & ~np.isin(body.node_numbers, helpers))
+    if len(wrong):
+        problem = f"{len(wrong)} nodes belong to no cell: {body.node_labels(wrong)}"
+        yield Finding(problem=problem, allowed="nodes of cells only (export the named volume alone)")

@@ -12,12 +12,10 @@ from typing import Any, Final
 _HOME: Final = MappingProxyType(
     {
         "factorised": "ringbalance.physics.pressure.sparse",
-        "linear_prolongation": "ringbalance.physics.pressure.sparse",
         "multigrid": "ringbalance.physics.pressure.multigrid",
         "sloshing_response": "ringbalance.physics.sloshing.response",
         "nnls": "scipy.optimize",
         "Sobol": "scipy.stats.qmc",
-        "sparse_matrix": "ringbalance.physics.pressure.sparse",
     }
 )
 

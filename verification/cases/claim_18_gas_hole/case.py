@@ -9,15 +9,19 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from ringbalance.mesh.geometry import half_angle, surface_radius
+from ringbalance.mesh.quadratic_tetrahedra import shapes, slopes, tetrahedra
 from ringbalance.scene.arrays import ComplexArray, FloatArray
+from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, NotRunError, Series, figure
 
-_GRIDS = ((30, 45), (60, 90))
-"""Radial and angular cells, coarse and fine."""
+_GRIDS = ((30, 45, 4), (60, 90, 8))
+"""Radial and angular cells, and of an imported cell Gauss points along each direction; coarse and fine."""
 _ANGLES = np.linspace(0.0, np.pi, 181)
 """Of the shaft; the chamber is symmetric about its centre line."""
+_HOLE = "gas_hole"
+"""Boundary of an imported chamber that is the mouth of its gas line."""
 _JUDGED = ("stopped", "running", "any_speed")
 _DOWNWARD = _ANGLES[:1]
 _OFFSETS = np.array([0.02, 0.1, 0.3, 0.6, 1.0, 2.0, 5.0, 20.0])
@@ -37,7 +41,7 @@ class _Cells:
 
 
 def values(scene: Scene) -> dict[str, float]:
-    return _margins(scene, _ANGLES, _GRIDS[0])
+    return _margins(scene, _angles(scene.disc), _GRIDS[0])
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -48,11 +52,12 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     if scene.environment.shaft != "horizontal" or scene.environment.gravity == 0:
         raise NotRunError("the claim is about a horizontal shaft under gravity")
     disc = scene.disc
-    angles = _DOWNWARD if defect == "upright_only" else _ANGLES
+    angles = _DOWNWARD if defect == "upright_only" else _angles(disc)
     coarse, fine = (_cells(disc, *grid) for grid in _GRIDS)
     best = _safest_radius(disc, fine, angles)
+    hole = _hole(disc, best)
     offset = scene.environment.gravity / scene.rotor.speed**2
-    rough, safe = (_safe_fills(disc, cells, best, offset, angles) for cells in (coarse, fine))
+    rough, safe = (_safe_fills(disc, cells, hole, offset, angles) for cells in (coarse, fine))
     found = {
         f"margin_{state}": Found(
             value=fill - disc.max_fill_ratio, numerical=from_half_width(abs(fill - rough[state]))
@@ -65,39 +70,61 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         found=found,
         numbers={
             "best_radius": best,
+            "hole_radius": float(np.abs(hole).mean()),
             "max_fill": disc.max_fill_ratio,
             "safe_running": safe["running"],
             "safe_stopped": safe["stopped"],
             "ring_radius": ring,
-            "safe_at_ring": _safe_at_rest(fine, ring, angles),
+            "safe_at_ring": _safe_at_rest(fine, _on_centre_line(ring), angles),
             "between_margin": safe["turning"] - safe["stopped"],
         },
         series=(_figure(disc, fine, offset),),
     )
 
 
-def _margins(scene: Scene, angles: FloatArray, grid: tuple[int, int]) -> dict[str, float]:
+def _margins(scene: Scene, angles: FloatArray, grid: tuple[int, int, int]) -> dict[str, float]:
     disc, offset = scene.disc, scene.environment.gravity / scene.rotor.speed**2
     cells = _cells(disc, *grid)
-    safe = _safe_fills(disc, cells, _safest_radius(disc, cells, angles), offset, angles)
+    hole = _hole(disc, _safest_radius(disc, cells, angles))
+    safe = _safe_fills(disc, cells, hole, offset, angles)
     return {f"margin_{state}": safe[state] - disc.max_fill_ratio for state in _JUDGED}
 
 
+def _angles(disc: Disc) -> FloatArray:
+    """Of the shaft: an imported chamber need not be symmetric."""
+    return _ANGLES if disc.geometry is None else np.linspace(-np.pi, np.pi, _ANGLES.size)
+
+
+def _hole(disc: Disc, best: float) -> ComplexArray:
+    """Points of the hole, m: the one that an imported chamber has, or the safest point of the centre line."""
+    facets = {} if disc.geometry is None else disc.geometry.boundaries
+    if disc.geometry is None or _HOLE not in facets:
+        return _on_centre_line(best)
+    places = disc.geometry.points[np.unique(facets[_HOLE])]
+    return np.asarray(np.unique(np.round(places[:, 0] + 1j * places[:, 1], 6)), dtype=np.complex128)
+
+
+def _on_centre_line(radius: float) -> ComplexArray:
+    return np.array([radius], dtype=np.complex128)
+
+
 def _safe_fills(
-    disc: Disc, cells: _Cells, radius: float, offset: float, angles: FloatArray
+    disc: Disc, cells: _Cells, hole: ComplexArray, offset: float, angles: FloatArray
 ) -> Mapping[str, float]:
-    """Safe fills with the hole at a radius: at full speed, at rest, at any speed between, at the worst."""
-    stopped = _safe_at_rest(cells, radius, angles)
-    turning = _safe_turning(cells, radius, _OFFSETS * disc.outer_radius, angles)
+    """Safe fills with a hole: at full speed, at rest, at any speed between, at the worst."""
+    stopped = _safe_at_rest(cells, hole, angles)
+    turning = _safe_turning(cells, hole, _OFFSETS * disc.outer_radius, angles)
     return {
-        "running": _safe_turning(cells, radius, np.array([offset]), angles),
+        "running": _safe_turning(cells, hole, np.array([offset]), angles),
         "stopped": stopped,
         "turning": turning,
         "any_speed": min(stopped, turning),
     }
 
 
-def _cells(disc: Disc, radial: int, angular: int) -> _Cells:
+def _cells(disc: Disc, radial: int, angular: int, points: int) -> _Cells:
+    if disc.geometry is not None:
+        return _imported_cells(disc.geometry, radial, angular, points)
     depth = disc.outer_radius - disc.inner_radius
     radius = disc.inner_radius + depth * (np.arange(radial) + 0.5) / radial
     alpha = half_angle(disc=disc, radius=radius)
@@ -107,34 +134,74 @@ def _cells(disc: Disc, radial: int, angular: int) -> _Cells:
     return _Cells(place=place, share=area / area.sum(), width=np.sqrt(area))
 
 
+def _imported_cells(geometry: ChamberGeometry, radial: int, angular: int, points: int) -> _Cells:
+    """What lies in each column along the shaft, at the middle of it."""
+    place, volume = (values.ravel() for values in _columns(geometry, points))
+    parts = []
+    for value, count in ((np.abs(place), radial), (np.angle(place), angular)):
+        step = np.ptp(value) / count
+        parts.append((np.minimum(((value - value.min()) / step).astype(np.int64), count - 1), step))
+    (ring, depth), (ray, angle) = parts
+    cell, size = ring * angular + ray, radial * angular
+    share = np.bincount(cell, volume, size)
+    middle = np.bincount(cell, volume * place.real, size) + 1j * np.bincount(cell, volume * place.imag, size)
+    filled = share > 0
+    middle = middle[filled] / share[filled]
+    return _Cells(
+        place=middle,
+        share=share[filled] / share.sum(),
+        width=np.sqrt(depth * angle * np.abs(middle)),
+    )
+
+
+def _columns(geometry: ChamberGeometry, points: int) -> tuple[ComplexArray, FloatArray]:
+    """Gauss points of all cells across the shaft, m, and the volume at each, m^3."""
+    body = tetrahedra(geometry)
+    one, weights = np.polynomial.legendre.leggauss(points)
+    u, v, w = (grid.ravel() for grid in np.meshgrid(*3 * [(1 + one) / 2], indexing="ij"))
+    weight = np.prod([grid.ravel() for grid in np.meshgrid(*3 * [weights / 2], indexing="ij")], axis=0)
+    # A cube drawn to a corner: its Jacobian is (1 - v)(1 - w)^2.
+    second, third, fourth = u * (1 - v) * (1 - w), v * (1 - w), w
+    local = np.stack([1 - second - third - fourth, second, third, fourth], axis=1)
+    corners = body.nodes[body.cells]
+    jacobian = np.einsum("enx,pna->epxa", corners, slopes(local), optimize=True)
+    volume = np.linalg.det(jacobian) * weight * (1 - v) * (1 - w) ** 2
+    places = np.einsum("pn,enx->epx", shapes(local), corners[..., :2], optimize=True)
+    return np.asarray(places[..., 0] + 1j * places[..., 1]), np.asarray(volume)
+
+
 def _liquid_share(cells: _Cells, height: FloatArray) -> FloatArray:
     """Share of the chamber below a level; height = distance of each cell beyond it, shape (states, cells)."""
     inside = np.clip(0.5 + height / cells.width, 0.0, 1.0)
     return np.asarray(inside @ cells.share, dtype=np.float64)
 
 
-def _safe_at_rest(cells: _Cells, radius: float, angles: FloatArray) -> float:
-    """Smallest share below the level through a point of the centre line, over directions of gravity."""
+def _safe_at_rest(cells: _Cells, hole: ComplexArray, angles: FloatArray) -> float:
+    """Smallest share below the level through a point of the hole, over directions of gravity."""
     down = np.exp(1j * angles)[:, None]
-    return float(_liquid_share(cells, np.real((cells.place - radius) * np.conj(down))).min())
+    place = np.real(cells.place * np.conj(down))
+    # The lowest point is reached first.
+    level = np.real(hole * np.conj(down)).max(axis=1, keepdims=True)
+    return float(_liquid_share(cells, place - level).min())
 
 
-def _safe_turning(cells: _Cells, radius: float, offsets: FloatArray, angles: FloatArray) -> float:
+def _safe_turning(cells: _Cells, hole: ComplexArray, offsets: FloatArray, angles: FloatArray) -> float:
     """The same with the surface a circle about -g/omega^2."""
     shares = []
     for offset in offsets:
         centre = -offset * np.exp(1j * angles)[:, None]
-        shares.append(_liquid_share(cells, np.abs(cells.place - centre) - np.abs(radius - centre)).min())
+        level = np.abs(hole - centre).max(axis=1, keepdims=True)
+        shares.append(_liquid_share(cells, np.abs(cells.place - centre) - level).min())
     return float(min(shares))
 
 
 def _safest_radius(disc: Disc, cells: _Cells, angles: FloatArray) -> float:
     inner, outer = disc.inner_radius, disc.outer_radius
     scan = np.linspace(inner, outer, 25)
-    best = scan[int(np.argmax([_safe_at_rest(cells, r, angles) for r in scan]))]
+    best = scan[int(np.argmax([_safe_at_rest(cells, _on_centre_line(r), angles) for r in scan]))]
     step = scan[1] - scan[0]
     result = minimize_scalar(
-        lambda r: -_safe_at_rest(cells, r, angles),
+        lambda r: -_safe_at_rest(cells, _on_centre_line(r), angles),
         bounds=(max(inner, best - step), min(outer, best + step)),
         method="bounded",
         options={"xatol": 1e-4 * (outer - inner)},
@@ -144,8 +211,9 @@ def _safest_radius(disc: Disc, cells: _Cells, angles: FloatArray) -> float:
 
 def _figure(disc: Disc, cells: _Cells, offset: float) -> Series:
     radius = np.linspace(disc.inner_radius, disc.outer_radius, 61)
-    rest = np.array([_safe_at_rest(cells, r, _ANGLES[::4]) for r in radius])
-    running = np.array([_safe_turning(cells, r, np.array([offset]), _ANGLES[::30]) for r in radius])
+    points, angles = [_on_centre_line(r) for r in radius], _angles(disc)
+    rest = np.array([_safe_at_rest(cells, point, angles[::4]) for point in points])
+    running = np.array([_safe_turning(cells, point, np.array([offset]), angles[::30]) for point in points])
     return figure(
         "largest fill that leaves the gas hole dry",
         ("radius of the hole on the centre line", "m", radius),

@@ -31,6 +31,12 @@ def stretched_table(geometry: ChamberGeometry, *, outer_radius: float, axial_wid
     if across == along == 1:
         return table
     volume, moment, square = across**2 * along, across**3 * along, across**2
-    scale = np.array([volume, moment, moment, square, *(s / square for s in (volume, moment, moment, square))])
-    patches = table.patches * np.array([across, across, along])
-    return replace(table, patches=patches, nodes=table.nodes * square, columns=table.columns * scale[:, None])
+    columns = (volume, moment, moment, square)
+    scale = np.array([*columns, *(each / square for each in columns)])[:, None]
+    return replace(
+        table,
+        patches=table.patches * np.array([across, across, along]),
+        nodes=table.nodes * square,
+        columns=table.columns * scale,
+        error=table.error * scale,
+    )

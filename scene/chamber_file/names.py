@@ -29,6 +29,7 @@ MEANINGS: Final[Mapping[str, str]] = MappingProxyType(
         "end_back": "end wall at the lower coordinate along the shaft",
         "end_front": "end wall at the higher coordinate along the shaft",
         "gas_tube": "outside of a tube or a pin inside the chamber",
+        "gas_hole": "mouth of the gas line",
         PORT: "opening of the connecting tube",
         WALLS: "any other wall; facets without a name count as this",
     }

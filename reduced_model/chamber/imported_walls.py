@@ -3,57 +3,37 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
-from ringbalance.mesh.geometry import (
-    chamber_volume,
-    liquid_first_moment,
-    moment_across,
-    surface_radius,
-    wall_square,
-)
-from ringbalance.physics import deferred
+from ringbalance.mesh.cut.faceting import drawing_error
+from ringbalance.mesh.cut.table import chamber_table
+from ringbalance.mesh.geometry import liquid_first_moment, moment_across, surface_radius
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.models import Disc
-
-_OUTER_WALL = "outer_wall"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Facets:
-    """How far facets are from the smooth walls that they may stand for."""
+class DrawingShares:
+    """Relative half-widths for a mesh in place of the chamber: facets for curved walls, and integration."""
 
     volume: float
-    """Between all walls and theirs, m^3, as if all were on one side."""
-    outer_depth: float
-    """Mean over the outer wall, m."""
+    wall_pressure: FloatArray
+    moment: FloatArray
+    """Of the moment or of lambda, whichever is larger."""
 
 
-@lru_cache(maxsize=8)
-def facets_of(geometry: ChamberGeometry) -> Facets:
-    """Estimate from the angles at which neighbouring facets meet; edges sharper than a mesh's count as real."""
-    space = deferred.TetrahedronSpace(body=deferred.tetrahedra(geometry))
-    walls = {name: space.facets(name) for name in space.boundaries}
-    return Facets(
-        volume=sum(float(wall.weights.sum()) * wall.depth_to_smooth() for wall in walls.values()),
-        outer_depth=walls[_OUTER_WALL].depth_to_smooth(),
-    )
-
-
-def drawing_error(disc: Disc, fills: FloatArray) -> tuple[float, FloatArray]:
-    """What the mesh's facets leave of smooth walls, relative: of volume, moment and lambda; of wall pressure.
-
-    Returns: A number, and one for each of the fills, which are above zero; zeros for the sector of the keys.
-    """
+def drawing_shares(disc: Disc, fills: FloatArray) -> DrawingShares:
+    """Shares at fill ratios above zero; zeros for the sector of the keys."""
     if disc.geometry is None:
-        return 0.0, np.zeros(fills.shape)
-    facets = facets_of(disc.geometry)
-    drawn = facets.volume / chamber_volume(disc=disc) + facets.outer_depth / disc.inner_radius
-    square = wall_square(disc=disc, surface_radius=surface_radius(disc=disc, fill_ratio=fills))
-    return drawn, drawn + 2 * disc.outer_radius * facets.outer_depth / square
+        return DrawingShares(volume=0.0, wall_pressure=np.zeros(fills.shape), moment=np.zeros(fills.shape))
+    table, error = chamber_table(disc.geometry), drawing_error(disc.geometry, fill_ratio=fills)
+    a = np.sqrt(table.level_of(fills * table.volume))
+    return DrawingShares(
+        volume=error.volume / table.volume,
+        wall_pressure=error.wall_square / table.at_radius(a, 3),
+        moment=np.maximum(error.moment / table.at_radius(a, 1), error.centroid / table.surface(a)[1]),
+    )
 
 
 def share_across(disc: Disc, fills: FloatArray) -> FloatArray:

@@ -7,6 +7,7 @@ from typing import Final
 
 from ringbalance.identification import eccentric_parameters as eccentric
 from ringbalance.identification import parameters as ring
+from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.model_errors import MODEL_ERRORS, model_errors, with_model_error
 from ringbalance.identification.parameters import Parameter
 from ringbalance.identification.predict.device import Models, models_of
@@ -32,9 +33,9 @@ def parameters_for(scene: AnyScene, names: Sequence[str]) -> tuple[Parameter, ..
     return eccentric.eccentric_parameters(scene, names)
 
 
-def informed(scene: AnyScene, kinds: Sequence[str]) -> list[str]:
-    """Parameters that kinds of data inform; a prescribed k stands in for the loss that it leaves out."""
-    names = dict.fromkeys(name for kind in kinds for name in PREDICTED[kind].informs)
+def informed(scene: AnyScene, data: Sequence[Observations]) -> list[str]:
+    """Parameters that data inform; a prescribed k stands in for the loss that it leaves out."""
+    names = dict.fromkeys(name for each in data for name in PREDICTED[each.kind].informs(each))
     prescribed = isinstance(scene, Scene) and scene.tube.drag_coefficient is not None
     return ["drag_coefficient" if prescribed and name == "extra_loss" else name for name in names]
 

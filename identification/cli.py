@@ -55,7 +55,7 @@ def fit(
         template: print an empty file of measurements of this kind, with explanations, and do nothing else.
 
     Returns:
-        Exit code: 1 when the fit does not describe the data.
+        Exit code: 1 when the fit does not describe the data, or another law does so better.
 
     Raises:
         SceneError: a scene, a file of measurements or a parameter that cannot be used.
@@ -89,7 +89,7 @@ def fit(
     if save is not None:
         save_result(save, text=text, result=result, data=observations, said=told.sentences)
         messages_console().print(f"fitted scene written to {save}", highlight=False, soft_wrap=True)
-    return DONE if told.criticism.describes else FAILED
+    return DONE if told.holds else FAILED
 
 
 def _fitted_name(name: str | None, result: FitResult) -> str | None:

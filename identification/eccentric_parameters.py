@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, Final
 
-from ringbalance.identification.parameters import FitError, Parameter
+from ringbalance.identification.parameters import FitError, Parameter, unknown_name
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.keys.eccentric_schema import ECCENTRIC_MASS
 from ringbalance.scene.uncertain import NORMAL_95
@@ -43,7 +43,7 @@ def fitted_names(scene: EccentricScene) -> tuple[str, ...]:
 
 def _parameter(scene: EccentricScene, name: str) -> Parameter:
     if name not in fitted_names(scene):
-        raise FitError(f'"{name}" cannot be fitted; allowed: {", ".join(fitted_names(scene))}')
+        raise unknown_name(name, fitted_names(scene))
     start, is_angle = eccentric_value(scene, name), name == "imbalance.phase"
     if start <= 0 and not is_angle:
         raise FitError(f"{name} is zero: give a value above zero to fit it")

@@ -67,7 +67,7 @@ def problem_of(
             raise FitError(f"{each.file}: data of kind {each.kind} do not belong to this balancer")
         if reason := PREDICTED[each.kind].too_long(scene, each):
             raise FitError(f"{each.file}: {reason}")
-    names = informed(scene, [each.kind for each in data]) if parameters is None else list(parameters)
+    names = informed(scene, data) if parameters is None else list(parameters)
     return Problem(
         scene=scene,
         models=models_for(scene),

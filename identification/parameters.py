@@ -16,6 +16,7 @@ from typing import Any, Final
 
 from ringbalance.identification.predict.device import device_of, models_of
 from ringbalance.reduced_model.chamber.inputs import half_widths
+from ringbalance.scene.faults import did_you_mean
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import NORMAL_95, UNCERTAIN_QUANTITIES, nominal_value, with_value
 
@@ -78,6 +79,12 @@ START: Final = ("initial_amplitude", "initial_phase")
 _LOSS_STEP: Final = 0.01
 
 
+def unknown_name(name: str, allowed: Sequence[str]) -> FitError:
+    """The error for a name that cannot be fitted."""
+    hint = did_you_mean(name, allowed)
+    return FitError(f'"{name}" cannot be fitted{hint}; allowed: {", ".join(allowed)}')
+
+
 def scene_parameter(scene: Scene, name: str) -> Parameter:
     """A quantity of a liquid-ring scene as a parameter.
 
@@ -86,7 +93,7 @@ def scene_parameter(scene: Scene, name: str) -> Parameter:
     if name in START:
         return _of_start(scene, name)
     if name not in UNCERTAIN_QUANTITIES:
-        raise FitError(f'"{name}" cannot be fitted; allowed: {", ".join(sorted(UNCERTAIN_QUANTITIES))}')
+        raise unknown_name(name, sorted((*UNCERTAIN_QUANTITIES, *START)))
     value = nominal_value(scene=scene, quantity=name)
     start = _NATURAL.get(name) if value is None else value
     if start is None:

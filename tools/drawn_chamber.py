@@ -221,14 +221,17 @@ def inp(drawing: Drawing) -> bytes:
 
 
 def scene_text(mesh: str, **disc: str | int) -> str:
-    """The paper's scene with a mesh in place of its dimensions. Args: `disc`: further keys of [disc]."""
+    """The paper's scene with a mesh in place of its dimensions.
+
+    Args: `disc`: further keys of [disc]; an empty one is left out.
+    """
     text = bundled_scene("liquid_ring_paper").read_text(encoding="utf-8")
     text = text[: text.index("[uncertainty]")] + text[text.index("[run]") :]
     gone = "outer_radius|inner_radius|axial_width|central_angle|plate_thickness|port_radius|hump_radius"
     text = re.sub(rf"(?m)^({gone}) = .*\n", "", text).replace(
         'origin = { plate_thickness = "inferred" }\n', ""
     )
-    lines = "".join(f"{key} = {value!r}\n" for key, value in disc.items())
+    lines = "".join(f"{key} = {value!r}\n" for key, value in disc.items() if value != "")
     return text.replace("[disc]\n", f"[disc]\nmesh = {mesh!r}\n{lines}", 1)
 
 

@@ -58,6 +58,7 @@ class Column:
     """SI."""
     highest: float = math.inf
     above_zero: bool = False
+    whole: bool = False
 
     @property
     def head(self) -> str:
@@ -75,6 +76,8 @@ class Column:
             raise FieldError("it is not above zero", self._range())
         if value < self.lowest:
             raise FieldError("it is negative" if self.lowest == 0 else "it is too small", self._range())
+        if self.whole and value != round(value):
+            raise FieldError("it is not a whole number", self._range())
         if abs(value) > self._largest:
             raise FieldError(f"it is too large; is [{self.unit or 1}] meant?", self._range())
 
@@ -322,6 +325,16 @@ _POSITIONING: Final = DataKind(
             unit="deg",
             meaning="moved by the mass on its track since then, not wrapped",
             measured=True,
+        ),
+        Column(
+            name="moved_mass",
+            dimension=None,
+            unit="",
+            meaning="1 or 2, the mass that moves while the other one is clamped; 1 without this column",
+            optional=True,
+            lowest=1.0,
+            highest=2.0,
+            whole=True,
         ),
     ),
 )

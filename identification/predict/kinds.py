@@ -46,8 +46,12 @@ class PredictedKind:
     """The measured column whose noise it is."""
     too_long: Callable[[Any, Observations], str]
     """Scene and observations to why predictions would take too long; empty where they do not."""
-    informs: tuple[str, ...]
+    informs: Callable[[Observations], tuple[str, ...]]
     """Parameters that are fitted to such data where the user names none."""
+
+
+def _always(*names: str) -> Callable[[Observations], tuple[str, ...]]:
+    return lambda _: names
 
 
 def _never(_scene: Any, _observations: Observations) -> str:
@@ -67,7 +71,7 @@ def _nothing_free(numbers_per_row: int) -> Callable[[Observations], FloatArray]:
 def _numbers(
     predict: Callable[..., FloatArray],
     column: Callable[[Observations], str],
-    *informs: str,
+    informs: Callable[[Observations], tuple[str, ...]],
     too_long: Callable[[Any, Observations], str] = _never,
 ) -> PredictedKind:
     """One measured number a row, its errors independent from row to row."""
@@ -85,7 +89,7 @@ def _numbers(
 
 def _vibrations(
     predict: Callable[[Any, Observations], FloatArray],
-    *informs: str,
+    informs: Callable[[Observations], tuple[str, ...]],
     free: Callable[[Observations], FloatArray],
 ) -> PredictedKind:
     """One measured vibration a row."""
@@ -104,14 +108,12 @@ def _vibrations(
 PREDICTED: Final[Mapping[str, PredictedKind]] = MappingProxyType(
     {
         "trial_weight": _vibrations(
-            trial_weights.predict, "influence_coefficient", "lag_angle", free=trial_weights.free
+            trial_weights.predict, _always("influence_coefficient", "lag_angle"), trial_weights.free
         ),
         "trial_amplitude": _numbers(
             _by_scene_alone(trial_amplitudes.predict),
             lambda _: "amplitude",
-            "influence_coefficient",
-            "initial_amplitude",
-            "initial_phase",
+            _always("influence_coefficient", "initial_amplitude", "initial_phase"),
         ),
         "injection": PredictedKind(
             predict=injections.predict,
@@ -121,25 +123,20 @@ PREDICTED: Final[Mapping[str, PredictedKind]] = MappingProxyType(
             free=_nothing_free(2),
             column=lambda _: "amplitude_after",
             too_long=_never,
-            informs=("lambda_factor", "bore", "extra_loss"),
+            informs=_always("lambda_factor", "bore", "extra_loss"),
         ),
-        "transfer": _numbers(transfers.predict, transfers.column, "bore", "extra_loss"),
-        "flow": _numbers(flows.predict, lambda _: "flow_rate", "bore", "extra_loss"),
-        "pressure": _numbers(_by_scene_alone(pressures.predict), lambda _: "pressure", "density"),
+        "transfer": _numbers(transfers.predict, transfers.column, _always("bore", "extra_loss")),
+        "flow": _numbers(flows.predict, lambda _: "flow_rate", _always("bore", "extra_loss")),
+        "pressure": _numbers(_by_scene_alone(pressures.predict), lambda _: "pressure", _always("density")),
         "run_up": _vibrations(
             run_ups.predict,
-            "rotor.stiffness",
-            "rotor.damping",
-            "imbalance.mass",
-            "imbalance.phase",
-            free=_nothing_free(2),
+            _always("rotor.stiffness", "rotor.damping", "imbalance.mass", "imbalance.phase"),
+            _nothing_free(2),
         ),
         "positioning": _numbers(
             _by_scene_alone(positionings.predict),
             lambda _: "angle",
-            "masses.friction_arm[0]",
-            "motor.torque_constant",
-            "motor.back_emf_constant",
+            positionings.informs,
             too_long=positionings.too_long,
         ),
     }

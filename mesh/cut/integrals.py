@@ -30,7 +30,7 @@ LONGEST: Final = 1 / 3
 _STEEP: Final = 0.05
 """Least over largest slope of h along the lines on which the surface is looked for."""
 _HALVINGS: Final = 30
-_NEGLIGIBLE: Final = 1e-10
+_NEGLIGIBLE: Final = 1e-12
 """Of the volume: most that a piece of wall may hold whose crossing is not looked for."""
 COLUMNS: Final = 4
 """Volume, moment along x and along y, and int h dA over the outer wall; then their derivatives by L."""

@@ -16,8 +16,8 @@ from ringbalance.mesh.cut.integrals import COLUMNS, integrals, walls_about
 from ringbalance.mesh.cut.table import ChamberTable
 from ringbalance.scene.arrays import BoolArray, FloatArray
 
-_CLOSE: Final = 1e-6
-"""Of the volume: what is left is put right to first order, which leaves the square of it."""
+_CLOSE: Final = 1e-8
+"""Of the volume; what is left is put right to first order, but for the slopes by L."""
 _STEPS: Final = 12
 _WET: Final = 1e-7
 """Of the outer wall, that may look dry by rounding."""

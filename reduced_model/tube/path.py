@@ -61,6 +61,11 @@ def crest_span(tube: Tube) -> tuple[float, float]:
     return tube.hump_position * (1 - arc), tube.hump_position + (1 - tube.hump_position) * arc
 
 
+def crest_middle(tube: Tube) -> float:
+    """Fraction of the path that halves the crest: where liquid parts that nothing pulls to either side."""
+    return sum(crest_span(tube)) / 2
+
+
 def _arc_fraction(tube: Tube) -> float:
     if tube.hump_radius is None or tube.hump_shape == "point":
         return 0.0

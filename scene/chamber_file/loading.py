@@ -13,9 +13,11 @@ import numpy as np
 from ringbalance.scene.arrays import IntArray
 from ringbalance.scene.chamber_file.assembly import Body, assembled, helpers
 from ringbalance.scene.chamber_file.contents import MeshFileError
+from ringbalance.scene.chamber_file.keys import MeshKeys
 from ringbalance.scene.chamber_file.names import boundaries_of
 from ringbalance.scene.chamber_file.placing import (
     Placed,
+    covered_findings,
     opening_findings,
     placed,
     port_findings,
@@ -26,14 +28,16 @@ from ringbalance.scene.chamber_file.reading import content_of, contents_of, is_s
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.chamber_file.shape import oriented
 from ringbalance.scene.chamber_file.step_file import STEP_UNIT
+from ringbalance.scene.chamber_file.stretching import STRETCHED
 from ringbalance.scene.chamber_file.topology import facets_of, topology_findings
 from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.faults import Fault
+from ringbalance.scene.keys.declaration import keys_of
 from ringbalance.scene.keys.derivations import even_number_of_chambers
 from ringbalance.scene.keys.reading import Reading
 from ringbalance.scene.rules.check import Finding, written
 
-_FOLLOWING: Final = ("outer_radius", "inner_radius", "axial_width", "central_angle", "plate_thickness")
+_FOLLOWING: Final = (*STRETCHED, "plate_thickness")
 """Keys of [disc] that a mesh decides."""
 _PORT: Final = "tube.port_radius"
 
@@ -45,7 +49,8 @@ def with_chamber(reading: Reading) -> tuple[Reading, tuple[Fault, ...]]:
     faults = [*_superfluous(reading), *_unit_faults(reading)]
     paths = frozenset(f"disc.{key}" for key in (*_FOLLOWING, "geometry"))
     unknown = replace(reading, broken=reading.broken | paths)
-    if faults or not reading.known("disc.mesh", "disc.mesh_axis", "accuracy.tolerance"):
+    unread = {f"disc.{key}" for key in keys_of(MeshKeys)} & reading.broken
+    if faults or unread or not reading.known("disc.mesh", "accuracy.tolerance"):
         return unknown, tuple(faults)
     try:
         return _following(reading, *_chamber(reading)), ()
@@ -123,6 +128,16 @@ def _unfitting(
     if port is not None:
         yield from scale_findings(found.dimensions, unit=unit, port=port)
         yield from port_findings(found.points, boundaries, found.dimensions, port=port)
+    radii = {
+        "port_radius": port or port_radius(found.points, boundaries),
+        "inlet_radius": reading.values.get("gas.inlet_radius"),
+    }
+    yield from covered_findings(
+        body,
+        found.points,
+        radii={name: value for name, value in radii.items() if value is not None},
+        fill=reading.values.get("disc.max_fill_ratio", 0.5),
+    )
 
 
 def _record(

@@ -115,7 +115,7 @@ def _no_facets(body: Body, facets: Facets, block: Elements, real: BoolArray) -> 
         if wrong.any():
             corners = block.nodes[wrong, : CORNERS[block.kind]]
             labels = body.facet_labels(corners, block.numbers[wrong])
-            problem = f"{len(corners)} facets named {names} {what}: {labels}"
+            problem = f"facets named {names} {what} ({len(corners)}): {labels}"
             yield Finding(problem=problem, allowed="facets of the chamber's surface")
 
 
@@ -128,7 +128,7 @@ def _other_middles(body: Body, cell: IntArray, block: Elements, real: BoolArray)
     if wrong.any():
         corners = nodes[wrong, : CORNERS[block.kind]]
         labels = body.facet_labels(corners, block.numbers[real][wrong])
-        problem = f"{len(corners)} named facets have other mid-side nodes than their cells: {labels}"
+        problem = f"named facets have other mid-side nodes than their cells ({len(corners)}): {labels}"
         yield Finding(problem=problem, allowed="facets and cells with the same nodes")
 
 
@@ -137,5 +137,5 @@ def _named_twice(body: Body, corners: IntArray, held: BoolArray) -> Iterator[Fin
     if wrong.any():
         both = held[:, np.flatnonzero(wrong)[0]]
         names = " and ".join(toml_text(KNOWN_NAMES[place]) for place in np.flatnonzero(both))
-        problem = f"{wrong.sum()} facets have two names ({names}): {body.facet_labels(corners[wrong])}"
+        problem = f"facets have two names, {names} ({wrong.sum()}): {body.facet_labels(corners[wrong])}"
         yield Finding(problem=problem, allowed="one name for each facet")

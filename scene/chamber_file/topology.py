@@ -84,7 +84,7 @@ def _repeated(body: Body) -> Iterator[Finding]:
     ordered = np.sort(body.cells, axis=1)
     wrong = np.flatnonzero((ordered[:, 1:] == ordered[:, :-1]).any(axis=1))
     if len(wrong):
-        problem = f"{len(wrong)} degenerate cells have a node twice: {body.cell_labels(wrong)}"
+        problem = f"cells have a node twice ({len(wrong)}): {body.cell_labels(wrong)}"
         yield Finding(problem=problem, allowed="cells with different nodes")
 
 
@@ -101,7 +101,7 @@ def _same_rows(rows: IntArray) -> IntArray:
 def _same_cells(body: Body) -> Iterator[Finding]:
     wrong = _same_rows(np.sort(body.corners, axis=1))
     if len(wrong):
-        problem = f"{len(wrong)} cells stand in the file twice: {body.cell_labels(wrong)}"
+        problem = f"cells stand in the file twice ({len(wrong)}): {body.cell_labels(wrong)}"
         yield Finding(problem=problem, allowed="each cell once")
 
 
@@ -110,7 +110,7 @@ def _crowded_facets(body: Body, facets: Facets) -> Iterator[Finding]:
     _, first = np.unique(facets.keys[wrong], return_index=True)
     if len(first):
         labels = body.facet_labels(facets.nodes[wrong[first], : facets.corners])
-        problem = f"{len(first)} facets belong to more than two cells: {labels}"
+        problem = f"facets belong to more than two cells ({len(first)}): {labels}"
         yield Finding(problem=problem, allowed="at most two cells at a facet")
 
 
@@ -122,7 +122,7 @@ def _doubled_nodes(body: Body, facets: Facets) -> Iterator[Finding]:
     found = [_same_rows(np.floor(points / step + shift).astype(np.int64)) for shift in (0.0, 0.5)]
     twice = nodes[np.unique(np.concatenate(found))]
     if len(twice):
-        problem = f"{len(twice)} nodes lie where another node lies already: {body.node_labels(twice)}"
+        problem = f"nodes lie where another node lies already ({len(twice)}): {body.node_labels(twice)}"
         yield Finding(problem=problem, allowed="merged nodes (Gmsh: Coherence Mesh), so that cells meet")
 
 
@@ -139,7 +139,7 @@ def _hanging_nodes(body: Body, facets: Facets) -> Iterator[Finding]:
     owners = outer if facets.corners == 3 else np.concatenate([outer, outer])
     wrong = np.union1d(mixed, _on_triangles(body.points, triangles, owners))
     if len(wrong):
-        problem = f"{len(wrong)} hanging nodes, on a facet or an edge of which they are no corner: "
+        problem = f"nodes hang, on a facet or an edge of which they are no corner ({len(wrong)}): "
         yield Finding(problem=problem + body.node_labels(wrong), allowed="cells that meet at whole facets")
 
 
@@ -196,7 +196,7 @@ def _pinched(body: Body, facets: Facets) -> Iterator[Finding]:
     )
     wrong = edges[first[counts != 2]]
     if len(wrong):
-        problem = f"the surface is open or touches itself along {len(wrong)} edges: "
+        problem = f"the surface is open or touches itself along edges ({len(wrong)}): "
         labels = body.facet_labels(wrong).replace("facet", "edge")
         yield Finding(problem=problem + labels, allowed="a closed surface, two facets at each edge")
 
@@ -206,5 +206,5 @@ def _unused(body: Body, helpers: IntArray) -> Iterator[Finding]:
     used[body.cells] = True
     wrong = np.flatnonzero(~used & ~np.isin(body.node_numbers, helpers))
     if len(wrong):
-        problem = f"{len(wrong)} nodes belong to no cell: {body.node_labels(wrong)}"
+        problem = f"nodes belong to no cell ({len(wrong)}): {body.node_labels(wrong)}"
         yield Finding(problem=problem, allowed="nodes of cells only (export the named volume alone)")

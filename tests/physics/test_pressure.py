@@ -112,6 +112,29 @@ def test_assembly_agrees_with_scikit_fems_forms(disc: Disc, cells: tuple[int, ..
         )
 
 
+@pytest.mark.parametrize("order", [2, 3, 5])
+def test_cells_of_any_order_agree_with_scikit_fems_hierarchical_ones(disc: Disc, order: int) -> None:
+    """On straight sides both span the same space, so the work of the load on the pressure is the same."""
+    cells = (2, 5)
+    chamber = chamber_mesh(disc=disc, surface_radius=wavy, cells=cells, order=order, geometry="straight")
+    discrete = WATER.problem().discretise(chamber=chamber)
+    solution = solve_pressure(chamber=chamber, problem=WATER.problem())
+    corners, _ = scikit_fem_mesh(
+        chamber_mesh(disc=disc, surface_radius=wavy, cells=cells, geometry="straight")
+    )
+    mesh = skfem.MeshQuad1.from_mesh(corners)
+    points = 2 * order + 1
+    basis = skfem.Basis(mesh, skfem.ElementQuadP(order), intorder=points)
+    laplace = skfem.BilinearForm(lambda u, v, _: dot(grad(u), grad(v))).assemble(basis)
+    unit = disc.outer_radius**2 * 1000.0 * 1047.2**2
+    load = skfem.LinearForm(lambda v, _: -2 * unit * v).assemble(basis)
+    for name in ("outer_wall", "plate_left", "plate_right"):
+        wall = skfem.FacetBasis(mesh, basis.elem, facets=corners.boundaries[name], intorder=points)
+        load += skfem.LinearForm(lambda v, w: unit * dot(w.x, w.n) * v).assemble(wall)
+    other = skfem.solve(*skfem.condense(laplace, load, D=basis.get_dofs(corners.boundaries["free_surface"])))
+    assert discrete.load @ solution.pressure == pytest.approx(float(load @ other), rel=1e-11)
+
+
 def mass(facets: Facets, nodal: FloatArray) -> FloatArray:
     """Integrals of u v over a side."""
     return facets.load(facets.at_points(nodal), unknowns=nodal.size)

@@ -1,4 +1,4 @@
-"""An imported chamber whose disc has another outer radius or width than its mesh: the mesh stretched to it."""
+"""An imported chamber whose disc has another outer radius or width than its mesh: stretched to it."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ class Facets:
 
 @lru_cache(maxsize=8)
 def facets_of(geometry: ChamberGeometry) -> Facets:
-    """Estimate from the angles at which neighbouring facets meet; edges sharper than a mesh's count as real."""
+    """Estimate from the angles at which facets meet; edges sharper than a mesh's count as real."""
     space = deferred.TetrahedronSpace(body=deferred.tetrahedra(geometry))
     walls = {name: space.facets(name) for name in space.boundaries}
     return Facets(

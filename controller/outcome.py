@@ -12,6 +12,9 @@ from ringbalance.controller.judgement import NOISE_DEVIATIONS
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.liquid_ring.reach import (
     BEYOND_CAPACITY,
+    LEAST_PRESSURE,
+    NEARLY_EMPTY,
+    RUNS_BACK,
     largest_pair_moment,
     starting_pressure,
     unreachable_vibration,
@@ -27,10 +30,6 @@ from ringbalance.scene.models import Scene
 MICROMETRE: Final = 1e-6
 GRAM_MILLIMETRE: Final = 1e-6
 MANY_OVERSHOOTS: Final = 2
-NEARLY_EMPTY: Final = 1e-6
-"""Fill ratio at which a chamber's last liquid is looked at."""
-LEAST_PRESSURE: Final = 1.0
-"""Gauge, Pa, at which the search for a pressure that starts a flow begins without one."""
 NO_SAMPLE: Final = "no usable sample"
 """Reason that every algorithm gives for doing nothing on a dropped sample or a NaN."""
 
@@ -306,8 +305,7 @@ def _diverging(facts: Facts) -> str:
 def _drifting(facts: Facts) -> str:
     return (
         f"{_not_settled(facts)}; the full tube lets liquid run back while the gas is off (up to "
-        f"{facts.drift:.3g} in fill between samples): raise rotor.speed or lower tube.hump_radius so "
-        "that the column breaks, or vent the tube"
+        f"{facts.drift:.3g} in fill between samples): {RUNS_BACK}"
     )
 
 

@@ -7,6 +7,7 @@ from typing import Final
 
 from ringbalance.identification import eccentric_parameters as eccentric
 from ringbalance.identification import parameters as ring
+from ringbalance.identification.model_errors import MODEL_ERRORS, model_errors, with_model_error
 from ringbalance.identification.parameters import Parameter
 from ringbalance.identification.predict.device import Models, models_of
 from ringbalance.identification.predict.kinds import PREDICTED
@@ -39,18 +40,25 @@ def informed(scene: AnyScene, kinds: Sequence[str]) -> list[str]:
 
 
 def held_for(scene: AnyScene, fitted: Sequence[str]) -> dict[str, float]:
-    """Standard deviation, SI, of every uncertain quantity of the scene that is not fitted."""
+    """Standard deviation, SI, of every uncertain quantity of the scene that is not fitted, and of what its
+    models may be off by."""
     if isinstance(scene, Scene):
-        return ring.held_inputs(scene, fitted)
+        return {**ring.held_inputs(scene, fitted), **dict.fromkeys(model_errors(scene), 1.0)}
     return eccentric.eccentric_held(scene, fitted)
 
 
 def both_sides(scene: AnyScene, name: str, change: float) -> tuple[AnyScene, AnyScene]:
     """The scene with one of these lower and higher by a change, SI, as far as a device can have it."""
-    if isinstance(scene, Scene):
-        low, high = (shifted(scene=scene, quantity=name, change=side * change) for side in (-1, 1))
-        return low, high
-    return tuple(eccentric.eccentric_shifted(scene, name, side * change) for side in (-1, 1))  # type: ignore[return-value]
+    low, high = (_changed(scene, name, side * change) for side in (-1, 1))
+    return low, high
+
+
+def _changed(scene: AnyScene, name: str, change: float) -> AnyScene:
+    if not isinstance(scene, Scene):
+        return eccentric.eccentric_shifted(scene, name, change)
+    if name in MODEL_ERRORS:
+        return with_model_error(scene, name, change)
+    return shifted(scene=scene, quantity=name, change=change)
 
 
 def nearby(scene: AnyScene, name: str) -> AnyScene:

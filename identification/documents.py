@@ -43,6 +43,7 @@ def fit_document(
         "noise": [_noise(each) for each in result.noise],
         "residuals": [_residuals(each) for each in result.residuals],
         "held": dict(result.held),
+        "pulls": dict(result.pulls),
         "exact": exact_inputs(result),
         "loss": result.loss,
         "starts": result.starts,

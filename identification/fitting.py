@@ -49,7 +49,7 @@ def fit(
     held = held_for(scene, names)
     nothing = np.zeros((problem.measured.size, 0))
     first = optimum(problem, nothing, loss=loss, starts=starts)
-    effects = _effects(problem, first.t, held)
+    effects = held_effects(problem, first.t, [both_sides(scene, name, sd) for name, sd in held.items()])
     counts = np.linalg.norm(first.residuals.scale[:, None] * effects, axis=0) > _NO_EFFECT
     best = optimum(problem, effects[:, counts], loss=loss, starts=starts, before=first)
     kept = {name: sd for (name, sd), one in zip(held.items(), counts, strict=True) if one}
@@ -74,11 +74,6 @@ def problem_of(
         parameters=parameters_for(scene, names),
         blocks=tuple(block_of(each) for each in data),
     )
-
-
-def _effects(problem: Problem, t: FloatArray, held: dict[str, float]) -> FloatArray:
-    changes = [both_sides(problem.scene, name, sd) for name, sd in held.items()]
-    return held_effects(problem, t, changes)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -113,6 +108,7 @@ def _result(best: Optimum, held: dict[str, float], loss: str) -> FitResult:
         noise=_noises(best),
         residuals=_residuals(best),
         held=held,
+        pulls=dict(zip(held, (best.residuals.held_values(best.t) / NORMAL_95).tolist(), strict=True)),
         loss=loss,
         starts=best.starts,
         evaluations=problem.evaluations,

@@ -250,9 +250,13 @@ class Residuals:
         taken = u[:, s > 1e-10 * np.max(s, initial=1e-300)]
         return np.asarray(np.sum(taken[:n] ** 2, axis=1) + np.sum(self.base[:n] ** 2, axis=1))
 
-    def with_noise(self, noise: FloatArray) -> Residuals:
-        """The same under another noise."""
-        return replace(self, noise=noise)
+    def held_values(self, t: FloatArray) -> FloatArray:
+        """Likeliest n of the held inputs at t, in their standard deviations."""
+        left = self.scale * (self.problem.measured - self.problem.at(t))
+        count = self.held.shape[1]
+        full = np.concatenate([left, np.zeros(count)])
+        found = np.linalg.lstsq(self.linear, full, rcond=1e-10)[0]
+        return np.asarray(found[found.size - count :])
 
 
 def held_effects(problem: Problem, t: FloatArray, changes: Sequence[tuple[Any, Any]]) -> FloatArray:

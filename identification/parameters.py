@@ -142,23 +142,14 @@ def _loss_scale(scene: Scene, name: str) -> tuple[float, float]:
         return 0.0, 1.0
     here = scene.tube.extra_loss
     speeds = [
-        _velocity(with_value(scene=scene, quantity=name, value=here + step)) for step in (0.0, _LOSS_STEP)
+        models_of(with_value(scene=scene, quantity=name, value=here + step)).velocity
+        for step in (0.0, _LOSS_STEP)
     ]
     if speeds[1] <= 0 or speeds[0] <= speeds[1]:
         return 1.0, 1.0
     apart = _LOSS_STEP / (-2 * math.log(speeds[1] / speeds[0]))
     law_loss = _driving_head(scene) * 2 / speeds[0] ** 2
     return apart - here, law_loss / apart
-
-
-def _velocity(scene: Scene) -> float:
-    """Of a primed tube at equal fills, m/s."""
-    fill = scene.disc.initial_fill
-    law = device_of(scene, models_of(scene)).law
-    flow = law.evaluate(
-        fill_ratio=fill, opposite_fill_ratio=fill, gas_pressure=scene.gas.pressure, primed=True
-    )
-    return float(flow.velocity)
 
 
 def _driving_head(scene: Scene) -> float:

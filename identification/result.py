@@ -105,6 +105,8 @@ class FitResult:
     held: Mapping[str, float]
     """Uncertain inputs of the scene that were not fitted, with their standard deviations, SI; their effect is
     in all intervals."""
+    pulls: Mapping[str, float]
+    """The likeliest error of each of them, over its expanded uncertainty (95 %)."""
     loss: str
     starts: int
     evaluations: int
@@ -115,6 +117,16 @@ class FitResult:
     """With the fitted values."""
     optimum: Optimum
     """For criticism and for the choice of the next measurement."""
+
+    @property
+    def pulled(self) -> tuple[str, ...]:
+        """Held inputs that the data pull out of what is stated of them, each in one sentence."""
+        return tuple(
+            f"the data pull {name} off by {abs(pull):.2g} of its stated uncertainties (95 %), and it was not "
+            "fitted: fit it, or look at what is stated of it"
+            for name, pull in self.pulls.items()
+            if abs(pull) > 1
+        )
 
     def parameter(self, name: str) -> FittedParameter:
         """One parameter by name. Raises: KeyError: it was not fitted."""

@@ -95,6 +95,7 @@ def save_result(
             for each in result.parameters
             for doubt in each.doubts
         ),
+        *(MeasuredFinding(about="value", text=_short(each)) for each in result.pulled),
         *(MeasuredFinding(about="combination", text=_combination(each)) for each in result.combinations),
         *(MeasuredFinding(about="correlation", text=each) for each in _correlations(result)),
     ]

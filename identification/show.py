@@ -18,6 +18,7 @@ from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.documents import exact_inputs
 from ringbalance.identification.identifiability import Verdict
+from ringbalance.identification.model_errors import MODEL_ERRORS, causes
 from ringbalance.identification.next_measurement import NextMeasurement
 from ringbalance.identification.result import FitResult, FittedParameter, Noise
 from ringbalance.reduced_model.budget import rounded
@@ -109,9 +110,11 @@ def _remarks(result: FitResult) -> Iterator[Text]:
     yield from (Text(_noise(each)) for each in result.noise)
     yield from map(Text, _pairs(result))
     yield from _rows(result)
-    if result.held:
-        held = ", ".join(result.held)
-        yield Text(f"Not fitted, their [uncertainty] is in all intervals: {held}.", "dim")
+    yield from (Text(_sentence(each), style="yellow") for each in result.pulled)
+    if held := [name for name in result.held if name not in MODEL_ERRORS]:
+        yield Text(f"Not fitted, their [uncertainty] is in all intervals: {', '.join(held)}.", "dim")
+    if models := causes(result.held):
+        yield Text(f"So is what the models themselves may be off by: {', '.join(models)}.", "dim")
     if exact := exact_inputs(result):
         yield Text(f"Not fitted and without [uncertainty], so taken as exact: {', '.join(exact)}.", "dim")
 

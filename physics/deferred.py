@@ -12,7 +12,6 @@ from typing import Any, Final
 _HOME: Final = MappingProxyType(
     {
         "factorised": "ringbalance.physics.pressure.sparse",
-        "linear_prolongation": "ringbalance.physics.pressure.sparse",
         "multigrid": "ringbalance.physics.pressure.multigrid",
         "sloshing_response": "ringbalance.physics.sloshing.response",
         "solved_ring": "ringbalance.physics.pressure.imported",
@@ -20,7 +19,6 @@ _HOME: Final = MappingProxyType(
         "tetrahedra": "ringbalance.mesh.quadratic_tetrahedra",
         "nnls": "scipy.optimize",
         "Sobol": "scipy.stats.qmc",
-        "sparse_matrix": "ringbalance.physics.pressure.sparse",
     }
 )
 

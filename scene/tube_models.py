@@ -28,6 +28,17 @@ class TubeModels:
     """Left out: no entrance loss, alpha = 1; by correlation: as if all flow were turbulent."""
     bends_before: tuple[int, int] | None = None
     """Bends between either chamber and the crest's end; None: as many as lie there when spread evenly."""
+    errors: tuple[tuple[str, float, float], ...] = ()
+    """Errors of the models themselves, supposed or drawn: cause, and two parts in standard deviations, of
+    which the second belongs to k alone; see `physics.tube.uncertainty.with_errors`."""
+
+    def error(self, cause: str) -> float:
+        """First part of a cause's errors together."""
+        return sum(first for name, first, _ in self.errors if name == cause)
 
 
+CLEARING_ERROR: Final = "clearing of the crest"
+CAVITY_ERROR: Final = "pressure of the cavity"
+START_ERROR: Final = "start of the flow"
+"""Causes of `TubeModels.errors` beside those of k."""
 FINEST_MODELS: Final = TubeModels()

@@ -19,6 +19,7 @@ import numpy.typing as npt
 from ringbalance.controller.rotor import chamber_letters
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.fitting import fit
+from ringbalance.identification.model_errors import model_errors, with_model_error
 from ringbalance.identification.predict.device import Models, models_of
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
@@ -36,6 +37,8 @@ THREE_KINDS: Final = (
     ("flow", "transfer", "injection"),
 )
 READINGS: Final = ("amplitude_before", "phase_before", "amplitude_after", "phase_after")
+_DRAWN: Final = (-2.5, 2.5)
+"""Standard deviations of an error of a model: beyond, a head may fall with the velocity somewhere."""
 _LAMBDA_WIDTH: Final = 0.05
 """Expanded uncertainty (95 %) of the factor on lambda."""
 _VIBRATION_NOISE: Final = (1e-8, 6e-8)
@@ -83,10 +86,12 @@ def _scene(name: str, random: np.random.Generator) -> Scene:
 
 
 def _drawn(scene: Scene, random: np.random.Generator) -> Scene:
-    """The device: every uncertain input drawn from its normal distribution."""
+    """The device: every uncertain input and error of its models, drawn from normal distributions."""
     truth = scene
     for name, width in half_widths(scene).items():
         truth = shifted(scene=truth, quantity=name, change=width / NORMAL_95 * random.standard_normal())
+    for name in model_errors(scene):
+        truth = with_model_error(truth, name, float(np.clip(random.standard_normal(), *_DRAWN)))
     return truth
 
 

@@ -15,10 +15,18 @@ from ringbalance.scene.loop_models import Rotor
 
 _MAX_DOUBLINGS: Final = 40
 _REFINEMENTS: Final = 6
+_FILLS: Final = 513
+"""At which a stall is looked for."""
+NEARLY_EMPTY: Final = 1e-6
+"""Fill ratio at which a chamber's last liquid is looked at."""
+LEAST_PRESSURE: Final = 1.0
+"""Gauge, Pa, at which the search for a pressure that starts a flow begins without one."""
 BEYOND_CAPACITY: Final = (
     "balance the rotor first, use a denser liquid, or a larger or differently clocked disc"
 )
 """What to do about an unbalance that the disc cannot cancel."""
+RUNS_BACK: Final = "raise rotor.speed or lower tube.hump_radius so that the column breaks, or vent the tube"
+"""What to do about a full tube that lets liquid run back while the gas is off."""
 
 
 def largest_pair_moment(*, plant: LiquidRing, state: DiscState) -> float:
@@ -55,6 +63,20 @@ def unreachable_vibration(*, plant: LiquidRing, state: DiscState, rotor: Rotor) 
     """Vibration that remains with the liquid at its best, m; zero within capacity."""
     wanted = -initial_unbalance(rotor=rotor)
     return unreachable_moment(plant=plant, state=state, wanted=wanted) * rotor.influence_coefficient
+
+
+def least_driven_fill(*, law: FlowLaw, total: float, gas_pressure: float) -> float:
+    """Smallest fill ratio to which gas drives a chamber from equal fills; total/2 where it drives nothing."""
+    fills = np.linspace(total / 2, max(0.0, total - law.max_fill_ratio), _FILLS)
+    rest = law.evaluate(fill_ratio=fills, opposite_fill_ratio=total - fills, gas_pressure=0.0, primed=True)
+    flow = law.evaluate(
+        fill_ratio=fills,
+        opposite_fill_ratio=total - fills,
+        gas_pressure=gas_pressure,
+        primed=rest.primed,
+    )
+    stopped = np.flatnonzero(flow.velocity <= 0)
+    return float(fills[stopped[0]] if stopped.size else fills[-1])
 
 
 def starting_pressure(

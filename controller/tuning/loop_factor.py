@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -22,6 +22,12 @@ from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.algorithms.law_based import LawBased
 from ringbalance.controller.algorithms.law_based_times import fill_for_moment, pair_changes
 from ringbalance.controller.algorithms.target_vector import TargetVector
+from ringbalance.controller.liquid_ring.reach import (
+    LEAST_PRESSURE,
+    NEARLY_EMPTY,
+    least_driven_fill,
+    starting_pressure,
+)
 from ringbalance.controller.rotor import initial_unbalance
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio
@@ -33,6 +39,8 @@ STAYING_DEVIATIONS: Final = 3.0
 _FILL_STEP: Final = 1e-4
 """Half the distance over which the slope of a moment is taken, as a fraction of the range of fills."""
 _HALVINGS: Final = 40
+_SPARE: Final = 1.1
+"""Times the pressure at which the liquid only just moves."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,11 +120,29 @@ def _noise_at_limit(scene: Scene) -> float:
     return math.hypot(sensor.amplitude_noise, scene.controller.limit * sensor.phase_noise)
 
 
+def usable_fill(scene: Scene, model: BalancerModel) -> float:
+    """Smallest fill ratio to which a chamber is driven: its residual one, or that at which the gas stalls."""
+    start = scene.disc.initial_fill
+    by_gas = least_driven_fill(law=model.flow, total=2 * start, gas_pressure=scene.gas.pressure)
+    return min(max(residual_fill_ratio(scene, law=model.flow), by_gas), start)
+
+
+def with_driving_gas(scene: Scene, model: BalancerModel) -> Scene:
+    """The scene, its gas pressure raised where it stalls a chamber above its residual fill."""
+    total, law = 2.0 * scene.disc.initial_fill, model.flow
+    fill = max(residual_fill_ratio(scene, law=law), total - law.max_fill_ratio + NEARLY_EMPTY)
+    above = max(scene.gas.pressure, LEAST_PRESSURE)
+    found = starting_pressure(law=law, fill=fill, opposite_fill=total - fill, primed=False, above=above)
+    if found is None or found <= above:
+        return scene
+    return replace(scene, gas=replace(scene.gas, pressure=_SPARE * found))
+
+
 def balanced_fills(scene: Scene, model: BalancerModel) -> FloatArray:
     """Fills of the positive chambers with which the disc cancels the unbalance, or comes nearest to it."""
     total = 2.0 * scene.disc.initial_fill
     least, most = _range(scene, model)
-    lowest = max(least, min(residual_fill_ratio(scene, law=model.flow), scene.disc.initial_fill))
+    lowest = max(least, usable_fill(scene, model))
     highest = min(most, total - lowest)
     ends = np.array([scene.disc.initial_fill, lowest, highest])
     now, low, high = model.moment.pair_moment(fill_ratio=ends, opposite_fill_ratio=total - ends)

@@ -9,7 +9,7 @@ from typing import Final
 
 from ringbalance.controller.algorithms.by_name import target_vector_of
 from ringbalance.controller.tuning.dead_time import compensated, dead_times, offset_text
-from ringbalance.controller.tuning.loop_factor import loop_factor
+from ringbalance.controller.tuning.loop_factor import loop_factor, with_driving_gas
 from ringbalance.controller.tuning.recommendation import FactorUncertainty, recommended_gain
 from ringbalance.controller.tuning.settling import Progress, SettlingTimes, tried
 from ringbalance.reduced_model.law.model import BalancerModel
@@ -109,7 +109,7 @@ def search(
         if most >= 1.0:
             held = (found.quantiles["p95"] or 0.0) + scene.controller.hold_time
             return Search(best=each, settles=True, needs=held, limit=None, tried=tuple(rows))
-    limit = next(_reached(scene, model, known, rows, told), None)
+    limit = next(_reached(replace(scene, gas=best.scene.gas), model, known, rows, told), None)
     return Search(best=best, settles=False, needs=None, limit=limit, tried=tuple(rows))
 
 
@@ -135,8 +135,9 @@ def _others(
             changed = replace(settings, proportional=factor * settings.proportional)
             text = f"controller.proportional = {_gain(changed.proportional)}"
             yield _candidate(given, replace(base.scene, controller=changed), text)
-    for factor in _PRESSURES:
-        pressure = factor * scene.gas.pressure
+    raised = (factor * scene.gas.pressure for factor in _PRESSURES)
+    driving = with_driving_gas(scene, model).gas.pressure
+    for pressure in sorted({*raised, driving} - {scene.gas.pressure}):
         higher = recommended(replace(scene, gas=replace(scene.gas, pressure=pressure)), model, known)
         if higher is None:
             continue

@@ -9,12 +9,19 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.controller.algorithms.by_name import law_based_of
 from ringbalance.controller.ensemble.monte_carlo import Probability, binomial_share, simulate_ensemble
-from ringbalance.controller.ensemble.samples import MemberUncertainty, drawn_members
+from ringbalance.controller.ensemble.samples import Members, MemberUncertainty, drawn_members
+from ringbalance.controller.liquid_ring.plant import initial_state
+from ringbalance.controller.liquid_ring.reach import unreachable_vibration
 from ringbalance.controller.loop import simulate
+from ringbalance.controller.simulation import Outcome, Simulation
 from ringbalance.controller.terms import run_models, terms_modelled
+from ringbalance.controller.tuning.loop_factor import usable_fill, with_driving_gas
 from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.operating.residual import residual_by_velocity
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene
 
 Progress = Callable[[str], None]
@@ -28,6 +35,8 @@ FIRST_MEMBERS: Final = 16
 RUNS: Final = 20
 """Runs one by one, of an algorithm that is not compiled."""
 FIRST_RUNS: Final = 4
+TOO_MANY: Final = 0.05
+"""Fraction of the runs that is kept from settling for one reason, beyond which 95 % cannot settle."""
 QUANTILES: Final = {"p50": 0.5, "p95": 0.95}
 _TRIED_SAMPLES: Final = 40
 """Commands after which a change that helps has settled the loop: three take a tenth of the way each."""
@@ -42,6 +51,18 @@ class SettlingTimes:
     """Within the scene's time limit."""
     quantiles: dict[str, float | None]
     """s, by which that fraction of all runs has settled; None: fewer have."""
+    drifted: float = 0.0
+    """Fraction that has not settled, and in which liquid ran back with the gas off."""
+    beyond_capacity: float = 0.0
+    """Fraction in which the liquid at its best leaves more than the limit; looked for where p95 is None."""
+    beyond_pressure: float = 0.0
+    """The same with the fills to which the scene's gas drives the liquid."""
+
+    @property
+    def capacity_explains(self) -> bool:
+        """Whether 95 % cannot settle for want of liquid, and next to nothing else keeps them from it."""
+        others = 1.0 - self.settled.value - self.beyond_capacity
+        return self.quantiles["p95"] is None and self.beyond_capacity > TOO_MANY >= others
 
     def rows(self, limit: float) -> dict[str, str]:
         """As a person reads them; `limit` is the time that each run had, s."""
@@ -65,9 +86,12 @@ def settling_times(
     most = min(members, MOVING_MEMBERS if moving else members) if compiled else runs
     first = (FIRST_MEMBERS if moving else most) if compiled else FIRST_RUNS
     found = _runs(scene, model, widths, number=min(first, most), told=told)
-    if first >= most or found.settled.high < QUANTILES["p95"]:
+    if first < most and found.settled.high >= QUANTILES["p95"]:
+        found = _runs(scene, model, widths, number=most, told=told)
+    if found.quantiles["p95"] is not None:
         return found
-    return _runs(scene, model, widths, number=most, told=told)
+    beyond, driven = _beyond_capacity(scene, model, widths, runs=most)
+    return replace(found, beyond_capacity=beyond, beyond_pressure=driven)
 
 
 def tried(scene: Scene, model: BalancerModel, widths: MemberUncertainty, *, told: Progress) -> SettlingTimes:
@@ -86,7 +110,10 @@ def _runs(
 ) -> SettlingTimes:
     if scene.controller.kind == "target_vector":
         return _of_ensemble(scene, model, widths, members=number, told=told)
-    return summary([_one_run(scene, model, widths, number=i, told=told) for i in range(number)])
+    found = [_one_run(scene, model, widths, number=i, told=told) for i in range(number)]
+    times = [math.inf if run.settling_time is None else run.settling_time for run in found]
+    drifted = sum(run.outcome is Outcome.DRIFTING for run in found)
+    return replace(summary(times), drifted=drifted / number)
 
 
 def summary(times: Sequence[float]) -> SettlingTimes:
@@ -112,28 +139,54 @@ def _of_ensemble(
         runs=members,
         settled=found.settled,
         quantiles=dict(zip(QUANTILES, found.settling_quantiles, strict=True)),
+        drifted=found.drifted.value,
+    )
+
+
+def _beyond_capacity(
+    scene: Scene, model: BalancerModel, widths: MemberUncertainty, *, runs: int
+) -> tuple[float, float]:
+    """Of the drawn runs, the fraction whose unbalance is beyond the liquid, and beyond it under this gas."""
+    ring, state = law_based_of(scene, model).ring, initial_state(disc=scene.disc)
+    drawn = drawn_members(scene, uncertainty_95=widths, seed=scene.run.seed, block=0)
+    driven = with_driving_gas(scene, model)
+    residual = np.interp(drawn.velocity_factor[:runs], *residual_by_velocity(driven, law=model.flow))
+
+    def fraction(least: FloatArray) -> float:
+        left = (
+            unreachable_vibration(
+                plant=replace(ring, residual_fill=float(fill)),
+                state=state,
+                rotor=_rotor(scene, drawn, number),
+            )
+            for number, fill in enumerate(least)
+        )
+        return sum(vibration > scene.controller.limit for vibration in left) / runs
+
+    return fraction(residual), fraction(np.maximum(residual, usable_fill(scene, model)))
+
+
+def _rotor(scene: Scene, drawn: Members, number: int) -> Rotor:
+    """Of one drawn run; its balancing moment acts through the product, which is put into the coefficient."""
+    coefficient = drawn.influence_coefficient[number] * drawn.moment_factor[number]
+    return replace(
+        scene.rotor,
+        influence_coefficient=float(coefficient),
+        lag_angle=float(drawn.lag_angle[number]),
     )
 
 
 def _one_run(
     scene: Scene, model: BalancerModel, widths: MemberUncertainty, *, number: int, told: Progress
-) -> float:
-    """Settling time of one drawn run, s; infinite when it does not settle.
-
-    Velocity, moment and influence coefficient act through their product, which is put into the last.
-    """
+) -> Simulation:
+    """One drawn run; velocity, moment and influence coefficient act through their product."""
     told(f"run {number + 1}")
     drawn = drawn_members(scene, uncertainty_95=widths, seed=scene.run.seed, block=0)
-    factor = drawn.velocity_factor[number] * drawn.moment_factor[number]
-    rotor = replace(
-        scene.rotor,
-        influence_coefficient=float(drawn.influence_coefficient[number] * factor),
-        lag_angle=float(drawn.lag_angle[number]),
-    )
+    rotor = _rotor(scene, drawn, number)
+    faster = rotor.influence_coefficient * float(drawn.velocity_factor[number])
     run = replace(scene.run, seed=scene.run.seed + number)
-    asked = replace(scene, rotor=rotor, gas=drawn.gas_of(scene.gas, number), run=run)
-    time = simulate(asked, model).settling_time
-    return math.inf if time is None else time
+    gas, rotor = drawn.gas_of(scene.gas, number), replace(rotor, influence_coefficient=faster)
+    return simulate(replace(scene, rotor=rotor, gas=gas, run=run), model)
 
 
 def _quantile(times: FloatArray, q: float) -> float | None:

@@ -11,18 +11,30 @@ import numpy as np
 from ringbalance.controller.algorithms.by_name import controller_of, law_based_of
 from ringbalance.controller.checks import check_settings
 from ringbalance.controller.liquid_ring.plant import initial_state
-from ringbalance.controller.liquid_ring.reach import BEYOND_CAPACITY, unreachable_vibration
+from ringbalance.controller.liquid_ring.reach import unreachable_vibration
 from ringbalance.controller.terms import run_models
 from ringbalance.controller.tuning.dead_time import dead_times, dead_zone
-from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor, vibration_rates
+from ringbalance.controller.tuning.loop_factor import (
+    LoopFactor,
+    loop_factor,
+    vibration_rates,
+    with_driving_gas,
+)
 from ringbalance.controller.tuning.margins import Margins, loop_margins
 from ringbalance.controller.tuning.recommendation import (
     Contribution,
     FactorUncertainty,
     factor_uncertainty,
 )
-from ringbalance.controller.tuning.search import LIMITS, Candidate, Search, recommended, search
-from ringbalance.controller.tuning.settling import MEMBERS, RUNS, Progress, SettlingTimes, settling_times
+from ringbalance.controller.tuning.search import Candidate, Search, recommended, search
+from ringbalance.controller.tuning.settling import (
+    MEMBERS,
+    RUNS,
+    Progress,
+    SettlingTimes,
+    settling_times,
+)
+from ringbalance.controller.tuning.status import over_capacity, status_of
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.gas_line import LineAnswer, line_answers, line_document
 from ringbalance.reduced_model.law.model import BalancerModel
@@ -99,7 +111,7 @@ def tune(
     if best is not None:
         told("settling times ...")
         settling = settling_times(best.scene, model, known.widths, members=members, runs=runs, told=told)
-        if settling.quantiles["p95"] is None and _beyond_capacity(scene, model) <= scene.controller.limit:
+        if settling.quantiles["p95"] is None and not settling.capacity_explains:
             found = search(scene, model, known, base=best, told=told)
             if found.best is not best:
                 best = found.best
@@ -155,13 +167,14 @@ def _judged(
         gas_line=lines,
         settling=settling,
         models_used=run_models(scene=tuned, model=model),
-        status=_over_capacity(scene, beyond)
-        or _status(tuned, loop, zone=zone, smallest=smallest, settling=settling, best=best, found=found),
+        status=over_capacity(scene, beyond)
+        or status_of(tuned, loop, zone=zone, smallest=smallest, settling=settling, best=best, found=found),
     )
 
 
 def _beyond_capacity(scene: Scene, model: BalancerModel) -> float:
-    plant, state = law_based_of(scene, model).ring, initial_state(disc=scene.disc)
+    """With gas that drives the liquid: what only a higher pressure can do is not beyond the disc."""
+    plant, state = law_based_of(with_driving_gas(scene, model), model).ring, initial_state(disc=scene.disc)
     return unreachable_vibration(plant=plant, state=state, rotor=scene.rotor)
 
 
@@ -187,67 +200,6 @@ def _margins(scene: Scene, loop: LoopFactor, known: FactorUncertainty) -> Margin
         phase_uncertainty=known.widths.lag_angle + error,
         integral=settings.period / (settings.integral_time or math.inf) if fixed else 0.0,
         derivative=settings.derivative_time / settings.period if fixed else 0.0,
-    )
-
-
-def _over_capacity(scene: Scene, beyond: float) -> str:
-    """Empty within capacity."""
-    limit, start, um = scene.controller.limit, scene.rotor.initial_amplitude, 1e6
-    if beyond <= limit:
-        return ""
-    return (
-        f"capacity exceeded: with the liquid at its best {beyond * um:.4g} um remain of {start * um:.4g} um, "
-        f"limit {limit * um:.4g} um: {BEYOND_CAPACITY}"
-    )
-
-
-def _status(
-    scene: Scene,
-    loop: LoopFactor,
-    *,
-    zone: float,
-    smallest: float,
-    settling: SettlingTimes | None,
-    best: Candidate | None,
-    found: Search | None,
-) -> str:
-    limit, um = scene.controller.limit, 1e6
-    if loop.rate == 0.0:
-        return "no gain: the gas drives no liquid at the balanced fills: raise gas.pressure"
-    if best is None or settling is None or not loop.stays:
-        return (
-            f"no gain keeps the amplitude within {limit * um:.4g} um: the sensor's noise is "
-            f"{scene.sensor.amplitude_noise * um:.4g} um: raise controller.limit or average the sensor"
-        )
-    reached, also = settling.quantiles["p95"], f", with {best.change}" if best.change else ""
-    if reached is not None:
-        return f"tuned{also}: 95 % of the runs settle within {reached:.3g} s"
-    if max(zone, smallest / 2) > limit:
-        return (
-            f"the valve is too slow for the limit of {limit * um:.4g} um: the shortest valve-open time moves "
-            f"the vibration by {smallest * um:.4g} um, and up to {zone * um:.4g} um none moves liquid: "
-            f"lower controller.minimum_gas_time{_reached(found)}"
-        )
-    share = (
-        f"{settling.settled.value:.1%} of the runs settle within the time limit of "
-        f"{scene.run.time_limit:.4g} s{also}: 95 % is not reached"
-    )
-    if found is not None and found.needs is not None and found.needs > scene.run.time_limit:
-        return f"{share}; they need some {found.needs:.2g} s: raise run.time_limit"
-    return f"{share}, nor by other gains and pressures{_reached(found)}"
-
-
-def _reached(found: Search | None) -> str:
-    """What to do about a limit that is out of reach."""
-    if found is None:
-        return " or raise controller.limit"
-    if found.limit is None:
-        return (
-            f"; no limit up to {LIMITS[-1]:.3g} times as high is reached: take a faster valve or a larger "
-            "conductance"
-        )
-    return (
-        f"; a limit of {found.limit * 1e6:.3g} um is reached: raise controller.limit, or take a faster valve"
     )
 
 
@@ -288,6 +240,9 @@ def tuning_document(tuning: Tuning) -> dict[str, Any]:
         "settling_time_s": None if settling is None else settling.quantiles,
         "fraction_settled": None if settling is None else settling.settled.value,
         "fraction_settled_95": None if settling is None else [settling.settled.low, settling.settled.high],
+        "fraction_beyond_capacity": None if settling is None else settling.beyond_capacity,
+        "fraction_beyond_pressure": None if settling is None else settling.beyond_pressure,
+        "fraction_drifted": None if settling is None else settling.drifted,
         "runs": 0 if settling is None else settling.runs,
         "left_out": [],
         "neglected": asdict(neglected_in_injections(tuning.models_used)),

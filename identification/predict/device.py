@@ -29,13 +29,16 @@ from ringbalance.reduced_model.selection.tube_terms import tube_models
 from ringbalance.reduced_model.tube.path import with_bends_kept
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.scene.tube_models import TubeModels
+from ringbalance.scene.tube_models import START_ERROR, TubeModels
+from ringbalance.scene.uncertain import NORMAL_95
 
 RELATIVE_ERROR: Final = 1e-6
 """Allowed to one step of an injection: fills within 1e-9, so that differences of predictions are smooth."""
 _SETTLED: Final = 10.0
 """s after a valve has closed: the gas has vented and the liquid rests, or has run back."""
 _KEPT: Final = 32
+_LEAST_LEFT: Final = 0.1
+"""Of a valve-open time, when the start of the flow is supposed late."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,15 +48,24 @@ class Models:
     tube: TubeModels
     gravity: bool
     """Whether the chamber's values hold gravity."""
+    velocity: float
+    """Of a primed tube at equal fills, m/s."""
     other: Callable[[CalibratedLaw], CalibratedLaw] | None = None
     """Makes another law of the scene's, to be compared with it."""
 
 
 def models_of(scene: Scene) -> Models:
     """The models that `calibrate` takes."""
-    return Models(
-        tube=with_bends_kept(tube_models(scene), scene.tube), gravity=mean_gravity(scene) > scene.tolerance
-    )
+    tube = with_bends_kept(tube_models(scene), scene.tube)
+    gravity = mean_gravity(scene) > scene.tolerance
+    law = nominal_law(replace(scene, tube=replace(scene.tube, models=tube)), gravity=gravity)
+    return Models(tube=tube, gravity=gravity, velocity=primed_velocity(law, scene))
+
+
+def primed_velocity(law: CalibratedLaw, scene: Scene) -> float:
+    """Of a primed tube at equal fills under the scene's gas, m/s; zero where it is blocked."""
+    fill = scene.disc.initial_fill
+    return abs(float(law.evaluate(fill_ratio=fill, gas_pressure=scene.gas.pressure, primed=True).velocity))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -61,14 +73,21 @@ class Device:
     """Disc, tube and gas line of a scene."""
 
     scene: Scene
-    gravity: bool
-    other: Callable[[CalibratedLaw], CalibratedLaw] | None = None
+    models: Models
 
     @cached_property
     def law(self) -> CalibratedLaw:
-        """Flow law and moments."""
-        law = nominal_law(self.scene, gravity=self.gravity)
-        return law if self.other is None else self.other(law)
+        """Flow law and moments.
+
+        Which flows carry the gas out of the crest is decided by the scene that is fitted: what a faster one
+        would tell of k by that rests on a Froude number that is not known so well.
+        """
+        law = nominal_law(self.scene, gravity=self.models.gravity)
+        velocity = primed_velocity(law, self.scene)
+        if velocity > 0 and self.models.velocity > 0:
+            froude = law.path.froude_velocity * velocity / self.models.velocity
+            law = replace(law, path=replace(law.path, froude_velocity=froude))
+        return law if self.models.other is None else self.models.other(law)
 
     @cached_property
     def _plant(self) -> npt.NDArray[np.void]:
@@ -79,6 +98,12 @@ class Device:
         if dynamics is None:
             raise ValueError("the calibrated law has a column in the tube")
         return dynamics.plant(total=2 * self.scene.disc.initial_fill, relative_error=RELATIVE_ERROR)
+
+    @cached_property
+    def _delay(self) -> float:
+        """By which the flow starts late, s: its error (95 %) is L/u at equal fills."""
+        error = self.scene.tube.models.error(START_ERROR) / NORMAL_95
+        return error * self.scene.tube.length / velocity if (velocity := self.models.velocity) else 0.0
 
     @cached_property
     def _kept(self) -> dict[int, tuple[Observations, FloatArray]]:
@@ -102,9 +127,11 @@ class Device:
         plant, work = self._plant, np.zeros(WORKSPACE)
         plant["gas_pressure"] = pressure
         motion = packed(plant, fill=fill, primed=False, motion=Motion())
-        command(plant[0], motion[0], chamber, gas_time)
+        # Of a shorter time the model would have nothing left to start.
+        left = max(gas_time - self._delay, _LEAST_LEFT * gas_time)
+        command(plant[0], motion[0], chamber, left)
         lag = float(plant["valve_lag"][0])
-        advance(plant[0], motion[0], lag + gas_time + _SETTLED, work, 0, 0, work)
+        advance(plant[0], motion[0], lag + left + _SETTLED, work, 0, 0, work)
         return float(motion["state"][0, X])
 
 
@@ -115,10 +142,10 @@ def device_of(scene: Scene, models: Models) -> Device:
         scene.rotor, influence_coefficient=1.0, lag_angle=0.0, initial_amplitude=0.0, initial_phase=0.0
     )
     disc = replace(scene.disc, lambda_factor=None)
-    tube = replace(scene.tube, models=models.tube)
-    return _device(replace(scene, rotor=rotor, disc=disc, tube=tube), models.gravity, models.other)
+    tube = replace(scene.tube, models=replace(models.tube, errors=scene.tube.models.errors))
+    return _device(replace(scene, rotor=rotor, disc=disc, tube=tube), models)
 
 
 @lru_cache(maxsize=_KEPT)
-def _device(scene: Scene, gravity: bool, other: Callable[[CalibratedLaw], CalibratedLaw] | None) -> Device:
-    return Device(scene=scene, gravity=gravity, other=other)
+def _device(scene: Scene, models: Models) -> Device:
+    return Device(scene=scene, models=models)

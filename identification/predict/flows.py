@@ -11,6 +11,7 @@ import numpy as np
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.predict.device import Device, Models, device_of
 from ringbalance.physics.tube.state import tube_state
+from ringbalance.physics.tube.uncertainty import with_errors
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.tube_models import FINEST_MODELS
@@ -46,5 +47,6 @@ def _flow_rate(device: Device, observations: Observations) -> FloatArray:
 
 def _loss(scene: Scene, velocity: FloatArray) -> FloatArray:
     """k of the tube at rest, by the finest models: the scene's are chosen for its own velocities."""
-    tube = replace(scene.tube, models=FINEST_MODELS)
-    return tube_state(tube=tube, liquid=scene.liquid, angular_velocity=0.0, velocity=velocity).k
+    tube = replace(scene.tube, models=replace(FINEST_MODELS, errors=scene.tube.models.errors))
+    state = tube_state(tube=tube, liquid=scene.liquid, angular_velocity=0.0, velocity=velocity)
+    return with_errors(tube=tube, state=state).k

@@ -46,6 +46,8 @@ class ChamberTable:
     their derivatives by L."""
     wall_area: float
     """Of the outer wall, m^2."""
+    wall_start: float
+    """Least r^2 on the outer wall, m^2."""
     error: FloatArray
     """Of values and slopes between two nodes, shape (8, nodes - 1): difference in the middle of the interval
     that was halved last, of which a sixteenth (slopes: an eighth) is left where the walls are smooth."""
@@ -141,6 +143,7 @@ def chamber_table(geometry: ChamberGeometry) -> ChamberTable:
         nodes=nodes,
         columns=columns,
         wall_area=wall_area,
+        wall_start=float(walls.lowest[walls.outer].min()),
         error=error,
     )
 

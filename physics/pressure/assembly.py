@@ -1,33 +1,24 @@
-"""Assembly of the Poisson problem on the quadratic cells of a chamber, and integrals over them and its sides.
+"""The Poisson problem on the cells of a chamber, without a matrix, and integrals over them and its sides.
 
-The sums over cells are matrix products.  A side is integrated from inside its cells, at the cells' own
-reference points: finding those points again by Newton's method, as a general facet basis does, fails in a
-cell a thousand times longer than deep.  Three Gauss points along each axis are exact for the load on the
-cells of a chamber, of order six for the rest.
+A field goes to quadrature points and back one axis at a time.  A side is integrated from inside its cells, at
+the cells' own reference points: finding those points again by Newton's method, as a general facet basis does,
+fails in a cell a thousand times longer than deep.  One Gauss point more than the order along each axis is
+exact for the load on the cells of a chamber, of twice that order for the rest.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from ringbalance.mesh.chamber import SIDES, ChamberMesh
-from ringbalance.mesh.quadratic import cell_shapes, jacobians, products
-from ringbalance.physics import deferred
+from ringbalance.mesh.tensor_cells import contracted, contracted_all, line_shapes, products
 from ringbalance.scene.arrays import FloatArray, IntArray
 
-if TYPE_CHECKING:
-    from scipy.sparse import csr_matrix
-
-    Matrix: TypeAlias = FloatArray | csr_matrix
-
-DENSE_LIMIT = 450
-"""Unknowns up to which a matrix is dense: its solve is then shorter than the import of sparse matrices."""
-_GAUSS, _WEIGHT = np.sqrt(0.6) * np.array([-1.0, 0.0, 1.0]), np.array([5.0, 8.0, 5.0]) / 9
-_CHUNK = 8192
+_BLOCK = 2**15
+"""Quadrature points worked on at a time: what a processor keeps at hand."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,26 +26,24 @@ class Volume:
     """Quadrature points of all cells; lengths in the mesh's unit."""
 
     points: FloatArray
-    """Shape (dimension, cells, points)."""
+    """Shape (dimension, points, cells)."""
     weights: FloatArray
-    """Shape (cells, points)."""
+    """Shape (points, cells)."""
     nodes: IntArray
-    """Shape (cells, functions)."""
+    """Shape (order + 1 along each axis, cells)."""
     values: FloatArray
-    """Shape functions, shape (functions, points)."""
+    """Functions of one axis at its points, shape (points, functions)."""
 
     def load(self, density: FloatArray, *, unknowns: int) -> FloatArray:
         """Vector of the integrals of f v over the cells or a side, f given at the points."""
-        return _summed(self.nodes, (density * self.weights) @ self.values.T, unknowns)
-
-    def mass(self, *, unknowns: int) -> Matrix:
-        """Symmetric matrix of the integrals of u v over these cells, among the first `unknowns` nodes."""
-        local = np.einsum("fq,iq,jq->fij", self.weights, self.values, self.values, optimize=True)
-        return _matrix(self.nodes, local.reshape(len(local), -1), unknowns)
+        axes = self.nodes.ndim - 1
+        field = (density * self.weights).reshape(*(len(self.values),) * axes, -1)
+        return _summed(self.nodes, contracted_all([self.values.T] * axes, field), unknowns)
 
     def at_points(self, nodal: FloatArray) -> FloatArray:
         """Values at the quadrature points of a field given at the mesh's nodes."""
-        return np.asarray(nodal[self.nodes] @ self.values)
+        field = contracted_all([self.values] * (self.nodes.ndim - 1), nodal[self.nodes])
+        return field.reshape(self.weights.shape)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,74 +55,119 @@ class Facets(Volume):
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Rule:
-    """Shape functions of one reference cell at the points of a quadrature."""
+class Line:
+    """Functions of one axis of a cell at the points of a quadrature."""
 
     weights: FloatArray
     """Shape (points,)."""
     values: FloatArray
-    """Shape (functions, points)."""
-    gradients: FloatArray
-    """Shape (functions, points, dimension)."""
+    """Shape (points, functions)."""
+    slopes: FloatArray
+    """Shape (points, functions)."""
 
 
-@lru_cache(maxsize=16)
-def _rule(dimension: int, axis: int = -1, end: float = 0.0) -> _Rule:
-    """Gauss points of a cell, or of its side at the `end`, -1 or 1, of an axis."""
-    points, weights = [_GAUSS] * dimension, [_WEIGHT] * dimension
-    if axis >= 0:
-        points[axis], weights[axis] = np.array([end]), np.ones(1)
-    values, gradients = cell_shapes(points)
-    return _Rule(weights=products(weights), values=values, gradients=gradients)
+@lru_cache(maxsize=32)
+def gauss_line(order: int, extra: int = 0) -> Line:
+    """Gauss points of one axis, one more than the order, and some extra."""
+    points, weights = np.polynomial.legendre.leggauss(order + 1 + extra)
+    return _line(np.asarray(points), np.asarray(weights), order)
 
 
-@lru_cache(maxsize=4)
-def _gradient_products(dimension: int) -> FloatArray:
-    """Products of reference gradients, shape (points * dimension^2, functions^2)."""
-    gradients = _rule(dimension).gradients
-    products = np.einsum("iqa,jqb->qabij", gradients, gradients)
-    return np.ascontiguousarray(products.reshape(-1, gradients.shape[0] ** 2))
+@lru_cache(maxsize=32)
+def _end_line(order: int, end: float) -> Line:
+    """One end of an axis, -1 or 1."""
+    return _line(np.array([end]), np.ones(1), order)
 
 
-def _jacobians(chamber: ChamberMesh, nodes: IntArray, rule: _Rule) -> tuple[FloatArray, FloatArray]:
-    """Cofactor matrix and determinant of dx/dX, shapes (cells, points, dim, dim) and (cells, points)."""
-    jacobian = jacobians(chamber.nodes[:, nodes], rule.gradients)
+def _line(points: FloatArray, weights: FloatArray, order: int) -> Line:
+    values, slopes = line_shapes(points, order)
+    return Line(weights=weights, values=values.T.copy(), slopes=slopes.T.copy())
+
+
+def _mapping(places: FloatArray, lines: list[Line]) -> tuple[FloatArray, FloatArray]:
+    """Cofactor matrix and determinant of dx/dX in cells, shapes (dim, dim, points, cells), (points, cells).
+
+    Args: `places`: of the cells' nodes, shape (dim, functions along each axis, cells).
+    """
+    corner = (slice(None), *[slice(1)] * len(lines))
+    local = places - places[corner]  # differences first: a film's depth would cancel in the sums
+    columns = []
+    for own in range(len(lines)):
+        field = local
+        for axis, line in enumerate(lines):
+            field = contracted(line.slopes if axis == own else line.values, field, 1 + axis)
+        columns.append(field.reshape(len(local), -1, local.shape[-1]))
+    jacobian = np.stack(columns, axis=1)
     cofactor = _cofactor(jacobian)
-    determinant = np.einsum("eqa,eqa->eq", jacobian[..., 0], cofactor[..., 0])
-    return cofactor, determinant
+    return cofactor, np.sum(jacobian[:, 0] * cofactor[:, 0], axis=0)
 
 
 def _cofactor(jacobian: FloatArray) -> FloatArray:
-    if jacobian.shape[-1] == 2:
-        return np.asarray(jacobian[..., ::-1, ::-1] * np.array([[1, -1], [-1, 1]]))
-    first, second, third = np.moveaxis(jacobian, -1, 0)
-    columns = [np.cross(second, third), np.cross(third, first), np.cross(first, second)]
-    return np.stack(columns, axis=-1)
+    if len(jacobian) == 2:
+        (xa, xb), (ya, yb) = jacobian
+        return np.stack([np.stack([yb, -ya]), np.stack([-xb, xa])])
+    following, last = np.array([1, 2, 0]), np.array([2, 0, 1])
+    one, other = jacobian[following], jacobian[last]
+    return np.asarray(one[:, following] * other[:, last] - one[:, last] * other[:, following])
 
 
-def stiffness(chamber: ChamberMesh) -> Matrix:
-    """Symmetric matrix over the nodes of the integrals of grad u . grad v, by three Gauss points an axis."""
-    dimension, unknowns = chamber.dimension, chamber.grid.size
-    rule, total = _rule(dimension), None
-    for start in range(0, len(chamber.cell_nodes), _CHUNK):
-        nodes = chamber.cell_nodes[start : start + _CHUNK]
-        cofactor, determinant = _jacobians(chamber, nodes, rule)
-        scale = rule.weights / np.abs(determinant)
-        metric = np.einsum("eq,eqka,eqkb->eqab", scale, cofactor, cofactor, optimize=True)
-        local = metric.reshape(len(nodes), -1) @ _gradient_products(dimension)
-        part = _matrix(nodes, local, unknowns)
-        total = part if total is None else total + part
-    return total
+def _blocks(chamber: ChamberMesh) -> list[slice]:
+    """Places of cells that are worked on together."""
+    cells, points = chamber.cell_nodes.shape[-1], (chamber.order + 1) ** chamber.dimension
+    step = max(1, _BLOCK // points)
+    return [slice(start, start + step) for start in range(0, cells, step)]
 
 
-def _matrix(nodes: IntArray, local: FloatArray, unknowns: int) -> Matrix:
-    """Sum of the cells' matrices, given as rows of functions^2 numbers."""
-    functions = nodes.shape[1]
-    rows = np.repeat(nodes, functions, axis=1).ravel()
-    columns = np.tile(nodes, (1, functions)).ravel()
-    if unknowns > DENSE_LIMIT:
-        return deferred.sparse_matrix(rows, columns, local.ravel(), unknowns)
-    return _summed(rows * unknowns + columns, local, unknowns**2).reshape(unknowns, unknowns)
+@dataclass(frozen=True, kw_only=True)
+class Stiffness:
+    """The symmetric form of the integrals of grad u . grad v over the nodes, applied without a matrix."""
+
+    chamber: ChamberMesh
+    metric: tuple[FloatArray, ...]
+    """w det(J) J^-1 J^-T at the points of each block of cells, shape (dim, dim, points..., cells)."""
+    values: FloatArray
+    """Functions of one axis at its points, shape (points, functions)."""
+    derivative: FloatArray
+    """Takes values at one axis's points to slopes there, exactly, shape (points, points)."""
+
+    @classmethod
+    def of(cls, chamber: ChamberMesh) -> Stiffness:
+        """The form on a chamber, by one Gauss point more than the order along each axis."""
+        line, dimension = gauss_line(chamber.order), chamber.dimension
+        weights, metric = products([line.weights] * dimension)[:, None], []
+        for block in _blocks(chamber):
+            places = chamber.nodes[:, chamber.cell_nodes[..., block]]
+            cofactor, determinant = _mapping(places, [line] * dimension)
+            found = np.einsum("kapc,kbpc->abpc", cofactor, cofactor) * (weights / np.abs(determinant))
+            metric.append(found.reshape(*found.shape[:2], *(line.weights.size,) * dimension, -1))
+        derivative = np.asarray(np.linalg.solve(line.values.T, line.slopes.T).T, dtype=np.float64)
+        return cls(chamber=chamber, metric=tuple(metric), values=line.values, derivative=derivative)
+
+    def apply(self, nodal: FloatArray) -> FloatArray:
+        """Integrals of grad u . grad v for every v, from u at all nodes."""
+        cell_nodes, axes = self.chamber.cell_nodes, range(self.chamber.dimension)
+        local = np.empty(cell_nodes.shape)
+        for block, metric in zip(_blocks(self.chamber), self.metric, strict=True):
+            field = contracted_all([self.values] * len(axes), nodal[cell_nodes[..., block]])
+            slopes = [contracted(self.derivative, field, axis) for axis in axes]
+            gathered = np.zeros_like(field)
+            for axis in axes:
+                flux = metric[axis, 0] * slopes[0]
+                for other in axes[1:]:
+                    flux += metric[axis, other] * slopes[other]
+                gathered += contracted(self.derivative.T, flux, axis)
+            local[..., block] = contracted_all([self.values.T] * len(axes), gathered)
+        return _summed(cell_nodes, local, nodal.size)
+
+    def magnitude(self, nodal: FloatArray) -> FloatArray:
+        """What `apply` adds up for every v with every term positive: the scale of its rounding."""
+        positive = replace(
+            self,
+            metric=tuple(np.abs(block) for block in self.metric),
+            values=np.abs(self.values),
+            derivative=np.abs(self.derivative),
+        )
+        return positive.apply(np.abs(nodal))
 
 
 def _summed(places: IntArray, local: FloatArray, size: int) -> FloatArray:
@@ -141,15 +175,21 @@ def _summed(places: IntArray, local: FloatArray, size: int) -> FloatArray:
     return np.asarray(total, dtype=np.float64)
 
 
-def volume_points(chamber: ChamberMesh) -> Volume:
-    """Quadrature points over all cells, in the mesh's unit."""
-    rule, nodes = _rule(chamber.dimension), chamber.cell_nodes
-    _, determinant = _jacobians(chamber, nodes, rule)
+def volume_points(chamber: ChamberMesh, *, extra: int = 0) -> Volume:
+    """Quadrature points over all cells, in the mesh's unit, with `extra` more than usual along each axis."""
+    line, dimension = gauss_line(chamber.order, extra), chamber.dimension
+    points, determinants = [], []
+    for block in _blocks(chamber):
+        places = chamber.nodes[:, chamber.cell_nodes[..., block]]
+        determinants.append(np.abs(_mapping(places, [line] * dimension)[1]))
+        for axis in range(dimension):
+            places = contracted(line.values, places, 1 + axis)
+        points.append(places.reshape(dimension, -1, places.shape[-1]))
     return Volume(
-        points=np.asarray(chamber.nodes[:, nodes] @ rule.values),
-        weights=np.asarray(np.abs(determinant) * rule.weights),
-        nodes=nodes,
-        values=rule.values,
+        points=np.concatenate(points, axis=-1),
+        weights=np.concatenate(determinants, axis=-1) * products([line.weights] * dimension)[:, None],
+        nodes=chamber.cell_nodes,
+        values=line.values,
     )
 
 
@@ -157,17 +197,22 @@ def facet_points(chamber: ChamberMesh, boundary: str) -> Facets:
     """Quadrature points over one side, with outward normals by Nanson: n dS = det(J) J^-T N dS_ref."""
     dimension, (axis, end) = chamber.dimension, SIDES[boundary]
     outward = 2 * end + 1  # the last place is -1, the first is 0
-    rule = _rule(dimension, axis, -float(outward))
-    nodes = np.take(chamber.cell_nodes.reshape(*chamber.cells, -1), end, axis=axis)
-    nodes = nodes.reshape(-1, 3**dimension)
-    cofactor, determinant = _jacobians(chamber, nodes, rule)
-    vector = -outward * np.moveaxis(cofactor[..., axis], -1, 0) * np.sign(determinant)
+    line = gauss_line(chamber.order)
+    lines = [line] * dimension
+    lines[axis] = _end_line(chamber.order, -float(outward))
+    across = chamber.cell_nodes.reshape(*chamber.cell_nodes.shape[:-1], *chamber.cells)
+    nodes = np.take(across, end, axis=dimension + axis).reshape(*across.shape[:dimension], -1)
+    cofactor, determinant = _mapping(chamber.nodes[:, nodes], lines)
+    vector = -outward * cofactor[:, axis] * np.sign(determinant)
     size = np.linalg.norm(vector, axis=0)
-    present = np.take(np.arange(3**dimension).reshape((3,) * dimension), end, axis=axis).ravel()
+    here = np.take(nodes, end, axis=axis)
+    points = chamber.nodes[:, here]
+    for side in range(dimension - 1):
+        points = contracted(line.values, points, 1 + side)
     return Facets(
-        points=np.asarray(chamber.nodes[:, nodes] @ rule.values),
+        points=points.reshape(vector.shape),
         normals=vector / size,
-        weights=size * rule.weights,
-        values=rule.values[present],
-        nodes=nodes[:, present],
+        weights=size * products([one.weights for one in lines])[:, None],
+        values=line.values,
+        nodes=here,
     )

@@ -1,4 +1,5 @@
-"""Solution of the symmetric positive definite systems of the pressure problem, with the true residual."""
+"""Solution of symmetric positive definite systems, with the true residual: forms without a matrix, or sparse
+matrices."""
 
 from __future__ import annotations
 
@@ -15,15 +16,19 @@ from ringbalance.scene.arrays import FloatArray
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-    from ringbalance.physics.pressure.assembly import Matrix
-
 # Above these a factorisation costs more time and memory than multigrid does.
 DIRECT_LIMIT = {2: 100_000, 3: 20_000}
+_TOLERANCE = 1e-14
+"""Of the error in the form's own norm, as its near inverse sees it, over that of zero."""
+_MAX_ITERATIONS = 500
 _ACCEPTED = 1e-10
 _ROUNDING = 8 * float(np.finfo(np.float64).eps)
 """Of |A| |u| + |b|, that a backward-stable solve may leave of the residual."""
 _MOST_ROUNDING = 1e-6
 """Relative residual above which rounding has cost too many digits to call a system solved."""
+
+Form = Callable[[FloatArray], FloatArray]
+"""A matrix times a vector."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,8 +41,23 @@ class LinearSolution:
     statistics: Statistics
 
 
+def solve_form(form: Form, right: FloatArray, *, inverse: Form, magnitude: Form) -> LinearSolution:
+    """Solve A u = b by conjugate gradients with a near inverse.
+
+    Args:
+        form: A times a vector, A symmetric and positive, but for constants perhaps.
+        right: b, shape (unknowns,), in the range of A.
+        inverse: near inverse of A times a vector, symmetric.
+        magnitude: |A| |u|, the sum of all terms of A u taken positive.
+    Returns: u and its status, as in `solve_linear`.
+    Source: Hestenes and Stiefel (1952), doi:10.6028/jres.049.044.
+    """
+    values, iterations = _conjugate_gradients(form, right, inverse)
+    return _judged(values, form(values), right, magnitude, iterations, {})
+
+
 def solve_linear(
-    matrix: Matrix,
+    matrix: csr_matrix,
     right: FloatArray,
     *,
     dimension: int,
@@ -47,44 +67,76 @@ def solve_linear(
     """Solve A u = b: by factorisation when small, else by conjugate gradients with algebraic multigrid.
 
     Args:
-        matrix: A, symmetric positive definite, dense or sparse.
+        matrix: A, symmetric positive definite.
         right: b, shape (unknowns,).
         dimension: of the mesh behind the matrix, 2 or 3; decides where factorisation ends.
-        prolongation: gives, when multigrid asks for it, the interpolation that `linear_prolongation` makes;
-            None lets multigrid find its own coarse levels.
+        prolongation: gives, when multigrid asks for it, the interpolation from linear elements on the same
+            mesh; None lets multigrid find its own coarse levels.
         direct_limit: unknowns up to which to factorise; default 100 000 in two dimensions, 20 000 in three.
     Returns: u with the true relative residual |b - A u| / |b|; the status is NOT_CONVERGED when that is above
         1e-10, unless it is rounding, at most 8 eps | |A| |u| + |b| | / |b|, and at most 1e-6: elongated cells
         make terms cancel that are larger than b by the square of their elongation.
     Source: smoothed aggregation of Vanek, Mandel and Brezina (1996), doi:10.1007/BF02238511, through pyamg.
     """
-    unknowns = right.size
     limit = DIRECT_LIMIT[dimension] if direct_limit is None else direct_limit
-    if unknowns <= limit:
+    if right.size <= limit:
         values, iterations, extra = _factorised(matrix, right), 0, dict[str, float]()
     else:
         values, iterations, extra = deferred.multigrid(
             matrix, right, prolongation() if prolongation else None
         )
-    size = float(np.linalg.norm(right))
-    size = size if size > 0 else 1.0
-    residual = float(np.linalg.norm(right - matrix @ values)) / size
-    terms = float(np.linalg.norm(abs(matrix) @ np.abs(values) + np.abs(right))) / size
-    statistics = Statistics(unknowns=unknowns, iterations=iterations, relative_residual=residual, extra=extra)
-    return LinearSolution(values=values, status=_status(residual, _ROUNDING * terms), statistics=statistics)
+    return _judged(values, matrix @ values, right, lambda u: abs(matrix) @ np.abs(u), iterations, extra)
 
 
-def _factorised(matrix: Matrix, right: FloatArray) -> FloatArray:
+def _conjugate_gradients(form: Form, right: FloatArray, inverse: Form) -> tuple[FloatArray, int]:
+    values, residual = np.zeros_like(right), right.copy()
+    step = inverse(residual)
+    first = square = float(residual @ step)
+    for iteration in range(_MAX_ITERATIONS):
+        if square <= _TOLERANCE**2 * first:
+            return values, iteration
+        image = form(step)
+        length = square / float(step @ image)
+        values += length * step
+        residual -= length * image
+        nearer = inverse(residual)
+        square, before = float(residual @ nearer), square
+        step = nearer + square / before * step
+    return values, _MAX_ITERATIONS
+
+
+def _factorised(matrix: csr_matrix, right: FloatArray) -> FloatArray:
     try:
-        if isinstance(matrix, np.ndarray):
-            return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
         return np.asarray(deferred.factorised(matrix, right))
     except np.linalg.LinAlgError:  # the residual of zeros says so
         return np.zeros_like(right)
 
 
-def _status(residual: float, rounding: float) -> Status:
-    limit = max(_ACCEPTED, min(rounding, _MOST_ROUNDING))
+def _judged(
+    values: FloatArray,
+    image: FloatArray,
+    right: FloatArray,
+    magnitude: Form,
+    iterations: int,
+    extra: dict[str, float],
+) -> LinearSolution:
+    size = float(np.linalg.norm(right))
+    size = size if size > 0 else 1.0
+    residual = float(np.linalg.norm(right - image)) / size
+    limit = _ACCEPTED
+    if residual > limit:
+        terms = float(np.linalg.norm(magnitude(values) + np.abs(right))) / size
+        limit = max(limit, min(_ROUNDING * terms, _MOST_ROUNDING))
+    return LinearSolution(
+        values=values,
+        status=_status(residual, limit),
+        statistics=Statistics(
+            unknowns=right.size, iterations=iterations, relative_residual=residual, extra=extra
+        ),
+    )
+
+
+def _status(residual: float, limit: float) -> Status:
     if residual <= limit:
         return Status()
     return Status(

@@ -15,19 +15,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ringbalance.mesh.chamber import ChamberMesh
-from ringbalance.physics import deferred
-from ringbalance.physics.pressure.assembly import facet_points, stiffness, volume_points
-from ringbalance.physics.pressure.linear import LinearSolution, solve_linear
+from ringbalance.physics.pressure.assembly import Stiffness, facet_points, gauss_line, volume_points
+from ringbalance.physics.pressure.linear import Form, LinearSolution, solve_form
+from ringbalance.physics.pressure.separable import mass_inverse, stiffness_inverse
 from ringbalance.physics.results import Statistics, Status
 from ringbalance.scene.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from ringbalance.physics.pressure.assembly import Matrix
 
 FREE_SURFACE = "free_surface"
 
@@ -43,14 +39,14 @@ class PressureProblem:
     surface_pressure: Callable[[FloatArray], FloatArray]
     """p_gas(x), Pa, gauge."""
 
-    def discretise(self, *, chamber: ChamberMesh) -> _DiscreteProblem:
-        """Matrix and load of the weak form; the free surface is left without a condition."""
+    def discretise(self, *, chamber: ChamberMesh) -> DiscreteProblem:
+        """Form and load of the weak problem; the free surface is left without a condition."""
         unit, volume = chamber.length_scale, volume_points(chamber)
         total = -(unit**2) * volume.load(self.source(unit * volume.points), unknowns=chamber.grid.size)
         for name in chamber.boundaries:
             if name != FREE_SURFACE:
                 total += self.wall_load(chamber=chamber, boundary=name)
-        return _DiscreteProblem(matrix=stiffness(chamber), load=total)
+        return DiscreteProblem(stiffness=Stiffness.of(chamber), load=total)
 
     def wall_load(self, *, chamber: ChamberMesh, boundary: str) -> FloatArray:
         """Part of the load that one boundary contributes, int q v, in the mesh's unit of length."""
@@ -110,49 +106,51 @@ class PressureSolution:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _DiscreteProblem:
-    """Matrix and load of the weak form, before any condition on the free surface; lengths in mesh units."""
+class DiscreteProblem:
+    """Form and load of the weak problem, before any condition on the free surface; lengths in mesh units."""
 
-    matrix: Matrix
+    stiffness: Stiffness
     load: FloatArray
     """- int f v + int_walls q v."""
 
+    def solve(self, *, start: FloatArray, pinned_surface: bool) -> LinearSolution:
+        """Solve for what is to be added to a starting field.
 
-def solve_pressure(
-    *, chamber: ChamberMesh, problem: PressureProblem, direct_limit: int | None = None
-) -> PressureSolution:
+        Args: `pinned_surface`: whether the nodes of the free surface keep their values; if not, the load must
+            be in balance, and what is added has no constant part.
+        """
+        # The nodes of the free surface are the first.
+        first = self.stiffness.chamber.grid[0].size if pinned_surface else 0
+
+        def among_free(form: Form) -> Form:
+            return lambda free: form(np.concatenate([np.zeros(first), free]))[first:]
+
+        return solve_form(
+            among_free(self.stiffness.apply),
+            (self.load - self.stiffness.apply(start))[first:],
+            inverse=stiffness_inverse(self.stiffness, pinned_surface=pinned_surface),
+            magnitude=among_free(self.stiffness.magnitude),
+        )
+
+
+def solve_pressure(*, chamber: ChamberMesh, problem: PressureProblem) -> PressureSolution:
     """Solve the pressure problem on the mesh of a chamber's liquid.
 
     int grad p . grad v = - int f v + int_walls q v for all v that vanish on the free surface, p = p_gas
     there.
     Args: `chamber`: mesh, two- or three-dimensional, with its named boundaries. `problem`: right-hand sides;
-        `RotatingLiquid.problem` gives the physical ones. `direct_limit`: unknowns up to which the matrix is
-        factorised; default as in `solve_linear`.
+        `RotatingLiquid.problem` gives the physical ones.
     Returns: The nodal pressure; its status is NOT_CONVERGED when the true residual of the linear system is
         too large.
-    Source: Eqs. 9 to 11 of the liquid-ring paper as a boundary-value problem; quadratic elements, order three
-    in the pressure and four in integrals of it, as long as the geometry is quadratic.
+    Source: Eqs. 9 to 11 of the liquid-ring paper as a boundary-value problem; elements of the mesh's order p,
+    of order p + 1 in the pressure and 2 p in integrals of it, as long as the geometry is curved.
     """
     discrete = problem.discretise(chamber=chamber)
     surface = chamber.grid[0].ravel()
-    pressure = np.zeros(discrete.load.size)
-    pressure[surface] = problem.surface_pressure(chamber.places[:, surface])
-    free = chamber.grid[1:].ravel()
-    rows = discrete.matrix[free]
-    linear = solve_linear(
-        rows[:, free],
-        discrete.load[free] - rows @ pressure,
-        dimension=chamber.dimension,
-        prolongation=lambda: deferred.linear_prolongation(chamber, pinned_surface=True),
-        direct_limit=direct_limit,
-    )
-    pressure[free] = linear.values
-    return _solution(chamber, discrete, pressure, linear)
-
-
-def _solution(
-    chamber: ChamberMesh, discrete: _DiscreteProblem, pressure: FloatArray, linear: LinearSolution
-) -> PressureSolution:
+    on_surface = problem.surface_pressure(chamber.places[:, surface])
+    pressure = np.tile(on_surface, chamber.grid.shape[0])
+    linear = discrete.solve(start=pressure, pinned_surface=True)
+    pressure[surface.size :] += linear.values
     gradient = _surface_gradient(chamber, discrete, pressure)
     return PressureSolution(
         chamber=chamber,
@@ -164,11 +162,13 @@ def _solution(
 
 
 def _surface_gradient(
-    chamber: ChamberMesh, discrete: _DiscreteProblem, pressure: FloatArray
+    chamber: ChamberMesh, discrete: DiscreteProblem, pressure: FloatArray
 ) -> LinearSolution:
     """Flux that balances the weak form on the surface, in mesh units: better than the field's gradient."""
-    nodes = chamber.grid[0].ravel()
-    residual = discrete.matrix[nodes] @ pressure - discrete.load[nodes]
-    # The nodes of the free surface are the first.
-    matrix = facet_points(chamber, FREE_SURFACE).mass(unknowns=nodes.size)
-    return solve_linear(matrix, residual, dimension=chamber.dimension)
+    facets, count = facet_points(chamber, FREE_SURFACE), chamber.grid[0].size
+    return solve_form(
+        lambda flux: facets.load(facets.at_points(flux), unknowns=count),
+        (discrete.stiffness.apply(pressure) - discrete.load)[:count],
+        inverse=mass_inverse(facets, cells=chamber.cells[1:], line=gauss_line(chamber.order)),
+        magnitude=np.abs,
+    )

@@ -13,9 +13,7 @@ import numpy as np
 
 from ringbalance.mesh.chamber import ChamberMesh, chamber_mesh
 from ringbalance.mesh.geometry import half_angle, liquid_area, surface_radius
-from ringbalance.physics import deferred
 from ringbalance.physics.pressure.assembly import facet_points, volume_points
-from ringbalance.physics.pressure.linear import solve_linear
 from ringbalance.physics.pressure.solve import (
     FREE_SURFACE,
     PressureSolution,
@@ -236,17 +234,9 @@ def _free_pressure(chamber: ChamberMesh, liquid: RotatingLiquid) -> FloatArray:
     discrete = problem.discretise(chamber=chamber)
     on_surface = replace(problem, wall_flux=lambda x, n: _normal_force(liquid, x, n))
     load = discrete.load + on_surface.wall_load(chamber=chamber, boundary=FREE_SURFACE)
-    load -= load.mean()  # what quadrature leaves of the balance would become a spike at the pinned node
-    free = chamber.grid.ravel()[:-1]
-    linear = solve_linear(
-        discrete.matrix[free][:, free],
-        load[free],
-        dimension=chamber.dimension,
-        prolongation=lambda: deferred.linear_prolongation(chamber, pinned_surface=False),
-    )
-    pressure = np.zeros(load.size)
-    pressure[free] = linear.values
-    return pressure
+    load -= load.mean()  # what quadrature leaves of the balance
+    balanced = replace(discrete, load=load)
+    return balanced.solve(start=np.zeros(load.size), pinned_surface=False).values
 
 
 def _wanted_move(chamber: ChamberMesh, liquid: RotatingLiquid, target: float) -> FloatArray:

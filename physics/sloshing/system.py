@@ -35,8 +35,8 @@ from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
 from ringbalance.mesh.chamber import chamber_mesh
-from ringbalance.mesh.quadratic import line_shapes
-from ringbalance.physics.pressure.assembly import stiffness as stiffness_of
+from ringbalance.mesh.tensor_cells import line_shapes
+from ringbalance.physics.pressure.sparse import stiffness_matrix
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.models import Disc
 
@@ -102,7 +102,7 @@ def sloshing_system(*, disc: Disc, surface_radius: float, cells: tuple[int, int]
     Source: the equations at the head of this module, derived there.
     """
     chamber = chamber_mesh(disc=disc, surface_radius=surface_radius, cells=cells)
-    stiffness = csc_matrix(stiffness_of(chamber))
+    stiffness = csc_matrix(stiffness_matrix(chamber))
     grid, nodes = chamber.grid, chamber.nodes
     kept, inner = grid[0, 1:-1], grid[1:-1, 1:-1].ravel()
     extension = _extension(stiffness, inner, kept)

@@ -16,6 +16,7 @@ from ringbalance.physics.tube.rotation import rotating_friction_ratio, turbulent
 from ringbalance.physics.tube.state import TubeState, finest_state, tube_state
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import InputUncertainty, Liquid, Tube
+from ringbalance.scene.uncertain import NORMAL_95
 
 ASSUMED_ROUGHNESS_UNCERTAINTY: Final = 0.5
 """Relative expanded uncertainty (95 %) of a roughness for which the scene states none."""
@@ -23,6 +24,15 @@ SIMPLER: Final = "left out"
 """Part by what models simpler than the finest neglect."""
 INPUT_PART: Final = "input: "
 """What the names of parts by inputs begin with."""
+MODEL_CAUSES: Final[Mapping[str, str]] = {
+    "friction correlation": "friction",
+    "rotation model": "rotation",
+    "rotation entry": "rotation",
+    "ends": "entrance",
+    "bends": "bends",
+    SIMPLER: "extra",
+}
+"""Causes of `model_parts`, each with the term of k that its error changes."""
 TUBE_INPUTS: Final = ("bore", "length", "roughness", "extra_loss", "drag_coefficient")
 
 
@@ -90,6 +100,29 @@ def model_parts(*, tube: Tube, state: TubeState) -> dict[str, FloatArray]:
         "bends": state.bend_half_width,
     }
     return parts if chosen is state else parts | {SIMPLER: np.abs(state.k - chosen.k)}
+
+
+def with_errors(*, tube: Tube, state: TubeState) -> TubeState:
+    """The state with the errors that `TubeModels.errors` supposes of its models.
+
+    e(Re) = (U/1.96) (n cos ln Re + m sin ln Re) of each cause, n and m its two parts: a random function of
+    standard deviation U/1.96 at every Re, with the correlation cos(ln Re - ln Re') between two of them.  Over
+    a small range that is a level and a slope of U/1.96 per e-fold of Re, which is what the residuals of
+    measured smooth tubes have.
+    """
+    if not tube.models.errors:
+        return state
+    parts, terms, bends = model_parts(tube=tube, state=state), dict(state.terms), state.bends
+    for cause, even, odd in tube.models.errors:
+        if cause not in parts:
+            continue
+        angle = np.log(state.reynolds)
+        error = parts[cause] / NORMAL_95 * (even * np.cos(angle) + odd * np.sin(angle))
+        term = "decree" if "decree" in terms else MODEL_CAUSES[cause]
+        if term == "bends":
+            bends = tuple(k * (1 + error / terms[term]) for k in bends)
+        terms[term] = terms[term] + error
+    return replace(state, terms=terms, bends=bends)
 
 
 def _development_part(tube: Tube, state: TubeState, friction_ratio: FloatArray) -> FloatArray:

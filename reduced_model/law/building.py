@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.mesh.geometry import chamber_volume
+from ringbalance.mesh.geometry import chamber_volume, wall_radius
 from ringbalance.physics.gas.column import pressure_factor
 from ringbalance.physics.pressure.hydrostatics import Radius, hydrostatic_pressure
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes
@@ -19,8 +19,10 @@ from ringbalance.reduced_model.tables.fit import flat_table, table_from_samples
 from ringbalance.reduced_model.tables.hermite import HermiteTable
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
 from ringbalance.reduced_model.tube.heads import TubeHeads, nominal_heads
-from ringbalance.reduced_model.tube.regime import RELEASED, TubePath
+from ringbalance.reduced_model.tube.regime import CLEARING_UNCERTAINTY, RELEASED, TubePath
 from ringbalance.scene.models import Scene
+from ringbalance.scene.tube_models import CAVITY_ERROR, CLEARING_ERROR
+from ringbalance.scene.uncertain import NORMAL_95
 
 # Density and speed act on both wall pressures and on the tube at once, so the law handles them separately.
 _SHARED: Final = ("density", "speed")
@@ -102,15 +104,18 @@ def tube_path(scene: Scene) -> TubePath:
 
     Source: p(r) = rho omega^2 r^2/2 of liquid at rest in the rotating frame.
     """
-    hump = scene.tube.hump_radius
+    hump, error = scene.tube.hump_radius, scene.tube.models.error
+    froude = 1 + CLEARING_UNCERTAINTY * error(CLEARING_ERROR) / NORMAL_95
+    # With dissolved gas both ends of what the cavity's pressure may be are in its uncertainty.
+    released = min(max(RELEASED * (1 + error(CAVITY_ERROR) / NORMAL_95), 0.0), 1.0)
     return TubePath(
         density=scene.liquid.density,
         port_pressure=column_pressure(scene=scene, radius=scene.tube.port_radius),
         hump_pressure=None if hump is None else column_pressure(scene=scene, radius=hump),
         trapped=scene.tube.hump_gas == "trapped",
         vapour_pressure=scene.liquid.vapour_pressure - scene.gas.ambient_pressure,
-        released=RELEASED if scene.liquid.dissolved_gas == "saturated" else 0.0,
-        froude_velocity=abs(scene.rotor.speed) * math.sqrt((hump or 0.0) * scene.tube.bore),
+        released=released if scene.liquid.dissolved_gas == "saturated" else 0.0,
+        froude_velocity=froude * abs(scene.rotor.speed) * math.sqrt((hump or 0.0) * scene.tube.bore),
     )
 
 
@@ -124,7 +129,7 @@ def column_pressure(*, scene: Scene, radius: Radius) -> Radius:
         density=scene.liquid.density,
         angular_velocity=scene.rotor.speed,
         inner=radius,
-        outer=scene.disc.outer_radius,
+        outer=wall_radius(disc=scene.disc),
     )
 
 

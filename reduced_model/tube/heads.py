@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.physics.tube.state import TubeState, finest_state, tube_state
-from ringbalance.physics.tube.uncertainty import SIMPLER, model_parts, uncertainty_parts
+from ringbalance.physics.tube.uncertainty import SIMPLER, model_parts, uncertainty_parts, with_errors
 from ringbalance.reduced_model.chamber.inputs import half_widths
 from ringbalance.reduced_model.tables.fit import flat_table, level_table, refined_table
 from ringbalance.reduced_model.tables.hermite import HermiteTable
@@ -180,12 +180,13 @@ def log_heads(scene: Scene) -> list[LogHead]:
 
     @lru_cache(maxsize=32)
     def state(log_velocity: bytes) -> TubeState:
-        return tube_state(
+        found = tube_state(
             tube=tube,
             liquid=scene.liquid,
             angular_velocity=scene.rotor.speed,
             velocity=np.exp(np.frombuffer(log_velocity)),
         )
+        return with_errors(tube=tube, state=found)
 
     def between(log_velocity: FloatArray) -> FloatArray:
         return np.asarray(np.log((state(log_velocity.tobytes()).k + 1) / 2) + 2 * log_velocity)

@@ -25,6 +25,8 @@ Source: May, Allen and Nelson, "Hydraulic Investigation of Air in Small Diameter
 7 (2018) 51, doi:10.5923/j.ijhe.20180703.02; Pothof, "Co-current air-water flow in downward sloping pipes",
 thesis, Delft (2011), ISBN 978-90-8957-018-5.
 """
+CLEARING_UNCERTAINTY: Final = (CLEARING[1] - CLEARING[0]) / (CLEARING[1] + CLEARING[0])
+"""Relative, of the Froude number in the middle: that span (95 %)."""
 RELEASED: Final = 0.5
 """Where between vapour pressure and the downstream gas the cavity is taken to lie with dissolved gas: the
 middle, with both ends in the uncertainty.

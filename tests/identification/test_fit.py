@@ -14,6 +14,7 @@ from synthetic_rigs import covered, fitted, measured, observations, rig
 from ringbalance.controller.rotor import influence
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.fitting import fit, problem_of
+from ringbalance.identification.model_errors import model_errors, with_model_error
 from ringbalance.identification.parameters import FitError
 from ringbalance.identification.predict.device import models_of
 from ringbalance.identification.predict.kinds import PREDICTED
@@ -145,9 +146,15 @@ def injected(scene: Scene, *, sd: float) -> Observations:
 def posterior(scene: Scene, data: Observations, result: FitResult, sd: float) -> FloatArray:
     """Means, then standard deviations, of bore and lambda factor by the density written out here.
 
-    The grid is sheared along the ridge, which keeps the area of its cells.
+    The errors of the models are in the covariance.  The grid is sheared along the ridge, which keeps the area
+    of its cells.
     """
     kind, models = PREDICTED["injection"], models_of(scene)
+    covariance = sd**2 * np.eye(2 * len(data))
+    for name in model_errors(scene):
+        low, high = (kind.predict(with_model_error(scene, name, n), data, models) for n in (-1, 1))
+        covariance += np.outer(high - low, high - low) / 4
+    precision = np.linalg.inv(covariance)
     values = np.array([p.value for p in result.parameters])
     widths = np.array([np.diff(p.interval)[0] / 2 / 1.96 for p in result.parameters])
     ridge = float(result.correlations[0, 1])
@@ -158,8 +165,10 @@ def posterior(scene: Scene, data: Observations, result: FitResult, sd: float) ->
             bore, factor = places[i, j] = values + widths * offset
             moved = with_value(scene=scene, quantity="bore", value=float(bore))
             moved = with_value(scene=moved, quantity="lambda_factor", value=float(factor))
-            left = (kind.measured(data) - kind.predict(moved, data, models)) / sd
-            log_density[i, j] = -(left @ left + ((bore - scene.tube.bore) / (5e-5 / 1.96)) ** 2) / 2
+            left = kind.measured(data) - kind.predict(moved, data, models)
+            log_density[i, j] = (
+                -(left @ precision @ left + ((bore - scene.tube.bore) / (5e-5 / 1.96)) ** 2) / 2
+            )
     weight = np.exp(log_density - log_density.max())
     mean = np.tensordot(weight / weight.sum(), places, axes=2)
     spread = np.sqrt(np.tensordot(weight / weight.sum(), (places - mean) ** 2, axes=2))
@@ -177,6 +186,31 @@ def test_a_posterior_on_a_grid(paper_scene: Scene) -> None:
     widths = np.array([np.diff(p.interval)[0] / 2 / 1.96 for p in result.parameters])
     assert widths == pytest.approx(spread, rel=0.01)
     assert np.abs(values - mean) / spread == pytest.approx([0, 0], abs=0.05)
+
+
+def test_a_held_input_that_the_data_pull_off_its_statement(paper_scene: Scene) -> None:
+    """Pressures 3 % too high at a held density of 1 % (95 %), the speed fitted and known to 0.01 %: what is
+    fitted cannot take it up, and the likeliest density is the weighted mean of statement and data."""
+    scene = stated(
+        paper_scene, density=0.01 * paper_scene.liquid.density, speed=1e-4 * paper_scene.rotor.speed
+    )
+    plan = observations(
+        "pressure", {"radius": np.linspace(0.04, 0.0445, 6), "fill_ratio": 0.25, "pressure": 1.0}
+    )
+    right = PREDICTED["pressure"].predict(scene, plan, models_of(scene))
+    data = replace(
+        plan,
+        columns=dict(plan.columns) | {"pressure": 1.03 * right},
+        uncertainty={"pressure": 0.02 * np.full(6, right[-1])},
+    )
+    found = fit(scene, data=[data], parameters=["speed"])
+    by_data = np.sum((right / data.uncertainty["pressure"]) ** 2)
+    expected = 3 * by_data / (by_data + 1 / 0.01**2)
+    assert found.pulls["density"] == pytest.approx(expected, rel=0.01)
+    assert len(found.pulled) == 1
+    assert f"density off by {expected:.2g} of its stated" in found.pulled[0]
+    quiet = replace(data, columns=dict(plan.columns) | {"pressure": 1.003 * right})
+    assert fit(scene, data=[quiet], parameters=["speed"]).pulled == ()
 
 
 def test_derivatives_against_richardson() -> None:

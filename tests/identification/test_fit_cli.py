@@ -86,7 +86,8 @@ def test_the_examples_together_give_back_the_truth(balancer: str, run: Run) -> N
         low, high = each["interval"]
         assert low < truth[each["name"]] < high, each
         assert high - low < widest[each["name"]], each
-        assert each["verdict"] == "identified"
+        # What the correlations of k are uncertain by stands for a bore as well as its own tolerance does.
+        assert each["verdict"] == "identified" or "bore^3/(k + 1)" in each["text"]
     stated = {each["group"] for each in document["noise"] if not each["estimated"]}
     assert stated == {group for group in STATED if group.split(" ")[0] in files}
 
@@ -99,7 +100,8 @@ def test_injections_alone_do_not_blame_the_bore_for_a_loss(run: Run) -> None:
     for name, each in found.items():
         low, high = each["interval"]
         assert low < example_measurements.TRUTH["liquid_ring"][name] < high, each
-    assert "bore^3/(k + 1)" in found["bore"]["text"]
+    assert found["extra_loss"]["interval"][0] > 0
+    assert found["bore"]["verdict"] != "identified"
 
 
 def test_a_prescribed_loss_is_fitted_in_place_of_the_extra_one() -> None:

@@ -85,7 +85,7 @@ def test_surface_radii_are_kept_as_given(disc: Disc) -> None:
 
 @pytest.mark.parametrize("depth", [24e-3, 1e-3, 1e-6])
 @pytest.mark.parametrize("cells", [(8, 24), (8, 24, 4)])
-@pytest.mark.parametrize("geometry", ["quadratic", "straight"])
+@pytest.mark.parametrize("geometry", ["curved", "straight"])
 def test_cells_stay_square_down_to_a_micrometre(
     disc: Disc, depth: float, cells: tuple[int, ...], geometry: Geometry
 ) -> None:

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from ringbalance.mesh.chamber import chamber_mesh
+from ringbalance.mesh.cut.faceting import drawing_error
 from ringbalance.mesh.cut.integrals import integrals, walls_about
 from ringbalance.mesh.cut.patches import split_patches, wall_patches
 from ringbalance.mesh.cut.table import SLOPE_TOLERANCE, TOLERANCE, chamber_table
@@ -164,3 +165,29 @@ def test_the_wall_pressure_counts_the_wet_part_of_a_flat_wall(disc: Disc) -> Non
         first = np.sqrt(max(a * a - X1 * X1, 0.0))
         wet = quad(lambda y, a=a: X1**2 + y * y - a * a, first, HALF)[0] / HALF
         assert wall_square(disc=flat, surface_radius=a) == pytest.approx(wet, rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_facets_may_miss_holds_what_they_miss(disc: Disc, kind: CellKind) -> None:
+    """The true chamber is known here; an interval three times too wide would say little."""
+    geometry, fills = sector(disc, cells=(2, 8, 3), kind=kind), np.linspace(0.05, 0.9, 5)
+    meshed, error = replace(disc, geometry=geometry), drawing_error(geometry, fill_ratio=fills)
+    missing = abs(chamber_volume(disc=meshed) - chamber_volume(disc=disc))
+    assert error.volume / 3 < missing < error.volume
+    a, b = (surface_radius(disc=each, fill_ratio=fills) for each in (disc, meshed))
+    plain, drawn = (
+        disc.axial_width * liquid_first_moment(disc=each, surface_radius=at)
+        for each, at in ((disc, a), (meshed, b))
+    )
+    assert np.all(np.abs(plain - drawn) < error.moment)
+    assert np.all(error.moment < 4 * np.abs(plain - drawn))
+    walls = [wall_square(disc=each, surface_radius=at) for each, at in ((disc, a), (meshed, b))]
+    assert np.all(np.abs(walls[0] - walls[1]) < error.wall_square)
+    centres = [surface_centroid(disc=each, radius=at) for each, at in ((disc, a), (meshed, b))]
+    assert np.all(np.abs(centres[0] - centres[1]) < error.centroid)
+
+
+def test_flat_walls_miss_nothing() -> None:
+    assert drawing_error(box(kind="tetra"), fill_ratio=np.array([0.3])).volume == pytest.approx(
+        TOLERANCE * (X1 - X0) * 2 * HALF * WIDTH, rel=1e-3
+    )

@@ -179,7 +179,7 @@ def bound(disc: Disc, dimension: int, geometry: Geometry) -> float:
     volume = volume_points(chamber)
     points = chamber.length_scale * volume.points
     exact, nodal = made_up.value(points), made_up.value(chamber.length_scale * chamber.nodes)
-    if geometry == "quadratic":
+    if geometry == "curved":
         error = volume.at_points(nodal) - exact
         return 2 * float(np.sqrt(np.sum(volume.weights * error**2) / np.sum(volume.weights * exact**2)))
     chord = disc.outer_radius * (disc.central_angle / cells[1]) ** 2 / 8
@@ -189,7 +189,7 @@ def bound(disc: Disc, dimension: int, geometry: Geometry) -> float:
 
 # Third order in L2 is what quadratic elements give; straight sides draw an arc to second order.
 @pytest.mark.parametrize("dimension", [2, 3])
-@pytest.mark.parametrize(("geometry", "order"), [("quadratic", 3.0), ("straight", 2.0)])
+@pytest.mark.parametrize(("geometry", "order"), [("curved", 3.0), ("straight", 2.0)])
 def test_order_and_finest_error(disc: Disc, dimension: int, geometry: Geometry, order: float) -> None:
     found = errors(disc, dimension, geometry)
     # Three cells across a quarter are not yet asymptotic: in three dimensions the first pair has some room.
@@ -204,17 +204,17 @@ def test_an_uneven_surface_keeps_the_order(disc: Disc, dimension: int) -> None:
     def surface(angle: FloatArray, axial: FloatArray) -> FloatArray:
         return np.asarray(SURFACE + 2e-3 * np.cos(2 * angle + 0.5) + 0.04 * axial)
 
-    found = errors(disc, dimension, "quadratic", surface=surface)
+    found = errors(disc, dimension, "curved", surface=surface)
     assert rates(found)[-1] == pytest.approx(3.0, abs=0.2)
-    assert found[-1] < 1.5 * bound(disc, dimension, "quadratic")
+    assert found[-1] < 1.5 * bound(disc, dimension, "curved")
 
 
 @pytest.mark.parametrize("fault", ["source_factor", "wall_factor"])
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_a_fault_of_a_hundredth_stops_convergence(disc: Disc, dimension: int, fault: str) -> None:
-    found = errors(disc, dimension, "quadratic", **{fault: 1.01})
+    found = errors(disc, dimension, "curved", **{fault: 1.01})
     assert rates(found)[-1] < 1.0
-    assert found[-1] > bound(disc, dimension, "quadratic")
+    assert found[-1] > bound(disc, dimension, "curved")
 
 
 @pytest.mark.parametrize("wall", ["outer_wall", "plate_left", "plate_right", "end_front", "end_back"])

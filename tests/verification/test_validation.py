@@ -16,6 +16,7 @@ from ringbalance.identification.data.measurements import MeasurementsError, pars
 from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.scene.models import Scene
+from ringbalance.scene.uncertain import NORMAL_95
 from ringbalance.verification.catalogue import case_code
 from ringbalance.verification.validation import tube_at_rest
 from ringbalance.verification.validation.comparison import KINDS, compare
@@ -111,6 +112,22 @@ def test_the_budget_of_k_holds_bias_and_scatter_of_turbulent_friction(paper_scen
     loss = tube_loss(tube=smooth, liquid=paper_scene.liquid, angular_velocity=0.0, velocity=np.array([15.0]))
     assert loss.uncertainty_parts["friction correlation"] >= spread * loss.terms["friction"]
     assert loss.k.uncertainty >= loss.uncertainty_parts["friction correlation"]
+
+
+def test_measured_friction_drifts_from_the_correlation_as_its_error_is_taken_to() -> None:
+    """`with_errors` has a slope of U/1.96 per e-fold of Re: that of series of smooth tubes, turbulent and
+    over at least a factor of two, is within a factor of two of it (root mean square)."""
+    points = friction_points("mckeon_2004", "stanton_pannell_1914", "senecal_1951")
+    points = points.where((points.reynolds > 6000) & (points.reynolds < 1e5))
+    apart = points.friction / points.predicted() - 1
+    stated = points.stated() / points.predicted() / NORMAL_95
+    slopes = []
+    for series in np.unique(points.series):
+        log_re = np.log(points.reynolds[mine := points.series == series])
+        if np.count_nonzero(mine) >= 6 and np.ptp(log_re) > math.log(2):
+            slopes.append(np.polyfit(log_re, apart[mine], 1)[0] / np.mean(stated[mine]))
+    assert len(slopes) >= 6
+    assert 0.5 < math.sqrt(np.mean(np.square(slopes))) < 2
 
 
 _HEAD = '# kind = "friction"\n# source = "me"\n# uncertainty = 0.02\n'

@@ -29,7 +29,7 @@ _SLOPES: Final = (3.0, 0.7, 1.8)
 _SHIFTS: Final = (0.4, 0.2)
 _GAUSS: Final = 40
 _FIELD_ORDER: Final = 3.0
-_WALL_ORDER: Final = {"quadratic": 4.0, "straight": 2.0}
+_WALL_ORDER: Final = {"curved": 4.0, "straight": 2.0}
 _FILL_SHARE: Final = 0.8
 """Of the largest fill: a ring deep enough to show every direction."""
 
@@ -134,7 +134,7 @@ def manufactured_evidence(*, disc: Disc, cells: Sequence[tuple[int, ...]], defec
 
     Raises: ValueError: an unknown defect.
     """
-    curved, straight = (_study(disc, cells, geometry, defect) for geometry in ("quadratic", "straight"))
+    curved, straight = (_study(disc, cells, geometry, defect) for geometry in ("curved", "straight"))
     found = {
         "field_order_quadratic": curved.field.settled_order,
         "field_error_quadratic": curved.field.finest_error,

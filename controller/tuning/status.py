@@ -1,0 +1,86 @@
+"""What a tuning comes to, in one sentence: what keeps the runs from settling, and what to do about it."""
+
+from __future__ import annotations
+
+from ringbalance.controller.liquid_ring.reach import BEYOND_CAPACITY, RUNS_BACK
+from ringbalance.controller.tuning.loop_factor import LoopFactor
+from ringbalance.controller.tuning.search import LIMITS, Candidate, Search
+from ringbalance.controller.tuning.settling import TOO_MANY, SettlingTimes
+from ringbalance.scene.models import Scene
+
+
+def over_capacity(scene: Scene, beyond: float) -> str:
+    """Empty within capacity."""
+    limit, start, um = scene.controller.limit, scene.rotor.initial_amplitude, 1e6
+    if beyond <= limit:
+        return ""
+    return (
+        f"capacity exceeded: with the liquid at its best {beyond * um:.4g} um remain of {start * um:.4g} um, "
+        f"limit {limit * um:.4g} um: {BEYOND_CAPACITY}"
+    )
+
+
+def status_of(
+    scene: Scene,
+    loop: LoopFactor,
+    *,
+    zone: float,
+    smallest: float,
+    settling: SettlingTimes | None,
+    best: Candidate | None,
+    found: Search | None,
+) -> str:
+    """Of a scene as recommended, whose nominal unbalance is within the disc's capacity; lengths in m."""
+    limit, um = scene.controller.limit, 1e6
+    if loop.rate == 0.0:
+        return "no gain: the gas drives no liquid at the balanced fills: raise gas.pressure"
+    if best is None or settling is None or not loop.stays:
+        return (
+            f"no gain keeps the amplitude within {limit * um:.4g} um: the sensor's noise is "
+            f"{scene.sensor.amplitude_noise * um:.4g} um: raise controller.limit or average the sensor"
+        )
+    reached, also = settling.quantiles["p95"], f", with {best.change}" if best.change else ""
+    if reached is not None:
+        return f"tuned{also}: 95 % of the runs settle within {reached:.3g} s"
+    if max(zone, smallest / 2) > limit:
+        return (
+            f"the valve is too slow for the limit of {limit * um:.4g} um: the shortest valve-open time moves "
+            f"the vibration by {smallest * um:.4g} um, and up to {zone * um:.4g} um none moves liquid: "
+            f"lower controller.minimum_gas_time{_reached(found)}"
+        )
+    share = (
+        f"{settling.settled.value:.1%} of the runs settle within the time limit of "
+        f"{scene.run.time_limit:.4g} s{also}: 95 % is not reached"
+    )
+    if settling.capacity_explains:
+        return (
+            f"{share}; {settling.beyond_capacity:.1%} of them would need more moment than the disc can form "
+            f"above its residual fill: {BEYOND_CAPACITY}"
+        )
+    if found is not None and found.needs is not None and found.needs > scene.run.time_limit:
+        return f"{share}; they need some {found.needs:.2g} s: raise run.time_limit"
+    if settling.beyond_pressure > TOO_MANY:
+        return (
+            f"{share}, nor by other gains; in {settling.beyond_pressure:.1%} of the runs the gas does not "
+            f"drive the liquid far enough at {scene.gas.pressure / 1e6:.3g} MPa: raise gas.pressure"
+        )
+    if settling.drifted > TOO_MANY:
+        return (
+            f"{share}, nor by other gains and pressures; in {settling.drifted:.1%} of the runs the full tube "
+            f"lets liquid run back while the gas is off: {RUNS_BACK}"
+        )
+    return f"{share}, nor by other gains and pressures{_reached(found)}"
+
+
+def _reached(found: Search | None) -> str:
+    """What to do about a limit that is out of reach."""
+    if found is None:
+        return " or raise controller.limit"
+    if found.limit is None:
+        return (
+            f"; no limit up to {LIMITS[-1]:.3g} times as high is reached: take a faster valve or a larger "
+            "conductance"
+        )
+    return (
+        f"; a limit of {found.limit * 1e6:.3g} um is reached: raise controller.limit, or take a faster valve"
+    )

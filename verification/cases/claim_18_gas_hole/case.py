@@ -146,7 +146,7 @@ def _imported_cells(geometry: ChamberGeometry, radial: int, angular: int, points
     share = np.bincount(cell, volume, size)
     middle = np.bincount(cell, volume * place.real, size) + 1j * np.bincount(cell, volume * place.imag, size)
     filled = share > 0
-    middle = middle[filled] / share[filled]
+    middle = np.asarray(middle[filled] / share[filled], dtype=np.complex128)
     return _Cells(
         place=middle,
         share=share[filled] / share.sum(),

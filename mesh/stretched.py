@@ -39,4 +39,6 @@ def stretched_table(geometry: ChamberGeometry, *, outer_radius: float, axial_wid
         nodes=table.nodes * square,
         columns=table.columns * scale,
         error=table.error * scale,
+        wall_area=table.wall_area * across * along,
+        wall_start=table.wall_start * square,
     )

@@ -13,9 +13,8 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.cut.integrals import COLUMNS, integrals, walls_about
-from ringbalance.mesh.cut.table import ChamberTable, chamber_table
+from ringbalance.mesh.cut.table import ChamberTable
 from ringbalance.scene.arrays import BoolArray, FloatArray
-from ringbalance.scene.chamber_file.record import ChamberGeometry
 
 _CLOSE: Final = 1e-6
 """Of the volume: what is left is put right to first order, which leaves the square of it."""
@@ -41,13 +40,13 @@ class TiltedLiquid:
 
 @lru_cache(maxsize=16)
 def tilted_liquid(
-    geometry: ChamberGeometry, *, length: float, vertical: bool, turn: int, fills: tuple[float, ...]
+    table: ChamberTable, *, length: float, vertical: bool, turn: int, fills: tuple[float, ...]
 ) -> TiltedLiquid:
     """Integrals over the liquid of given fill ratios, above zero.
 
     Args: `length`: G, m. `turn`: angles of gravity, equally spaced from along x; one on a vertical shaft.
     """
-    table, fill = chamber_table(geometry), np.array(fills)
+    fill = np.array(fills)
     if vertical or length == 0:
         at_angles = [_at_angle(table, fill, np.zeros(2), 2 * length)]
     else:

@@ -2,37 +2,37 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ringbalance.mesh.cut.faceting import drawing_error
-from ringbalance.mesh.geometry import (
-    liquid_first_moment,
-    moment_across,
-    surface_centroid,
-    surface_radius,
-    wall_square,
-)
+from ringbalance.mesh.cut.table import chamber_table
+from ringbalance.mesh.geometry import liquid_first_moment, moment_across, surface_radius
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc
 
 
-def drawn_volume(disc: Disc) -> float:
-    """Expanded uncertainty (95 %) of a chamber's volume by the facets of its mesh, m^3; 0 for a sector."""
-    if disc.geometry is None:
-        return 0.0
-    return drawing_error(disc.geometry, fill_ratio=np.array([disc.max_fill_ratio])).volume
+@dataclass(frozen=True, kw_only=True)
+class DrawingShares:
+    """Relative half-widths for a mesh in place of the chamber: facets for curved walls, and integration."""
+
+    volume: float
+    wall_pressure: FloatArray
+    moment: FloatArray
+    """Of the moment or of lambda, whichever is larger."""
 
 
-def drawn_shares(disc: Disc, fills: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The same of wall pressure and of moment with lambda, relative. Args: `fills`: x, above zero."""
+def drawing_shares(disc: Disc, fills: FloatArray) -> DrawingShares:
+    """Shares at fill ratios above zero; zeros for the sector of the keys."""
     if disc.geometry is None:
-        return np.zeros(fills.shape), np.zeros(fills.shape)
-    found, a = drawing_error(disc.geometry, fill_ratio=fills), surface_radius(disc=disc, fill_ratio=fills)
-    moment = disc.axial_width * liquid_first_moment(disc=disc, surface_radius=a)
-    centroid = surface_centroid(disc=disc, radius=a)
-    return (
-        np.asarray(found.wall_square / wall_square(disc=disc, surface_radius=a)),
-        np.maximum(found.moment / moment, found.centroid / centroid),
+        return DrawingShares(volume=0.0, wall_pressure=np.zeros(fills.shape), moment=np.zeros(fills.shape))
+    table, error = chamber_table(disc.geometry), drawing_error(disc.geometry, fill_ratio=fills)
+    a = np.sqrt(table.level_of(fills * table.volume))
+    return DrawingShares(
+        volume=error.volume / table.volume,
+        wall_pressure=error.wall_square / table.at_radius(a, 3),
+        moment=np.maximum(error.moment / table.at_radius(a, 1), error.centroid / table.surface(a)[1]),
     )
 
 

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_area, surface_radius
-from ringbalance.reduced_model.chamber.imported_walls import drawn_shares, share_across
+from ringbalance.reduced_model.chamber.imported_walls import drawing_shares, share_across
 from ringbalance.reduced_model.chamber.values import by_closed_form, by_quadrature
 from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.reduced_model.paper import formulas as paper
@@ -88,8 +88,9 @@ def unmodelled_fractions(scene: Scene, fills: FloatArray) -> Mapping[str, FloatA
     """
     found, wet = {}, fills > 0
     common = wall_layers(scene, fills[wet])[0] + wave_mean(scene, fills[wet])
-    pressures, moments = drawn_shares(scene.disc, fills[wet])
-    own = {"pressures": pressures, "moments": moments + np.abs(share_across(scene.disc, fills[wet]))}
+    drawn = drawing_shares(scene.disc, fills[wet])
+    across = np.abs(share_across(scene.disc, fills[wet]))
+    own = {"pressures": drawn.wall_pressure, "moments": drawn.moment + across}
     for part, share in capillary_share(scene, fills[wet]).items():
         found[part] = np.zeros(fills.shape)
         found[part][wet] = share + common + own[part]

@@ -15,10 +15,16 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.mesh.cut.table import ChamberTable
 from ringbalance.mesh.cut.tilted import tilted_liquid
-from ringbalance.mesh.geometry import half_angle, liquid_area, liquid_first_moment, surface_radius
+from ringbalance.mesh.geometry import (
+    half_angle,
+    imported_table,
+    liquid_area,
+    liquid_first_moment,
+    surface_radius,
+)
 from ringbalance.scene.arrays import BoolArray, FloatArray
-from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.loop_models import Shaft
 from ringbalance.scene.models import Disc
 
@@ -99,16 +105,18 @@ def tilted_ring(
     length = gravity / angular_velocity**2
     turn = turn_samples(disc=disc, angular_velocity=angular_velocity, gravity=gravity)
 
+    table = imported_table(disc)
+
     def turned(fills: FloatArray, *, cut: bool) -> _Turned:
-        if disc.geometry is not None:
-            return _imported(disc, disc.geometry, length, fills, turn if shaft == "horizontal" else 0)
+        if table is not None:
+            return _imported(disc, table, length, fills, turn if shaft == "horizontal" else 0)
         if shaft == "vertical":
             return _along(disc, length, fills, cut)
         return _across(disc, length, fills, turn, cut)
 
     found = turned(fill_ratio, cut=False)
     is_open = ~np.all(found.closed, axis=1)
-    if np.any(is_open) and disc.geometry is None:
+    if np.any(is_open) and table is None:
         parts = turned(fill_ratio[is_open], cut=True)
         for name in ("wall_pressure", "moment", "moment_per_volume"):
             getattr(found, name)[is_open] = getattr(parts, name)
@@ -123,10 +131,10 @@ def tilted_ring(
     )
 
 
-def _imported(disc: Disc, geometry: ChamberGeometry, length: float, fills: FloatArray, turn: int) -> _Turned:
+def _imported(disc: Disc, table: ChamberTable, length: float, fills: FloatArray, turn: int) -> _Turned:
     """By integrals over the walls of a mesh, dry parts included. Args: `turn`: 0 on a vertical shaft."""
     found = tilted_liquid(
-        geometry, length=length, vertical=turn == 0, turn=turn, fills=tuple(float(x) for x in fills)
+        table, length=length, vertical=turn == 0, turn=turn, fills=tuple(float(x) for x in fills)
     )
     return _Turned(
         wall_pressure=found.wall_square.copy(),

@@ -15,8 +15,6 @@ _HOME: Final = MappingProxyType(
         "multigrid": "ringbalance.physics.pressure.multigrid",
         "sloshing_response": "ringbalance.physics.sloshing.response",
         "solved_ring": "ringbalance.physics.pressure.imported",
-        "TetrahedronSpace": "ringbalance.physics.pressure.tetrahedra",
-        "tetrahedra": "ringbalance.mesh.quadratic_tetrahedra",
         "nnls": "scipy.optimize",
         "Sobol": "scipy.stats.qmc",
     }

@@ -146,18 +146,10 @@ def uncertainty_faults(reading: Reading) -> Iterator[Fault]:
         if not reading.known(path):
             continue
         width, relative = reading.values[path]
-<<<<<<< HEAD
         if quantity in reading.derived and quantity not in STRETCHES:
             problem = f"{key} follows from the mesh"
             yield reading.fault(path, problem=problem, allowed=f"{' and '.join(STRETCHES)}, which stretch it")
         elif reading.lacks(quantity) and _may_be_unused(reading, quantity):
-=======
-        if quantity == "disc.plate_thickness" and quantity in reading.derived:
-            problem = "the mesh has the plates in its shape, and no thickness of its own"
-            yield reading.fault(path, problem=problem, allowed="central_angle's uncertainty in its place")
-            continue
-        if reading.lacks(quantity) and _may_be_unused(reading, quantity):
->>>>>>> main
             problem = f"[{table}] has no {key} that could be uncertain"
             yield reading.fault(path, problem=problem, allowed=f"a scene with [{table}] {key}")
         elif (

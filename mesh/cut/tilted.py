@@ -69,7 +69,7 @@ def _deep(table: ChamberTable, fills: FloatArray, length: float) -> BoolArray:
 
 def _at_angle(table: ChamberTable, fills: FloatArray, centre: FloatArray, slope: float) -> FloatArray:
     """The eight columns of `integrals`, shape (8, n), for one direction of gravity."""
-    walls = walls_about(table.patches, table.outer, centre=centre, slope=slope)
+    walls = walls_about(*table.patches, centre=centre, slope=slope)
     wanted = fills * table.volume
     start = table.level_of(wanted)
     _, slopes = table.at(start)

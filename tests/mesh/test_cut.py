@@ -29,6 +29,7 @@ from ringbalance.mesh.geometry import (
 )
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import CellKind, ChamberGeometry
+from ringbalance.scene.chamber_file.stretching import STRETCHED, stretched
 from ringbalance.scene.models import Disc
 from ringbalance.verification.reference.block_chambers import block_chamber
 
@@ -146,7 +147,7 @@ def test_the_table_agrees_with_the_integrals_and_falls() -> None:
     geometry = box(kind="hexahedron")
     table = chamber_table(geometry)
     levels = table.level_of(table.volume * np.linspace(0.998, 0.002, 57))
-    walls = walls_about(table.patches, table.outer)
+    walls = walls_about(*table.patches)
     found, exact = np.concatenate(table.at(levels)), integrals(walls, levels)
     size = np.abs(exact).max(axis=1)
     assert np.max(np.abs(found - exact)[:2] / size[:2, None]) < TOLERANCE
@@ -191,3 +192,34 @@ def test_flat_walls_miss_nothing() -> None:
     assert drawing_error(box(kind="tetra"), fill_ratio=np.array([0.3])).volume == pytest.approx(
         TOLERANCE * (X1 - X0) * 2 * HALF * WIDTH, rel=1e-3
     )
+
+
+@pytest.mark.parametrize("quantity", ["outer_radius", "inner_radius", "axial_width", "central_angle"])
+def test_a_stretched_chamber_has_the_table_of_its_mesh_moved(disc: Disc, quantity: str) -> None:
+    """Stretched sectors stay sectors; the integrals over the moved nodes are made again for comparison."""
+    plain = replace(disc, plate_thickness=0.0)
+    geometry = sector(plain, cells=(3, 16, 2), kind="hexahedron27")
+    dimensions = {name: getattr(plain, name) for name in STRETCHED}
+    value = 1.02 * dimensions[quantity]
+    moved = stretched(geometry, dimensions=dimensions, quantity=quantity, value=value)
+    table, fresh = chamber_table(moved), chamber_table(replace(moved, digest=f"fresh {quantity}", stretch=None))
+    volumes = fresh.volume * np.linspace(0.05, 0.95, 9)
+    assert table.volume == pytest.approx(fresh.volume, rel=1e-6)
+    # What quadratic cells draw of a stretched arc differs by R (h/2)^4/32 at most.
+    np.testing.assert_allclose(table.level_of(volumes), fresh.level_of(volumes), rtol=1e-6)
+    at = fresh.level_of(volumes)
+    np.testing.assert_allclose(table.at(at)[0][[0, 1, 3]], fresh.at(at)[0][[0, 1, 3]], rtol=3e-6)
+    np.testing.assert_allclose(table.at(at)[1][:2], fresh.at(at)[1][:2], rtol=3e-5)
+
+
+def test_a_chamber_stretched_twice_comes_from_its_own_mesh(disc: Disc) -> None:
+    geometry = sector(disc, cells=(2, 8, 1), kind="hexahedron27")
+    dimensions = {name: getattr(disc, name) for name in STRETCHED}
+    once = stretched(geometry, dimensions=dimensions, quantity="outer_radius", value=45e-3)
+    twice = stretched(
+        once, dimensions=dimensions | {"outer_radius": 45e-3}, quantity="axial_width", value=31e-3
+    )
+    assert twice.stretch is not None
+    assert twice.stretch.base is geometry
+    volumes = [chamber_table(each).volume for each in (once, twice)]
+    assert volumes[1] == pytest.approx(volumes[0] / 2, rel=1e-12)

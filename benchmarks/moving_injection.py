@@ -3,10 +3,10 @@
     python benchmarks/moving_injection.py [--json] [--repeats 5]
 
 Both sides model the same: the column's mass, its lift along the crest, the spill until the tube is primed,
-separation, and the gas of both chambers through an ISO 6358 line.  The rival is what one would write oneself with the
-calibrated law's own tables: phases that end at events, at the loosest tolerance that keeps the fill within
-1e-6, by the fastest of the methods tried.  Ours is the compiled march of an ensemble's member at its own
-tolerance, and must keep the fill within the same 1e-6.
+separation, and the gas of both chambers through an ISO 6358 line.  The rival is what one would write oneself
+with the calibrated law's own tables: phases that end at events, at the loosest tolerance that keeps the fill
+within 1e-6, by the fastest of the methods tried.  Ours is the compiled march of an ensemble's member at its
+own tolerance, and must keep the fill within the same 1e-6.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.reduced_model.chamber.inputs import half_widths, shifted
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
-from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, nominal_value
+from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, eccentric_value, nominal_value
 
 _LITTLE: Final = 1e-4
 """Of a quantity, or in SI units where it is zero."""
@@ -67,7 +67,7 @@ def nearby(scene: AnyScene, name: str) -> AnyScene:
     if isinstance(scene, Scene):
         value = nominal_value(scene=scene, quantity=name)
     else:
-        value = eccentric.eccentric_value(scene, name)
+        value = eccentric_value(scene, name)
     return both_sides(scene, name, _LITTLE * abs(value) if value else -_LITTLE)[0]
 
 

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
-from typing import Any, Final
+from typing import Final
 
 from ringbalance.identification.parameters import FitError, Parameter, unknown_name
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.keys.eccentric_schema import ECCENTRIC_MASS
-from ringbalance.scene.uncertain import NORMAL_95
+from ringbalance.scene.uncertain import NORMAL_95, eccentric_value, eccentric_with
 
 _REACH: Final = 30.0
 """Factor up to which a value is looked for."""
-_ENTRY: Final = re.compile(r"(\w+)\.(\w+)(?:\[([01])\])?")
 
 
 def eccentric_parameters(scene: EccentricScene, names: Sequence[str]) -> tuple[Parameter, ...]:
@@ -65,31 +62,6 @@ def _half_width(scene: EccentricScene, name: str) -> float:
     """Expanded uncertainty (95 %) that the scene states, SI; zero where it states none."""
     stated = {each.quantity: each for each in scene.uncertainty}.get(name.split("[")[0])
     return 0.0 if stated is None else stated.absolute(eccentric_value(scene, name))
-
-
-def eccentric_value(scene: EccentricScene, name: str) -> float:
-    """Value at a path, SI."""
-    table, key, entry = _place(name)
-    value = getattr(getattr(scene, table), key)
-    return float(value if entry is None else value[entry])
-
-
-def eccentric_with(scene: EccentricScene, value: float, *, name: str) -> EccentricScene:
-    """The scene with another value at a path; nothing is checked again."""
-    table, key, entry = _place(name)
-    record, new = getattr(scene, table), value
-    changed: Any = new
-    if entry is not None:
-        changed = tuple(new if i == entry else old for i, old in enumerate(getattr(record, key)))
-    tables: dict[str, Any] = {table: replace(record, **{key: changed})}
-    return replace(scene, **tables)
-
-
-def _place(name: str) -> tuple[str, str, int | None]:
-    match = _ENTRY.fullmatch(name)
-    if match is None:
-        raise ValueError(f"{name!r} is no path of a scene")
-    return match[1], match[2], None if match[3] is None else int(match[3])
 
 
 def eccentric_held(scene: EccentricScene, fitted: Sequence[str]) -> dict[str, float]:

@@ -13,13 +13,13 @@ from ringbalance.identification.criticism.at_solution import AtSolution, at_solu
 from ringbalance.identification.criticism.law_comparison import LawComparison, compare_laws
 from ringbalance.identification.criticism.other_laws import EXPONENTS, WITHOUT, laws_to_compare, other_law
 from ringbalance.identification.criticism.patterns import Criticism, criticise
-from ringbalance.identification.eccentric_parameters import eccentric_with
 from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.predict.device import device_of
 from ringbalance.identification.result import FitResult
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.models import Scene
+from ringbalance.scene.uncertain import eccentric_with
 
 _BY_LAW: Final = ("injection", "transfer", "flow")
 """Kinds that the law of the tube's flow decides on."""

@@ -15,7 +15,7 @@ from ringbalance.cli import main
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
 from ringbalance.identification.criticism.review import review
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.eccentric_parameters import eccentric_value, eccentric_with, fitted_names
+from ringbalance.identification.eccentric_parameters import fitted_names
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.identifiability import Verdict
 from ringbalance.identification.next_measurement import next_measurement, offered_rows, words_of
@@ -25,6 +25,7 @@ from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.narrowing import eccentric_scene
+from ringbalance.scene.uncertain import eccentric_value, eccentric_with
 
 NOISE = 20e-6
 SPEEDS = np.linspace(8.0, 24.0, 24)

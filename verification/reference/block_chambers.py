@@ -9,9 +9,11 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.mesh.geometry import half_angle
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.chamber_file.facets import boundary_facets
 from ringbalance.scene.chamber_file.record import CellKind, ChamberGeometry
+from ringbalance.scene.models import Disc
 
 _CORNERS: Final = np.array(
     [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [0, 0, 2], [2, 0, 2], [2, 2, 2], [0, 2, 2]]
@@ -101,3 +103,20 @@ def sector_chamber(
         return np.stack(across, axis=-1)
 
     return block_chamber(cells, place, kind=kind, closed=angle > 2 * np.pi - 1e-9)
+
+
+def disc_chamber(
+    disc: Disc, cells: tuple[int, int, int], *, kind: CellKind = "hexahedron27"
+) -> ChamberGeometry:
+    """The built-in chamber of a disc, plates and all."""
+    t = disc.plate_thickness
+    faces = [float(np.sqrt(radius**2 - t**2)) for radius in (disc.inner_radius, disc.outer_radius)]
+
+    def place(cube: FloatArray) -> FloatArray:
+        # Along a plate's straight face distances grow evenly.
+        radius = np.hypot(faces[0] + cube[..., 0] * (faces[1] - faces[0]), t)
+        turned = (2 * cube[..., 1] - 1) * half_angle(disc=disc, radius=radius)
+        axial = disc.axial_width * (cube[..., 2] - 0.5)
+        return np.stack([radius * np.cos(turned), radius * np.sin(turned), axial], axis=-1)
+
+    return block_chamber(cells, place, kind=kind)

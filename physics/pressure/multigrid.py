@@ -22,7 +22,7 @@ def multigrid(
     Returns: u, the number of steps, and the hierarchy's operator complexity.
     """
     matrix = csr_matrix(matrix)
-    hierarchy = _hierarchy(matrix, prolongation)
+    hierarchy = hierarchy_of(matrix, prolongation)
     preconditioner: LinearOperator = hierarchy.aspreconditioner(cycle="V")
     count = 0
 
@@ -36,7 +36,7 @@ def multigrid(
     return values, count, {"operator_complexity": float(hierarchy.operator_complexity())}
 
 
-def _hierarchy(matrix: csr_matrix, prolongation: csr_matrix | None) -> pyamg.multilevel.MultilevelSolver:
+def hierarchy_of(matrix: csr_matrix, prolongation: csr_matrix | None) -> pyamg.multilevel.MultilevelSolver:
     """Linear elements below quadratic ones, aggregates below those.
 
     Aggregates of quadratic elements would swallow whole stencils of 125 points.  No part needs a spectral

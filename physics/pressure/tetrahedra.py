@@ -11,7 +11,7 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-from scipy.sparse import csr_matrix, diags_array
+from scipy.sparse import csr_matrix, diags_array, vstack
 
 from ringbalance.mesh.quadratic_tetrahedra import EDGES, FACES, Tetrahedra, face_nodes, shapes, slopes
 from ringbalance.scene.arrays import FloatArray, IntArray
@@ -154,12 +154,26 @@ class TetrahedronSpace:
     @cached_property
     def gradient(self) -> csr_matrix:
         """Matrix that takes nodal values to gradients at the quadrature points, three rows a point."""
-        inverse = np.linalg.inv(self._jacobian)
-        local = np.einsum("epax,pna->epxn", inverse, slopes(_CELL_POINTS), optimize=True)
-        rows, functions = 3 * self.weights.size, self.body.cells.shape[1]
-        columns = np.repeat(self.body.cells, local.shape[1] * 3, axis=0)
+        return self._gradient(self.body.cells, _CELL_POINTS)
+
+    def _gradient(self, cells: IntArray, points: FloatArray) -> csr_matrix:
+        local_slopes = slopes(points)
+        places = self.body.nodes[cells]
+        jacobian = np.einsum("enx,pna->epxa", places - places[:, :1], local_slopes, optimize=True)
+        local = np.einsum("epax,pna->epxn", np.linalg.inv(jacobian), local_slopes, optimize=True)
+        rows, functions = 3 * len(cells) * len(points), cells.shape[1]
+        columns = np.repeat(cells, 3 * len(points), axis=0)
         starts = np.arange(0, (rows + 1) * functions, functions)
         return csr_matrix((local.ravel(), columns.ravel(), starts), shape=(rows, self.unknowns))
+
+    def gradient_at(self, name: str) -> csr_matrix:
+        """As `gradient`, at the points of a boundary's facets, in the order of `facets`."""
+        number, parts = self.body.names.index(name), []
+        for k, corners in enumerate(FACES):
+            points = np.zeros((len(_FACET_POINTS), 4))
+            points[:, corners] = _FACET_POINTS
+            parts.append(self._gradient(self.body.cells[self.body.faces[:, k] == number], points))
+        return csr_matrix(vstack(parts))
 
     @cached_property
     def stiffness(self) -> csr_matrix:

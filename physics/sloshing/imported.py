@@ -1,0 +1,219 @@
+"""Waves on the ring in an imported chamber: natural frequencies, the answer to gravity across the shaft."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+
+from ringbalance.mesh.liquid_body import Level, liquid_body
+from ringbalance.mesh.quadratic_tetrahedra import tetrahedra
+from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
+from ringbalance.physics.results import Estimate, Statistics, Status, StatusCode
+from ringbalance.physics.sloshing.body import ReducedWaves, reduced_waves
+from ringbalance.physics.sloshing.range import SMALL
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.chamber_file.record import ChamberGeometry
+
+WALL: Final = "outer_wall"
+LEVELS: Final = 3
+"""Of the Coriolis force: on a full ring they bring waves along the shaft within 0.3 %."""
+_SPARE: Final = 7
+"""Potentials beyond the waves asked for: rotation mixes neighbours."""
+_OF_SURFACE: Final = 0.35
+"""Share of a wave's kinetic energy in potential flow from which it is a wave of the surface; the liquid's
+inertial waves have less."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RingWaves:
+    """Small waves on the liquid in one imported chamber."""
+
+    surface_radius: float
+    """a, m."""
+    frequency_ratio: Estimate
+    """s, natural angular frequency seen in the disc over the angular velocity, lowest first, shape (n,)."""
+    vortical_share: FloatArray
+    """Of each wave's kinetic energy, what is no potential flow, shape (n,): 0 for a wave that is the same all
+    along the shaft.  Where it is not 0 and s < 2 the liquid has inertial waves at all neighbouring
+    frequencies, and s is the middle of a resonance."""
+    amplification: Estimate
+    """Change of the chamber's moment over that of a surface which follows gravity at once, shape ()."""
+    pressure_amplification: Estimate
+    """Change of the mean pressure on the outer wall over that under such a surface, shape ()."""
+    surface_amplitude: Estimate
+    """Largest displacement of the surface, m zero-to-peak, shape ()."""
+    damped_share: float
+    """Amplification with the walls' Stokes layers over that without viscosity."""
+    statistics: Statistics
+    status: Status
+
+
+@dataclass(frozen=True, kw_only=True)
+class _System:
+    """What one surface in one chamber gives, whatever the speed."""
+
+    reduced: ReducedWaves
+    scale: float
+    """Largest distance of the liquid from the shaft, m."""
+    faceting: float
+    """Relative error of a frequency by the facets of the wall."""
+    unknowns: int
+
+
+def ring_waves(
+    *,
+    geometry: ChamberGeometry,
+    surface_radius: float,
+    angular_velocity: float = 1.0,
+    kinematic_viscosity: float = 0.0,
+    gravity: float = 0.0,
+    axial_gravity: float = 0.0,
+    frequency_ratio: float = 1.0,
+    modes: int = 6,
+    levels: int = LEVELS,
+) -> RingWaves:
+    """Natural frequencies and forced response of the waves, with Coriolis force and in three dimensions.
+
+    (-s^2 + 2 i s C + A + i s sqrt(i s E) W) c = F, E = nu/(omega R^2); the reference is a surface always
+    across the sum of both fields.
+    Args:
+        surface_radius: a, m; along a vertical shaft, of the cylinder on whose potential the paraboloid is
+            half-way along the chamber.
+        kinematic_viscosity: nu, m^2/s, zero or more; zero leaves resonance without a limit.
+        gravity: across the shaft, m/s^2: turns in the disc's frame.
+        axial_gravity: along the shaft, m/s^2: shapes the surface and excites no wave.
+        frequency_ratio: s of the force, above 0; 1 for gravity.
+        modes: number of frequencies, 1 to 12.
+        levels: of the Coriolis force, 2 or more; the change from the last one is part of the uncertainty.
+    Returns: RingWaves.  Status NO_RING where gravity exceeds omega^2 a, OUT_OF_RANGE where waves would not be
+        small, NOT_CONVERGED where a linear solve failed.
+    Raises: ValueError: arguments out of range, or a free surface that misses the chamber.
+    Validity: small waves; thin Stokes layers on the walls without the Coriolis force in them.
+    Source: derived in `physics/sloshing/body.py`.
+    """
+    _check(angular_velocity, kinematic_viscosity, gravity, frequency_ratio, modes, levels)
+    tilt = -axial_gravity / angular_velocity**2
+    system = _system(geometry, surface_radius, tilt, modes, levels)
+    ekman = kinematic_viscosity / (abs(angular_velocity) * system.scale**2)
+    values, shares, widths = _frequencies(system, modes)
+    counts = system.reduced.levels[-2:]
+    before, last = (np.array(_answer(system.reduced, n, frequency_ratio, ekman)) for n in counts)
+    scale = gravity / angular_velocity**2
+    change = np.abs(last - before) + last * system.faceting
+    amplitude = Estimate(value=np.array(scale * last[2]), uncertainty=np.array(scale * change[2]))
+    return RingWaves(
+        surface_radius=surface_radius,
+        frequency_ratio=Estimate(value=values, uncertainty=widths),
+        vortical_share=shares,
+        amplification=Estimate(value=np.array(last[0]), uncertainty=np.array(change[0])),
+        pressure_amplification=Estimate(value=np.array(last[1]), uncertainty=np.array(change[1])),
+        surface_amplitude=amplitude,
+        damped_share=float(last[3]),
+        statistics=Statistics(unknowns=system.unknowns, relative_residual=system.reduced.residual),
+        status=_status(system, surface_radius, float(amplitude.value), scale),
+    )
+
+
+def _check(omega: float, viscosity: float, gravity: float, ratio: float, modes: int, levels: int) -> None:
+    if not (np.isfinite([omega, ratio]).all() and omega != 0 and ratio > 0):
+        raise ValueError(
+            "angular_velocity must be finite and not zero, frequency_ratio finite and above zero"
+        )
+    if not (np.isfinite([viscosity, gravity]).all() and viscosity >= 0 and gravity >= 0):
+        raise ValueError("kinematic_viscosity and gravity must be finite and not negative")
+    if not (1 <= modes <= 12 and levels >= 2):
+        raise ValueError("modes must be 1 to 12, and levels at least 2")
+
+
+@lru_cache(maxsize=16)
+def _system(geometry: ChamberGeometry, radius: float, tilt: float, modes: int, levels: int) -> _System:
+    body = liquid_body(tetrahedra(geometry), Level(constant=radius**2 / 2, tilt=(0.0, 0.0, tilt)))
+    scale = float(np.hypot(*body.nodes[:, :2].T).max())
+    space = TetrahedronSpace(body=replace(body, nodes=body.nodes / scale))
+    level = Level(constant=radius**2 / 2 / scale**2, tilt=(0.0, 0.0, tilt / scale))
+    reduced = reduced_waves(space=space, level=level, wall=WALL, potentials=modes + _SPARE, levels=levels)
+    # Frequencies grow with the root of the depth.
+    faceting = space.facets(WALL).depth_to_smooth() / (2 * (1 - radius / scale))
+    return _System(reduced=reduced, scale=scale, faceting=faceting, unknowns=space.unknowns)
+
+
+def _frequencies(system: _System, modes: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Frequencies of the surface's waves, their vortical shares and expanded uncertainties."""
+    reduced = system.reduced
+    values, potential, weights = _waves(reduced, reduced.levels[-1])
+    before = _waves(reduced, reduced.levels[-2])[0]
+    errors = reduced.squared_errors
+    change = np.abs(values[:, None] - before).min(axis=1)
+    widths = change + values * (weights[:, : errors.size] @ errors / 2 + system.faceting)
+    return values[:modes], 1 - potential[:modes], widths[:modes]
+
+
+def _waves(reduced: ReducedWaves, fields: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Frequencies with so many fields, the kinetic energy's potential share, and its parts by field.
+
+    The oscillator c'' + 2 C c' + A c = 0 is d/dt (c', A^(1/2) c) = B (...) with a real antisymmetric B, whose
+    eigenvalues are +- i s.
+    """
+    coriolis, stiff = (m[:fields, :fields] for m in (reduced.coriolis, reduced.stiffness))
+    squares, axes = np.linalg.eigh(stiff)
+    root = (axes * np.sqrt(np.maximum(squares, 0.0))) @ axes.T
+    first_order = np.block([[-2 * coriolis, -root], [root, np.zeros_like(root)]])
+    values, shapes = np.linalg.eigh(1j * first_order)
+    shapes = shapes[:, values > 0]
+    kinetic = np.abs(shapes[:fields].T) ** 2
+    parts = kinetic / kinetic.sum(axis=1, keepdims=True)
+    potential = parts[:, : reduced.levels[0]].sum(axis=1)
+    kept = (potential > _OF_SURFACE) & (values[values > 0] > _SLOWEST)
+    return values[values > 0][kept], potential[kept], parts[kept]
+
+
+_SLOWEST: Final = 1e-4
+"""Frequency ratio below which a field is at rest."""
+
+
+def _answer(reduced: ReducedWaves, fields: int, ratio: float, ekman: float) -> tuple[float, ...]:
+    """Amplification of moment and wall pressure, largest displacement for g/omega^2 = 1 (any unit of length),
+
+    and the share that damping leaves.
+    """
+    cut = slice(0, fields)
+    swinging = (
+        -(ratio**2) * np.eye(fields) + 2j * ratio * reduced.coriolis[cut, cut] + reduced.stiffness[cut, cut]
+    )
+    layers = 1j * ratio * np.sqrt(1j * ratio * ekman) * reduced.wall_loss[cut, cut]
+    outflow = reduced.outflow[:, cut]
+    forcing = outflow[1] + 1j * outflow[2]
+    damped, free = (np.linalg.solve(matrix, forcing) for matrix in (swinging + layers, swinging))
+    moment, undamped = (float(np.linalg.norm(outflow[1:] @ c)) for c in (damped, free))
+    wall = reduced.wall
+    pressure = wall.drive + (1j * ratio * wall.flow[cut] + wall.surface[cut]) @ damped
+    return (
+        moment / float(np.linalg.norm(reduced.quasi_static[1:])),
+        float(abs(pressure / wall.still)),
+        float(np.abs(reduced.displacement[:, cut] @ damped).max()),
+        moment / undamped,
+    )
+
+
+def _status(system: _System, radius: float, amplitude: float, tilt: float) -> Status:
+    if system.reduced.residual > _ACCEPTED:
+        text = f"a linear solve left a relative residual of {system.reduced.residual:.1e}: use a better mesh"
+        return Status(code=StatusCode.NOT_CONVERGED, text=text)
+    if tilt >= radius:
+        text = "gravity is stronger than omega^2 a: turn the disc faster"
+        return Status(code=StatusCode.NO_RING, text=text)
+    share = amplitude / (system.scale - radius)
+    if share > SMALL:
+        text = (
+            f"waves would reach {share:.2g} of the ring's depth, too high for this theory: "
+            "turn the disc faster"
+        )
+        return Status(code=StatusCode.OUT_OF_RANGE, text=text)
+    return Status()
+
+
+_ACCEPTED: Final = 1e-7
+"""Relative residual of a projection."""

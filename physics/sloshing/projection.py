@@ -1,0 +1,145 @@
+"""Displacement fields on the liquid's body that keep its volume and slide along its walls.
+
+A field is a column: three rows for each quadrature point, those of the body first and those of the walls
+behind, each times the root of its point's weight.  So sums of products are integrals.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from pyamg.relaxation.relaxation import gauss_seidel
+from scipy.sparse import csr_matrix, diags_array, vstack
+from scipy.sparse.linalg import LinearOperator, cg
+
+from ringbalance.mesh.liquid_body import FREE_SURFACE, Level
+from ringbalance.physics.pressure.multigrid import hierarchy_of
+from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
+from ringbalance.scene.arrays import FloatArray, IntArray
+
+_TOLERANCE: Final = 1e-9
+"""Relative residual of a projection."""
+
+
+class Multigrid:
+    """Repeated solves with one positive definite matrix of quadratic elements."""
+
+    def __init__(self, matrix: csr_matrix, prolongation: csr_matrix) -> None:
+        self._matrix, self._up = csr_matrix(matrix), prolongation
+        self._matrix.sort_indices()
+        self._down = csr_matrix(prolongation.T)
+        coarse = csr_matrix(self._down @ self._matrix @ prolongation)
+        self._coarse = hierarchy_of(coarse, None).aspreconditioner(cycle="V")
+        self.cycle = LinearOperator(self._matrix.shape, matvec=self._cycle, dtype=np.float64)
+        self.residual = 0.0
+        """Largest relative one of all solves."""
+
+    def _cycle(self, right: FloatArray) -> FloatArray:
+        right = np.ascontiguousarray(right.ravel())
+        result = np.zeros_like(right)
+        gauss_seidel(self._matrix, result, right, sweep="forward")
+        result += self._up @ (self._coarse @ (self._down @ (right - self._matrix @ result)))
+        gauss_seidel(self._matrix, result, right, sweep="backward")
+        return result
+
+    def solve(self, right: FloatArray, start: FloatArray | None = None) -> FloatArray:
+        """Columns of u for columns of b, to `_TOLERANCE` of b."""
+        result = np.zeros_like(right) if start is None else start.copy()
+        for column, b in enumerate(right.T):
+            size = float(np.linalg.norm(b))
+            if size == 0.0:
+                continue
+            found, _ = cg(
+                self._matrix, b, x0=result[:, column], rtol=_TOLERANCE, atol=0.0, maxiter=500, M=self.cycle
+            )
+            result[:, column] = found
+            left = float(np.linalg.norm(b - self._matrix @ found)) / size
+            self.residual = max(self.residual, left)
+        return result
+
+
+@dataclass(frozen=True)
+class Fields:
+    """Operators on fields on one mesh, lengths in outer radii."""
+
+    space: TetrahedronSpace
+    level: Level
+
+    @cached_property
+    def surface_mass(self) -> csr_matrix:
+        """Integrals of N_i N_j / g over the free surface, all nodes."""
+        facets = self.space.facets(FREE_SURFACE)
+        weight = 1 / np.linalg.norm(self.level.gradient(facets.points), axis=-1)
+        return facets.mass(weight, unknowns=self.space.unknowns)
+
+    @cached_property
+    def surface(self) -> IntArray:
+        """Nodes on the free surface."""
+        return np.unique(self.space.facets(FREE_SURFACE).nodes)
+
+    @cached_property
+    def inner(self) -> IntArray:
+        """All other nodes."""
+        return np.setdiff1d(np.arange(self.space.unknowns), self.surface)
+
+    @cached_property
+    def body_rows(self) -> int:
+        """Rows of a field that belong to the body."""
+        return 3 * self.space.weights.size
+
+    @cached_property
+    def gradient(self) -> csr_matrix:
+        """Fields of nodal potentials."""
+        walls = [name for name in self.space.boundaries if name != FREE_SURFACE]
+        weights = [self.space.weights, *(self.space.facets(name).weights.ravel() for name in walls)]
+        parts = [self.space.gradient, *map(self.space.gradient_at, walls)]
+        return csr_matrix(diags_array(np.repeat(np.sqrt(np.concatenate(weights)), 3)) @ vstack(parts))
+
+    @cached_property
+    def inner_gradient(self) -> csr_matrix:
+        """Fields of potentials that vanish on the free surface, given at the other nodes."""
+        return csr_matrix(self.gradient[:, self.inner])
+
+    @cached_property
+    def pinned(self) -> Multigrid:
+        """The stiffness of the nodes that are not on the surface."""
+        inside = self.space.stiffness[self.inner][:, self.inner]
+        return Multigrid(inside, self.space.prolongation(self.inner))
+
+    def harmonic(self, values: FloatArray) -> FloatArray:
+        """Columns of nodal values, those inside replaced by the harmonic ones with walls without flux."""
+        right = -(self.space.stiffness[self.inner][:, self.surface] @ values[self.surface])
+        result = values.copy()
+        result[self.inner] = self.pinned.solve(right, values[self.inner])
+        return result
+
+    def products(self, first: FloatArray, second: FloatArray) -> FloatArray:
+        """Integrals over the body of the products of columns."""
+        return np.asarray(first[: self.body_rows].T @ second[: self.body_rows])
+
+    def coriolis_part(self, fields: FloatArray) -> FloatArray:
+        """The part of e_z x u that keeps volume and walls."""
+        turned = turn(fields)
+        rows = self.inner_gradient[: self.body_rows]
+        potential = self.pinned.solve(np.asarray(rows.T @ turned[: self.body_rows]))
+        turned -= self.inner_gradient @ potential
+        return turned
+
+    def new_directions(self, fields: FloatArray, before: list[FloatArray], least: float) -> FloatArray:
+        """Orthonormal columns of what is new in fields of norm 1, without what is smaller than `least`."""
+        for _ in range(2):
+            for block in before:
+                fields = fields - block @ self.products(block, fields)
+        squares, axes = np.linalg.eigh(self.products(fields, fields))
+        kept = squares > least**2
+        return np.asarray(fields @ (axes[:, kept] / np.sqrt(squares[kept])))
+
+
+def turn(fields: FloatArray) -> FloatArray:
+    """e_z x u."""
+    result = np.zeros_like(fields)
+    result[0::3], result[1::3] = -fields[1::3], fields[0::3]
+    return result

@@ -27,6 +27,8 @@ class ImportedElements:
     """Pa, shape (n,)."""
     moment: Estimate
     """kg m, shape (n,)."""
+    volume: FloatArray
+    """Of the liquid as it is drawn, m^3, shape (n,)."""
     cells: tuple[tuple[int, ...], ...]
     """Of the scene's mesh."""
     status: Status
@@ -59,6 +61,7 @@ def imported_elements(scene: Scene, geometry: ChamberGeometry, *, fill_ratio: Fl
         ),
         # A free surface drawn by quadratic facets takes liquid off or adds some, all of it at the surface.
         moment=Estimate(value=moment, uncertainty=(_ROUNDING + drawn) * np.abs(moment)),
+        volume=volume,
         cells=((len(geometry.cells),),),
         status=status,
         statistics=rings[-1].statistics,

@@ -202,7 +202,10 @@ def test_a_stretched_chamber_has_the_table_of_its_mesh_moved(disc: Disc, quantit
     dimensions = {name: getattr(plain, name) for name in STRETCHED}
     value = 1.02 * dimensions[quantity]
     moved = stretched(geometry, dimensions=dimensions, quantity=quantity, value=value)
-    table, fresh = chamber_table(moved), chamber_table(replace(moved, digest=f"fresh {quantity}", stretch=None))
+    table, fresh = (
+        chamber_table(moved),
+        chamber_table(replace(moved, digest=f"fresh {quantity}", stretch=None)),
+    )
     volumes = fresh.volume * np.linspace(0.05, 0.95, 9)
     assert table.volume == pytest.approx(fresh.volume, rel=1e-6)
     # What quadratic cells draw of a stretched arc differs by R (h/2)^4/32 at most.

@@ -9,9 +9,11 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.mesh.geometry import half_angle
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.chamber_file.facets import boundary_facets
 from ringbalance.scene.chamber_file.record import CellKind, ChamberGeometry
+from ringbalance.scene.models import Disc
 
 _CORNERS: Final = np.array(
     [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [0, 0, 2], [2, 0, 2], [2, 2, 2], [0, 2, 2]]
@@ -101,3 +103,24 @@ def sector_chamber(
         return np.stack(across, axis=-1)
 
     return block_chamber(cells, place, kind=kind, closed=angle > 2 * np.pi - 1e-9)
+
+
+def plated_chamber(
+    disc: Disc, cells: tuple[int, int, int], *, kind: CellKind = "hexahedron27"
+) -> ChamberGeometry:
+    """The space between the plates of a disc that the keys give, as a file would give it."""
+    ends = np.sqrt(np.array([disc.inner_radius, disc.outer_radius]) ** 2 - disc.plate_thickness**2)
+
+    def place(cube: FloatArray) -> FloatArray:
+        # Even along the plates' faces, which quadratic cells then draw exactly.
+        radius = np.hypot(ends[0] + np.ptp(ends) * cube[..., 0], disc.plate_thickness)
+        turned = (2 * cube[..., 1] - 1) * half_angle(disc=replace(disc, geometry=None), radius=radius)
+        across = [radius * np.cos(turned), radius * np.sin(turned)]
+        return np.stack([*across, disc.axial_width * (cube[..., 2] - 0.5)], axis=-1)
+
+    return block_chamber(cells, place, kind=kind)
+
+
+def imported(disc: Disc, *, cells: tuple[int, int, int] = (4, 16, 2)) -> Disc:
+    """The disc with its own chamber imported, and no other dimensions."""
+    return replace(disc, geometry=plated_chamber(disc, cells))

@@ -1,4 +1,4 @@
-"""Ensembles of noisy closed-loop runs with inertia, gas filling and valve lag, beside scipy's solve_ivp.
+"""Ensembles of noisy closed-loop runs with all terms of an injection, beside scipy's solve_ivp.
 
     python benchmarks/closed_loop_moving.py [--json] [--repeats 3] [--members 1000] [--largest 8000]
 
@@ -32,7 +32,7 @@ from ringbalance.controller.liquid_ring.motion import Dynamics
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.selection.estimates import FILLING, INERTIA, LAG
+from ringbalance.reduced_model.selection.estimates import FILLING, HELD, INERTIA, LAG
 from ringbalance.scene.models import Scene
 
 GAIN = 0.3
@@ -107,10 +107,10 @@ def compare(repeats: int, members: int, largest: int) -> dict[str, object]:
         run=replace(scene.run, time_limit=TIME_LIMIT),
     )
     model = calibrate(scene).model
-    dynamics = dynamics_of(scene=scene, model=model, modelled=(INERTIA, FILLING, LAG))
+    dynamics = dynamics_of(scene=scene, model=model, modelled=(INERTIA, FILLING, LAG, HELD))
     assert dynamics is not None
     plant = ensemble_transfer(scene, model).plant
-    if not (plant["inertia"][0] and plant["line"][0] and plant["valve_lag"][0] > 0):
+    if not all(plant[name][0] > 0 for name in ("inertia", "line", "lifts", "valve_lag")):
         raise RuntimeError("the ensemble leaves out what is to be compared")
     carried = Carried(rival=Rival(scene, model), total=2 * scene.disc.initial_fill)
     check_same(scene, model, carried)

@@ -14,7 +14,12 @@ from ringbalance.mesh.geometry import half_angle
 from ringbalance.scene.models import Disc
 
 VERSION = ng.__version__
-SETTINGS = tuple((order, size) for size in (0.6, 0.3, 0.2, 0.15, 0.1) for order in (2, 3, 4, 5, 6))
+SETTINGS = tuple(
+    (order, size)
+    for size, highest in ((1.0, 8), (0.6, 8), (0.3, 7), (0.2, 6), (0.15, 5))
+    for order in range(2, highest + 1)
+)
+"""Finer meshes of the highest orders take seconds and are far better than any target."""
 
 
 def geometry(disc: Disc) -> OCCGeometry:

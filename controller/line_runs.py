@@ -12,7 +12,7 @@ from ringbalance.controller.terms import can_carry
 from ringbalance.reduced_model.gas_line import line_ends
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
-from ringbalance.reduced_model.selection.estimates import FILLING, INERTIA, LAG
+from ringbalance.reduced_model.selection.estimates import FILLING, HELD, INERTIA, LAG
 from ringbalance.scene.models import Scene
 
 
@@ -30,8 +30,8 @@ class LineRun:
 
 
 def line_runs(scene: Scene, model: BalancerModel) -> tuple[LineRun, ...]:
-    """Runs with gas filling, valve lag and inertia modelled; none where the scene gives its gas line, or the
-    law no forces."""
+    """Runs with all terms of an injection modelled; none where the scene gives its gas line, or the law no
+    forces."""
     ends = line_ends(scene)
     if len(ends) == 1 or not can_carry(scene, model):
         return ()
@@ -43,8 +43,9 @@ def line_runs(scene: Scene, model: BalancerModel) -> tuple[LineRun, ...]:
             critical_ratio=end.line.critical_ratio,
             valve_lag=end.valve_lag,
         )
-        # The paper's law has no mass in the tube.
-        terms = (FILLING, LAG) if isinstance(model.flow, PaperLaw) else (INERTIA, FILLING, LAG)
+        # The paper's law has no mass in the tube and no crest.
+        own = () if isinstance(model.flow, PaperLaw) else (INERTIA, HELD)
+        terms = (*own, FILLING, LAG)
         run = simulate(replace(scene, gas=gas), model, modelled=terms)
         found.append(
             LineRun(end=end.name, conductance=end.line.conductance, valve_lag=end.valve_lag, run=run)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
-from ringbalance.controller.liquid_ring.column import column_of
+from ringbalance.controller.liquid_ring.column import column_of, lift_of
 from ringbalance.controller.liquid_ring.motion import Dynamics
 from ringbalance.physics.gas.supply import VENTED, gas_line
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
-from ringbalance.reduced_model.selection.estimates import FILLING, INERTIA, LAG, term_estimates
+from ringbalance.reduced_model.selection.estimates import FILLING, HELD, INERTIA, LAG, term_estimates
 from ringbalance.reduced_model.selection.registry import IN_INJECTIONS, ModelUsed, models_used
 from ringbalance.scene.models import Scene
 
@@ -61,6 +61,7 @@ def known_dynamics(
         chamber_volume=model.chamber_volume,
         max_fill_ratio=model.flow.max_fill_ratio,
         residual=residual_fill,
+        lift=lift_of(scene, law=model.flow) if HELD in modelled else None,
     )
 
 
@@ -73,8 +74,9 @@ def _check(scene: Scene, model: BalancerModel, asked: Collection[str]) -> None:
     for term in asked:
         if term not in IN_INJECTIONS:
             raise ValueError(f"no term {term!r}; there are {', '.join(IN_INJECTIONS)}")
-        unknown = term != INERTIA and term_estimates(scene)[term].contribution is None
-        if unknown or not can_carry(scene, model):
+        unknown = term not in (INERTIA, HELD) and term_estimates(scene)[term].contribution is None
+        no_crest = term == HELD and isinstance(model.flow, PaperLaw)
+        if unknown or no_crest or not can_carry(scene, model):
             raise ValueError(f"{term} cannot be modelled: the scene or the law gives no numbers for it")
 
 
@@ -83,5 +85,8 @@ def _obstacles(scene: Scene, model: BalancerModel) -> dict[str, str]:
     if not can_carry(scene, model):
         return dict.fromkeys(IN_INJECTIONS, "this law gives velocities and no forces")
     if isinstance(model.flow, PaperLaw):
-        return {INERTIA: "the paper's law has no mass in the tube"}
+        return {
+            INERTIA: "the paper's law has no mass in the tube",
+            HELD: "the paper's law has no crest",
+        }
     return {}

@@ -29,7 +29,7 @@ def exact_inputs(result: FitResult) -> list[str]:
 
 
 def fit_document(
-    result: FitResult, *, data: Sequence[Observations], told: Review, following: NextMeasurement | None
+    result: FitResult, *, data: Sequence[Observations], told: Review, following: NextMeasurement
 ) -> dict[str, Any]:
     """What `ringbalance fit --json` prints."""
     scene = result.optimum.residuals.problem.scene
@@ -50,7 +50,7 @@ def fit_document(
         "evaluations": result.evaluations,
         "log_likelihood": result.log_likelihood,
         "criticism": _criticism(told),
-        "next_measurement": None if following is None else _following(following),
+        "next_measurement": _following(following),
     }
 
 

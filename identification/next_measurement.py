@@ -22,7 +22,9 @@ from ringbalance.identification.likelihood import Block, Problem, block_of, held
 from ringbalance.identification.result import FitResult
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.dimensions import DIMENSIONS
+from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.units import format_quantity
 
 ASSUMED_NOISE: Final = 0.01
@@ -35,6 +37,12 @@ _TIMES: Final = (0.05, 0.2, 0.8)
 """s, of valve-open."""
 _BEYOND: Final = (0.5, 1.0, 2.0)
 """Of the middle of what was measured, or of what makes the vibration at the start."""
+_VOLTAGES: Final = (0.25, 0.5, 1.0)
+"""Of the largest; where the scene gives none, those of the data alone."""
+_MOTION_TIMES: Final = (0.1, 0.4, 1.0)
+"""s, of positioning."""
+_SPEEDS: Final = 9
+"""From half of the lowest speed of the scene to the highest one."""
 _WORTHWHILE: Final = 0.9
 """Ratio of widths up to which one measurement is advised; beyond it, many of them would be needed."""
 _AT_ALL: Final = 0.99
@@ -63,15 +71,12 @@ class NextMeasurement:
         )
 
 
-def next_measurement(result: FitResult, parameter: str | None = None) -> NextMeasurement | None:
+def next_measurement(result: FitResult, parameter: str | None = None) -> NextMeasurement:
     """Rank candidates for a parameter; None: the one that the data identify least.
 
-    Returns: None where no candidates are known for the balancer.
     Raises: KeyError: the parameter was not fitted.
     """
     problem = result.optimum.residuals.problem
-    if not isinstance(problem.scene, Scene):
-        return None
     names = [each.name for each in result.parameters]
     chosen = parameter or _least_identified(result)
     result.parameter(chosen)
@@ -112,6 +117,8 @@ def _candidates(result: FitResult, kind: str) -> Iterator[Candidate]:
     scene = problem.scene_at(t)
     measured = next((b for b in problem.blocks if b.observations.kind == kind), None)
     offered = offered_rows(scene, kind, None if measured is None else measured.observations)
+    if not len(offered):
+        return
     block = block_of(offered)
     asked = replace(problem, blocks=(block,))
     scale = 1 / _noise(result, measured, asked, t)
@@ -161,8 +168,27 @@ def _first_series(block: Block) -> FloatArray:
     return np.asarray(names == block.observations.series[0], dtype=np.float64)
 
 
-def _grids(scene: Scene) -> dict[str, Grid]:
+def _grids(scene: AnyScene) -> dict[str, Grid]:
     """Values of what is set, by kind and column, SI, over the ranges of a scene."""
+    return _ring_grids(scene) if isinstance(scene, Scene) else _eccentric_grids(scene)
+
+
+def _eccentric_grids(scene: EccentricScene) -> dict[str, Grid]:
+    speeds = [point.speed for point in scene.rotor.speed_profile]
+    largest = scene.motor.maximum_voltage
+    voltages = [] if largest is None else [x * largest for x in _VOLTAGES]
+    return {
+        "run_up": {"speed": np.linspace(min(speeds) / 2, max(speeds), _SPEEDS).tolist()},
+        "positioning": {
+            "moved_mass": [1.0, 2.0],
+            "voltage": voltages,
+            "speed": [min(speeds)],
+            "time": _MOTION_TIMES,
+        },
+    }
+
+
+def _ring_grids(scene: Scene) -> dict[str, Grid]:
     fills = [x * scene.disc.max_fill_ratio for x in _FRACTIONS]
     pressures = [x * scene.gas.pressure for x in _PRESSURES]
     unbalance = scene.rotor.initial_amplitude / scene.rotor.influence_coefficient
@@ -178,11 +204,11 @@ def _grids(scene: Scene) -> dict[str, Grid]:
     }
 
 
-def offered_rows(scene: Scene, kind: str, measured: Observations | None) -> Observations:
+def offered_rows(scene: AnyScene, kind: str, measured: Observations | None) -> Observations:
     """All rows of a kind's grid, each a series of its own; what is measured is that of the data's middle."""
     grid = dict(_grids(scene)[kind])
     if measured is not None:
-        for name in ("gas_time", "pressure_difference", "unbalance"):
+        for name in ("gas_time", "pressure_difference", "unbalance", "voltage"):
             values = measured.columns[name] if name in grid else np.empty(0)
             # Of runs without trial weight alone the middle says nothing.
             if np.any(values > 0):
@@ -190,27 +216,24 @@ def offered_rows(scene: Scene, kind: str, measured: Observations | None) -> Obse
     rows = list(product(*grid.values()))
     count = len(rows)
     columns = {name: np.array([row[i] for row in rows]) for i, name in enumerate(grid)}
-    middles, widths = _middles(scene, kind, measured)
+    middles, widths = _middles(kind, measured)
     return Observations(
         kind=kind,
         file="",
         lines=np.arange(1, count + 1),
         series=np.array([f"{i}" for i in range(count)]),
-        chamber=np.full(count, "A" if kind in ("injection", "transfer") else ""),
+        chamber=np.full(count, "A" if KINDS[kind].has_chamber else ""),
         columns={name: np.full(count, value) for name, value in middles.items() if name not in columns}
         | columns,
         uncertainty={name: np.full(count, width) for name, width in widths.items()},
     )
 
 
-def _middles(
-    scene: Scene, kind: str, measured: Observations | None
-) -> tuple[Mapping[str, float], Mapping[str, float]]:
-    """Middle of every measured column and of its uncertainty."""
-    if measured is None:
-        names = [c.name for c in KINDS[kind].columns if c.measured or c.amplitude]
-        return dict.fromkeys((n for n in names if n != "mass"), scene.rotor.initial_amplitude), {}
+def _middles(kind: str, measured: Observations | None) -> tuple[Mapping[str, float], Mapping[str, float]]:
+    """Middle of every measured column and of its uncertainty; one where nothing was measured."""
     named = {c.name for c in KINDS[kind].columns if c.measured or c.amplitude}
+    if measured is None:
+        return dict.fromkeys(named - {"mass"}, 1.0), {}
     return (
         {name: float(np.median(v)) for name, v in measured.columns.items() if name in named},
         {name: float(np.median(v)) for name, v in measured.uncertainty.items()},

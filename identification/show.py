@@ -40,11 +40,10 @@ _FAR: Final = 3.0
 
 
 def fit_view(
-    result: FitResult, *, data: Sequence[Observations], told: Review, following: NextMeasurement | None
+    result: FitResult, *, data: Sequence[Observations], told: Review, following: NextMeasurement
 ) -> RenderableType:
     """Parameters, whether the fit holds, and what else the data say, for a rich console."""
-    more = [] if following is None else [Text(_sentence(following.text))]
-    remarks = [*_review(told), *_remarks(result), *more]
+    remarks = [*_review(told), *_remarks(result), Text(_sentence(following.text))]
     return Group(_heading(result, data), _parameters(result), *remarks)
 
 

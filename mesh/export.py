@@ -25,7 +25,10 @@ def scikit_fem_mesh(chamber: ChamberMesh) -> tuple[MeshQuad2 | MeshHex2, IntArra
     """The same mesh as scikit-fem has it, in units of `length_scale`, with its boundaries by name.
 
     Returns: The mesh, and for each of its nodes the number that the chamber gives it.
+    Raises: ValueError: a mesh that is not quadratic, for which scikit-fem has no cells.
     """
+    if chamber.order != 2:
+        raise ValueError(f"only a mesh of order 2 can be exported, not one of order {chamber.order}")
     cells = chamber.cells
     first, second = (MeshQuad1, MeshQuad2) if len(cells) == 2 else (MeshHex1, MeshHex2)
     order = _CELL_AXES[len(cells)]
@@ -45,7 +48,8 @@ def write_vtu(path: Path, *, chamber: ChamberMesh, fields: Mapping[str, npt.Arra
     """Write a mesh in metres with its boundary names and nodal fields, whole or not at all.
 
     Args: `path`: of the file, ending in .vtu. `fields`: nodal values by name, shape (nodes,) each, SI.
-    Raises: ValueError: another ending, or a field that is not one finite value per node.
+    Raises: ValueError: another ending, a mesh that is not quadratic, or a field that is not one finite value
+        per node.
     Raises: OSError: the file cannot be written.
     Source: VTK XML through meshio; scikit-fem stores each boundary as cell data "skfem:b:<name>".
     """

@@ -47,10 +47,10 @@ def line_shapes(places: FloatArray, order: int = 2) -> tuple[FloatArray, FloatAr
 
 
 def products(along: Sequence[FloatArray]) -> FloatArray:
-    """All products of one entry along each axis; the last axis runs fastest."""
+    """All products of one number along each axis; the last axis runs fastest."""
     total = along[0]
     for other in along[1:]:
-        total = np.asarray(np.kron(total, other), dtype=np.float64)
+        total = (total[:, None] * other).ravel()
     return total
 
 

@@ -22,6 +22,7 @@ from ringbalance.reduced_model.short_injection import (
     ShortInjection,
     accelerated_part,
     edges_of,
+    lifted_of,
 )
 from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.models import Gas, Scene
@@ -128,6 +129,7 @@ def _injection(scene: Scene, end: LineEnd, fills: Fills, edges: Edges, *, inerti
         edges=edges,
         mass=model.density * scene.tube.length if inertia else 0.0,
         part=accelerated_part(scene.tube, model),
+        lifted=lifted_of(scene.tube, model, inertia=inertia),
     )
 
 

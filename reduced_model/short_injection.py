@@ -6,6 +6,9 @@ valve that shuts at that moment leaves a primed column, which runs until the cha
 pressure that stops it: this amount is the smallest that the line can be relied upon to deliver; what spills
 before is less, and depends on every millisecond.  A valve is not expected to open for less than its own lag.
 
+**Lift.**  The gas lifts the liquid in the leg as it fills the chamber; what it then pushes to the middle of
+the crest falls back in the end, so it is taken off what the column has moved.
+
 **Movement.**  With isothermal gas the times belong to the pressure (`physics.gas.supply`), so the liquid
 moved is the integral of rho S u dt over filling and venting.  The column has its mass and moves by
     du/dt = B - c(u) u^2,
@@ -32,7 +35,7 @@ from ringbalance.physics.gas.supply import GasLine
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Flow
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.tube.path import crest_span
+from ringbalance.reduced_model.tube.path import crest_middle, crest_span
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Tube
 
@@ -42,6 +45,10 @@ _SLOWEST_RISE: Final = 100.0
 """Times longer than without liquid that a pressure may take to rise."""
 _STEPS: Final = 33
 """Of filling or venting."""
+_INSTANT: Final = 2e-4
+"""s, to which it is known when the front has passed the crest."""
+_LIFTING: Final = 100
+"""Instants that this may take."""
 _SLOWEST: Final = 1e-9
 """m/s."""
 _LEAST_PUSH: Final = 1e-9
@@ -144,6 +151,29 @@ def accelerated_part(tube: Tube, model: BalancerModel) -> float:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Lifted:
+    """What becomes of the liquid on the crest; lengths of tube, m."""
+
+    way: float = 0.0
+    """By which the column moves until its front reaches the crest's end."""
+    passed: float = 0.0
+    """From the crest's middle to its end: of the way, what does not fall back."""
+
+
+def lifted_of(tube: Tube, model: BalancerModel, *, inertia: bool) -> Lifted:
+    """The lift of a leg that has followed the filling gas up to the crest; nothing without a crest.
+
+    The column that starts from rest is taken as long as up to the crest's end.  The one that is lifted is as
+    long as up to the crest's middle, in the mean, and comes further in the same time: by the inverse ratio.
+    """
+    if tube.hump_radius is None or not isinstance(model.flow, CalibratedLaw):
+        return Lifted()
+    (start, stop), middle = crest_span(tube), crest_middle(tube)
+    ratio = middle / stop if inertia else 1.0
+    return Lifted(way=(stop - start) * ratio * tube.length, passed=(stop - middle) * tube.length)
+
+
+@dataclass(frozen=True, kw_only=True)
 class ShortInjection:
     """Injections of one line into the driven chamber of a pair."""
 
@@ -156,6 +186,7 @@ class ShortInjection:
     """rho L, kg/m^2; zero: the column follows the pressure at once."""
     part: float
     """L_up/L."""
+    lifted: Lifted = Lifted()
 
     def shortest(self, least: float) -> Moved:
         """By the shortest valve-open time that primes the tube and is not below `least`, s."""
@@ -174,20 +205,31 @@ class ShortInjection:
 
     @cached_property
     def _primed(self) -> Moved:
-        """When the tube is primed."""
+        """When the tube is primed, with its front past the crest."""
         ambient = self.line.ambient_pressure
         rising = np.linspace(ambient + self.edges.starts, ambient + self.edges.primes, _STEPS)
         filled = float(self.line.filling_time(rising[0], volume=self.volume))
-        return self._passed(rising, Moved(time=filled, pressure=float(rising[0])), primed=False)
+        begun = self.lifted.passed - self.lifted.way
+        now = Moved(metres=begun, time=filled, pressure=float(rising[0]))
+        now = self._passed(rising, now, primed=False)
+        for _ in range(_LIFTING):
+            if now.metres >= self.lifted.passed or begun == 0.0:
+                break
+            now = self._open(now, now.time + _INSTANT)
+        return now
 
     def _opened(self, opening: float) -> Moved:
         """When the valve shuts, at the earliest as the tube is primed."""
         now = self._primed
         if now.time >= opening:
             return now
+        return self._open(now, opening)
+
+    def _open(self, now: Moved, until: float) -> Moved:
+        """Of a primed tube, up to a time, s."""
         rising = np.linspace(now.pressure, self.line.supply_pressure, _STEPS)
-        now = self._passed(rising, now, primed=True, until=opening)
-        return self._held(now, opening - now.time) if now.time < opening else now
+        now = self._passed(rising, now, primed=True, until=until)
+        return self._held(now, until - now.time) if now.time < until else now
 
     def _closed(self, before: Moved) -> Moved:
         """At rest, with the chamber vented; its time stays that of the opening."""
@@ -197,7 +239,7 @@ class ShortInjection:
         if self.edges.stops > 0:
             now = self._passed(np.linspace(stop, ambient, _STEPS), now, primed=True)
             now = self._braked(now)
-        return replace(now, time=before.time)
+        return replace(now, metres=max(now.metres, 0.0), time=before.time)
 
     def _passed(self, pressure: FloatArray, before: Moved, *, primed: bool, until: float = math.inf) -> Moved:
         """Along an absolute pressure that rises or falls, V dp = (f - p S u) dt, f = V dp/dt of the line, up

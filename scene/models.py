@@ -115,7 +115,7 @@ class Disc:
         UNCERTAIN,
         shown("measured factor on lambda"),
     ] = None
-    geometry: ChamberGeometry | None = None
+    geometry: Annotated[ChamberGeometry | None, shown("geometry of a chamber")] = None
     """One chamber as a mesh file gives it, no key; None for the sector between plates that the keys give."""
 
     @property

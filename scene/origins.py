@@ -15,6 +15,7 @@ KEY_OF_FIELD = {
     "rotor.initial_amplitude": "rotor.initial_vibration",
     "rotor.initial_phase": "rotor.initial_vibration",
     "tolerance": "accuracy.tolerance",
+    "disc.geometry": "disc.mesh",
 }
 """Path of the key from which a field of another name is read."""
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, Final
 
+from ringbalance.scene.chamber_file.stretching import STRETCHED, stretched
+from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.keys.schema import LIQUID_RING
 from ringbalance.scene.models import Scene
 
 NORMAL_95: Final = 1.959963984540054
 """Expanded uncertainty (95 %) of a normal distribution in standard deviations."""
+_PATH: Final = re.compile(r"(\w+)\.(\w+)(?:\[([01])\])?")
 UNCERTAIN_QUANTITIES: Mapping[str, str] = MappingProxyType(
     {
         name: table
@@ -23,6 +27,10 @@ UNCERTAIN_QUANTITIES: Mapping[str, str] = MappingProxyType(
 """Keys of [uncertainty], each with the table of its quantity, which is an attribute of `Scene` too."""
 
 
+SHAPE: Final = (*STRETCHED, "plate_thickness")
+"""Keys of [disc] that follow from a mesh where there is one."""
+
+
 def nominal_value(*, scene: Scene, quantity: str) -> float | None:
     """SI value of a key of `UNCERTAIN_QUANTITIES`; None when the scene does not ask for the term."""
     value: float | None = getattr(getattr(scene, _table_of(quantity)), quantity)
@@ -30,10 +38,56 @@ def nominal_value(*, scene: Scene, quantity: str) -> float | None:
 
 
 def with_value(*, scene: Scene, quantity: str, value: float) -> Scene:
-    """Copy a scene with one of `UNCERTAIN_QUANTITIES` changed, SI; nothing is checked again."""
+    """Copy a scene with one of `UNCERTAIN_QUANTITIES` changed, SI; nothing is checked again.
+
+    The mesh of a chamber is stretched with its dimension.
+    Raises: ValueError: a mesh has no such dimension of its own.
+    """
     table = _table_of(quantity)
-    changed: dict[str, Any] = {table: replace(getattr(scene, table), **{quantity: value})}
+    changed: dict[str, Any] = {quantity: value}
+    disc, geometry = scene.disc, scene.disc.geometry
+    if geometry is not None and quantity in SHAPE:
+        if quantity not in STRETCHED:
+            raise ValueError(f"the mesh of a chamber has no {quantity} of its own")
+        dimensions = {each: getattr(disc, each) for each in STRETCHED}
+        changed["geometry"] = stretched(geometry, dimensions=dimensions, quantity=quantity, value=value)
+    return replace(scene, **{table: replace(getattr(scene, table), **changed)})
+
+
+def eccentric_value(scene: EccentricScene, path: str) -> float:
+    """SI value at a path, such as "rotor.mass" or "masses.friction_arm[0]"."""
+    table, key, entry = _placed(path)
+    value = getattr(getattr(scene, table), key)
+    return float(value if entry is None else value[entry])
+
+
+def eccentric_moved(scene: EccentricScene, path: str, move: Callable[[float], float]) -> EccentricScene:
+    """Copy a scene of eccentric masses with the value at a path moved, SI; nothing is checked again.
+
+    A path without an entry, such as "masses.friction_arm", moves the values of both masses.
+    """
+    table, key, entry = _placed(path)
+    record = getattr(scene, table)
+    value = getattr(record, key)
+    moved: Any
+    if isinstance(value, tuple):
+        moved = tuple(move(old) if entry in (None, place) else old for place, old in enumerate(value))
+    else:
+        moved = move(value)
+    changed: dict[str, Any] = {table: replace(record, **{key: moved})}
     return replace(scene, **changed)
+
+
+def eccentric_with(scene: EccentricScene, value: float, *, name: str) -> EccentricScene:
+    """The same with a value in place of the one at a path."""
+    return eccentric_moved(scene, name, lambda _: value)
+
+
+def _placed(path: str) -> tuple[str, str, int | None]:
+    match = _PATH.fullmatch(path)
+    if match is None:
+        raise ValueError(f"{path!r} is no path of a scene")
+    return match[1], match[2], None if match[3] is None else int(match[3])
 
 
 def _table_of(quantity: str) -> str:

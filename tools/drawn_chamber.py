@@ -24,7 +24,7 @@ from ringbalance.scene.chamber_file.elements import (
 GMSH_NUMBERS = {name: number for number, name in GMSH_KINDS.items()}
 DIVISIONS = (2, 3, 2)
 """Cells in the directions of radius, angle and shaft."""
-CHAMBER, NAMES = 7, ("inner_wall", "outer_wall", "plate_left", "plate_right", "end_back", "end_front")
+CHAMBER, NAMES = 7, ("inner_wall", "outer_wall", "plate_right", "plate_left", "end_back", "end_front")
 """Physical number of the volume, and names of the sides, whose physical numbers count from 1."""
 _SIX_TETRAHEDRA = ((0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6))
 
@@ -221,14 +221,17 @@ def inp(drawing: Drawing) -> bytes:
 
 
 def scene_text(mesh: str, **disc: str | int) -> str:
-    """The paper's scene with a mesh in place of its dimensions. Args: `disc`: further keys of [disc]."""
+    """The paper's scene with a mesh in place of its dimensions.
+
+    Args: `disc`: further keys of [disc]; an empty one is left out.
+    """
     text = bundled_scene("liquid_ring_paper").read_text(encoding="utf-8")
     text = text[: text.index("[uncertainty]")] + text[text.index("[run]") :]
     gone = "outer_radius|inner_radius|axial_width|central_angle|plate_thickness|port_radius|hump_radius"
     text = re.sub(rf"(?m)^({gone}) = .*\n", "", text).replace(
         'origin = { plate_thickness = "inferred" }\n', ""
     )
-    lines = "".join(f"{key} = {value!r}\n" for key, value in disc.items())
+    lines = "".join(f"{key} = {value!r}\n" for key, value in disc.items() if value != "")
     return text.replace("[disc]\n", f"[disc]\nmesh = {mesh!r}\n{lines}", 1)
 
 

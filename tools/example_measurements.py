@@ -18,13 +18,12 @@ import numpy.typing as npt
 from ringbalance.identification.balancers import models_for
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.eccentric_parameters import eccentric_with
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.scene import AnyScene, bundled_scene, load_scene, write_whole
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.describe import in_usual_unit, usual_name, usual_unit
 from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, with_value
+from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, eccentric_with, with_value
 from ringbalance.scene.units import format_quantity
 
 FOLDER: Final = Path(__file__).resolve().parents[1] / "scenes" / "measurements"

@@ -77,7 +77,7 @@ def orders_found(studies: Mapping[str, OrderStudy]) -> dict[str, Found]:
 
 def field_error(solution: PressureSolution, exact: Callable[[FloatArray], FloatArray]) -> float:
     """Root mean square over the liquid of a pressure's error, relative to that of the exact one at places."""
-    volume = volume_points(solution.chamber)
+    volume = volume_points(solution.chamber, extra=2)
     true = exact(solution.chamber.length_scale * volume.points)
     difference = volume.at_points(solution.pressure) - true
     squares = [np.sum(volume.weights * field**2) for field in (difference, true)]

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.strategy.settings import strategy_settings
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.models import InputUncertainty
-from ringbalance.scene.uncertain import NORMAL_95
+from ringbalance.scene.uncertain import NORMAL_95, eccentric_moved
 
 Judged = Mapping[str, float | None]
 """Numbers that a run comes to, by name; None: it does not come to it."""
@@ -53,13 +52,14 @@ def _both_ends(scene: EccentricScene, uncertain: InputUncertainty) -> Iterator[E
         return lambda value: value + sign * uncertain.absolute(value)
 
     for sign in (-1, 1):
-        yield _moved(scene, uncertain, at(sign))
+        yield eccentric_moved(scene, uncertain.quantity, at(sign))
 
 
 def drawn_plant(scene: EccentricScene, random: np.random.Generator) -> EccentricScene:
     """The scene with every stated input drawn: relative ones log-normal, so that none changes its sign."""
     for uncertain in scene.uncertainty:
-        scene = _moved(scene, uncertain, _drawn(uncertain, random.standard_normal() / NORMAL_95))
+        move = _drawn(uncertain, random.standard_normal() / NORMAL_95)
+        scene = eccentric_moved(scene, uncertain.quantity, move)
     return scene
 
 
@@ -68,18 +68,6 @@ def _drawn(uncertain: InputUncertainty, part: float) -> Callable[[float], float]
     if uncertain.relative:
         return lambda value: value * math.exp(math.log1p(uncertain.half_width) * part)
     return lambda value: value + uncertain.half_width * part
-
-
-def _moved(
-    scene: EccentricScene, uncertain: InputUncertainty, move: Callable[[float], float]
-) -> EccentricScene:
-    """The values of both masses move together."""
-    table, key = uncertain.quantity.split(".")
-    record = getattr(scene, table)
-    value = getattr(record, key)
-    moved = tuple(map(move, value)) if isinstance(value, tuple) else move(value)
-    changed: dict[str, Any] = {table: replace(record, **{key: moved})}
-    return replace(scene, **changed)
 
 
 def effects(value: float, moved: Mapping[str, list[Judged]], name: str) -> dict[str, tuple[float, float]]:

@@ -36,6 +36,7 @@ def begin(plant: Record, motion: Record, fill: float, speed: float, residual: fl
     motion.primed, motion.valve_0, motion.valve_1, motion.direction = 0, 0, 0, 0
     motion.balanced, motion.stopped, motion.steps, motion.chamber = 0, 0, 0, 0
     motion.regime_start, motion.regime_end, motion.event = 0, 0, 0
+    motion.front, motion.lifting, motion.side = 0.0, 0, 0
 
 
 @in_place

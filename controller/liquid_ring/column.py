@@ -10,9 +10,20 @@ from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import FlowLaw
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.tables.hermite import HermiteTable
+from ringbalance.reduced_model.tube.heads import entrance_fraction
 from ringbalance.reduced_model.tube.path import crest_span
 from ringbalance.reduced_model.tube.regime import SiphonCrest
-from ringbalance.scene.models import Tube
+from ringbalance.scene.models import Scene, Tube
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lift:
+    """The tube from a port to the crest, as liquid fills it."""
+
+    straight: float
+    """c of D_m - D = (D_m - D_p)(c o + (1 - c) o^2) with o from 0 at the crest to 1 at the port."""
+    entrance: float
+    """Fraction of the loss up to the crest's end that is lost at the entrance."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -44,6 +55,19 @@ def column_of(*, law: FlowLaw, tube: Tube, gas_off: float = 0.0) -> Column | Non
     if isinstance(law, CalibratedLaw):
         return _calibrated(law, tube, gas_off)
     return _paper(law, tube, gas_off) if isinstance(law, PaperLaw) else None
+
+
+def lift_of(scene: Scene, *, law: FlowLaw) -> Lift | None:
+    """What liquid meets on its way up to the crest; None without a crest, or under a law that has none."""
+    tube = scene.tube
+    if tube.hump_radius is None or not isinstance(law, CalibratedLaw) or law.path.crest is None:
+        return None
+    half = law.max_fill_ratio / 2
+    flow = law.evaluate(fill_ratio=half, gas_pressure=scene.gas.pressure, primed=True)
+    straight = (
+        0.0 if tube.hump_shape == "arc" else 2 * tube.hump_radius / (tube.port_radius + tube.hump_radius)
+    )
+    return Lift(straight=straight, entrance=entrance_fraction(scene, float(flow.velocity) or 1.0))
 
 
 def _calibrated(law: CalibratedLaw, tube: Tube, gas_off: float) -> Column:

@@ -86,28 +86,29 @@ def _guess(plant: Record, which: int, y: float) -> float:
 
 
 @inlined
-def _crest_table(direction: int) -> int:
+def crest_table(direction: int) -> int:
+    """Number of the table of the loss up to the crest."""
     return TO_CREST if direction > 0 else RETURN_CREST
 
 
 @in_place
-def _velocity(plant: Record, which: int, pressure: float, log_speed: float) -> float:
+def quasi_steady(plant: Record, which: int, pressure: float, log_speed: float) -> float:
     """Quasi-steady velocity, m/s, under a pressure above zero; `log_speed`: of a factor on it."""
     return math.exp(_inverse(plant, which, math.log(pressure / plant.density)) + log_speed)
 
 
 @inlined
-def _law_log(speed: float, log_speed: float) -> float:
+def law_log(speed: float, log_speed: float) -> float:
     """ln of the velocity that the law itself has where a factor on it gives this one."""
     return math.log(max(abs(speed), _SLOWEST)) - log_speed
 
 
 @inlined
-def _loss(plant: Record, which: int, speed: float, law_log: float) -> tuple[float, float]:
+def tube_loss(plant: Record, which: int, speed: float, log_of_law: float) -> tuple[float, float]:
     """Pressure that a velocity loses over rho, m^2/s^2, and its derivative by the velocity, m/s."""
     if abs(speed) < _SLOWEST:
         return 0.0, 0.0
-    value, slope = table(plant, which, law_log)
+    value, slope = table(plant, which, log_of_law)
     loss = math.copysign(math.exp(value), speed)
     return loss, loss * slope / speed
 
@@ -144,7 +145,7 @@ def _allowed(plant: Record, at: tuple[float, float, float, float], primed: bool)
 
 
 @inlined
-def _margins(plant: Record, at: tuple[float, float, float, float]) -> tuple[float, float]:
+def crest_margins(plant: Record, at: tuple[float, float, float, float]) -> tuple[float, float]:
     """Crest pressure at rest less that of the cavity of a primed tube, and less that of gas there, Pa."""
     low = at[1] if at[3] < plant.port_pressure else plant.vapour_pressure
     high = low if plant.released == 0.0 else max(at[1], low)
@@ -161,7 +162,7 @@ def can_flow(plant: Record, at: tuple[float, float, float, float], primed: bool)
         return False
     if not plant.crest:
         return True
-    primed_margin, gas_margin = _margins(plant, at)
+    primed_margin, gas_margin = crest_margins(plant, at)
     return bool((primed_margin if primed and not plant.one_way else gas_margin) > 0.0)
 
 
@@ -173,7 +174,7 @@ def holds_at_rest(plant: Record, at: tuple[float, float, float, float], primed: 
     if not plant.crest:
         return _allowed(plant, at, True)
     covered = at[2] >= plant.port_pressure
-    return bool(covered and _driving(plant, at) == 0.0 and _margins(plant, at)[0] > 0.0)
+    return bool(covered and _driving(plant, at) == 0.0 and crest_margins(plant, at)[0] > 0.0)
 
 
 @inlined
@@ -200,17 +201,17 @@ def _crest_margin(
 ) -> tuple[float, float, float]:
     """What drives a separated column, Pa, how far the gas over the crest is carried out, and the derivative
     of the former by the gas margin beyond 1 - the latter."""
-    primed_margin, gas_margin = _margins(plant, at)
+    primed_margin, gas_margin = crest_margins(plant, at)
     if primed:
         return primed_margin, 1.0, 0.0
     if gas_margin <= 0.0:
         return gas_margin, 0.0, 0.0
-    which = _crest_table(direction)
-    spill = _velocity(plant, which, gas_margin, log_speed)
+    which = crest_table(direction)
+    spill = quasi_steady(plant, which, gas_margin, log_speed)
     cleared, slope = _cleared(plant, spill)
     more = max(primed_margin - gas_margin, 0.0)
     if slope > 0.0:
-        slope /= plant.density * _loss(plant, which, spill, _law_log(spill, log_speed))[1]
+        slope /= plant.density * tube_loss(plant, which, spill, law_log(spill, log_speed))[1]
     return gas_margin + cleared * more, cleared, slope * more
 
 
@@ -225,11 +226,11 @@ def _directed(
     """Velocity of flow in one direction, and whether the column is separated."""
     if not can_flow(plant, at, primed):
         return 0.0, False
-    full = _velocity(plant, HEAD, _driving(plant, at), log_speed)
+    full = quasi_steady(plant, HEAD, _driving(plant, at), log_speed)
     if not plant.crest:
         return full, False
     margin = _crest_margin(plant, at, direction, primed, log_speed)[0]
-    broken = _velocity(plant, _crest_table(direction), margin, log_speed)
+    broken = quasi_steady(plant, crest_table(direction), margin, log_speed)
     return min(broken, full), broken < full
 
 
@@ -270,9 +271,12 @@ def clearance(
     half = _HALF_CLEARED * plant.froude_velocity
     if half == 0.0:
         return math.inf
-    law_log = _law_log(half, log_speed)
-    spills = _margins(plant, at)[1] / plant.density - _loss(plant, _crest_table(direction), half, law_log)[0]
-    flows = _driving(plant, at) / plant.density - _loss(plant, HEAD, half, law_log)[0]
+    log_of_law = law_log(half, log_speed)
+    spills = (
+        crest_margins(plant, at)[1] / plant.density
+        - tube_loss(plant, crest_table(direction), half, log_of_law)[0]
+    )
+    flows = _driving(plant, at) / plant.density - tube_loss(plant, HEAD, half, log_of_law)[0]
     return float(min(spills, flows))
 
 
@@ -287,14 +291,14 @@ def _fills(
     """Whether a column that flows is a continuous one: gas carried out, no cavity open to the port."""
     if not plant.crest:
         return True
-    which, driving = _crest_table(direction), _driving(plant, at)
+    which, driving = crest_table(direction), _driving(plant, at)
     if not primed and clearance(plant, at, direction, log_speed) <= 0.0:
         return False
     if at[3] >= plant.port_pressure:
         return True
     margin = _crest_margin(plant, at, direction, primed, log_speed)[0]
-    broken = _velocity(plant, which, margin, log_speed)
-    return broken >= _velocity(plant, HEAD, driving, log_speed)
+    broken = quasi_steady(plant, which, margin, log_speed)
+    return broken >= quasi_steady(plant, HEAD, driving, log_speed)
 
 
 @inlined
@@ -312,8 +316,8 @@ def accelerations(
     Returns: the two, then the derivatives of the smaller one by the speed, by the pressure upstream (of gas
     or liquid), by the gas pressure downstream and by the liquid's pressure there.
     """
-    law_log = _law_log(speed, log_speed)
-    loss, slope = _loss(plant, HEAD, speed, law_log)
+    log_of_law = law_log(speed, log_speed)
+    loss, slope = tube_loss(plant, HEAD, speed, log_of_law)
     length, covered = plant.length, 1.0 if at[3] > plant.port_pressure else 0.0
     per, each = 1.0 / length, 1.0 / (plant.density * length)
     full = _driving(plant, at) * each - loss * per
@@ -321,12 +325,12 @@ def accelerations(
         return full, math.inf, -slope * per, each, -each, -each * covered
     fraction = plant.crest_end if direction > 0 else plant.return_crest_end
     margin, cleared, more = _crest_margin(plant, at, direction, primed, log_speed)
-    upper_loss, upper_slope = _loss(plant, _crest_table(direction), speed, law_log)
+    upper_loss, upper_slope = tube_loss(plant, crest_table(direction), speed, log_of_law)
     per_upper, each_upper = 1.0 / (fraction * length), 1.0 / (plant.density * fraction * length)
     broken = margin * each_upper - upper_loss * per_upper
     if full <= broken:
         return full, broken, -slope * per, each, -each, -each * covered
-    by_cavity, by_gas, by_far = _crest_slopes(plant, at)
+    by_cavity, by_gas, by_far = crest_slopes(plant, at)
     gas = 1.0 - cleared + more
     by_down = -each_upper * (gas * by_gas + cleared * by_cavity)
     by_up, by_liquid = each_upper * (gas + cleared), -each_upper * gas * by_far
@@ -334,12 +338,12 @@ def accelerations(
 
 
 @inlined
-def _crest_slopes(plant: Record, at: tuple[float, float, float, float]) -> tuple[float, float, float]:
+def crest_slopes(plant: Record, at: tuple[float, float, float, float]) -> tuple[float, float, float]:
     """Derivatives of the pressures over the crest: of a cavity and of gas by the gas pressure downstream, and
     of gas by the liquid's pressure there."""
     is_open = at[3] < plant.port_pressure
     by_cavity = 1.0 if is_open else plant.released if at[1] > plant.vapour_pressure else 0.0
-    cavity_margin, gas_margin = _margins(plant, at)
+    cavity_margin, gas_margin = crest_margins(plant, at)
     if gas_margin == cavity_margin:
         return by_cavity, by_cavity, 0.0
     return by_cavity, 1.0, 0.0 if is_open or not plant.trapped else 1.0

@@ -18,6 +18,7 @@ from ringbalance.controller.liquid_ring.compiled_column import (
     open_to_gas,
     steady,
 )
+from ringbalance.controller.liquid_ring.compiled_lift import arrived, crest_stop, lift_push, shown
 from ringbalance.controller.liquid_ring.records import EVENTS, P, Record, U, X
 from ringbalance.controller.liquid_ring.transfer import Event
 from ringbalance.reduced_model.law.flow_law import Regime
@@ -30,6 +31,8 @@ FILLS: Final = 2
 """The tube counts as filled, beside the directions of a start."""
 STOPS: Final = 3
 """The column comes to rest."""
+ARRIVES: Final = 4
+"""Lifted liquid reaches the end of the crest."""
 _SIPHON: Final = int(Regime.SIPHON)
 _SEPARATED: Final = int(Regime.SEPARATED)
 _REVERSE: Final = int(Regime.REVERSE)
@@ -69,6 +72,14 @@ def holds_column(plant: Record, motion: Record, state: Four) -> bool:
 
 
 @in_place
+def pass_crest(plant: Record, motion: Record) -> None:
+    """What was lifted is the flow law's column from now on."""
+    motion.state[X] = shown(plant, motion, motion.state[X])
+    motion.front, motion.lifting = crest_stop(plant, motion.direction), 0
+    motion.primed = 1 if holds_column(plant, motion, now(motion)) else 0
+
+
+@in_place
 def outward(motion: Record) -> int:
     """Direction of flow out of the chamber that was driven last."""
     return 1 if motion.chamber == 0 else -1
@@ -105,7 +116,9 @@ def starts(plant: Record, motion: Record, state: Four) -> int:
 
 @in_place
 def _push(plant: Record, motion: Record, state: Four, direction: int) -> float:
-    """Acceleration of a column at rest."""
+    """Acceleration of a column at rest, or of lifted liquid."""
+    if motion.lifting:
+        return lift_push(plant, motion, state[0], state[2], state[3])
     at = pair_ends(plant, state, direction)
     found = accelerations(plant, at, 0.0, direction, motion.primed > 0, motion.log_speed)
     return min(found[0], found[1])
@@ -138,6 +151,8 @@ def flow_end(plant: Record, motion: Record, state: Four) -> int:
 @in_place
 def changes(plant: Record, motion: Record, state: Four) -> bool:
     """Whether an event lies between the last step and this state."""
+    if motion.lifting:
+        return bool(arrived(plant, motion, state[0]) >= 0.0 or flow_end(plant, motion, state) != NONE)
     if motion.direction != 0:
         filled = not motion.primed and holds_column(plant, motion, state)
         return filled or flow_end(plant, motion, state) != NONE
@@ -146,12 +161,14 @@ def changes(plant: Record, motion: Record, state: Four) -> bool:
 
 @in_place
 def heading(plant: Record, motion: Record, state: Four) -> int:
-    """What `changes` has found in a state, for `beyond`: a start's direction, else `FILLS`, `STOPS` or 0."""
+    """What `changes` has found in a state, for `beyond`: a start's direction, else one of the above or 0."""
     if motion.direction == 0:
         return starts(plant, motion, state)
+    if motion.lifting and arrived(plant, motion, state[0]) >= 0.0:
+        return ARRIVES
     if not plant.inertia:
         return 0
-    if not motion.primed and holds_column(plant, motion, state):
+    if not (motion.primed or motion.lifting) and holds_column(plant, motion, state):
         return FILLS
     return STOPS if state[1] * motion.direction < 0.0 else 0
 
@@ -164,6 +181,8 @@ def beyond(plant: Record, motion: Record, state: Four, what: int) -> float:
     """
     if motion.direction == 0:
         return _push(plant, motion, state, what) if what != 0 else 0.0
+    if what == ARRIVES:
+        return arrived(plant, motion, state[0])
     if what == FILLS:
         return clearance(plant, pair_ends(plant, state, motion.direction), motion.direction, motion.log_speed)
     return -state[1] * motion.direction if what == STOPS else 0.0

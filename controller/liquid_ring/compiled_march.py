@@ -27,12 +27,19 @@ from ringbalance.controller.liquid_ring.compiled_events import (
     now,
     outward,
     pair_ends,
+    pass_crest,
     regime,
     separates,
     starts,
     would_start,
 )
 from ringbalance.controller.liquid_ring.compiled_gas import end_pressure, near_end
+from ringbalance.controller.liquid_ring.compiled_lift import (
+    arrived,
+    front,
+    set_out,
+    shown,
+)
 from ringbalance.controller.liquid_ring.compiled_step import (
     BETWEEN,
     END,
@@ -67,7 +74,7 @@ _RESTING: Final = int(Regime.BLOCKED)
 @in_place
 def command(plant: Record, motion: Record, chamber: int, duration: float) -> None:
     """A valve opens and closes a lag after its command, which begins a new record of what it does."""
-    x = motion.state[X]
+    x = shown(plant, motion, motion.state[X])
     motion.chamber, motion.opens, motion.closes = chamber, plant.valve_lag, plant.valve_lag + duration
     motion.fill_before = plant.total - x if chamber else x
     motion.least_fill = motion.fill_before
@@ -104,13 +111,13 @@ def advance(
     _note_regime(plant, motion)
     _pause(plant, motion)
     for k in range(motion.noted, count):
-        notes[row, k] = motion.state[X]
+        notes[row, k] = shown(plant, motion, motion.state[X])
 
 
 @in_place
 def _pause(plant: Record, motion: Record) -> None:
     """Liquid without mass has no motion of its own: the next instant finds it again."""
-    if motion.direction != 0 and not plant.inertia:
+    if motion.direction != 0 and not (plant.inertia or motion.lifting):
         motion.primed = 1 if holds_column(plant, motion, now(motion)) else 0
         motion.direction = 0
 
@@ -172,25 +179,25 @@ def _march(
             _settle(plant, motion)
         if motion.steps >= plant.most_steps:
             motion.event = _UNFINISHED
-            _pass(motion, left, notes, row, count)
+            _pass(plant, motion, left, notes, row, count)
             return
         if _quiet(plant, motion):
             _rest_gases(plant, motion)
-            _pass(motion, left, notes, row, count)
+            _pass(plant, motion, left, notes, row, count)
             return
         h, goes_on = _step(plant, motion, left, notes, row, count, w)
-        _pass(motion, left if h >= left else h, notes, row, count)
+        _pass(plant, motion, left if h >= left else h, notes, row, count)
         left = 0.0 if h >= left else left - h
 
 
 @in_place
-def _pass(motion: Record, time: float, notes: FloatArray, row: int, count: int) -> None:
+def _pass(plant: Record, motion: Record, time: float, notes: FloatArray, row: int, count: int) -> None:
     """The clocks of the valves and of the interval; what is not noted yet has not moved."""
     motion.opens -= time
     motion.closes -= time
     motion.now += time
     while motion.noted < count and notes[0, motion.noted] < motion.now:
-        notes[row, motion.noted] = motion.state[X]
+        notes[row, motion.noted] = shown(plant, motion, motion.state[X])
         motion.noted += 1
 
 
@@ -216,17 +223,20 @@ def _step(
         rates_at_end(plant, motion, w)
         while motion.noted < count and notes[0, motion.noted] < motion.now + h:
             between(plant, motion, h, (notes[0, motion.noted] - motion.now) / h, w)
-            notes[row, motion.noted] = w[BETWEEN, X]
+            notes[row, motion.noted] = shown(plant, motion, w[BETWEEN, X])
             motion.noted += 1
-    before, y = motion.state[X], motion.state
+    y = motion.state
+    before = shown(plant, motion, y[X])
     for i in range(8):
         y[i] = w[END, i]
     if motion.direction == -outward(motion) and not (motion.valve_0 or motion.valve_1):
-        motion.ran_back += abs(y[X] - before)
+        motion.ran_back += abs(shown(plant, motion, y[X]) - before)
     if motion.direction != 0 and plant.inertia and y[U] * motion.direction < 0.0:
         y[U] = 0.0 if flow_end(plant, motion, now(motion)) == NONE else y[U]
-    motion.least_fill = min(motion.least_fill, plant.total - y[X] if motion.chamber else y[X])
-    if event and moves and not motion.primed and holds_column(plant, motion, now(motion)):
+    x = shown(plant, motion, y[X])
+    motion.least_fill = min(motion.least_fill, plant.total - x if motion.chamber else x)
+    filling = event and moves and not (motion.primed or motion.lifting)
+    if filling and holds_column(plant, motion, now(motion)):
         motion.primed = 1
     return h, moves and not event
 
@@ -273,6 +283,9 @@ def _event_part(plant: Record, motion: Record, h: float, near: float, w: FloatAr
 def _settle(plant: Record, motion: Record) -> None:
     """Let moving liquid come to rest, and resting liquid start, where it has to."""
     if motion.direction != 0:
+        if motion.lifting and arrived(plant, motion, motion.state[X]) >= 0.0:
+            pass_crest(plant, motion)
+            motion.length = _first(plant, motion)
         event = flow_end(plant, motion, now(motion))
         if event == NONE:
             return
@@ -288,9 +301,13 @@ def _settle(plant: Record, motion: Record) -> None:
         _note(plant, motion, limit, wanted)
     direction = starts(plant, motion, state)
     if direction == 0:
+        if not (motion.valve_0 or motion.valve_1):
+            motion.side = 0
         return
-    motion.primed = 1 if holds_column(plant, motion, state) else 0
     motion.direction, motion.length, motion.started = direction, _first(plant, motion), state[0]
+    set_out(plant, motion)
+    if not motion.lifting:
+        motion.primed = 1 if holds_column(plant, motion, state) else 0
     _note(plant, motion, NONE, direction)
 
 
@@ -303,8 +320,13 @@ def _first(plant: Record, motion: Record) -> float:
 @in_place
 def _stop(plant: Record, motion: Record, event: int) -> None:
     """At rest: at a limit exactly, and with a column only where the law has one."""
-    _note(plant, motion, event, motion.direction)
     y, direction = motion.state, motion.direction
+    if motion.lifting:
+        # The liquid comes to rest in the tube, and the chambers are as they were.
+        place, event = front(plant, motion, y[X]), STALLED
+        y[X] = shown(plant, motion, y[X])
+        motion.front, motion.lifting = place, 0
+    _note(plant, motion, event, direction)
     little = _NOTHING_MOVED if motion.stopped != -direction else _LITTLE_MOVED
     # A start that moved nothing will move nothing again, until a valve or a gas pressure does.
     motion.balanced = 1 if not plant.line and abs(y[X] - motion.started) < little else 0

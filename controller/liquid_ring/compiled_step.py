@@ -16,6 +16,7 @@ import numpy as np
 from ringbalance.controller.compilation.compiled import in_place, inlined
 from ringbalance.controller.liquid_ring.compiled_column import accelerations, hydrostatic, steady
 from ringbalance.controller.liquid_ring.compiled_gas import gas_volume, line_rates, near_end, rest_after
+from ringbalance.controller.liquid_ring.compiled_lift import lift_rates, lift_speed
 from ringbalance.controller.liquid_ring.records import WORK, P, Record, U, X
 from ringbalance.scene.arrays import FloatArray
 
@@ -73,17 +74,24 @@ def _column(
     own, other = hydrostatic(plant, x), hydrostatic(plant, plant.total - x)
     f = plant.gas_factor
     at = (f * p, f * q, own[0], other[0]) if direction > 0 else (f * q, f * p, other[0], own[0])
-    speed = u * direction
-    if not plant.inertia:
+    speed, lifting = u * direction, motion.lifting > 0
+    if not plant.inertia and lifting:
+        speed = lift_speed(plant, motion, at, x)
+    elif not plant.inertia:
         speed = max(steady(plant, x, plant.total - x, p, q, primed, motion.log_speed)[0] * direction, 0.0)
-    found = accelerations(plant, at, speed, direction, primed, motion.log_speed)
+    if lifting:
+        found = lift_rates(plant, motion, at, x, speed)
+    else:
+        found = accelerations(plant, at, speed, direction, primed, motion.log_speed)
     by_u, by_up, by_down, by_far = found[2], found[3] * direction, found[4] * direction, found[5] * direction
     if direction > 0:
         by_x, by_p, by_q = by_up * own[1] - by_far * other[1], f * by_up, f * by_down
     else:
         by_x, by_p, by_q = by_far * own[1] - by_up * other[1], f * by_down, f * by_up
+    by_x += found[1] if lifting else 0.0
     if plant.inertia:
-        return speed * direction, min(found[0], found[1]) * direction, by_u, by_x, by_p, by_q
+        least = found[0] if lifting else min(found[0], found[1])
+        return speed * direction, least * direction, by_u, by_x, by_p, by_q
     part = -1.0 / by_u if by_u < 0.0 else 0.0
     return speed * direction, 0.0, 0.0, part * by_x, part * by_p, part * by_q
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ringbalance.controller.liquid_ring.compiled_lift import keep_front
 from ringbalance.controller.liquid_ring.compiled_march import advance, opening_within
 from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, packed, unpacked
 from ringbalance.controller.liquid_ring.records import WORKSPACE, X
@@ -42,6 +43,7 @@ def pass_time(
     state = packed(plant, fill=fill, primed=primed, motion=motion)
     notes = np.stack([instants, instants])
     advance(plant[0], state[0], float(instants[-1]), notes, 1, instants.size, np.zeros(WORKSPACE))
+    keep_front(plant[0], state[0])
     lowest, highest = max(0.0, total - dynamics.max_fill_ratio), min(total, dynamics.max_fill_ratio)
     return Passage(
         fills=np.clip(notes[1], lowest, highest),

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.controller.liquid_ring.column import Column
+from ringbalance.controller.liquid_ring.column import Column, Lift
 from ringbalance.controller.liquid_ring.records import EVENTS, MOTION, PIECES, PLANT, WORK, P, U
 from ringbalance.controller.liquid_ring.transfer import Event
 from ringbalance.physics.gas.supply import (
@@ -76,6 +76,9 @@ class Motion:
     pending: tuple[Switch, ...] = ()
     """At most an opening and a closing of one valve."""
     record: Record = field(default_factory=Record)
+    lifted: tuple[float, int] = (0.0, 0)
+    """Fraction of the path up to which liquid stands in the tube, and the direction in which that counts; 0:
+    both legs stand at their chambers' levels."""
 
     @property
     def rests(self) -> bool:
@@ -108,6 +111,8 @@ class Dynamics:
     """Largest x of a chamber."""
     residual: float = 0.0
     """Fill of a driven chamber that no command goes below."""
+    lift: Lift | None = None
+    """None: liquid passes the crest as soon as the gas can hold it there."""
 
     def plant(self, *, total: float, relative_error: float = RELATIVE_ERROR) -> npt.NDArray[np.void]:
         """Record of type `PLANT`, shape (1,), of a pair with a sum of fill ratios."""
@@ -145,6 +150,10 @@ def _filled(dynamics: Dynamics, total: float, relative_error: float) -> npt.NDAr
         for name in names if source is not None else ():
             plant[name] = getattr(source, name)
     plant["crest"] = column.crest is not None
+    plant["hold_up"] = dynamics.tube_area * column.length / dynamics.chamber_volume
+    if dynamics.lift is not None and column.crest is not None:
+        plant["lifts"] = True
+        plant["lift_straight"], plant["lift_entrance"] = dynamics.lift.straight, dynamics.lift.entrance
     plant["crest_end"], plant["return_crest_end"] = column.crest_ends
     plant["total"], plant["relative_error"], plant["most_steps"] = total, relative_error, MOST_STEPS
     plant["first_step"] = _FIRST_STEP * (relative_error / RELATIVE_ERROR) ** 0.25
@@ -186,6 +195,8 @@ def packed(
     chamber = record.chamber
     for switch in motion.pending:
         state["opens" if switch.opens else "closes"], chamber = switch.after, switch.chamber
+    direction, (front, side) = int(np.sign(motion.velocity)), motion.lifted
+    stop = float(known["crest_end" if side > 0 else "return_crest_end"])
     for name, value in {
         "log_speed": log_speed,
         "length": known["first_step"],
@@ -198,7 +209,10 @@ def packed(
         "primed": primed,
         "valve_0": motion.valves[0],
         "valve_1": motion.valves[1],
-        "direction": np.sign(motion.velocity),
+        "direction": direction,
+        "front": front,
+        "side": side,
+        "lifting": direction != 0 and side == direction and not primed and front < stop,
         "chamber": chamber,
         "regime_start": record.regime_start,
         "regime_end": record.regime_end,
@@ -221,6 +235,7 @@ def unpacked(plant: npt.NDArray[np.void], state: npt.NDArray[np.void]) -> Motion
         pending=tuple(
             Switch(after=after, chamber=chamber, opens=opens) for after, opens in waiting if after < math.inf
         ),
+        lifted=(float(one["front"]), int(one["side"])),
         record=Record(
             chamber=chamber,
             fill=float(one["fill_before"]),

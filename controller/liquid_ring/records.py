@@ -32,6 +32,9 @@ _PLANT_REAL: Final = (
     "vapour_pressure",  # gauge, Pa
     "released",  # as in `SiphonCrest`
     "froude_velocity",  # m/s
+    "lift_straight",  # of `Lift`
+    "lift_entrance",
+    "hold_up",  # S L/V, fill ratio that the whole tube takes
     "gas_off",  # gauge, Pa, at or below which a chamber counts as without gas in a tube without a crest
     "gas_factor",  # gas pressure on the liquid over the one at the place of measurement
     "valve_lag",  # s
@@ -55,6 +58,7 @@ _PLANT_WHOLE: Final = (
     "trapped",
     "one_way",  # whether liquid leaves only a chamber that has gas, as in the paper's Eq. 19
     "inertia",
+    "lifts",  # whether an unprimed tube is filled up to the crest before liquid passes
     "line",  # whether valve and line take time to pass gas
     "most_steps",
 )
@@ -88,6 +92,7 @@ _MOTION_REAL: Final = (
     "residual",  # fill of a driven chamber that no command goes below
     "closing_pressure",  # of the driven chamber's gas when its valve closed, gauge, Pa
     "run_dry",  # time for which its valve stays open to the empty chamber, s
+    "front",  # fraction of the path up to which liquid stood in the tube at `started`, from chamber `side`
 )
 _MOTION_WHOLE: Final = (
     "primed",
@@ -102,6 +107,8 @@ _MOTION_WHOLE: Final = (
     "regime_start",  # values of `Regime`
     "regime_end",
     "event",  # index into `EVENTS`
+    "lifting",  # whether the liquid that moves has not reached the end of the crest yet
+    "side",  # direction in which `front` counts; 0: the legs stand at their chambers' levels
 )
 MOTION: Final = np.dtype(
     [("state", np.float64, (8,))]  # x, u, p, q (absolute), m R of both gases, work of both gases

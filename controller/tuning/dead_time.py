@@ -1,4 +1,4 @@
-"""The dead time of the valves: what of a valve-open time only fills gas, and what a controller does about it.
+"""Dead time: what of a valve-open time fills gas or lifts liquid to the crest, and what is done about it.
 
 An injection that is commanded for a share s of the gain's vector stays open for s + o, o the offset
 `controller.gas_time_offset`.  With a dead time d of its chamber it moves nothing while s + o <= d, so an
@@ -14,14 +14,21 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.terms import run_models, terms_modelled
+from ringbalance.controller.liquid_ring.interval import pass_time
+from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, Switch
+from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import balanced_fills, vibration_rates
+from ringbalance.physics.roots import bracketed_root
 from ringbalance.reduced_model.gas_line import line_ends, short_injection, standing_amplitude
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.selection.estimates import FILLING
+from ringbalance.reduced_model.selection.estimates import FILLING, HELD
 from ringbalance.reduced_model.short_injection import Fills
 from ringbalance.scene.models import Scene
 
+_TAIL: Final = 0.5
+"""s, in which a vented column has come to rest."""
+_LONGEST: Final = 0.1
+"""s, that a lift can take."""
 _DIGITS: Final = 4
 """Of an offset in s: a tenth of a millisecond."""
 
@@ -29,24 +36,54 @@ _DIGITS: Final = 4
 def dead_times(scene: Scene, model: BalancerModel) -> tuple[float, ...]:
     """Of every chamber at the balanced fills, for a correction of the size of the limit, s.
 
-    Empty where runs do not model the filling of gas; zero for a chamber that the gas cannot drive.
+    Empty where runs model neither the filling of gas nor the lift to the crest; zero for a chamber that the
+    gas cannot drive.
     """
-    if FILLING not in terms_modelled(run_models(scene=scene, model=model)):
+    modelled = terms_modelled(run_models(scene=scene, model=model))
+    if not {FILLING, HELD} & set(modelled):
         return ()
+    dynamics = None if FILLING in modelled else dynamics_of(scene=scene, model=model, modelled=modelled)
     total, fills = 2 * scene.disc.initial_fill, balanced_fills(scene, model)
     driven, rates = np.concatenate([fills, total - fills]), vibration_rates(scene, model)
     return tuple(
-        _dead_time(scene, Fills(model=model, driven=float(x), opposite=float(total - x)), rate=float(b))
+        _dead_time(
+            scene, Fills(model=model, driven=float(x), opposite=float(total - x)), dynamics, rate=float(b)
+        )
         for x, b in zip(driven, rates.T.ravel(), strict=True)
     )
 
 
-def _dead_time(scene: Scene, fills: Fills, *, rate: float) -> float:
+def _dead_time(scene: Scene, fills: Fills, dynamics: Dynamics | None, *, rate: float) -> float:
     injection = short_injection(scene, line_ends(scene)[0], fills)
     if injection is None or rate == 0.0:
         return 0.0
-    metres = scene.controller.limit / rate * fills.steady_velocity(scene.gas.pressure)
-    return round(max(float(injection.dead_time(metres)), 0.0), _DIGITS)
+    steady = scene.controller.limit / rate
+    metres = steady * fills.steady_velocity(scene.gas.pressure)
+    lost = injection.dead_time(metres) if dynamics is None else _lost(fills, dynamics, metres, steady)
+    return round(max(float(lost), 0.0), _DIGITS)
+
+
+def _lost(fills: Fills, dynamics: Dynamics, metres: float, steady: float) -> float:
+    """Valve-open time that the plant loses of the injection that moves the column by `metres`, s."""
+    total, lag = fills.driven + fills.opposite, dynamics.valve_lag
+    per_metre = dynamics.tube_area / dynamics.chamber_volume
+
+    def short(opening: float) -> float:
+        valve = tuple(Switch(after=lag + after, chamber=0, opens=after == 0.0) for after in (0.0, opening))
+        end = pass_time(
+            dynamics,
+            fill=fills.driven,
+            total=total,
+            primed=False,
+            motion=Motion(pending=valve),
+            instants=np.array([lag + opening + _TAIL]),
+        )
+        return (fills.driven - end.fill) / per_metre - metres
+
+    longest = steady + _LONGEST
+    if not short(steady) < 0 < short(longest):
+        return 0.0
+    return bracketed_root(short, steady, longest, tolerance=1e-5) - steady
 
 
 def compensated(scene: Scene, model: BalancerModel, dead: tuple[float, ...]) -> Scene:
@@ -87,6 +124,7 @@ def standing_remedy(scene: Scene, model: BalancerModel) -> str:
     still = dead_zone(scene, model, mended)
     by = "law" if scene.controller.kind == "law_based" else "gain alone"
     return (
-        f"a command by the {by} moves no liquid up to {1e6 * still:.3g} um, it only fills gas: set "
+        f"a command by the {by} moves no liquid up to {1e6 * still:.3g} um, it only fills gas or lifts "
+        "liquid to the crest: set "
         f"{offset_text(mended)}"
     )

@@ -58,11 +58,14 @@ class SettlingTimes:
     beyond_pressure: float = 0.0
     """The same with the fills to which the scene's gas drives the liquid."""
 
+    def explained_by(self, fraction: float) -> bool:
+        """Whether a fraction of the runs is most of those that do not settle."""
+        return fraction > 0.0 and fraction >= (1.0 - self.settled.value) / 2.0
+
     @property
-    def capacity_explains(self) -> bool:
-        """Whether 95 % cannot settle for want of liquid, and next to nothing else keeps them from it."""
-        others = 1.0 - self.settled.value - self.beyond_capacity
-        return self.quantiles["p95"] is None and self.beyond_capacity > TOO_MANY >= others
+    def out_of_capacity(self) -> bool:
+        """Whether the disc's capacity alone keeps 95 % from settling, and little else does."""
+        return self.beyond_capacity > TOO_MANY and self.explained_by(self.beyond_capacity)
 
     def rows(self, limit: float) -> dict[str, str]:
         """As a person reads them; `limit` is the time that each run had, s."""

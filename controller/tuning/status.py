@@ -5,7 +5,7 @@ from __future__ import annotations
 from ringbalance.controller.liquid_ring.reach import BEYOND_CAPACITY, RUNS_BACK
 from ringbalance.controller.tuning.loop_factor import LoopFactor
 from ringbalance.controller.tuning.search import LIMITS, Candidate, Search
-from ringbalance.controller.tuning.settling import TOO_MANY, SettlingTimes
+from ringbalance.controller.tuning.settling import SettlingTimes
 from ringbalance.scene.models import Scene
 
 
@@ -52,23 +52,25 @@ def status_of(
         f"{settling.settled.value:.1%} of the runs settle within the time limit of "
         f"{scene.run.time_limit:.4g} s{also}: 95 % is not reached"
     )
-    if settling.capacity_explains:
+    if settling.explained_by(settling.beyond_capacity):
         return (
             f"{share}; {settling.beyond_capacity:.1%} of them would need more moment than the disc can form "
             f"above its residual fill: {BEYOND_CAPACITY}"
         )
     if found is not None and found.needs is not None and found.needs > scene.run.time_limit:
         return f"{share}; they need some {found.needs:.2g} s: raise run.time_limit"
-    if settling.beyond_pressure > TOO_MANY:
+    if settling.explained_by(settling.beyond_pressure):
         return (
             f"{share}, nor by other gains; in {settling.beyond_pressure:.1%} of the runs the gas does not "
             f"drive the liquid far enough at {scene.gas.pressure / 1e6:.3g} MPa: raise gas.pressure"
         )
-    if settling.drifted > TOO_MANY:
+    if settling.explained_by(settling.drifted):
         return (
             f"{share}, nor by other gains and pressures; in {settling.drifted:.1%} of the runs the full tube "
             f"lets liquid run back while the gas is off: {RUNS_BACK}"
         )
+    if found is not None and found.settles:
+        return f"{share}: raise controller.limit"
     return f"{share}, nor by other gains and pressures{_reached(found)}"
 
 

@@ -111,7 +111,7 @@ def tune(
     if best is not None:
         told("settling times ...")
         settling = settling_times(best.scene, model, known.widths, members=members, runs=runs, told=told)
-        if settling.quantiles["p95"] is None and not settling.capacity_explains:
+        if settling.quantiles["p95"] is None and not settling.out_of_capacity:
             found = search(scene, model, known, base=best, told=told)
             if found.best is not best:
                 best = found.best

@@ -1,4 +1,4 @@
-"""Other laws of the tube's flow, which data are asked to tell from the fitted one."""
+"""Other laws of the tube's flow and of eccentric masses, which data are asked to tell from the fitted one."""
 
 from __future__ import annotations
 
@@ -22,6 +22,15 @@ UNSPILT: Final = "a column that runs full without spilling first"
 EXPONENTS: Final[Mapping[str, float]] = MappingProxyType({LAMINAR: 1.0, TURBULENT: 2.0})
 """Of the loss over the velocity, of those of these laws that are powers."""
 _OF_THE_CREST: Final = (UNBROKEN, BROKEN, UNSPILT)
+
+WITHOUT: Final[Mapping[str, tuple[str, tuple[str, ...]]]] = MappingProxyType(
+    {
+        "a rotor without damping": ("run_up", ("rotor.damping",)),
+        "masses without friction": ("positioning", ("masses.friction_arm[0]", "masses.friction_arm[1]")),
+        "a motor without back EMF": ("positioning", ("motor.back_emf_constant",)),
+    }
+)
+"""Of eccentric masses: the kind of data that an effect moves, and the values that are zero without it."""
 
 
 def power_of(law: CalibratedLaw, velocity: float, exponent: float) -> CalibratedLaw:

@@ -11,13 +11,15 @@ import numpy as np
 
 from ringbalance.identification.criticism.at_solution import AtSolution, at_solution
 from ringbalance.identification.criticism.law_comparison import LawComparison, compare_laws
-from ringbalance.identification.criticism.other_laws import EXPONENTS, laws_to_compare, other_law
+from ringbalance.identification.criticism.other_laws import EXPONENTS, WITHOUT, laws_to_compare, other_law
 from ringbalance.identification.criticism.patterns import Criticism, criticise
 from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.predict.device import device_of
 from ringbalance.identification.result import FitResult
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.models import Scene
+from ringbalance.scene.uncertain import eccentric_with
 
 _BY_LAW: Final = ("injection", "transfer", "flow")
 """Kinds that the law of the tube's flow decides on."""
@@ -29,7 +31,12 @@ class Review:
 
     criticism: Criticism
     laws: tuple[LawComparison, ...]
-    """The fitted law of the tube's flow against others; empty where no data depend on it."""
+    """The fitted law against others; empty where no data depend on one."""
+
+    @property
+    def holds(self) -> bool:
+        """Whether the fit describes the data, and no other law does so better."""
+        return self.criticism.describes and all(each.outcome != "other" for each in self.laws)
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -47,20 +54,41 @@ def review(result: FitResult) -> Review:
 
 
 def _comparisons(result: FitResult, found: AtSolution) -> Iterator[LawComparison]:
-    problem, t = result.optimum.residuals.problem, result.optimum.t
+    best = result.optimum
+    problem, scene = best.residuals.problem, best.residuals.problem.scene_at(best.t)
+    predictions = _by_other_tubes if isinstance(scene, Scene) else _by_other_machines
+    for name, predicted in predictions(problem, scene):
+        residuals = found.turned(best.residuals.at(best.t, predicted=predicted))
+        yield compare_laws(found.fit, other=name, residuals=residuals)
+
+
+def _by_other_machines(problem: Problem, scene: EccentricScene) -> Iterator[tuple[str, FloatArray]]:
+    """Without one of the effects that move the data, unless its size is fitted: then its interval tells."""
+    fitted = {parameter.name for parameter in problem.parameters}
+    kinds = {block.observations.kind for block in problem.blocks}
+    for name, (kind, paths) in WITHOUT.items():
+        if kind in kinds and not fitted & set(paths):
+            other = scene
+            for path in paths:
+                other = eccentric_with(other, 0.0, name=path)
+            yield name, problem.predicted(other)
+
+
+def _by_other_tubes(problem: Problem, scene: Scene) -> Iterator[tuple[str, FloatArray]]:
+    """By other laws of the tube's flow, where data depend on it."""
     blocks = [b for b in problem.blocks if b.observations.kind in _BY_LAW]
-    if not blocks or not isinstance(problem.scene, Scene):
+    if not blocks:
         return
-    scene, law = problem.scene_at(t), device_of(problem.scene_at(t), problem.models).law
-    velocity = _typical_velocity(scene, problem, blocks)
+    law, velocity = device_of(scene, problem.models).law, _typical_velocity(scene, problem, blocks)
     for name in laws_to_compare(law):
         models = replace(problem.models, other=partial(other_law, name=name, velocity=velocity))
         other = replace(problem, models=models)
-        predicted = np.concatenate(
-            [b.whiten @ _predicted(b, scene, other, EXPONENTS.get(name)) for b in problem.blocks]
+        yield (
+            name,
+            np.concatenate(
+                [b.whiten @ _predicted(b, scene, other, EXPONENTS.get(name)) for b in problem.blocks]
+            ),
         )
-        residuals = found.turned(result.optimum.residuals.at(t, predicted=predicted))
-        yield compare_laws(found.fit, other=name, residuals=residuals)
 
 
 def _predicted(block: Block, scene: Scene, problem: Problem, exponent: float | None) -> FloatArray:

@@ -17,16 +17,11 @@ from ringbalance.identification.predict import (
     pressures,
     run_ups,
     transfers,
-    trial_amplitudes,
     trial_weights,
 )
-from ringbalance.identification.predict.scalars import scalar_covariance
-from ringbalance.identification.predict.vibration import (
-    measured_covariance,
-    measured_vectors,
-    vector_noise_given,
-)
+from ringbalance.identification.predict.vibration import parts, spread_out, vector_covariance, vectors
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.uncertain import NORMAL_95
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,8 +41,18 @@ class PredictedKind:
     """The measured column whose noise it is."""
     too_long: Callable[[Any, Observations], str]
     """Scene and observations to why predictions would take too long; empty where they do not."""
-    informs: tuple[str, ...]
+    informs: Callable[[Observations], tuple[str, ...]]
     """Parameters that are fitted to such data where the user names none."""
+
+
+def _always(*names: str) -> Callable[[Observations], tuple[str, ...]]:
+    return lambda _: names
+
+
+def _scalar_covariance(observations: Observations, column: str) -> FloatArray:
+    """Of errors that are independent from row to row, shape (n, n); unit where their noise is not given."""
+    given = observations.uncertainty.get(column)
+    return np.diag(np.ones(len(observations)) if given is None else (given / NORMAL_95) ** 2)
 
 
 def _never(_scene: Any, _observations: Observations) -> str:
@@ -67,14 +72,14 @@ def _nothing_free(numbers_per_row: int) -> Callable[[Observations], FloatArray]:
 def _numbers(
     predict: Callable[..., FloatArray],
     column: Callable[[Observations], str],
-    *informs: str,
+    informs: Callable[[Observations], tuple[str, ...]],
     too_long: Callable[[Any, Observations], str] = _never,
 ) -> PredictedKind:
     """One measured number a row, its errors independent from row to row."""
     return PredictedKind(
         predict=predict,
         measured=lambda observations: observations.columns[column(observations)],
-        covariance=lambda observations: scalar_covariance(observations, column(observations)),
+        covariance=lambda observations: _scalar_covariance(observations, column(observations)),
         noise_given=lambda observations: column(observations) in observations.uncertainty,
         free=_nothing_free(1),
         column=column,
@@ -85,15 +90,17 @@ def _numbers(
 
 def _vibrations(
     predict: Callable[[Any, Observations], FloatArray],
-    *informs: str,
+    informs: Callable[[Observations], tuple[str, ...]],
     free: Callable[[Observations], FloatArray],
 ) -> PredictedKind:
     """One measured vibration a row."""
     return PredictedKind(
         predict=_by_scene_alone(predict),
-        measured=measured_vectors,
-        covariance=measured_covariance,
-        noise_given=vector_noise_given,
+        measured=lambda observations: parts(vectors(observations)),
+        covariance=lambda observations: spread_out(
+            vector_covariance(observations, given="amplitude" in observations.uncertainty)
+        ),
+        noise_given=lambda observations: "amplitude" in observations.uncertainty,
         free=free,
         column=lambda _: "amplitude",
         too_long=_never,
@@ -104,14 +111,12 @@ def _vibrations(
 PREDICTED: Final[Mapping[str, PredictedKind]] = MappingProxyType(
     {
         "trial_weight": _vibrations(
-            trial_weights.predict, "influence_coefficient", "lag_angle", free=trial_weights.free
+            trial_weights.predict, _always("influence_coefficient", "lag_angle"), trial_weights.free
         ),
         "trial_amplitude": _numbers(
-            _by_scene_alone(trial_amplitudes.predict),
+            _by_scene_alone(trial_weights.amplitudes),
             lambda _: "amplitude",
-            "influence_coefficient",
-            "initial_amplitude",
-            "initial_phase",
+            _always("influence_coefficient", "initial_amplitude", "initial_phase"),
         ),
         "injection": PredictedKind(
             predict=injections.predict,
@@ -121,25 +126,20 @@ PREDICTED: Final[Mapping[str, PredictedKind]] = MappingProxyType(
             free=_nothing_free(2),
             column=lambda _: "amplitude_after",
             too_long=_never,
-            informs=("lambda_factor", "bore", "extra_loss"),
+            informs=_always("lambda_factor", "bore", "extra_loss"),
         ),
-        "transfer": _numbers(transfers.predict, transfers.column, "bore", "extra_loss"),
-        "flow": _numbers(flows.predict, lambda _: "flow_rate", "bore", "extra_loss"),
-        "pressure": _numbers(_by_scene_alone(pressures.predict), lambda _: "pressure", "density"),
+        "transfer": _numbers(transfers.predict, transfers.column, _always("bore", "extra_loss")),
+        "flow": _numbers(flows.predict, lambda _: "flow_rate", _always("bore", "extra_loss")),
+        "pressure": _numbers(_by_scene_alone(pressures.predict), lambda _: "pressure", _always("density")),
         "run_up": _vibrations(
             run_ups.predict,
-            "rotor.stiffness",
-            "rotor.damping",
-            "imbalance.mass",
-            "imbalance.phase",
-            free=_nothing_free(2),
+            _always("rotor.stiffness", "rotor.damping", "imbalance.mass", "imbalance.phase"),
+            _nothing_free(2),
         ),
         "positioning": _numbers(
             _by_scene_alone(positionings.predict),
             lambda _: "angle",
-            "masses.friction_arm[0]",
-            "motor.torque_constant",
-            "motor.back_emf_constant",
+            positionings.informs,
             too_long=positionings.too_long,
         ),
     }

@@ -1,17 +1,16 @@
 """Way of one eccentric mass under a constant voltage of its motor, the other one clamped.
 
-The first mass starts at rest from its place in the scene, on a rotor that whirls steadily at constant speed.
+It starts at rest from its place in the scene, on a rotor that whirls steadily at constant speed.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from ringbalance.controller.compilation.signals import signals_deferred
 from ringbalance.controller.eccentric_mass.plant.friction import LOCKED, STUCK
 from ringbalance.controller.eccentric_mass.plant.integrate import plant_step, substeps
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
@@ -30,20 +29,31 @@ _MOST_SUBSTEPS: Final = 20_000
 def predict(scene: EccentricScene, observations: Observations) -> FloatArray:
     """Angles moved, rad, shape (n,), by the plant's equations of motion.
 
-    Rows of one series, voltage and speed are one motion.
+    Rows of one series, mass, voltage and speed are one motion.
     """
     plant = plant_parameters(scene)
     found = np.empty(len(observations))
-    for voltage, speed, rows in _motions(observations):
-        times = observations.columns["time"][rows]
-        found[rows] = _moved(plant, scene.masses.initial_angle, voltage=voltage, speed=speed, times=times)
+    for motion, rows in _motions(observations):
+        found[rows] = _moved(plant, scene.masses.initial_angle, motion, observations.columns["time"][rows])
     return found
+
+
+def moved_masses(observations: Observations) -> IntArray:
+    """Index, 0 or 1, of the mass that each row moves."""
+    return np.asarray(observations.columns.get("moved_mass", np.ones(len(observations))) - 1, dtype=np.int64)
+
+
+def informs(observations: Observations) -> tuple[str, ...]:
+    """Friction of every mass that moves, and the motor."""
+    arms = (f"masses.friction_arm[{mass}]" for mass in sorted(set(moved_masses(observations).tolist())))
+    return (*arms, "motor.torque_constant", "motor.back_emf_constant")
 
 
 def too_long(scene: EccentricScene, observations: Observations) -> str:
     """Why these motions would take too long to integrate, as a fit does some hundred times; else empty."""
     plant, times = plant_parameters(scene), observations.columns["time"]
-    steps = sum(substeps(plant, speed, 0.0, times[rows[-1]]) for _, speed, rows in _motions(observations))
+    motions = _motions(observations)
+    steps = sum(substeps(plant, motion.speed, 0.0, times[rows[-1]]) for motion, rows in motions)
     if steps <= MOST_STEPS:
         return ""
     return (
@@ -52,37 +62,38 @@ def too_long(scene: EccentricScene, observations: Observations) -> str:
     )
 
 
-def _motions(observations: Observations) -> Iterator[tuple[float, float, IntArray]]:
-    """Voltage and speed of every motion, and its rows in the order of their times."""
-    columns = observations.columns
-    motions: dict[tuple[str, float, float], list[int]] = {}
-    for row in range(len(observations)):
-        key = str(observations.series[row]), float(columns["voltage"][row]), float(columns["speed"][row])
-        motions.setdefault(key, []).append(row)
-    for (_, voltage, speed), rows in motions.items():
-        order = np.argsort(columns["time"][rows], kind="stable")
-        yield voltage, speed, np.array(rows)[order]
+class _Motion(NamedTuple):
+    series: str
+    mass: int
+    """Index."""
+    voltage: float
+    speed: float
+
+
+def _motions(observations: Observations) -> Iterator[tuple[_Motion, IntArray]]:
+    """Every motion, and its rows in the order of their times."""
+    columns, series = observations.columns, observations.series.tolist()
+    set_to = zip(series, moved_masses(observations), columns["voltage"], columns["speed"], strict=True)
+    rows_of: dict[_Motion, list[int]] = {}
+    for row, values in enumerate(set_to):
+        rows_of.setdefault(_Motion(*values), []).append(row)
+    for motion, rows in rows_of.items():
+        yield motion, np.array(rows)[np.argsort(columns["time"][rows], kind="stable")]
 
 
 def _moved(
-    plant: PlantParameters,
-    angles: tuple[float, float],
-    *,
-    voltage: float,
-    speed: float,
-    times: FloatArray,
+    plant: PlantParameters, angles: tuple[float, float], motion: _Motion, times: FloatArray
 ) -> FloatArray:
-    """Angle moved by the first mass at rising times, rad."""
-    state, flags = rest_state(angles), np.array([STUCK, LOCKED], dtype=np.int64)
+    """Angle moved at rising times, rad."""
+    speed, mass = float(motion.speed), motion.mass
+    state, flags = rest_state(angles), np.where(np.arange(2) == mass, STUCK, LOCKED)
     whirl = steady_whirl(plant, speed, angles) if speed else 0j
     state[0], state[1] = whirl.real, whirl.imag
-    command, found, now = np.array([voltage, 0.0]), np.empty(times.size), 0.0
+    command, found, now = motion.voltage * (np.arange(2) == mass), np.empty(times.size), 0.0
     for place, time in enumerate(times.tolist()):
         parts = math.ceil(substeps(plant, speed, 0.0, time - now) / _MOST_SUBSTEPS) if time > now else 0
         for _ in range(parts):
-            # Numba hands arrays over through a Python function, in which an interrupt would be an error.
-            with signals_deferred():
-                state, flags = plant_step(plant, state, flags, command, speed, 0.0, (time - now) / parts)
+            state, flags = plant_step(plant, state, flags, command, speed, 0.0, (time - now) / parts)
         now = time
-        found[place] = state[4] - angles[0]
+        found[place] = state[4 + mass] - angles[mass]
     return found

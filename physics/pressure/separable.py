@@ -101,7 +101,7 @@ def _profile(logs: FloatArray, axis: int) -> FloatArray:
 
 def _assembled(shapes: FloatArray, weights: FloatArray) -> FloatArray:
     """Matrix over one axis's nodes of the integrals of products of its functions or their slopes."""
-    local = np.einsum("qi,qj,qc->cij", shapes, shapes, weights, optimize=True)
+    local = shapes.T @ (weights.T[:, :, None] * shapes)
     order = shapes.shape[1] - 1
     matrix = np.zeros((order * len(local) + 1,) * 2)
     for k, block in enumerate(local):

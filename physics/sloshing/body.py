@@ -43,9 +43,15 @@ from ringbalance.scene.arrays import ComplexArray, FloatArray
 
 _NOISE: Final = 0.05
 """Part of a field of norm 1 that is new, below which it is the mesh's error and not taken up."""
+_PLANE: Final = 4
+"""Highest power of x + i y in the first level."""
+_ROUGH: Final = 0.02
+"""Squared error of a potential, relative, above which the mesh does not resolve it, and it is left out."""
+_SMALL: Final = 1e-3
+"""As `_NOISE`, for potentials: these are smooth."""
 _SHIFT: Final = 0.3
 """Of the squared frequencies, which makes the matrix of the potentials positive."""
-_ITERATIONS: Final = 12
+_ITERATIONS: Final = 9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,12 +109,21 @@ def reduced_waves(
     """
     fields = Fields(space, level)
     waves = _potentials(fields, potentials)
-    first = fields.new_directions(fields.gradient @ waves, [], _NOISE)
-    driven = fields.gradient @ fields.harmonic(space.body.nodes[:, :2])
-    blocks = [np.concatenate([first, fields.new_directions(driven, [first], _NOISE)], axis=1)]
+    errors = _squared_errors(space, space.gradient @ waves)
+    resolved = errors < _ROUGH
+    first = fields.new_directions(fields.gradient @ waves[:, resolved], [], _NOISE)
+    plane = fields.gradient @ fields.harmonic(_plane_functions(space.body.nodes))
+    blocks = [np.concatenate([first, fields.new_directions(plane, [first], _SMALL)], axis=1)]
     for _ in range(levels):
         blocks.append(fields.new_directions(fields.coriolis_part(blocks[-1]), blocks, _NOISE))
-    return _assembled(fields, wall, blocks, _squared_errors(space, space.gradient @ waves))
+    return _assembled(fields, wall, blocks, errors[resolved])
+
+
+def _plane_functions(places: FloatArray) -> FloatArray:
+    """Real and imaginary parts of (x + i y)^m as columns, of about the same size."""
+    turning = places[:, 0] + 1j * places[:, 1]
+    powers = (turning / np.abs(turning).max())[:, None] ** np.arange(1, _PLANE + 1)
+    return np.concatenate([powers.real, powers.imag], axis=1)
 
 
 def _potentials(fields: Fields, count: int) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Waves on the ring in an imported chamber: natural frequencies, the answer to gravity across the shaft."""
+"""Waves on the ring in an imported chamber: natural frequencies, and the answer to gravity across a shaft."""
 
 from __future__ import annotations
 
@@ -18,13 +18,17 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 
 WALL: Final = "outer_wall"
-LEVELS: Final = 3
-"""Of the Coriolis force: on a full ring they bring waves along the shaft within 0.3 %."""
-_SPARE: Final = 7
+LEVELS: Final = 2
+"""Of the Coriolis force: more bring in scales that a mesh does not resolve."""
+_SAFETY: Final = 1.25
+"""On the change from the last level."""
+_SPARE: Final = 5
 """Potentials beyond the waves asked for: rotation mixes neighbours."""
-_OF_SURFACE: Final = 0.35
-"""Share of a wave's kinetic energy in potential flow from which it is a wave of the surface; the liquid's
-inertial waves have less."""
+_OF_SURFACE: Final = 0.6
+"""Share of a wave's kinetic energy in potential flow from which it is a wave of the surface: those of a full
+ring, where both kinds are known in closed form, have 0.7 and more."""
+_PERHAPS: Final = 0.35
+"""The same with one level less, where a wave is only looked for again."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,7 +90,8 @@ def ring_waves(
         gravity: across the shaft, m/s^2: turns in the disc's frame.
         axial_gravity: along the shaft, m/s^2: shapes the surface and excites no wave.
         frequency_ratio: s of the force, above 0; 1 for gravity.
-        modes: number of frequencies, 1 to 12.
+        modes: number of frequencies, 1 to 12; fewer come back where a coarse mesh does not tell waves of the
+            surface from inertial ones.
         levels: of the Coriolis force, 2 or more; the change from the last one is part of the uncertainty.
     Returns: RingWaves.  Status NO_RING where gravity exceeds omega^2 a, OUT_OF_RANGE where waves would not be
         small, NOT_CONVERGED where a linear solve failed.
@@ -102,7 +107,7 @@ def ring_waves(
     counts = system.reduced.levels[-2:]
     before, last = (np.array(_answer(system.reduced, n, frequency_ratio, ekman)) for n in counts)
     scale = gravity / angular_velocity**2
-    change = np.abs(last - before) + last * system.faceting
+    change = _SAFETY * np.abs(last - before) + last * (system.faceting + system.reduced.squared_errors[0])
     amplitude = Estimate(value=np.array(scale * last[2]), uncertainty=np.array(scale * change[2]))
     return RingWaves(
         surface_radius=surface_radius,
@@ -143,15 +148,15 @@ def _system(geometry: ChamberGeometry, radius: float, tilt: float, modes: int, l
 def _frequencies(system: _System, modes: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Frequencies of the surface's waves, their vortical shares and expanded uncertainties."""
     reduced = system.reduced
-    values, potential, weights = _waves(reduced, reduced.levels[-1])
-    before = _waves(reduced, reduced.levels[-2])[0]
+    values, potential, weights = _waves(reduced, reduced.levels[-1], _OF_SURFACE)
+    before = _waves(reduced, reduced.levels[-2], _PERHAPS)[0]
     errors = reduced.squared_errors
     change = np.abs(values[:, None] - before).min(axis=1)
-    widths = change + values * (weights[:, : errors.size] @ errors / 2 + system.faceting)
+    widths = _SAFETY * change + values * (weights[:, : errors.size] @ errors / 2 + system.faceting)
     return values[:modes], 1 - potential[:modes], widths[:modes]
 
 
-def _waves(reduced: ReducedWaves, fields: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _waves(reduced: ReducedWaves, fields: int, least: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Frequencies with so many fields, the kinetic energy's potential share, and its parts by field.
 
     The oscillator c'' + 2 C c' + A c = 0 is d/dt (c', A^(1/2) c) = B (...) with a real antisymmetric B, whose
@@ -166,7 +171,7 @@ def _waves(reduced: ReducedWaves, fields: int) -> tuple[FloatArray, FloatArray, 
     kinetic = np.abs(shapes[:fields].T) ** 2
     parts = kinetic / kinetic.sum(axis=1, keepdims=True)
     potential = parts[:, : reduced.levels[0]].sum(axis=1)
-    kept = (potential > _OF_SURFACE) & (values[values > 0] > _SLOWEST)
+    kept = (potential > least) & (values[values > 0] > _SLOWEST)
     return values[values > 0][kept], potential[kept], parts[kept]
 
 
@@ -215,5 +220,5 @@ def _status(system: _System, radius: float, amplitude: float, tilt: float) -> St
     return Status()
 
 
-_ACCEPTED: Final = 1e-7
+_ACCEPTED: Final = 1e-6
 """Relative residual of a projection."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.operating.pressure_profile import HumpProfile, hump_profile
-from ringbalance.reduced_model.tube.path import path_angle
+from ringbalance.reduced_model.tube.path import crest_middle, path_angle
 from ringbalance.scene.models import Scene
 
 
@@ -49,7 +49,8 @@ class TubeLiquid:
     limit: float
     """Of the vibration, m."""
     returned_volume: float
-    """Liquid that each injection lifts to the crest and that falls back when the gas is vented, m^3."""
+    """Liquid that each injection lifts to the middle of the crest and that falls back when the gas is vented,
+    m^3; runs lift it from the level, where gas lies over the crest."""
 
     @property
     def above_limit(self) -> bool:
@@ -103,8 +104,12 @@ def _state(profile: HumpProfile) -> str:
 
 
 def _returned(scene: Scene, *, flowing: HumpProfile, after: HumpProfile) -> float:
-    """Volume between where the near column ends at rest and the crest; none where the tube stays full."""
-    if flowing.velocity == 0 or flowing.hump_path is None or np.all(after.full):
+    """Volume between where the near column ends at rest and the crest's middle; none in a full tube.
+
+    What lies on the crest's circle is pulled to neither side and drains to both.
+    """
+    if flowing.velocity == 0 or scene.tube.hump_radius is None or np.all(after.full):
         return 0.0
     near = float(after.path[int(np.argmin(after.full))])
-    return math.pi / 4 * scene.tube.bore**2 * max(flowing.hump_path - near, 0.0)
+    parts = crest_middle(scene.tube) * scene.tube.length
+    return math.pi / 4 * scene.tube.bore**2 * max(parts - near, 0.0)

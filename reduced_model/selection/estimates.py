@@ -55,7 +55,7 @@ from ringbalance.reduced_model.time_scales import (
     start_up_loss,
     start_up_time,
 )
-from ringbalance.reduced_model.tube.path import crest_span, share_at_radius
+from ringbalance.reduced_model.tube.path import crest_middle, share_at_radius
 from ringbalance.scene.accuracy import FINEST
 from ringbalance.scene.models import Scene
 from ringbalance.scene.tube_models import TubeModels
@@ -244,7 +244,7 @@ def injection_estimates(scene: Scene) -> Mapping[str, TermEstimate]:
 
 
 def _held(scene: Scene, flow: RangeFlow, deciding: float, within: str) -> Row:
-    """What is lifted to the crest and falls back, as in `tube_liquid`, at the lowest level of the range."""
+    """What is lifted to the crest and falls back, as in a run, at the lowest level of the range."""
     tube, slowest = scene.tube, float(np.min(flow.velocity[flow.starts], initial=np.inf))
     if tube.hump_radius is None:
         return HELD, 0.0, "a tube without a crest stays full", None
@@ -252,12 +252,13 @@ def _held(scene: Scene, flow: RangeFlow, deciding: float, within: str) -> Row:
         return HELD, None, "nothing flows", None
     level = float(surface_radius(disc=scene.disc, fill_ratio=SHARES[0] * scene.disc.max_fill_ratio))
     near = share_at_radius(tube=tube, radius=level, far_leg=False)
-    length = tube.length * (crest_span(tube)[1] - near)
+    length = tube.length * (crest_middle(tube) - near)
     formula = (
-        f"at most what fills {1e3 * length:.3g} mm of tube, from the level to the crest's end, falls back "
+        f"at most what fills {1e3 * length:.3g} mm of tube, from the level to the crest's middle, falls back "
         f"after venting, over the liquid moved {within}, at the worst fill"
     )
-    return HELD, min(length / max(slowest * deciding, 1e-300), 1.0), formula, None
+    time = length / max(slowest, 1e-300)
+    return HELD, min(time / deciding, 1.0), formula, time
 
 
 def _chamber_gas(scene: Scene) -> float:

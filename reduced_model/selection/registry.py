@@ -301,7 +301,12 @@ TERMS: Final = (
     ),
     Term(name=FILLING, part="injection", models=(LEFT_OUT, "ISO 6358, in injections"), select=_filling),
     Term(name=LAG, part="injection", models=(LEFT_OUT, "pure delay, in injections"), select=_by_tolerance),
-    Term(name=HELD, part="injection", models=(LEFT_OUT,), select=_by_tolerance),
+    Term(
+        name=HELD,
+        part="injection",
+        models=(LEFT_OUT, "lifted from the level to the crest unless the tube is primed, in injections"),
+        select=_by_tolerance,
+    ),
 )
 """All physical terms, in the order of every `models_used`."""
 IN_INJECTIONS: Final = tuple(term.name for term in TERMS if term.part == "injection" and term.has_model)

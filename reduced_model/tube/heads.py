@@ -217,6 +217,14 @@ def crest_head(
     return np.asarray(fall + head_behind_crest(tube=tube, along=along, square=scene.rotor.speed**2))
 
 
+def entrance_fraction(scene: Scene, velocity: float) -> float:
+    """Fraction of the head up to the crest that is lost at the entrance, (alpha + K_ent)/(alpha + k_up)."""
+    u = np.array([velocity])
+    state = tube_state(tube=scene.tube, liquid=scene.liquid, angular_velocity=scene.rotor.speed, velocity=u)
+    entrance = (state.kinetic_factor + state.terms.get("entrance", 0.0)) * u**2 / 2
+    return float((entrance / crest_head(scene=scene, tube=scene.tube, state=state, velocity=u))[0])
+
+
 def _head_table(
     log_head: LogHead, start: float, stop: float, *, tolerance: float = TABLE_ERROR, first: int = 129
 ) -> tuple[HermiteTable, float]:

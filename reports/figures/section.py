@@ -28,7 +28,7 @@ def disc_section(found: Record) -> Drawing:
     """Section of the disc with its dimensions.
 
     Args: `found`: `disc` of the evidence: lengths in m, angles in rad, the fill that is drawn and, of an
-        imported chamber, `outlines`: its sections.
+        imported chamber, its sections under "outlines".
     """
     size = {
         key.removesuffix("_m"): value * _MILLIMETRES

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from ringbalance.controller.loop import simulate
+from ringbalance.controller.tuning.highest_pressure import highest_pressure
 from ringbalance.controller.tuning.tune import tuning_document
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.chamber.inputs import half_widths
@@ -73,6 +74,7 @@ def _collect(work: Work) -> Record:
         "needed_uncertainty_kg_m": _needed_uncertainty(work.scene),
         "gas_pressure_uncertainty_Pa": half_widths(work.scene).get("pressure", 0.0),
         "requirement": requirement_record(work.scene),
+        "highest_gas_pressure_Pa": highest_pressure(work.scene, work.calibration.model),
         "crest": crest_range(work.scene, work.calibration),
         "bore_m": work.scene.tube.bore,
         "bore_uncertainty_stated": any(i.quantity == "bore" for i in work.scene.uncertainty),

@@ -164,7 +164,8 @@ def _gas_pressure(evidence: Record) -> Requirement | None:
     verdicts = {above(gas, bound, both) for bound in (least, most)}
     return Requirement(
         name="Gas pressure " + ("that lifts the liquid over the siphon crest" if starts else "above stall"),
-        wanted=f"at least {read(evidence, f'operating_point.{key}', 'Pa', width=width)}{anywhere}",
+        wanted=f"at least {read(evidence, f'operating_point.{key}', 'Pa', width=width)}{anywhere}"
+        f"{_at_most(evidence, summary)}",
         result=read(evidence, "operating_point.gas_pressure_Pa", "Pa", width=own),
         verdict=verdicts.pop() if len(verdicts) == 1 else OPEN,
         rests=resting(evidence, "tube.hump_radius", "tube.port_radius", "tube.hump_gas"),
@@ -175,6 +176,14 @@ def _gas_pressure(evidence: Record) -> Requirement | None:
         high=gas * point[key] / least + both if least > 0 else None,
         unit="Pa",
     )
+
+
+def _at_most(evidence: Record, summary: Record) -> str:
+    """The pressure from which the valve's smallest correction is above the limit."""
+    path = "summary.highest_gas_pressure_Pa"
+    if summary.get("highest_gas_pressure_Pa") is None:
+        return ""
+    return f"; at most {read(evidence, path, 'Pa', digits=2)} for corrections as small as the limit"
 
 
 def _scene_gain(evidence: Record) -> Requirement | None:

@@ -98,14 +98,14 @@ class ChamberField:
 
     def outside(self) -> Outside:
         """What bounds the liquid."""
-        corners = self.solution.chamber.grid[::2, ::2, ::2]
+        chamber = self.solution.chamber
+        corners = chamber.grid[(slice(None, None, chamber.order),) * 3]
         sides = [np.take(corners, end, axis=axis) for axis in range(3) for end in (0, -1)]
         faces = [
             np.stack([side[:-1, :-1], side[1:, :-1], side[1:, 1:], side[:-1, 1:]], axis=-1).reshape(-1, 4)
             for side in sides
         ]
-        places = self.solution.chamber.places.T
-        return Outside(places=places, faces=np.concatenate(faces), pressure=self.solution.pressure)
+        return Outside(places=chamber.places.T, faces=np.concatenate(faces), pressure=self.solution.pressure)
 
     def write(self, *, path: Path) -> Path:
         """Write the field to a VTU file: gauge pressure in Pa and depth below the free surface in m.

@@ -176,7 +176,7 @@ def _nodes_4(stream: _Stream) -> tuple[IntArray, FloatArray]:
         dimension, _tag, parametric = stream.integers(3).tolist()
         count = int(stream.sizes(1)[0])
         numbers.append(stream.sizes(count))
-        width = 3 + (dimension if parametric else 0)
+        width = 3 + (dimension if parametric and 0 < dimension <= 3 else 0)
         places.append(stream.reals(count * width).reshape(count, width)[:, :3])
     return np.concatenate(numbers), np.concatenate(places)
 
@@ -196,14 +196,14 @@ def _elements_4(
 def _read_2(sections: Mapping[str, bytes], names: Names, binary: bool) -> Contents:
     count, body = _counted(sections["Nodes"], "section $Nodes")
     if binary:
+        if len(body) < count * 28:
+            raise _short("section $Nodes")
         rows = np.frombuffer(body[: count * 28], dtype=[("number", "<i4"), ("place", "<f8", 3)])
         numbers, places = rows["number"].astype(np.int64), rows["place"].astype(np.float64)
     else:
         stream = _Text(body, "section $Nodes")
         table = stream.reals(count * 4).reshape(count, 4)
         numbers, places = whole(table[:, 0], "section $Nodes"), table[:, 1:]
-    if len(numbers) != count:
-        raise _short("section $Nodes")
     count, body = _counted(sections["Elements"], "section $Elements")
     runs = list(_runs_binary(body, count) if binary else _runs_text(body, count))
     blocks = [block for kind, tags, rows in runs for block in _named_2(kind, tags, rows, names)]

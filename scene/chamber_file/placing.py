@@ -20,6 +20,8 @@ from ringbalance.scene.rules.check import Finding, written
 _DRAWING_ROUNDING: Final = 1e-5
 _DIGITS: Final = 7
 """Of dimensions read off a mesh: rounding in a file shall not put a port just outside its wall."""
+_FRAME: Final = [0, 1, 2, -1]
+"""Corners of a cell that span it; for its share of the volume."""
 _SHARES: Final = tuple(step / 32 for step in range(33))
 """Of an edge of second order, between which it is as good as straight: a share 1e-3 of its bulge."""
 _LARGEST, _SMALLEST = 5.0, 1e-3
@@ -152,10 +154,8 @@ def opening_findings(body: Body, points: FloatArray, *, chambers: int) -> Iterat
     wrong = np.flatnonzero(angle > half * (1 + _DRAWING_ROUNDING))
     if len(wrong):
         worst = wrong[np.argsort(-angle[wrong])]
-        problem = (
-            f"{len(wrong)} nodes lie outside the opening angle, 360 deg / {chambers} chambers about the "
-        )
-        problem += f"middle; farthest: {body.node_labels(worst)}"
+        problem = f"nodes lie outside the opening angle, 360 deg / {chambers} chambers about the middle "
+        problem += f"({len(wrong)}); farthest: {body.node_labels(worst)}"
         limit = written(half, "deg")
         yield Finding(problem=problem, allowed=f"within {limit} on both sides of the middle (mesh_middle)")
 
@@ -173,6 +173,30 @@ def port_findings(
         where = f"from {written(low, 'mm')} to {written(high, 'mm')}"
         problem = f'port_radius is {written(port, "mm")}, but the boundary "{PORT}" lies {where}'
         yield Finding(problem=problem, allowed="a radius on the port, or no port_radius")
+
+
+def covered_findings(
+    body: Body, points: FloatArray, *, radii: Mapping[str, float], fill: float
+) -> Iterator[Finding]:
+    """Ports that the liquid leaves free at the start, and a gas inlet that it covers when it is most.
+
+    Args: `radii`: of "port_radius" and "inlet_radius", as far as known. `fill`: greatest fill ratio of a
+        chamber, of which one holds half at the start.
+    """
+    at = np.hypot(points[:, 0], points[:, 1])[body.cells]
+    low, high = at.min(axis=1), at.max(axis=1)
+    volumes = np.abs(np.linalg.det(np.diff(points[body.corners[:, _FRAME]], axis=1)))
+    for name, radius in radii.items():
+        shares = clipped((high - radius) / np.maximum(high - low, 1e-300), 0.0, 1.0)
+        outside = float((shares * volumes).sum() / volumes.sum())
+        if name == "port_radius" and outside > fill / 2:
+            problem = f"at the start (fill {fill / 2:.3g}) the liquid does not cover {name}, "
+            problem += f"{written(radius, 'mm')}: {outside:.2g} of the chamber lies outside it"
+            yield Finding(problem=problem, allowed="a port nearer to the outer wall, or more liquid")
+        if name == "inlet_radius" and outside < fill:
+            problem = f"at max_fill_ratio ({fill:.3g}) the liquid covers {name}, {written(radius, 'mm')}: "
+            problem += f"{outside:.2g} of the chamber lies outside it"
+            yield Finding(problem=problem, allowed="an inlet nearer to the inner wall, or less liquid")
 
 
 def port_radius(points: FloatArray, boundaries: Mapping[str, IntArray]) -> float | None:

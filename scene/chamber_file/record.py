@@ -26,10 +26,14 @@ class ChamberGeometry:
     digest: str
     """SHA-256 of the file's bytes, unit and axis."""
     kind: CellKind = field(compare=False)
-    points: FloatArray = field(compare=False)
+    points: FloatArray = field(compare=False, repr=False)
     """Places of the nodes, m, shape (n, 3)."""
-    cells: IntArray = field(compare=False)
+    cells: IntArray = field(compare=False, repr=False)
     """Numbers of nodes, shape (cells, nodes of a cell); every cell's Jacobian is positive."""
-    boundaries: Mapping[str, IntArray] = field(compare=False)
+    boundaries: Mapping[str, IntArray] = field(compare=False, repr=False)
     """Facets by name, shape (facets, nodes of a facet), in meshio's order; normals unspecified.  `outer_wall`
     is always there; no facet has two names."""
+
+    def __str__(self) -> str:
+        """The file and what it holds, for people."""
+        return f"{self.file}: {len(self.cells)} {self.kind} cells, {', '.join(self.boundaries)}"

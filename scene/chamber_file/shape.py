@@ -56,17 +56,17 @@ def _jacobians(body: Body) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def _flat(body: Body, cells: IntArray) -> Iterator[Finding]:
     if len(cells):
-        problem = f"{len(cells)} degenerate cells have no volume: {body.cell_labels(cells)}"
+        problem = f"cells are degenerate, without volume ({len(cells)}): {body.cell_labels(cells)}"
         yield Finding(problem=problem, allowed="cells whose corners do not lie in one plane")
 
 
 def _inverted(body: Body, mark: BoolArray) -> Iterator[Finding]:
-    """The smaller number of cells is called inverted, as it is probably the wrong one."""
+    """Cells of negative Jacobian; where they are most, the others may be the wrong ones."""
     cells = np.flatnonzero(mark)
     if len(cells):
         rest = len(mark) - len(cells)
-        word = "are inverted" if len(cells) <= rest else f"have the other orientation than the {rest} others"
-        problem = f"{len(cells)} cells {word}: {body.cell_labels(cells)}"
+        word = "are inverted" if len(cells) <= rest else "have another orientation than the others"
+        problem = f"cells {word} ({len(cells)} of {len(mark)}): {body.cell_labels(cells)}"
         yield Finding(problem=problem, allowed="cells that all have the same orientation")
 
 
@@ -74,7 +74,7 @@ def _folded(body: Body, mark: BoolArray) -> Iterator[Finding]:
     cells = np.flatnonzero(mark)
     if not len(cells):
         return
-    problem = f"{len(cells)} cells fold over: {body.cell_labels(cells)}"
+    problem = f"cells fold over ({len(cells)}): {body.cell_labels(cells)}"
     if len(between(body.kind)) > CORNERS[body.kind]:
         node = _farthest_middle(body, int(cells[0]))
         problem += f"; farthest from the middle of its side is {body.node_labels(np.array([node]))}"

@@ -39,12 +39,12 @@ def mesh_step(source: str, target: str, share: float) -> None:
     gmsh.option.setNumber("Mesh.SecondOrderLinear", 0)
     gmsh.option.setNumber("Mesh.HighOrderOptimize", 1)
     gmsh.option.setNumber("Mesh.MeshSizeMin", size / 50)
+    gmsh.model.mesh.generate(3)
     faces = gmsh.model.getEntities(2)
     named = {face: name for face in faces if (name := _name(face))} or dict(_placed(faces))
     for name in dict.fromkeys(named.values()):
         gmsh.model.addPhysicalGroup(2, [tag for (_, tag), each in named.items() if each == name], name=name)
     gmsh.model.addPhysicalGroup(3, [tag for _, tag in volumes], name="chamber")
-    gmsh.model.mesh.generate(3)
     gmsh.write(target)
 
 
@@ -71,31 +71,25 @@ def _name(face: Entity) -> str:
 
 def _placed(faces: list[Entity]) -> Iterator[tuple[Entity, str]]:
     """Names that follow from where faces lie about the z axis."""
-    radii = {face: _radii(face) for face in faces}
-    box = gmsh.model.getBoundingBox(-1, -1)
-    size = max(abs(value) for value in box)
-    highest = max(high for _, high in radii.values())
-    lowest = min(low for low, _ in radii.values())
-    for face, (low, high) in radii.items():
-        own = gmsh.model.getBoundingBox(*face)
-        if low > highest - _SAME * size:
-            yield face, "outer_wall"
-        elif high < lowest + _SAME * size:
-            yield face, "inner_wall"
-        elif own[5] < box[2] + _SAME * size:
-            yield face, "end_back"
-        elif own[2] > box[5] - _SAME * size:
-            yield face, "end_front"
+    places = {face: _nodes(face) for face in faces}
+    radii = [radius for each in places.values() for radius, _ in each]
+    heights = [height for each in places.values() for _, height in each]
+    near = _SAME * max(radii)
+    for face, each in places.items():
+        for name, of, value in (
+            ("outer_wall", 0, max(radii)),
+            ("inner_wall", 0, min(radii)),
+            ("end_back", 1, min(heights)),
+            ("end_front", 1, max(heights)),
+        ):
+            if all(abs(place[of] - value) < near for place in each):
+                yield face, name
 
 
-def _radii(face: Entity) -> tuple[float, float]:
-    """Smallest and largest distance of a face from the z axis, at the points of a lattice on it."""
-    (u0, v0), (u1, v1) = gmsh.model.getParametrizationBounds(*face)
-    steps = [step / 8 for step in range(9)]
-    at = [value for s in steps for t in steps for value in (u0 + s * (u1 - u0), v0 + t * (v1 - v0))]
-    xyz = gmsh.model.getValue(*face, at)
-    radii = [math.hypot(x, y) for x, y in zip(xyz[::3], xyz[1::3], strict=True)]
-    return min(radii), max(radii)
+def _nodes(face: Entity) -> list[tuple[float, float]]:
+    """Radius and height of the nodes on a face and its edges."""
+    _, xyz, _ = gmsh.model.mesh.getNodes(*face, includeBoundary=True)
+    return [(math.hypot(x, y), z) for x, y, z in zip(xyz[::3], xyz[1::3], xyz[2::3], strict=True)]
 
 
 if __name__ == "__main__":

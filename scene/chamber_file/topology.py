@@ -20,7 +20,8 @@ _SAME: Final = 1e-7
 """Distance, as a share of the body, below which two nodes are meant to be one."""
 _ON: Final = 1e-6
 """Distance from a facet, as a share of its size, below which a node lies on it."""
-_MOST_NEAR: Final = 1000
+_MOST_NEAR: Final = 5_000_000
+"""Pairs of facets and nodes near them that are looked at, the facets with the fewest first."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,7 +85,7 @@ def _repeated(body: Body) -> Iterator[Finding]:
     ordered = np.sort(body.cells, axis=1)
     wrong = np.flatnonzero((ordered[:, 1:] == ordered[:, :-1]).any(axis=1))
     if len(wrong):
-        problem = f"{len(wrong)} degenerate cells have a node twice: {body.cell_labels(wrong)}"
+        problem = f"cells have a node twice ({len(wrong)}): {body.cell_labels(wrong)}"
         yield Finding(problem=problem, allowed="cells with different nodes")
 
 
@@ -101,7 +102,7 @@ def _same_rows(rows: IntArray) -> IntArray:
 def _same_cells(body: Body) -> Iterator[Finding]:
     wrong = _same_rows(np.sort(body.corners, axis=1))
     if len(wrong):
-        problem = f"{len(wrong)} cells stand in the file twice: {body.cell_labels(wrong)}"
+        problem = f"cells stand in the file twice ({len(wrong)}): {body.cell_labels(wrong)}"
         yield Finding(problem=problem, allowed="each cell once")
 
 
@@ -110,7 +111,7 @@ def _crowded_facets(body: Body, facets: Facets) -> Iterator[Finding]:
     _, first = np.unique(facets.keys[wrong], return_index=True)
     if len(first):
         labels = body.facet_labels(facets.nodes[wrong[first], : facets.corners])
-        problem = f"{len(first)} facets belong to more than two cells: {labels}"
+        problem = f"facets belong to more than two cells ({len(first)}): {labels}"
         yield Finding(problem=problem, allowed="at most two cells at a facet")
 
 
@@ -122,7 +123,7 @@ def _doubled_nodes(body: Body, facets: Facets) -> Iterator[Finding]:
     found = [_same_rows(np.floor(points / step + shift).astype(np.int64)) for shift in (0.0, 0.5)]
     twice = nodes[np.unique(np.concatenate(found))]
     if len(twice):
-        problem = f"{len(twice)} nodes lie where another node lies already: {body.node_labels(twice)}"
+        problem = f"nodes lie where another node lies already ({len(twice)}): {body.node_labels(twice)}"
         yield Finding(problem=problem, allowed="merged nodes (Gmsh: Coherence Mesh), so that cells meet")
 
 
@@ -139,7 +140,7 @@ def _hanging_nodes(body: Body, facets: Facets) -> Iterator[Finding]:
     owners = outer if facets.corners == 3 else np.concatenate([outer, outer])
     wrong = np.union1d(mixed, _on_triangles(body.points, triangles, owners))
     if len(wrong):
-        problem = f"{len(wrong)} hanging nodes, on a facet or an edge of which they are no corner: "
+        problem = f"nodes hang, on a facet or an edge of which they are no corner ({len(wrong)}): "
         yield Finding(problem=problem + body.node_labels(wrong), allowed="cells that meet at whole facets")
 
 
@@ -152,7 +153,8 @@ def _on_triangles(points: FloatArray, triangles: IntArray, owners: IntArray) -> 
     radii = np.linalg.norm(corners - middles[:, None], axis=2).max(axis=1)
     tree = cKDTree(points[nodes])
     counts = tree.query_ball_point(middles, radii, return_length=True)
-    near = np.flatnonzero(counts <= _MOST_NEAR)
+    order = np.argsort(counts, kind="stable")
+    near = order[np.cumsum(counts[order]) <= _MOST_NEAR]
     lists = tree.query_ball_point(middles[near], radii[near])
     which = np.repeat(near, [len(each) for each in lists])
     candidates = nodes[np.fromiter((node for each in lists for node in each), dtype=np.int64)]
@@ -196,7 +198,7 @@ def _pinched(body: Body, facets: Facets) -> Iterator[Finding]:
     )
     wrong = edges[first[counts != 2]]
     if len(wrong):
-        problem = f"the surface is open or touches itself along {len(wrong)} edges: "
+        problem = f"the surface is open or touches itself along edges ({len(wrong)}): "
         labels = body.facet_labels(wrong).replace("facet", "edge")
         yield Finding(problem=problem + labels, allowed="a closed surface, two facets at each edge")
 
@@ -206,5 +208,5 @@ def _unused(body: Body, helpers: IntArray) -> Iterator[Finding]:
     used[body.cells] = True
     wrong = np.flatnonzero(~used & ~np.isin(body.node_numbers, helpers))
     if len(wrong):
-        problem = f"{len(wrong)} nodes belong to no cell: {body.node_labels(wrong)}"
+        problem = f"nodes belong to no cell ({len(wrong)}): {body.node_labels(wrong)}"
         yield Finding(problem=problem, allowed="nodes of cells only (export the named volume alone)")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 
 from ringbalance.scene.keys.derivations import even_number_of_chambers, shortest_path, swept_area
+from ringbalance.scene.keys.reading import Reading
 from ringbalance.scene.models import Bend
 from ringbalance.scene.rules.check import Check, Finding, check, written
 
@@ -275,6 +276,12 @@ _CHAMBER = (_INNER, _OUTER, _ANGLE, _PLATE)
 _NO_CHAMBER = (*_NO_DEPTH, _plates_leave_room, _chamber_wide_enough, _fill_has_depth, _fills_share_the_liquid)
 _NO_PATH = (_port_in_chamber, _crest_in_disc, _crest_inside_port)
 
+
+def _drawn(reading: Reading) -> bool:
+    """Whether the keys give the chamber; a mesh is looked at itself."""
+    return not reading.known("disc.geometry")
+
+
 CHECKS: tuple[Check, ...] = (
     check(_radii_in_order, _INNER, _OUTER),
     check(_chamber_has_depth, _INNER, _OUTER, moot=_NO_RING),
@@ -285,8 +292,15 @@ CHECKS: tuple[Check, ...] = (
     check(_chambers_even, _ANGLE, when=lambda reading: not reading.given("disc.chambers")),
     check(_fills_share_the_liquid, "disc.initial_fill", _FILL),
     check(_port_in_chamber, _PORT, _INNER, _OUTER, moot=_NO_RING),
-    check(_port_under_liquid, _PORT, "disc.initial_fill", *_CHAMBER, moot=(*_NO_CHAMBER, _port_in_chamber)),
-    check(_inlet_above_liquid, "gas.inlet_radius", _FILL, *_CHAMBER, moot=_NO_CHAMBER),
+    check(
+        _port_under_liquid,
+        _PORT,
+        "disc.initial_fill",
+        *_CHAMBER,
+        moot=(*_NO_CHAMBER, _port_in_chamber),
+        when=_drawn,
+    ),
+    check(_inlet_above_liquid, "gas.inlet_radius", _FILL, *_CHAMBER, moot=_NO_CHAMBER, when=_drawn),
     check(_crest_in_disc, _CREST, _OUTER),
     check(_crest_inside_port, _CREST, _PORT, moot=(_port_in_chamber, _crest_in_disc)),
     check(_bore_fits_bends, _BORE, "tube.bends"),

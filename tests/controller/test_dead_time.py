@@ -26,6 +26,7 @@ from ringbalance.controller.tuning.loop_factor import vibration_rates
 from ringbalance.controller.tuning.tune import Tuning, tune, tuning_document
 from ringbalance.reduced_model.gas_line import largest_standing, line_answers, line_warning
 from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.tube.path import crest_middle
 from ringbalance.scene.models import Scene
 
 
@@ -38,7 +39,7 @@ def slow(scene: Scene) -> Scene:
     """A line that takes 45 ms before liquid moves, and a gain that asks for half of that at the limit."""
     gas = replace(scene.gas, conductance=0.6e-8, critical_ratio=0.3, valve_lag=4e-3)
     short = replace(scene, gas=gas, run=replace(scene.run, time_limit=30.0))
-    return with_settings(short, limit=0.3e-6, proportional=0.02e6, integral_time=None)
+    return with_settings(short, limit=0.35e-6, proportional=0.02e6, integral_time=None)
 
 
 @pytest.fixture(scope="module")
@@ -57,13 +58,13 @@ def test_the_largest_vector_that_stands_still() -> None:
 
 
 def test_an_amplitude_stands_as_far_as_the_dead_time_says(slow: Scene, calibrated: BalancerModel) -> None:
-    """A run that starts within the zone does not move; one that starts beyond it does."""
+    """A run that starts within the zone does not move; one that starts beyond what is lifted, too, does."""
     start = slow.rotor.initial_phase + slow.rotor.lag_angle
     zone = (
         min(dead_times(replace(slow, rotor=_start(slow, 0.5e-6)), calibrated)) / slow.controller.proportional
     )
     along = replace(slow.rotor, initial_phase=start - slow.rotor.lag_angle - start)
-    for part, moves in ((0.9, False), (1.2, True)):
+    for part, moves in ((0.9, False), (2.0, True)):
         begun = replace(slow, rotor=replace(along, initial_amplitude=part * zone))
         exact = replace(begun, sensor=replace(slow.sensor, amplitude_noise=0.0, phase_noise=0.0))
         run = simulate(replace(exact, run=replace(slow.run, time_limit=2.0)), calibrated)
@@ -75,8 +76,17 @@ def _start(scene: Scene, amplitude: float) -> Any:
     return replace(scene.rotor, initial_amplitude=amplitude)
 
 
-def test_only_a_line_that_runs_model_has_a_dead_time(scene: Scene, calibrated: BalancerModel) -> None:
-    assert dead_times(scene, calibrated) == ()
+def test_only_what_runs_model_has_a_dead_time(
+    scene: Scene, calibrated: BalancerModel, model: BalancerModel
+) -> None:
+    """The paper's law has no crest; without a line the lift over the steady velocity is an upper bound."""
+    assert dead_times(scene, model) == ()
+    lift = crest_middle(scene.tube) * scene.tube.length
+    slowest = calibrated.flow.evaluate(
+        fill_ratio=0.06, opposite_fill_ratio=0.44, gas_pressure=scene.gas.pressure, primed=True
+    )
+    dead = dead_times(scene, calibrated)
+    assert 0 < min(dead) < max(dead) < lift / float(slowest.velocity)
     assert compensated(scene, calibrated, ()) is scene
     assert standing_remedy(scene, calibrated) == ""
 
@@ -110,7 +120,8 @@ def test_many_runs_have_the_offsets_of_one(offset: Scene, calibrated: BalancerMo
     one, many = simulate(exact, calibrated), simulate_members(exact, calibrated)
     assert many.settled[0]
     assert many.settling_time[0] == pytest.approx(one.settling_time, rel=1e-4)
-    assert many.final_amplitude[0] == pytest.approx(one.amplitude[-1], rel=1e-4)
+    # 1e-5 in fill, as in the other comparisons of both, is 2e-10 m.
+    assert many.final_amplitude[0] == pytest.approx(one.amplitude[-1], abs=2e-10)
 
 
 def test_every_chamber_has_its_own_offset(scene: Scene) -> None:
@@ -172,8 +183,8 @@ def test_the_law_based_algorithm_keeps_its_times_where_offsets_would_slow_it(
     slow: Scene, calibrated: BalancerModel
 ) -> None:
     """It learns the dead time of a fast line from the first response."""
-    gas = replace(slow.gas, conductance=5e-8, valve_lag=2e-3)
-    fast = with_settings(replace(slow, gas=gas), kind="law_based", limit=0.1e-6)
+    gas = replace(slow.gas, conductance=3e-8, valve_lag=2e-3)
+    fast = with_settings(replace(slow, gas=gas), kind="law_based", limit=0.22e-6)
     dead = dead_times(fast, calibrated)
     assert dead_zone(fast, calibrated, dead) > fast.controller.limit
     found = tuned(fast, calibrated)

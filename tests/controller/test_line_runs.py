@@ -23,7 +23,12 @@ def test_a_line_that_is_not_given_is_run_at_both_ends(scene: Scene, calibrated: 
     assert (slow.end, fast.end) == ("slow", "fast")
     assert (slow.conductance, fast.conductance) == pytest.approx((0.2e-8, 1e-8))
     assert (slow.valve_lag, fast.valve_lag) == pytest.approx((10e-3, 5e-3))
-    assert set(slow.run.terms_modelled) == {"tube inertia", "gas filling", "valve lag"}
+    assert set(slow.run.terms_modelled) == {
+        "tube inertia",
+        "gas filling",
+        "valve lag",
+        "liquid held in the tube",
+    }
     # Late gas moves less in the same valve-open time, and the slow line is later.
     moved = [
         run.injections[0].operation.fill_before - run.injections[0].operation.fill_after

@@ -82,7 +82,8 @@ def test_an_integrator_excludes_terms(scene: Scene, model: BalancerModel) -> Non
 def test_a_run_states_a_bound_on_what_it_neglects_and_the_status_of_its_models(scene: Scene) -> None:
     calibrated = calibrate(scene).model
     short = replace(scene, run=replace(scene.run, time_limit=0.5 * scene.controller.period))
-    document = simulation_document(simulate(short, calibrated))
+    assert simulation_document(simulate(short, calibrated))["neglected"]["bound"] == 0
+    document = simulation_document(simulate(short, calibrated, modelled=["tube inertia"]))
     held = {row["term"]: row["estimated_contribution"] for row in document["models_used"]}
     neglected = document["neglected"]
     assert list(neglected["terms"]) == ["liquid held in the tube"]

@@ -15,15 +15,17 @@ from ringbalance.cli import main
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
 from ringbalance.identification.criticism.review import review
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.eccentric_parameters import eccentric_value, eccentric_with, fitted_names
+from ringbalance.identification.eccentric_parameters import fitted_names
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.identifiability import Verdict
+from ringbalance.identification.next_measurement import next_measurement, offered_rows, words_of
 from ringbalance.identification.parameters import FitError
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.narrowing import eccentric_scene
+from ringbalance.scene.uncertain import eccentric_value, eccentric_with
 
 NOISE = 20e-6
 SPEEDS = np.linspace(8.0, 24.0, 24)
@@ -107,6 +109,70 @@ def test_positioning_gives_back_friction_and_motor(scene: EccentricScene) -> Non
     assert eccentric_scene(result.scene).masses.friction_arm[1] == scene.masses.friction_arm[1]
 
 
+def test_the_second_mass_moves_as_the_first_one_would_in_its_place(scene: EccentricScene) -> None:
+    """Places and friction exchanged give the same motion, and the friction that is fitted is its own."""
+    masses = replace(scene.masses, friction_arm=(0.014, 0.009))
+    one = replace(scene, masses=masses)
+    other = replace(
+        scene,
+        masses=replace(
+            masses, friction_arm=masses.friction_arm[::-1], initial_angle=masses.initial_angle[::-1]
+        ),
+    )
+    data = positioning(one, 4)
+    second = replace(data, columns=dict(data.columns) | {"moved_mass": np.full(30, 2.0)})
+    predict = PREDICTED["positioning"].predict
+    assert predict(other, second, None) == pytest.approx(predict(one, data, None), rel=1e-12)
+    arms = {"masses.friction_arm[0]", "masses.friction_arm[1]"}
+    for each, name in ((data, "masses.friction_arm[0]"), (second, "masses.friction_arm[1]")):
+        assert arms & set(PREDICTED["positioning"].informs(each)) == {name}
+    found = fit(scene, data=[second], parameters=["masses.friction_arm[1]", "masses.friction_arm[0]"])
+    assert found.parameters[0].verdict is Verdict.IDENTIFIED
+    assert found.parameters[1].verdict is Verdict.STRUCTURALLY
+
+
+def test_the_next_speed_narrows_as_expected(scene: EccentricScene) -> None:
+    """A run-up with the offered speed as one more row of known noise, against the gain expected of it."""
+    width = {"amplitude": np.full(24, 1.96 * NOISE)}
+    data = replace(run_up(scene, 6), uncertainty=width)
+    few = replace(
+        data,
+        lines=data.lines[:4],
+        series=data.series[:4],
+        chamber=data.chamber[:4],
+        columns={name: values[:4] for name, values in data.columns.items()},
+        uncertainty={name: values[:4] for name, values in width.items()},
+    )
+    first = fit(scene, data=[few], parameters=["rotor.damping"])
+    told = next_measurement(first, "rotor.damping")
+    offered = offered_rows(first.scene, "run_up", few)
+    chosen = next(i for i in range(len(offered)) if words_of(offered, i) == told.gains[0].candidate)
+    speed = offered.columns["speed"][[chosen]]
+    plain = observed("run_up", {"speed": speed, "amplitude": np.ones(1), "phase": np.zeros(1)})
+    real, imaginary = PREDICTED["run_up"].predict(first.scene, plain, None)
+    row = {
+        "speed": speed,
+        "amplitude": np.hypot([real], [imaginary]),
+        "phase": np.arctan2([imaginary], [real]),
+    }
+    more = observed("run_up", row, {"amplitude": np.array([1.96 * NOISE])})
+    again = fit(scene, data=[few, replace(more, file="more.csv")], parameters=["rotor.damping"])
+    widths = [r.parameters[0].profile.high - r.parameters[0].profile.low for r in (first, again)]
+    assert widths[1] / widths[0] == pytest.approx(told.gains[0].ratio, rel=0.05)
+    assert told.gains[0].ratio < 0.5
+
+
+def test_data_of_a_rotor_without_damping(scene: EccentricScene) -> None:
+    """Off the critical speed: the damping of the scene, held, is told from none, and none is preferred."""
+    none = eccentric_with(scene, 1e-9, name="rotor.damping")
+    for true, outcome in ((scene, "fitted"), (none, "other")):
+        (law,) = review(fit(scene, data=[run_up(true, 7)], parameters=["imbalance.mass"])).laws
+        assert law.other == "a rotor without damping"
+        assert law.outcome == outcome
+    free = fit(scene, data=[run_up(scene, 7)], parameters=["imbalance.mass", "rotor.damping"])
+    assert review(free).laws == ()
+
+
 def test_a_mass_reaches_the_speed_at_which_motor_and_friction_balance(scene: EccentricScene) -> None:
     """B V = C phi' + mu_f b (W + phi')^2, solved by hand; whirl moves it by less than two per cent."""
     stiff = eccentric_with(scene, 1e6, name="rotor.stiffness")
@@ -183,7 +249,7 @@ def test_the_command_takes_and_saves_such_a_scene(
     words = [str(bundled_scene("eccentric_mass_paper")), str(path), "--save", str(target)]
     assert main(["fit", *words, "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
-    assert document["next_measurement"] is None
+    assert document["next_measurement"]["candidates"][0]["measurement"].startswith("run up with speed")
     saved = eccentric_scene(load_scene(target))
     by_name = {each["name"]: each["value"] for each in document["parameters"]}
     assert saved.rotor.damping == pytest.approx(by_name["rotor.damping"], rel=1e-7)

@@ -15,8 +15,11 @@ import pytest
 
 from ringbalance.cli import main
 from ringbalance.identification.balancers import informed
+from ringbalance.identification.criticism.law_comparison import LawComparison
+from ringbalance.identification.criticism.patterns import Criticism
+from ringbalance.identification.criticism.review import Review
 from ringbalance.identification.data.kinds import KINDS
-from ringbalance.identification.data.reading import observations_of
+from ringbalance.identification.data.reading import observations_of, read_observations
 from ringbalance.identification.data.template import template
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.models import Scene
@@ -107,9 +110,47 @@ def test_injections_alone_do_not_blame_the_bore_for_a_loss(run: Run) -> None:
 def test_a_prescribed_loss_is_fitted_in_place_of_the_extra_one() -> None:
     scene = liquid_ring_scene(load_scene(PAPER))
     prescribed = with_value(scene=scene, quantity="drag_coefficient", value=50.0)
-    kinds = ["injection", "transfer"]
-    assert informed(scene, kinds) == ["lambda_factor", "bore", "extra_loss"]
-    assert informed(prescribed, kinds) == ["lambda_factor", "bore", "drag_coefficient"]
+    data = read_observations([Path(EXAMPLES[kind]) for kind in ("injection", "transfer")], scene=scene)
+    assert informed(scene, data) == ["lambda_factor", "bore", "extra_loss"]
+    assert informed(prescribed, data) == ["lambda_factor", "bore", "drag_coefficient"]
+
+
+def test_another_law_that_the_data_prefer_is_a_failure(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Values may then be wrong by more than their intervals, so that a script must not go on with them."""
+    better = LawComparison(other="another law", separation=100.0, preference=-50.0)
+    assert better.outcome == "other"
+    words = (PAPER, EXAMPLES["trial_weight"])
+    for laws, expected in (((), 0), ((better,), 1)):
+        found = Review(criticism=Criticism(findings=()), laws=laws)
+        monkeypatch.setattr("ringbalance.identification.cli.review", lambda _, found=found: found)
+        code, out, _ = run(*words)
+        assert code == expected
+        assert ("prefer another law" in " ".join(out.split())) == bool(laws)
+
+
+@pytest.mark.parametrize(
+    ("balancer", "kind", "name", "close"),
+    [
+        ("liquid_ring", "trial_weight", "lagangle", "lag_angle"),
+        ("eccentric_mass", "run_up", "rotor.dampin", "rotor.damping"),
+    ],
+)
+def test_a_misspelt_parameter(balancer: str, kind: str, name: str, close: str, run: Run) -> None:
+    scene = bundled_scene(example_measurements.SCENES[balancer])
+    code, _, err = run(scene, EXAMPLES[kind], "--parameters", name)
+    assert code == 2
+    assert f'"{name}" cannot be fitted (did you mean "{close}"?); allowed: ' in " ".join(err.split())
+
+
+def test_a_mass_that_there_is_not(run: Run, tmp_path: Path) -> None:
+    scene = bundled_scene(example_measurements.SCENES["eccentric_mass"])
+    path = tmp_path / "third.csv"
+    head = Path(EXAMPLES["positioning"]).read_text(encoding="utf-8").split("series\n")[0]
+    path.write_text(f"{head}series,moved_mass\n0.1,6,100,38,a,3\n0.2,6,100,38,a,1.5\n", encoding="utf-8")
+    code, _, err = run(scene, path)
+    assert code == 2
+    assert "it is too large" in err
+    assert "it is not a whole number" in err
 
 
 def has_key(document: Any, name: str) -> bool:

@@ -131,6 +131,24 @@ def test_impossible_meshes_are_refused(disc: Disc, surface: Any, cells: tuple[in
         chamber_mesh(disc=disc, surface_radius=surface, cells=cells)
 
 
+@pytest.mark.parametrize("order", [0, 17])
+def test_impossible_orders_are_refused(disc: Disc, order: int) -> None:
+    with pytest.raises(ValueError, match="order"):
+        chamber_mesh(disc=disc, surface_radius=30e-3, cells=(2, 4), order=order)
+
+
+@pytest.mark.parametrize("order", [1, 3, 8, 16])
+def test_nodes_of_any_order_lie_on_the_arcs_and_share_their_cells_corners(disc: Disc, order: int) -> None:
+    chamber = chamber_mesh(disc=disc, surface_radius=30e-3, cells=(2, 4, 3), order=order)
+    quadratic = chamber_mesh(disc=disc, surface_radius=30e-3, cells=(2, 4, 3))
+    for end, radius in ((0, 30e-3), (-1, disc.outer_radius)):
+        nodes = chamber.places[:2, chamber.grid[end]]
+        np.testing.assert_allclose(np.hypot(*nodes), radius, rtol=1e-14)
+    corners = chamber.nodes[:, chamber.grid[::order, ::order, ::order]]
+    np.testing.assert_allclose(corners, quadratic.nodes[:, quadratic.grid[::2, ::2, ::2]], atol=1e-15)
+    assert chamber.quality().minimum_scaled_jacobian > 0.95
+
+
 def test_default_cells_follow_the_angle(disc: Disc) -> None:
     assert default_cells(disc=disc, dimension=3) == (8, 24, 4)
     assert default_cells(disc=replace(disc, central_angle=np.pi)) == (8, 48)

@@ -54,3 +54,10 @@ def test_what_cannot_be_stored_is_refused(disc: Disc, tmp_path: Path, name: str,
     with pytest.raises(ValueError, match=r"vtu|finite value per node"):
         write_vtu(tmp_path / name, chamber=chamber, fields={"pressure": field})
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_mesh_of_another_order_is_refused(disc: Disc, tmp_path: Path) -> None:
+    chamber = chamber_mesh(disc=disc, surface_radius=35e-3, cells=(2, 4), order=3)
+    with pytest.raises(ValueError, match="order 2"):
+        write_vtu(tmp_path / "cubic.vtu", chamber=chamber)
+    assert not list(tmp_path.iterdir())

@@ -180,6 +180,12 @@ def test_a_crest_that_nobody_gave_widens_what_the_gas_must_do(
     assert ("wherever the crest may lie" in row.wanted) == (pressures is not None)
 
 
+def test_the_gas_pressure_has_an_upper_end_where_one_was_found(evidence: Record) -> None:
+    assert "at most" not in row_of(evidence, "Gas pressure").wanted
+    evidence["summary"]["highest_gas_pressure_Pa"] = 0.92e6
+    assert "at most 0.92\u202fMPa" in untraced(row_of(evidence, "Gas pressure").wanted)
+
+
 def test_the_crest_may_lie_wherever_the_tube_is_empty_at_rest(paper_scene: Scene) -> None:
     """Both ends by hydrostatics, rho omega^2 (R2^2 - r^2)/2; none where its radius is given."""
     crest, rotor = crest_range(paper_scene, calibration_of(paper_scene)), paper_scene.rotor

@@ -26,7 +26,7 @@ from ringbalance.verification.selection_studies.study import hierarchies_of, ter
 BUNDLED = ("liquid_ring_paper", "perfluorinated_oil", "silicone_oil_100cst", "six_chamber")
 RANDOM = (1, 2, 3, 5, 8, 13, 14, 17, 30, 35)
 LINE = {"conductance": 1e-7, "critical_ratio": 0.3, "dead_volume": 5e-6, "valve_lag": 2e-5}
-IN_TIME = ("tube inertia", "gas filling", "valve lag")
+IN_TIME = ("tube inertia", "gas filling", "valve lag", "liquid held in the tube")
 
 Rows = Mapping[str, Mapping[str, Any]]
 

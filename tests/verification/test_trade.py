@@ -102,12 +102,17 @@ def test_the_moved_mass_against_an_independent_solver(scene: Scene) -> None:
 
 
 def test_the_ways_through_an_operation_are_those_the_scene_gives_numbers_for(scene: Scene) -> None:
-    assert [time.modelled for time in time_models(scene)][-1] == ("tube inertia",)
+    assert [time.modelled for time in time_models(scene)][-1] == ("tube inertia", "liquid held in the tube")
     gas = dataclasses.replace(
         scene.gas, conductance=1e-8, critical_ratio=0.3, dead_volume=1e-6, valve_lag=5e-3
     )
     richer = time_models(dataclasses.replace(scene, gas=gas))
-    assert richer[-1].modelled == ("tube inertia", "gas filling", "valve lag")
+    assert richer[-1].modelled == (
+        "tube inertia",
+        "liquid held in the tube",
+        "gas filling",
+        "valve lag",
+    )
     assert "gas filling" in richer[0].lacks
     assert operation_laws(scene)[-1].regimes == REGIMES
 

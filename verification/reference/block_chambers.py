@@ -105,22 +105,23 @@ def sector_chamber(
     return block_chamber(cells, place, kind=kind, closed=angle > 2 * np.pi - 1e-9)
 
 
-def plated_chamber(
+def disc_chamber(
     disc: Disc, cells: tuple[int, int, int], *, kind: CellKind = "hexahedron27"
 ) -> ChamberGeometry:
-    """The space between the plates of a disc that the keys give, as a file would give it."""
-    ends = np.sqrt(np.array([disc.inner_radius, disc.outer_radius]) ** 2 - disc.plate_thickness**2)
+    """The built-in chamber of a disc, plates and all."""
+    t = disc.plate_thickness
+    faces = [float(np.sqrt(radius**2 - t**2)) for radius in (disc.inner_radius, disc.outer_radius)]
 
     def place(cube: FloatArray) -> FloatArray:
-        # Even along the plates' faces, which quadratic cells then draw exactly.
-        radius = np.hypot(ends[0] + np.ptp(ends) * cube[..., 0], disc.plate_thickness)
-        turned = (2 * cube[..., 1] - 1) * half_angle(disc=replace(disc, geometry=None), radius=radius)
-        across = [radius * np.cos(turned), radius * np.sin(turned)]
-        return np.stack([*across, disc.axial_width * (cube[..., 2] - 0.5)], axis=-1)
+        # Along a plate's straight face distances grow evenly.
+        radius = np.hypot(faces[0] + cube[..., 0] * (faces[1] - faces[0]), t)
+        turned = (2 * cube[..., 1] - 1) * half_angle(disc=disc, radius=radius)
+        axial = disc.axial_width * (cube[..., 2] - 0.5)
+        return np.stack([radius * np.cos(turned), radius * np.sin(turned), axial], axis=-1)
 
     return block_chamber(cells, place, kind=kind)
 
 
 def imported(disc: Disc, *, cells: tuple[int, int, int] = (4, 16, 2)) -> Disc:
     """The disc with its own chamber imported, and no other dimensions."""
-    return replace(disc, geometry=plated_chamber(disc, cells))
+    return replace(disc, geometry=disc_chamber(disc, cells))

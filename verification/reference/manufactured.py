@@ -7,7 +7,7 @@ problem uses, so every term of the problem is exercised and none vanishes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
@@ -28,8 +28,8 @@ _SCALE: Final = 1e5
 _SLOPES: Final = (3.0, 0.7, 1.8)
 _SHIFTS: Final = (0.4, 0.2)
 _GAUSS: Final = 40
-_FIELD_ORDER: Final = 3.0
-_WALL_ORDER: Final = {"curved": 4.0, "straight": 2.0}
+_FIELD_ORDER: Final = {"quadratic": 3.0, "straight": 3.0, "quartic": 5.0}
+_WALL_ORDER: Final = {"quadratic": 4.0, "straight": 2.0}
 _FILL_SHARE: Final = 0.8
 """Of the largest fill: a ring deep enough to show every direction."""
 
@@ -105,82 +105,75 @@ def _without_one_plate(
     return np.where(on_plate, 0.0, exact.wall_flux(places, normals))
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Study:
-    """Errors of one geometry over all levels."""
-
-    geometry: Geometry
-    cells: Sequence[tuple[int, ...]]
-    unknowns: int
-    """On the finest mesh."""
-    field: OrderStudy
-    """Root mean square of the pressure's error over the liquid, relative."""
-    wall: OrderStudy
-    """Error of the integral of the pressure over the outer wall, relative."""
-
-    def tables(self) -> tuple[Convergence, Convergence]:
-        """Both errors beside their formal orders."""
-        cells = ", ".join(" x ".join(map(str, count)) for count in self.cells)
-        note = f"cells {cells}; up to {self.unknowns} unknowns"
-        shape, force = self.geometry, "force on the outer wall, relative error"
-        return (
-            self.field.table("pressure field, relative error", _FIELD_ORDER, geometry=shape, note=note),
-            self.wall.table(force, _WALL_ORDER[shape], geometry=shape, note=note),
-        )
-
-
 def manufactured_evidence(*, disc: Disc, cells: Sequence[tuple[int, ...]], defect: str | None) -> Evidence:
-    """Orders and finest errors on curved and on straight-sided meshes, coarse to fine, halving h each time.
+    """Orders and finest errors on meshes that halve h each time, coarse to fine.
 
+    Quadratic cells with curved and with straight sides, and quartic ones with curved sides, whose integrals
+    soon meet rounding.
     Raises: ValueError: an unknown defect.
     """
-    curved, straight = (_study(disc, cells, geometry, defect) for geometry in ("curved", "straight"))
-    found = {
-        "field_order_quadratic": curved.field.settled_order,
-        "field_error_quadratic": curved.field.finest_error,
-        "wall_order_quadratic": curved.wall.settled_order,
-        "wall_error_quadratic": curved.wall.finest_error,
-        "field_order_straight": straight.field.settled_order,
-        "wall_order_straight": straight.wall.settled_order,
-        "wall_error_straight": straight.wall.finest_error,
+    exact = Manufactured(length=disc.outer_radius, width=disc.axial_width, half_angle=disc.central_angle / 2)
+    solved = partial(_solutions, disc, exact.problem(defect), cells)
+    quadratic, straight, quartic = solved(2, "curved"), solved(2, "straight"), solved(4, "curved")
+    study = partial(order_study, size=[cells[0][0] / count[0] for count in cells])
+    fields = {
+        name: study(error=[field_error(s, exact.pressure) for s in solutions])
+        for name, solutions in (("quadratic", quadratic), ("straight", straight), ("quartic", quartic))
     }
-    curves = {
-        "pressure field, curved": curved.field,
-        "wall force, curved": curved.wall,
-        "pressure field, straight": straight.field,
-        "wall force, straight": straight.wall,
+    wall = _exact_wall_integral(disc, exact, dimension=len(cells[0]))
+    walls = {
+        name: study(error=[abs(_wall_integral(s) / wall - 1) for s in solutions])
+        for name, solutions in (("quadratic", quadratic), ("straight", straight))
     }
+    orders = {f"field_order_{name}": found.settled_order for name, found in fields.items()}
+    errors = {f"field_error_{name}": fields[name].finest_error for name in ("quadratic", "quartic")}
+    orders |= {f"wall_order_{name}": found.settled_order for name, found in walls.items()}
+    errors |= {f"wall_error_{name}": found.finest_error for name, found in walls.items()}
+    unknowns = quartic[-1].pressure.size
+    note = f"cells {', '.join(' x '.join(map(str, count)) for count in cells)}; up to {unknowns} unknowns"
     return Evidence(
-        found={name: Found(value=value) for name, value in found.items()},
+        found={name: Found(value=value) for name, value in (orders | errors).items()},
         numbers={
-            "curving": straight.wall.finest_error / curved.wall.finest_error,
-            "unknowns": float(curved.unknowns),
+            "curving": walls["straight"].finest_error / walls["quadratic"].finest_error,
+            "unknowns": float(unknowns),
         },
-        series=(order_figure(curves),),
-        convergence=(*curved.tables(), *straight.tables()),
+        series=(
+            order_figure(
+                {f"pressure field, {name}": found for name, found in fields.items()}
+                | {f"wall force, {name}": found for name, found in walls.items()}
+            ),
+        ),
+        convergence=(
+            *_tables(fields, "pressure field, relative error", _FIELD_ORDER, note),
+            *_tables(walls, "force on the outer wall, relative error", _WALL_ORDER, note),
+        ),
     )
 
 
-def _study(disc: Disc, cells: Sequence[tuple[int, ...]], geometry: Geometry, defect: str | None) -> _Study:
+def _tables(
+    studies: Mapping[str, OrderStudy], quantity: str, formal: Mapping[str, float], note: str
+) -> list[Convergence]:
+    return [found.table(quantity, formal[name], geometry=name, note=note) for name, found in studies.items()]
+
+
+def _solutions(
+    disc: Disc,
+    problem: PressureProblem,
+    cells: Sequence[tuple[int, ...]],
+    order: int,
+    geometry: Geometry,
+) -> list[PressureSolution]:
     """A wrong wall integral is seen against the true arc, so straight sides show in it."""
-    exact = Manufactured(length=disc.outer_radius, width=disc.axial_width, half_angle=disc.central_angle / 2)
     radius = float(surface_radius(disc=disc, fill_ratio=_FILL_SHARE * disc.max_fill_ratio))
-    solutions = [
+    return [
         solve_pressure(
-            chamber=chamber_mesh(disc=disc, surface_radius=radius, cells=count, geometry=geometry),
-            problem=exact.problem(defect),
+            chamber=chamber_mesh(
+                disc=disc, surface_radius=radius, cells=count, order=order, geometry=geometry
+            ),
+            problem=problem,
         )
         for count in cells
     ]
-    size = [cells[0][0] / count[0] for count in cells]
-    wall = _exact_wall_integral(disc, exact, dimension=len(cells[0]))
-    return _Study(
-        geometry=geometry,
-        cells=cells,
-        unknowns=solutions[-1].pressure.size,
-        field=order_study(size=size, error=[field_error(s, exact.pressure) for s in solutions]),
-        wall=order_study(size=size, error=[abs(_wall_integral(s) / wall - 1) for s in solutions]),
-    )
 
 
 def _wall_integral(solution: PressureSolution) -> float:

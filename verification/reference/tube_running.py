@@ -3,25 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
 
 import numpy as np
-from scipy.optimize import brentq
 
 from ringbalance.physics.tube.loss import TubeLoss, tube_loss
-from ringbalance.reduced_model.chamber.calibration import calibrate_chamber
-from ringbalance.reduced_model.law.building import calibrated_law
-from ringbalance.reduced_model.paper.formulas import PAPER_DRAG_COEFFICIENT
-from ringbalance.reduced_model.tube.heads import tube_heads
 from ringbalance.scene.models import Scene
 from ringbalance.verification.reference.exact_chamber import wall_pressure_of
 
 _VELOCITIES: Final = (1e-4, 3000.0, 401)
-_NARROWEST: Final = 0.4
-"""Smallest bore looked at, in units of the scene's."""
 _LEAST: Final = 0.05
 """Smallest head asked for, in units of the gas pressure's: below it lies a stall."""
 
@@ -90,27 +82,3 @@ def with_bore(scene: Scene, factor: float) -> Scene:
     tube, bore = scene.tube, factor * scene.tube.bore
     bends = tuple(dataclasses.replace(bend, radius=max(bend.radius, bore)) for bend in tube.bends)
     return dataclasses.replace(scene, tube=dataclasses.replace(tube, bore=bore, bends=bends))
-
-
-@lru_cache(maxsize=16)
-def second_reading(scene: Scene) -> Scene:
-    """The scene with the bore in which the calibrated law moves what the scene's own moves with k = 50.
-
-    Fig. 7 fixes only the product of influence coefficient, lambda, tube area and velocity. The paper's disc
-    has its bore from k = 50; this bore gives the same flow at equal fills under the calibrated law. A scene
-    whose k is prescribed, or whose tube carries less than with k = 50, is returned as it is.
-    """
-    head = scene.gas.pressure / scene.liquid.density
-    target = math.sqrt(2 * head / (PAPER_DRAG_COEFFICIENT + 1))
-
-    chamber = calibrate_chamber(scene)
-
-    def excess(factor: float) -> float:
-        own = with_bore(scene, factor)
-        law = calibrated_law(scene=own, chamber=chamber, heads=tube_heads(own))
-        flow = law.evaluate(fill_ratio=law.max_fill_ratio / 2, gas_pressure=scene.gas.pressure, primed=True)
-        return factor**2 * float(flow.velocity) - target
-
-    if scene.tube.drag_coefficient is not None or excess(1.0) <= 0:
-        return scene
-    return with_bore(scene, float(brentq(excess, _NARROWEST, 1.0, xtol=1e-4)))

@@ -22,6 +22,7 @@ from ringbalance.reduced_model.law.model import CompleteLaw, balancer_model
 from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.reduced_model.selection.estimates import (
     FILLING,
+    HELD,
     INERTIA,
     LAG,
     injection_estimates,
@@ -80,11 +81,12 @@ ModelPair = tuple[LawModels, _TimeModels]
 
 def time_models(scene: Scene) -> tuple[_TimeModels, ...]:
     """Ways through an injection that a scene has numbers for, in order of increasing cost."""
-    given = tuple(
-        term
-        for term, number in ((FILLING, scene.gas.conductance), (LAG, scene.gas.valve_lag))
-        if number is not None
+    numbers = (
+        (HELD, scene.tube.hump_radius),
+        (FILLING, scene.gas.conductance),
+        (LAG, scene.gas.valve_lag),
     )
+    given = tuple(term for term, number in numbers if number is not None)
     left = (INERTIA, *given)
     quasi_steady = (
         _steady(CLOSED_FORM, closed_form, left, closed_operation=1.0),
@@ -164,7 +166,12 @@ def _operation_contributions(scene: Scene) -> Mapping[str, Contribution]:
             term=term,
             value=found[term].contribution,
             formula=found[term].formula,
-            source={INERTIA: "rho L du/dt", FILLING: "ISO 6358-1", LAG: "definition"}[term],
+            source={
+                INERTIA: "rho L du/dt",
+                HELD: "lift to the crest",
+                FILLING: "ISO 6358-1",
+                LAG: "definition",
+            }[term],
             rough=True,
         )
         for term in IN_INJECTIONS

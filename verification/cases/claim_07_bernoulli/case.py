@@ -12,10 +12,10 @@ from ringbalance.scene.models import Scene
 from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
 from ringbalance.verification.loops import flow_law_of
+from ringbalance.verification.reference.fig_7 import readings
 from ringbalance.verification.reference.tube_running import (
     driving_head,
     running_tube,
-    second_reading,
     tube_curve,
 )
 
@@ -31,7 +31,7 @@ def values(scene: Scene) -> dict[str, float]:
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     excess, by_exit = _exit(scene)
-    bare = second_reading(scene)
+    _, bare = readings()
     return Evidence(
         found={
             "one_k": _one_k(scene),

@@ -18,11 +18,11 @@ from ringbalance.scene.models import Liquid, Scene
 from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, Series, Table, figure
 from ringbalance.verification.loops import flow_law_of
+from ringbalance.verification.reference.fig_7 import readings
 from ringbalance.verification.reference.tube_running import (
     Running,
     driving_head,
     running_tube,
-    second_reading,
     tube_curve,
     with_bore,
 )
@@ -53,11 +53,11 @@ def values(scene: Scene) -> dict[str, float]:
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     own = running_tube(scene, head=driving_head(scene, share=0.5))
-    bare = second_reading(scene)
+    printed, bare = readings()
     narrow = running_tube(bare, head=driving_head(bare, share=0.5))
-    fills = _over_fills(bare)
+    fills = _over_fills(scene)
     bores = [_with_bore(scene, factor) for factor in _BORES]
-    differences = _differences(scene, bare)
+    differences = _differences(printed, bare)
     liquids = {liquid.name: _with_liquid(scene, liquid) for liquid in _liquids()}
     return Evidence(
         found={
@@ -68,6 +68,8 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "gas": scene.gas.pressure,
             "velocity": own.velocity,
             "bore": scene.tube.bore,
+            "times_50": math.sqrt((PAPER_DRAG_COEFFICIENT + 1) / (own.k + 1)),
+            "printed_bore": printed.tube.bore,
             "k_own": own.k,
             "bare_bore": bare.tube.bore,
             "bare_k": narrow.k,
@@ -155,10 +157,10 @@ def _table(liquids: Mapping[str, Running]) -> Table:
 
 
 def _differences(scene: Scene, bare: Scene) -> Table:
-    """Velocities of both laws, each on the machine that meets Fig. 7 under it, over those at equal fills."""
+    """Velocities of both laws over those at equal fills, each on the disc that meets Fig. 7 under it."""
     full, gas = scene.disc.max_fill_ratio, scene.gas.pressure
     rows = {
-        "equal fills, the scene's gas pressure and liquid": (scene.liquid, full / 2, gas),
+        "equal fills, 0.7 MPa of gas and water": (scene.liquid, full / 2, gas),
         "1.5 times the gas pressure": (scene.liquid, full / 2, 1.5 * gas),
         "2.5 times the gas pressure": (scene.liquid, full / 2, 2.5 * gas),
         "driven chamber full": (scene.liquid, full, gas),

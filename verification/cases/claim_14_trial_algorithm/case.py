@@ -18,7 +18,7 @@ from ringbalance.verification.loops import PHASES, amplitude_series, loop_scene,
 _TEN_SECONDS: Final = 10.0
 _ABOUT: Final = 40.0
 _STEPS: Final = {
-    "light": ((0.02,), (0.1,), (0.003, 0.005), (0.25, 0.5, 1.0)),
+    "light": ((0.02, 0.05), (0.1, 0.2), (0.003, 0.005), (0.25, 1.0)),
     "heavy": ((0.02, 0.05), (0.1, 0.2), (0.003, 0.005, 0.007), (0.25, 0.5, 1.0)),
 }
 """First trial, long step, short step and period, s: each from barely visible to barely below the limit."""
@@ -50,6 +50,8 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         numbers={
             "settings": float(len(sets)),
             "settling_sets": float(settled.size),
+            "other_sets": float(len(sets) - settled.size),
+            "time_limit": scene.run.time_limit,
             "fastest": float(settled.min()),
             "slowest": float(settled.max()),
             "fewest": float(min(counts)),

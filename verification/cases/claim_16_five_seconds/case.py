@@ -20,7 +20,7 @@ from ringbalance.verification.loops import (
     run_loop,
     settling,
 )
-from ringbalance.verification.reference.tube_running import second_reading
+from ringbalance.verification.reference.fig_7 import readings
 
 _BOUND: Final = 5.0
 
@@ -35,7 +35,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     runs = {period: _runs(given, period) for period in PERIODS}
     slowest = [_slowest(scene, group) for group in runs.values()]
     rises = [max(run.misadjustments for run in group) for group in runs.values()]
-    bare = second_reading(given)
+    _, bare = readings()
     calibrated = _short_runs(bare)
     return Evidence(
         found={

@@ -10,6 +10,7 @@ import numpy as np
 
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.law.flow_law import FlowLaw
+from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import (
     Curve,
@@ -47,6 +48,10 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     laws = [_law(scene, density) for density in (light, felt)]
     reach_light, reach_dense = (_reach(law, scene.gas.pressure) for law in laws)
     raised = _gain(scene, laws, raised=2 if defect is None else 1)
+    usable = [
+        min(reach, scene.disc.max_fill_ratio - residual_fill_ratio(scene, law=law))
+        for law, reach in zip(laws, (reach_light, reach_dense), strict=True)
+    ]
     return Evidence(
         found={
             "gain": Found(value=_gain(scene, laws), numerical=_STANDARD, corrected=raised),
@@ -58,6 +63,8 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "gas": scene.gas.pressure,
             "reach_light": reach_light,
             "reach_dense": reach_dense,
+            "usable_light": usable[0],
+            "gain_usable": _ability(scene, 2 * light, usable[1]) / _ability(scene, light, usable[0]),
             "gain_full": _gain(scene, laws, full=True),
             "prime_light": _priming(scene, light),
             "prime_dense": _priming(scene, felt),

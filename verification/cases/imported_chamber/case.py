@@ -20,7 +20,7 @@ from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference
 from ringbalance.verification.orders import order_study
-from ringbalance.verification.reference.block_chambers import plated_chamber
+from ringbalance.verification.reference.block_chambers import disc_chamber
 from ringbalance.verification.reference.exact_chamber import central_lambda, exact_moment, wall_pressure_of
 from ringbalance.verification.reference.manufactured import Manufactured
 
@@ -63,7 +63,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 
 
 def _record(disc: Disc, cells: tuple[int, int, int], defect: str | None) -> ChamberGeometry:
-    record = plated_chamber(disc, cells)
+    record = disc_chamber(disc, cells)
     if defect == "drawn_too_large":
         return replace(record, points=record.points * 1.0001, digest=f"large {record.digest}")
     return record
@@ -107,7 +107,7 @@ def _manufactured(disc: Disc, defect: str | None) -> tuple[float, float]:
     exact = Manufactured(length=disc.outer_radius, width=disc.axial_width, half_angle=disc.central_angle / 2)
     errors = []
     for cells in _COARSE_TO_FINE:
-        record = plated_chamber(disc, cells)
+        record = disc_chamber(disc, cells)
         walls = {FREE_SURFACE if n == "inner_wall" else n: each for n, each in record.boundaries.items()}
         space = TetrahedronSpace(body=tetrahedra(replace(record, boundaries=walls)))
         solution = solve_on(space, exact.problem(defect))

@@ -1,0 +1,165 @@
+"""Liquid that is lifted in the tube before any of it passes the crest, in plain numbers.
+
+In a tube that is not primed the liquid of the chamber that gives stands at that chamber's level, with the
+gas of the other one over it.  Under gas its front, at the fraction s of the path, moves by
+    rho s L du/dt = p_A - p_c + P_A - D(s) - K(s) rho u^2/2,    L ds/dt = u,
+D(s) a column from the front to the outer wall, p_c the gas over the crest, K(s) = e K + (1 - e) K s/s_end
+with K = alpha + k_up up to the crest's end s_end, and e the fraction of it lost at the entrance.  From s_end
+on the flow law's column continues at the same velocity.
+
+Liquid on the crest's circle is pulled to neither side.  What is there when the column parts is taken to drain
+evenly: what was lifted to the middle of the crest falls back, what was lifted beyond it has passed.  While
+liquid is lifted the fill of the state is that of the chamber alone; `shown` is with the tube's share.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ringbalance.controller.compilation.compiled import in_place, inlined
+from ringbalance.controller.liquid_ring.compiled_column import (
+    crest_margins,
+    crest_slopes,
+    crest_table,
+    ends,
+    hydrostatic,
+    law_log,
+    quasi_steady,
+    tube_loss,
+)
+from ringbalance.controller.liquid_ring.compiled_gas import gas_volume
+from ringbalance.controller.liquid_ring.records import P, Record, X
+
+
+@inlined
+def crest_start(plant: Record, direction: int) -> float:
+    """Fraction of the path at which the crest's circle begins."""
+    return float(1.0 - (plant.return_crest_end if direction > 0 else plant.crest_end))
+
+
+@inlined
+def crest_stop(plant: Record, direction: int) -> float:
+    """Fraction of the path at which the crest's circle ends."""
+    return float(plant.crest_end if direction > 0 else plant.return_crest_end)
+
+
+@inlined
+def front(plant: Record, motion: Record, x: float) -> float:
+    """Fraction of the path up to which liquid stands, with chamber 0 at a fill."""
+    if not motion.lifting:
+        return float(motion.front)
+    return float(motion.front + motion.direction * (motion.started - x) / plant.hold_up)
+
+
+@inlined
+def shown(plant: Record, motion: Record, x: float) -> float:
+    """Fill of chamber 0 with what the tube gives back to it."""
+    if not motion.lifting:
+        return x
+    direction = motion.direction
+    middle = (crest_start(plant, direction) + crest_stop(plant, direction)) / 2.0
+    begun = max(motion.front - middle, 0.0)
+    passed = max(front(plant, motion, x) - middle, 0.0) - begun
+    return float(motion.started - direction * passed * plant.hold_up)
+
+
+@in_place
+def keep_front(plant: Record, motion: Record) -> None:
+    """Count what is lifted from its present place."""
+    x = motion.state[X]
+    fill, motion.front = shown(plant, motion, x), front(plant, motion, x)
+    motion.state[X], motion.started = fill, fill
+
+
+@inlined
+def arrived(plant: Record, motion: Record, x: float) -> float:
+    """How far the front is past the crest's end, a fraction of the path."""
+    return front(plant, motion, x) - crest_stop(plant, motion.direction)
+
+
+@inlined
+def _leg(plant: Record, place: float, direction: int) -> tuple[float, float]:
+    """D_m - D(s), Pa, and its slope."""
+    start, tall = crest_start(plant, direction), plant.column_pressure - plant.port_pressure
+    outward, straight = 1.0 - place / start, plant.lift_straight
+    if outward <= 0.0:
+        return 0.0, 0.0
+    height = tall * outward * (straight + (1.0 - straight) * outward)
+    return height, -tall / start * (straight + 2.0 * (1.0 - straight) * outward)
+
+
+@inlined
+def lift_rates(
+    plant: Record, motion: Record, at: tuple[float, float, float, float], x: float, speed: float
+) -> tuple[float, float, float, float, float, float]:
+    """Acceleration along the direction, m/s^2; by x through the front, against the direction; then as
+    `accelerations` by the speed, the pressure upstream, the gas downstream and the liquid there."""
+    direction, rho = motion.direction, plant.density
+    place, entrance = front(plant, motion, x), plant.lift_entrance
+    height, slope = _leg(plant, place, direction)
+    margin = crest_margins(plant, at)[1] + height
+    along = (1.0 - entrance) / crest_stop(plant, direction)
+    share, length = entrance + along * place, place * plant.length
+    loss, loss_slope = tube_loss(plant, crest_table(direction), speed, law_log(speed, motion.log_speed))
+    found = (margin / rho - share * loss) / length
+    by_place = (slope / rho - along * loss) / length - found / place
+    each = 1.0 / (rho * length)
+    _, by_gas, by_far = crest_slopes(plant, at)
+    by_x = -by_place / plant.hold_up
+    return found, by_x, -share * loss_slope / length, each, -each * by_gas, -each * by_far
+
+
+@in_place
+def lift_speed(plant: Record, motion: Record, at: tuple[float, float, float, float], x: float) -> float:
+    """Velocity of the front without inertia, m/s."""
+    direction, place = motion.direction, front(plant, motion, x)
+    margin = crest_margins(plant, at)[1] + _leg(plant, place, direction)[0]
+    if margin <= 0.0:
+        return 0.0
+    share = plant.lift_entrance + (1.0 - plant.lift_entrance) * place / crest_stop(plant, direction)
+    return quasi_steady(plant, crest_table(direction), margin / share, motion.log_speed)
+
+
+@in_place
+def lift_push(plant: Record, motion: Record, x: float, p: float, q: float) -> float:
+    """Acceleration of the front from rest, m/s^2; pressures absolute."""
+    ambient = plant.ambient_pressure
+    at = ends(plant, x, plant.total - x, p - ambient, q - ambient, motion.direction)
+    return lift_rates(plant, motion, at, x, 0.0)[0]
+
+
+@in_place
+def set_out(plant: Record, motion: Record) -> None:
+    """Where the front of liquid that begins to move stands; a primed tube has none."""
+    direction = motion.direction
+    if not plant.lifts or motion.primed:
+        motion.lifting, motion.front, motion.side = 0, crest_stop(plant, direction), direction
+        return
+    if motion.side != direction:
+        motion.front, motion.side = _resting_front(plant, motion), direction
+    motion.lifting = 1 if motion.front < crest_stop(plant, direction) else 0
+
+
+@in_place
+def _resting_front(plant: Record, motion: Record) -> float:
+    """Fraction of the path where the leg stands as flow over the crest becomes possible.
+
+    At the level under a gas that is there at once; at the crest's start under one that a line fills slowly.
+    Between them as far as a rising pressure moves a leg of constant length: p t^2/(6 rho s L), t the time of
+    the line while choked.
+    """
+    direction, x = motion.direction, motion.state[X]
+    own = x if direction > 0 else plant.total - x
+    tall = plant.column_pressure - plant.port_pressure
+    part = (plant.column_pressure - hydrostatic(plant, own)[0]) / tall
+    part, straight = min(max(part, 0.0), 1.0), plant.lift_straight
+    root = straight + math.sqrt(straight * straight + 4.0 * (1.0 - straight) * part)
+    start = crest_start(plant, direction)
+    # An entrance has the inertia of about a bore's length.
+    level = max(start * (1.0 - 2.0 * part / root), math.sqrt(4.0 / math.pi * plant.tube_area) / plant.length)
+    if not plant.line:
+        return float(level)
+    pressure = motion.state[P if direction > 0 else P + 1] - plant.ambient_pressure
+    time = pressure * gas_volume(plant, own) / (plant.passing * (plant.gas_pressure + plant.ambient_pressure))
+    way = pressure * time * time / (6.0 * plant.density * level * plant.length)
+    return float(max(min(level + way / plant.length, start), level))

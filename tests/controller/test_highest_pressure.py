@@ -1,0 +1,43 @@
+"""From where on gas that flows faster makes every correction larger than the limit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from ringbalance.controller.tuning.highest_pressure import highest_pressure
+from ringbalance.reduced_model.gas_line import line_answers
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.scene import Scene
+from ringbalance.scene.uncertain import with_value
+from ringbalance.verification.loops import calibration_of
+
+
+def smallest(scene: Scene, model: BalancerModel) -> float:
+    return max(answer.smallest_correction or 0.0 for answer in line_answers(scene, model))
+
+
+@pytest.fixture(scope="module")
+def fast(paper_scene: Scene) -> Scene:
+    """The paper's disc with a fast valve, and a limit a tenth above its smallest correction."""
+    scene = replace(paper_scene, gas=replace(paper_scene.gas, conductance=1e-8, valve_lag=5e-3))
+    limit = 1.1 * smallest(scene, calibration_of(scene).model)
+    return replace(scene, controller=replace(scene.controller, limit=limit))
+
+
+def test_there_the_smallest_correction_is_the_limit(fast: Scene) -> None:
+    model = calibration_of(fast).model
+    highest = highest_pressure(fast, model)
+    assert highest is not None
+    assert fast.gas.pressure < highest < 2 * fast.gas.pressure
+    there = with_value(scene=fast, quantity="pressure", value=highest)
+    # It rises by less than its own share of the pressure, which is known within 1 %.
+    assert smallest(there, model) == pytest.approx(fast.controller.limit, rel=0.01)
+
+
+@pytest.mark.parametrize("factor", [0.5, 10.0])
+def test_none_below_the_smallest_correction_or_far_above_it(fast: Scene, factor: float) -> None:
+    controller = replace(fast.controller, limit=factor * fast.controller.limit)
+    scene = replace(fast, controller=controller)
+    assert highest_pressure(scene, calibration_of(scene).model) is None

@@ -1,0 +1,120 @@
+"""Waves in imported chambers, against plane ones, closed forms, and themselves on finer meshes."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from ringbalance.mesh.geometry import surface_radius
+from ringbalance.physics.results import StatusCode
+from ringbalance.physics.sloshing.imported import RingWaves, ring_waves
+from ringbalance.physics.sloshing.modes import sloshing_modes
+from ringbalance.physics.sloshing.response import sloshing_response
+from ringbalance.scene.models import Disc
+from ringbalance.verification.reference.block_chambers import block_chamber, disc_chamber, sector_chamber
+
+_FILL, _NU, _OMEGA = 0.25, 1e-6, 1000.0
+
+
+@lru_cache(maxsize=1)
+def _disc() -> Disc:
+    return Disc(
+        outer_radius=0.0445, inner_radius=0.0205, axial_width=0.062, central_angle=np.pi / 2, chambers=4,
+        plate_thickness=0.002777, max_fill_ratio=0.5, initial_fill=0.25,
+    )  # fmt: skip
+
+
+@lru_cache(maxsize=4)
+def _waves(cells: tuple[int, int, int]) -> RingWaves:
+    radius = float(surface_radius(disc=_disc(), fill_ratio=_FILL))
+    return ring_waves(
+        geometry=disc_chamber(_disc(), cells),
+        surface_radius=radius,
+        angular_velocity=_OMEGA,
+        kinematic_viscosity=_NU,
+        gravity=9.8,
+    )
+
+
+def _nearest(values: np.ndarray, to: float) -> int:
+    return int(np.abs(values - to).argmin())
+
+
+def test_waves_that_are_the_same_along_the_shaft_are_the_plane_ones() -> None:
+    waves = _waves((12, 12, 6))
+    plane = sloshing_modes(disc=_disc(), fill_ratio=_FILL, modes=2).frequency_ratio.value[0]
+    for exact in plane:
+        here = _nearest(waves.frequency_ratio.value, exact)
+        assert waves.frequency_ratio.value[here] == pytest.approx(exact, rel=1e-3)
+        assert abs(waves.frequency_ratio.value[here] - exact) <= waves.frequency_ratio.uncertainty[here]
+        assert waves.vortical_share[here] < 0.02
+
+
+def test_the_answer_to_gravity_is_the_plane_one() -> None:
+    waves = _waves((12, 12, 6))
+    plane = sloshing_response(
+        disc=_disc(), fill_ratio=_FILL, angular_velocity=_OMEGA, kinematic_viscosity=_NU, gravity=9.8
+    )
+    assert waves.status.ok
+    assert waves.amplification.value == pytest.approx(plane.amplification.value[0], rel=1e-3)
+    assert waves.pressure_amplification.value == pytest.approx(
+        plane.pressure_amplification.value[0], rel=1e-3
+    )
+    # The highest place is at a corner, where meshes differ.
+    assert waves.surface_amplitude.value == pytest.approx(plane.surface_amplitude.value[0], rel=0.15)
+    assert waves.damped_share == pytest.approx(plane.damped_share[0], abs=1e-3)
+
+
+def test_waves_along_the_shaft_have_vorticity_and_an_uncertainty_that_says_so() -> None:
+    waves = _waves((12, 12, 6))
+    # The first wave along the shaft of this chamber lies next to the first plane one.
+    axial = waves.frequency_ratio.value[1]
+    assert 0.68 < axial < 0.72
+    assert waves.vortical_share[1] > 0.03
+    assert waves.frequency_ratio.uncertainty[1] > 1e-3
+
+
+def test_without_rotation_a_box_has_the_frequencies_of_its_closed_form() -> None:
+    """A box far from the shaft, spun so that only its centrifugal gravity counts: s^2 = g k tanh(k h)."""
+    far, depth, across, along = 2000.0, 0.5, 1.0, 0.8
+
+    def box(cube: np.ndarray) -> np.ndarray:
+        return np.stack(
+            [far + 2 * depth * (cube[..., 0] - 0.5), across * (cube[..., 1] - 0.5), along * cube[..., 2]],
+            axis=-1,
+        )
+
+    waves = ring_waves(geometry=block_chamber((8, 6, 6), box), surface_radius=far, modes=3)
+    k = np.pi * np.sort([1 / across, 1 / along, np.hypot(1 / across, 1 / along)])
+    # s is large (s^2 about far), so what the Coriolis force does is of order 1 / s.
+    assert waves.frequency_ratio.value == pytest.approx(np.sqrt(far * k * np.tanh(k * depth)), rel=2e-3)
+    assert waves.vortical_share.max() < 0.01
+
+
+def test_a_vertical_shaft_tilts_the_surface_and_slows_nothing_at_high_speed() -> None:
+    geometry = sector_chamber((4, 6, 3), radii=(0.5, 1.0), angle=np.pi / 2, width=1.0)
+    flat = ring_waves(geometry=geometry, surface_radius=0.8, modes=1)
+    steep = ring_waves(geometry=geometry, surface_radius=0.8, modes=1, axial_gravity=0.05)
+    change = steep.frequency_ratio.value[0] / flat.frequency_ratio.value[0] - 1
+    # The paraboloid's depth changes by g z / (omega^2 a) from end to end, evenly about the middle.
+    assert 1e-5 < abs(change) < 0.01
+
+
+@pytest.mark.parametrize(
+    ("gravity", "code"), [(0.9, StatusCode.NO_RING), (0.5, StatusCode.OUT_OF_RANGE), (1e-4, StatusCode.OK)]
+)
+def test_the_status_says_where_waves_are_not_small(gravity: float, code: StatusCode) -> None:
+    geometry = sector_chamber((3, 4, 2), radii=(0.5, 1.0), angle=np.pi / 2, width=1.0)
+    assert ring_waves(geometry=geometry, surface_radius=0.8, gravity=gravity).status.code is code
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"angular_velocity": 0.0}, {"gravity": -1.0}, {"modes": 0}, {"levels": 1}, {"frequency_ratio": 0.0}],
+)
+def test_impossible_arguments_are_refused(wrong: dict[str, float]) -> None:
+    geometry = sector_chamber((1, 2, 1), radii=(0.5, 1.0), angle=np.pi / 2, width=1.0)
+    with pytest.raises(ValueError, match="|".join(wrong)):
+        ring_waves(geometry=geometry, surface_radius=0.8, **wrong)  # type: ignore[arg-type]

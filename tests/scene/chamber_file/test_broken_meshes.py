@@ -1,0 +1,395 @@
+"""Meshes with one error or several: each is named with its entity and place, and nothing is a traceback."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from drawn_chamber import CHAMBER, Drawing, Element, drawn, inp, loaded, msh_2, msh_4, without
+
+from ringbalance.scene import Scene, SceneError
+
+
+class Broken(NamedTuple):
+    """A file, and what its message must say, in this order."""
+
+    content: Callable[[], bytes]
+    words: tuple[str, ...]
+    name: str = "chamber.msh"
+    keys: dict[str, str | int] = {}  # noqa: RUF012
+
+
+def spoilt(change: Callable[[Drawing], object], kind: str = "tetra") -> Callable[[], bytes]:
+    """A drawing that a function changes, in place or by its result, as a Gmsh file."""
+
+    def content() -> bytes:
+        drawing = drawn(kind)
+        changed = change(drawing)
+        return msh_2(changed if isinstance(changed, Drawing) else drawing)
+
+    return content
+
+
+def text(old: str, new: str, *, kind: str = "tetra", count: int = 1) -> Callable[[], bytes]:
+    """A file of version 4.1 with some text replaced."""
+    return lambda: msh_4(drawn(kind)).replace(old.encode(), new.encode(), count)
+
+
+def moved(drawing: Drawing, node: int, x: float, y: float, z: float) -> None:
+    drawing.points[node] = (float(x), float(y), float(z))
+
+
+def add(drawing: Drawing, kind: str, nodes: list[int], group: int = CHAMBER) -> int:
+    number = max(drawing.elements) + 1
+    drawing.elements[number] = Element(kind, nodes, group)
+    return number
+
+
+def named(drawing: Drawing, old: str, new: str) -> None:
+    drawing.names = {key: new if name == old else name for key, name in drawing.names.items()}
+
+
+def grouped(drawing: Drawing, number: int, name: str) -> None:
+    drawing.elements[number].group = next(group for (_, group), each in drawing.names.items() if each == name)
+
+
+def twice_named_facet(drawing: Drawing) -> None:
+    facet = drawing.elements[drawing.facets("outer_wall")[0]]
+    grouped(drawing, add(drawing, facet.kind, facet.nodes), "end_back")
+
+
+def inner_facet(drawing: Drawing) -> None:
+    outside = [set(drawing.elements[n].nodes) for n in drawing.elements if n not in drawing.cells()]
+    corners = next(
+        face
+        for n in drawing.cells()
+        for face in [drawing.elements[n].nodes[:3], drawing.elements[n].nodes[1:]]
+        if set(face) not in outside
+    )
+    grouped(drawing, add(drawing, "triangle", list(corners)), "outer_wall")
+
+
+def split_in_two(drawing: Drawing) -> None:
+    """Each cell gets its own nodes: nothing hangs together any more."""
+    first = drawing.cells()[0]
+    fresh = {node: node + 1000 for node in drawing.elements[first].nodes}
+    drawing.points |= {new: drawing.points[old] for old, new in fresh.items()}
+    for each in drawing.elements.values():
+        if each is drawing.elements[first]:
+            each.nodes = [fresh[node] for node in each.nodes]
+
+
+def triangles_on_hexahedra(drawing: Drawing) -> None:
+    for number in drawing.facets("end_back"):
+        facet = drawing.elements[number]
+        facet.kind, facet.nodes = "triangle", facet.nodes[:3]
+
+
+def far_copy(drawing: Drawing) -> None:
+    nodes = drawing.elements[drawing.cells()[0]].nodes
+    fresh = [node + 1000 for node in nodes]
+    for old, new in zip(nodes, fresh, strict=True):
+        x, y, z = drawing.points[old]
+        moved(drawing, new, x, y, z + 100)
+    add(drawing, "tetra", fresh)
+
+
+def third_cell(drawing: Drawing) -> None:
+    """A further cell on a facet that two cells have already."""
+    cells = [drawing.elements[n].nodes for n in drawing.cells()]
+    shared = next(
+        sorted(set(one) & set(two)) for one in cells for two in cells if one != two and len({*one, *two}) == 5
+    )
+    moved(drawing, 999, 30.0, 1.0, 0.5)
+    add(drawing, "tetra", [*shared, 999])
+
+
+def hanging(drawing: Drawing) -> None:
+    """The cells at one side of a facet are refined by a node in its middle, the other cell is not."""
+    cells = {n: drawing.elements[n].nodes for n in drawing.cells()}
+    one, shared = next(
+        (a, sorted(set(cells[a]) & set(cells[b])))
+        for a in cells
+        for b in cells
+        if a != b and len(set(cells[a]) & set(cells[b])) == 3
+    )
+    apex = next(node for node in cells[one] if node not in shared)
+    del drawing.elements[one]
+    middle = np.mean([drawing.points[node] for node in shared], axis=0)
+    moved(drawing, 999, *middle)
+    for gone in range(3):
+        corners = [999 if place == gone else node for place, node in enumerate(shared)]
+        nodes = [*corners, apex]
+        edges = np.diff([drawing.points[node] for node in nodes], axis=0)
+        add(drawing, "tetra", nodes if np.linalg.det(edges) > 0 else [nodes[1], nodes[0], *nodes[2:]])
+
+
+def inverted(drawing: Drawing) -> None:
+    nodes = drawing.elements[drawing.cells()[4]].nodes
+    nodes[0], nodes[1] = nodes[1], nodes[0]
+
+
+def other_kind(drawing: Drawing) -> None:
+    nodes = drawing.elements[drawing.cells()[0]].nodes
+    add(drawing, "tetra", [nodes[0], nodes[1], nodes[3], nodes[4]])
+
+
+def prism(drawing: Drawing) -> None:
+    add(drawing, "wedge", [1, 2, 3, 4, 5, 6])
+
+
+def flat(drawing: Drawing) -> None:
+    nodes = drawing.elements[drawing.cells()[0]].nodes
+    drawing.points[nodes[3]] = drawing.points[nodes[0]]
+
+
+def folded(drawing: Drawing) -> None:
+    """A mid-side node beyond the end of its side."""
+    nodes = drawing.elements[drawing.cells()[0]].nodes
+    a, b = (np.array(drawing.points[node]) for node in nodes[:2])
+    moved(drawing, nodes[4], *(a + 1.6 * (b - a)))
+
+
+def crack(drawing: Drawing) -> None:
+    facet = drawing.elements[drawing.facets("outer_wall")[0]]
+    x, y, z = drawing.points[facet.nodes[3]]
+    moved(drawing, 9999, 1.01 * x, y, z)
+    facet.nodes = [*facet.nodes[:3], 9999, *facet.nodes[4:]]
+
+
+def renumbered(drawing: Drawing) -> Drawing:
+    return replace(drawing, points={number: place for number, place in drawing.points.items() if number != 5})
+
+
+def only_facets(drawing: Drawing) -> Drawing:
+    return without(drawing, *drawing.cells())
+
+
+def turned(degrees: float) -> Callable[[Drawing], None]:
+    """The whole chamber seen from another axis, or stretched about it."""
+
+    def change(drawing: Drawing) -> None:
+        for number, (x, y, z) in drawing.points.items():
+            radius, angle = math.hypot(x, y), math.atan2(y, x) * degrees / 80
+            moved(drawing, number, radius * math.cos(angle), radius * math.sin(angle), z)
+
+    return change
+
+
+def shifted(drawing: Drawing) -> None:
+    for number, (x, y, z) in drawing.points.items():
+        moved(drawing, number, x - 30.0, y, z)
+
+
+def not_finite(drawing: Drawing) -> None:
+    moved(drawing, 7, math.nan, 0.0, 0.0)
+
+
+def lines_only(drawing: Drawing) -> None:
+    """The outer wall is the name of a line."""
+    for number in drawing.facets("outer_wall"):
+        del drawing.elements[number]
+    drawing.names.pop((2, 2))
+    drawing.names[1, 30] = "outer_wall"
+    add(drawing, "line", [1, 2], 30)
+
+
+def port_on_inner_wall(drawing: Drawing) -> None:
+    drawing.names[2, 40] = "port"
+    drawing.elements[drawing.facets("inner_wall")[0]].group = 40
+
+
+def two_apart(drawing: Drawing) -> Drawing:
+    """Two cells of different places, with no facet in common."""
+    keep = [drawing.cells()[0], drawing.cells()[2]]
+    return without(drawing, *(number for number in drawing.elements if number not in keep))
+
+
+def exchanged(drawing: Drawing) -> None:
+    named(drawing, "outer_wall", "end_wall")
+    named(drawing, "inner_wall", "outer_wall")
+    named(drawing, "end_wall", "inner_wall")
+
+
+def in_part(drawing: Drawing) -> None:
+    drawing.elements[drawing.cells()[0]].group = 0
+
+
+MESHES: dict[str, Broken] = {
+    "empty": Broken(lambda: b"", ("the file is empty",)),
+    "spaces": Broken(lambda: b" \n" * 99, ("the file is empty",)),
+    "another format": Broken(lambda: b"solid\n", ("ends with .stl",), "chamber.stl"),
+    "no mesh at all": Broken(lambda: b"hello\n", ("not a Gmsh mesh",)),
+    "ansys": Broken(lambda: b'(0 "ANSYS")\n(2 3)\n', ("ANSYS Fluent",)),
+    "old version": Broken(text("4.1 0 8", "4 0 8"), ("Gmsh version 4 is not one", "2.2 or 4.1")),
+    "single precision": Broken(text("4.1 0 8", "4.1 0 4"), ("numbers of 8 bytes",)),
+    "no nodes": Broken(text("$Nodes", "$Knots"), ("section $Knots ends",)),
+    "no elements": Broken(
+        lambda: msh_4(drawn()).replace(b"$Elements", b"$Others").replace(b"$EndElements", b"$EndOthers"),
+        ("no section $Elements",),
+    ),
+    "cut off": Broken(lambda: msh_4(drawn())[:-400], ("section $Elements ends before",)),
+    "too many announced": Broken(
+        text("3 7 4 72", "3 7 4 999999999999"), ("section $Elements ends before all that it announces",)
+    ),
+    "negative count": Broken(text("3 7 4 72", "3 7 4 -72"), ("section $Elements ends before",)),
+    "word among numbers": Broken(text("3 7 4 72", "3 7 four 72"), ("$Elements holds something other",)),
+    "fraction of a node": Broken(text("3 7 4 72", "3 7 4 72.5"), ("fraction where a whole number",)),
+    "two sections": Broken(lambda: msh_2(drawn()) * 2, ("$MeshFormat stands in the file twice",)),
+    "third order": Broken(text("3 7 4 72", "3 7 29 72"), ("Gmsh type 29", "Mesh.ElementOrder")),
+    "surface only": Broken(spoilt(only_facets), ("no cells", "only lines and surface elements")),
+    "prisms": Broken(spoilt(prism), ("kind wedge: cell 237", "mixes kinds")),
+    "mixed kinds": Broken(
+        spoilt(other_kind, "hexahedron"), ("mixes kinds of cells: 12 hexahedron", "1 tetra")
+    ),
+    "node missing": Broken(spoilt(renumbered), ("nodes that the file does not give", "has node 5")),
+    "number twice": Broken(
+        lambda: msh_2(drawn()).replace(b"\n5 ", b"\n4 ", 1),
+        ("more than one node of the same number: node 4",),
+    ),
+    "not finite": Broken(spoilt(not_finite), ("no finite numbers: node 7",)),
+    "unmerged nodes": Broken(
+        spoilt(split_in_two), ("lie where another node lies already (4): node 1", "2 separate volumes")
+    ),
+    "two volumes": Broken(spoilt(far_copy), ("falls into 2 separate volumes", "cell 1", "mm")),
+    "touching at an edge": Broken(spoilt(two_apart), ("separate volumes",)),
+    "three cells at a facet": Broken(
+        spoilt(third_cell), ("belong to more than two cells (1): facet (nodes",)
+    ),
+    "hanging node": Broken(spoilt(hanging), ("nodes hang", "(1): node 999 at (")),
+    "cell twice": Broken(
+        spoilt(lambda d: add(d, "tetra", d.elements[d.cells()[3]].nodes)),
+        ("stand in the file twice",),
+    ),
+    "node twice in a cell": Broken(
+        spoilt(lambda d: add(d, "tetra", [1, 1, 2, 5])), ("have a node twice (1): cell",)
+    ),
+    "inverted": Broken(spoilt(inverted), ("cells are inverted (1 of 72): cell 169 at (",)),
+    "flat": Broken(spoilt(flat), ("without volume",)),
+    "folded": Broken(spoilt(folded, "tetra10"), ("cells fold over (2", "farthest from the middle", "node")),
+    "unused node": Broken(
+        spoilt(lambda d: moved(d, 500, 30.0, 0.0, 1.0)),
+        ("nodes belong to no cell (1): node 500 at (30, 0, 1) mm",),
+    ),
+    "no names": Broken(
+        spoilt(lambda d: without(d, *(n for n in d.elements if n not in d.cells()))),
+        ('no facets have the name "outer_wall"',),
+    ),
+    "misspelt name": Broken(
+        spoilt(lambda d: named(d, "outer_wall", "outerwall")),
+        (
+            'unknown name of a boundary, "outerwall" (did you mean "outer_wall"?): facet (element',
+            "no facets have",
+        ),
+    ),
+    "number for a name": Broken(
+        spoilt(lambda d: d.names.pop((2, 5))), ('"physical group 5"', "facet (element")
+    ),
+    "volume of another name": Broken(
+        spoilt(lambda d: named(d, "chamber", "chambre")), ('"chambre" are not the chamber (did you mean',)
+    ),
+    "cells without the name": Broken(spoilt(in_part), ('do not belong to the volume "chamber": cell 1',)),
+    "line named": Broken(spoilt(lines_only), ('"outer_wall" names lines or points, not facets',)),
+    "two names on a facet": Broken(
+        spoilt(twice_named_facet), ('facets have two names, "outer_wall" and "end_back" (1): facet (nodes',)
+    ),
+    "two names on a surface": Broken(
+        lambda: msh_4(drawn(), more={2: [5]}),
+        ('facets have two names, "outer_wall" and "end_back" (12): facet (nodes',),
+    ),
+    "facet inside": Broken(
+        spoilt(inner_facet), ('named "outer_wall" lie between two cells (1): facet (element',)
+    ),
+    "triangles on hexahedra": Broken(
+        spoilt(triangles_on_hexahedra, "hexahedron"), ('named "end_back" are no side of any cell (6)',)
+    ),
+    "facet of no cell": Broken(
+        spoilt(lambda d: grouped(d, add(d, "triangle", [1, 2, 30]), "outer_wall")),
+        ('named "outer_wall" are no side of any cell (1): facet (element',),
+    ),
+    "other mid-side nodes": Broken(spoilt(crack, "tetra10"), ("other mid-side nodes than their cells",)),
+    "names exchanged": Broken(spoilt(exchanged), ("names exchanged",)),
+    "unit missing": Broken(lambda: msh_4(drawn()), ("[disc] mesh_unit is missing",), keys={"mesh_unit": ""}),
+    "too large for a disc": Broken(
+        lambda: msh_4(drawn()), ("40000 mm: wrong mesh_unit",), keys={"mesh_unit": "m"}
+    ),
+    "outside the opening": Broken(
+        spoilt(turned(100)), ("outside the opening angle, 360 deg / 4 chambers", "node", "within 45 deg")
+    ),
+    "beside its middle": Broken(
+        lambda: msh_4(drawn()), ("outside the opening angle", "mesh_middle"), keys={"mesh_middle": "30 deg"}
+    ),
+    "wrong axis": Broken(lambda: msh_4(drawn()), ("see mesh_axis and the origin",), keys={"mesh_axis": "x"}),
+    "round the axis": Broken(spoilt(shifted), ("the shaft's axis", "mesh_axis and the origin")),
+    "port elsewhere": Broken(spoilt(port_on_inner_wall), ("does not cover port_radius, 19.52",)),
+    "abaqus without nodes": Broken(lambda: b"*HEADING\n", ("not an Abaqus mesh",), "chamber.inp"),
+    "abaqus element": Broken(
+        lambda: inp(drawn()).replace(b"C3D4", b"C3D9"), ("unknown type C3D9",), "chamber.inp"
+    ),
+    "abaqus include": Broken(
+        lambda: b"*INCLUDE, INPUT=/etc/passwd\n" + inp(drawn()), ("includes another file",), "chamber.inp"
+    ),
+    "abaqus moved part": Broken(
+        lambda: inp(drawn()) + b"*INSTANCE, NAME=a, PART=b\n1., 0., 0.\n", ("*INSTANCE moves",), "chamber.inp"
+    ),
+    "abaqus half a node": Broken(
+        lambda: inp(drawn()).replace(b"*NODE\n", b"*NODE\n1, 2\n", 1),
+        ("*NODE does not have 4",),
+        "chamber.inp",
+    ),
+    "abaqus face": Broken(
+        lambda: inp(drawn()) + b"*SURFACE, NAME=port\nchamber, S6\n",
+        ("face S6 of tetra cells",),
+        "chamber.inp",
+    ),
+    "vtu no xml": Broken(lambda: b"<VTKFile", ("this is not XML",), "chamber.vtu"),
+    "vtu other xml": Broken(lambda: b"<svg/>", ("not a VTK UnstructuredGrid",), "chamber.vtu"),
+    "vtu entities": Broken(
+        lambda: b'<!DOCTYPE a [<!ENTITY b "c">]><VTKFile>&b;</VTKFile>',
+        ("declares XML entities",),
+        "chamber.vtu",
+    ),
+    "vtu no piece": Broken(
+        lambda: b'<VTKFile type="UnstructuredGrid"><UnstructuredGrid/></VTKFile>',
+        ("0 pieces",),
+        "chamber.vtu",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_each_is_named(name: str, tmp_path: Path) -> None:
+    broken = MESHES[name]
+    with pytest.raises(SceneError) as caught:
+        loaded(tmp_path, broken.content(), broken.name, **broken.keys)
+    message = str(caught.value)
+    at = 0
+    for word in broken.words:
+        assert word in message[at:], message
+        at = message.index(word, at)
+    assert all(fault.table == "disc" and fault.key.startswith("mesh") for fault in caught.value.faults), (
+        message
+    )
+
+
+def test_all_errors_are_reported_together(tmp_path: Path) -> None:
+    drawing = drawn()
+    inverted(drawing)
+    twice_named_facet(drawing)
+    named(drawing, "end_front", "end_frond")
+    moved(drawing, 500, 30.0, 0.0, 1.0)
+    with pytest.raises(SceneError) as caught:
+        loaded(tmp_path, msh_2(drawing))
+    message = str(caught.value)
+    for word in ("are inverted", "have two names", 'did you mean "end_front"', "belong to no cell"):
+        assert word in message
+    assert len(caught.value.faults) == 4
+
+
+def test_nothing_is_said_of_a_sound_mesh(tmp_path: Path) -> None:
+    assert isinstance(loaded(tmp_path, msh_2(drawn())), Scene)

@@ -1,0 +1,88 @@
+"""Files damaged at random: either a scene or its errors come out, never anything else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+from drawn_chamber import NAMES, drawn, inp, loaded, msh_2, msh_4, scene_text
+
+from ringbalance.scene import Scene, SceneError, load_scene
+
+
+def _binary(folder: Path, version: str) -> bytes:
+    (folder / "own.msh").write_bytes(msh_4(drawn()) if version == "gmsh" else msh_2(drawn()))
+    meshio.write(folder / "binary.msh", meshio.read(folder / "own.msh"), file_format=version, binary=True)
+    return (folder / "binary.msh").read_bytes()
+
+
+def _vtu(folder: Path, *, binary: bool) -> bytes:
+    (folder / "own.msh").write_bytes(msh_2(drawn()))
+    there = meshio.read(folder / "own.msh")
+    groups = there.cell_data["gmsh:physical"]
+    data = {name: [(each == number + 1) * 1 for each in groups] for number, name in enumerate(NAMES)}
+    meshio.vtu.write(
+        folder / "own.vtu", meshio.Mesh(there.points, there.cells, cell_data=data), binary=binary
+    )
+    return (folder / "own.vtu").read_bytes()
+
+
+FILES: dict[str, tuple[str, Callable[[Path], bytes]]] = {
+    "text 2.2": ("chamber.msh", lambda _: msh_2(drawn())),
+    "text 4.1": ("chamber.msh", lambda _: msh_4(drawn("tetra10"))),
+    "binary 2.2": ("chamber.msh", lambda folder: _binary(folder, "gmsh22")),
+    "binary 4.1": ("chamber.msh", lambda folder: _binary(folder, "gmsh")),
+    "abaqus": ("chamber.inp", lambda _: inp(drawn("hexahedron20"))),
+    "vtu text": ("chamber.vtu", lambda folder: _vtu(folder, binary=False)),
+    "vtu binary": ("chamber.vtu", lambda folder: _vtu(folder, binary=True)),
+}
+
+
+def damaged(content: bytes, chance: np.random.Generator) -> bytes:
+    """Some bytes replaced, left out, repeated, or the end cut off."""
+    spoilt = bytearray(content)
+    for _ in range(int(chance.integers(1, 6))):
+        at, length = int(chance.integers(len(spoilt))), int(chance.integers(1, 40))
+        way = chance.integers(5)
+        if way == 0:
+            spoilt[at] = int(chance.integers(256))
+        elif way == 1:
+            del spoilt[at : at + length]
+        elif way == 2:
+            spoilt[at:at] = spoilt[at : at + length]
+        elif way == 3:
+            spoilt[at : at + 1] = bytes([int(chance.choice(list(b'0123456789-. \n$<>*,eE"')))])
+        else:
+            del spoilt[max(at, len(spoilt) // 4) :]
+    return bytes(spoilt)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_damage_is_an_error_of_the_scene(name: str, tmp_path: Path) -> None:
+    file, write = FILES[name]
+    content = write(tmp_path)
+    assert isinstance(loaded(tmp_path, content, file), Scene)
+    chance = np.random.default_rng(5)
+    refused = 0
+    for _ in range(60):
+        try:
+            loaded(tmp_path, damaged(content, chance), file)
+        except SceneError as error:
+            refused += "mesh" in str(error)
+    assert refused > 20
+
+
+def test_a_pipe_a_folder_and_no_file(tmp_path: Path) -> None:
+    (tmp_path / "chamber.msh").mkdir()
+    with pytest.raises(SceneError, match="cannot be read"):
+        loaded_again(tmp_path, "chamber.msh")
+    with pytest.raises(SceneError, match="there is no file"):
+        loaded_again(tmp_path, "chambers.msh")
+
+
+def loaded_again(folder: Path, name: str) -> object:
+    (folder / "my_disc.toml").write_text(scene_text(name, mesh_unit="mm"), encoding="utf-8")
+    return load_scene(folder / "my_disc.toml")

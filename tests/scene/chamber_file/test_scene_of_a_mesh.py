@@ -1,0 +1,192 @@
+"""What a scene makes of a mesh: its keys, its uncertainties, its description, and where its file lies."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+from drawn_chamber import drawn, loaded, msh_2, msh_4, scene_text
+
+from ringbalance.scene import Scene, SceneError, bundled_scene, load_scene, scene_table
+from ringbalance.scene.chamber_file.names import MEANINGS
+from ringbalance.scene.uncertain import with_value
+
+
+def scene_of(folder: Path, kind: str = "tetra10", **disc: str | int) -> Scene:
+    scene = loaded(folder, msh_2(drawn(kind)), "chamber.msh", **disc)
+    assert isinstance(scene, Scene)
+    return scene
+
+
+def extents(scene: Scene) -> dict[str, float]:
+    """Dimensions that the mesh of a scene has."""
+    assert scene.disc.geometry is not None
+    x, y, z = scene.disc.geometry.points.T
+    return {
+        "outer_radius": float(np.hypot(x, y).max()),
+        "inner_radius": float(np.hypot(x, y).min()),
+        "axial_width": float(np.ptp(z)),
+        "central_angle": float(np.ptp(np.arctan2(y, x))),
+    }
+
+
+@pytest.mark.parametrize("quantity", ["outer_radius", "inner_radius", "axial_width", "central_angle"])
+def test_a_changed_dimension_stretches_the_mesh(quantity: str, tmp_path: Path) -> None:
+    scene = scene_of(tmp_path)
+    value = 1.01 * getattr(scene.disc, quantity)
+    changed = with_value(scene=scene, quantity=quantity, value=value)
+    expected = extents(scene) | {quantity: value}
+    assert extents(changed) == pytest.approx(expected, rel=2e-4)
+    assert extents(changed)[quantity] == pytest.approx(value, rel=1e-5 if "inner" not in quantity else 2e-4)
+    assert getattr(changed.disc, quantity) == value
+    assert changed.disc.geometry != scene.disc.geometry
+    again = with_value(scene=scene, quantity=quantity, value=value)
+    assert again.disc.geometry == changed.disc.geometry
+
+
+def test_plates_of_a_mesh_have_no_thickness(tmp_path: Path) -> None:
+    scene = scene_of(tmp_path)
+    with pytest.raises(ValueError, match="no plate_thickness of its own"):
+        with_value(scene=scene, quantity="plate_thickness", value=1e-3)
+    text = scene_text("chamber.msh", mesh_unit="mm") + '\n[uncertainty]\nplate_thickness = "0.1 mm"\n'
+    (tmp_path / "my_disc.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(SceneError, match=r"\[uncertainty\] plate_thickness .* no thickness of its own"):
+        load_scene(tmp_path / "my_disc.toml")
+
+
+def test_uncertain_dimensions_are_stated_as_ever(tmp_path: Path) -> None:
+    scene_of(tmp_path)
+    text = scene_text("chamber.msh", mesh_unit="mm") + '\n[uncertainty]\nouter_radius = "0.1 mm"\n'
+    (tmp_path / "my_disc.toml").write_text(text, encoding="utf-8")
+    scene = load_scene(tmp_path / "my_disc.toml")
+    rows = {row.path: row for row in scene_table(scene)} if isinstance(scene, Scene) else {}
+    assert rows["disc.outer_radius"].uncertainty == "0.1 mm"
+    assert rows["disc.outer_radius"].origin == "derived"
+    assert rows["disc.geometry"].value == (
+        "chamber.msh: 72 tetra10 cells, outer_wall, inner_wall, plate_left, plate_right, end_back, end_front"
+    )
+
+
+@pytest.mark.parametrize("key", ["outer_radius", "plate_thickness", "central_angle"])
+def test_a_dimension_beside_a_mesh_is_refused(key: str, tmp_path: Path) -> None:
+    value = "80 deg" if key == "central_angle" else "1 mm"
+    with pytest.raises(SceneError, match=rf'\[disc\] {key} = "{value}": it follows from the mesh') as caught:
+        scene_of(tmp_path, **{key: value})
+    assert len(caught.value.faults) == 1
+
+
+def test_a_dimension_hides_no_error_of_the_mesh(tmp_path: Path) -> None:
+    drawing = drawn()
+    drawing.names[2, 2] = "outside\x07wall"
+    with pytest.raises(SceneError) as caught:
+        loaded(tmp_path, msh_2(drawing), outer_radius="40 mm")
+    assert [fault.key for fault in caught.value.faults] == ["outer_radius", "mesh", "mesh"]
+    assert str(caught.value).replace("\n", "").isprintable()
+
+
+def test_keys_of_a_mesh_need_one(tmp_path: Path) -> None:
+    text = bundled_scene("six_chamber").read_text(encoding="utf-8")
+    (tmp_path / "my_disc.toml").write_text(
+        text.replace("[disc]\n", '[disc]\nmesh_unit = "mm"\nmesh_axis = "y"\n'), encoding="utf-8"
+    )
+    with pytest.raises(SceneError) as caught:
+        load_scene(tmp_path / "my_disc.toml")
+    assert [fault.key for fault in caught.value.faults] == ["mesh_unit", "mesh_axis"]
+    assert all("no meaning without mesh" in fault.problem for fault in caught.value.faults)
+
+
+def test_the_number_of_chambers_is_given_or_follows(tmp_path: Path) -> None:
+    drawing = drawn()
+    assert scene_of(tmp_path).disc.chambers == 4
+    text = scene_text("chamber.msh", mesh_unit="mm").replace("chambers = 4", "")
+    (tmp_path / "my_disc.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(SceneError, match="chambers is needed: the mesh takes 80 deg"):
+        load_scene(tmp_path / "my_disc.toml")
+    for number, (x, y, z) in drawing.points.items():
+        angle = np.arctan2(y, x) * 90 / 80
+        radius = np.hypot(x, y)
+        drawing.points[number] = (float(radius * np.cos(angle)), float(radius * np.sin(angle)), z)
+    (tmp_path / "chamber.msh").write_bytes(msh_4(drawing))
+    found = load_scene(tmp_path / "my_disc.toml")
+    assert isinstance(found, Scene)
+    assert found.disc.chambers == 4
+
+
+def test_port_and_scale(tmp_path: Path) -> None:
+    """A named port gives its radius; a port that no wall of this size has shows the unit that was meant."""
+    drawing = drawn()
+    drawing.names[2, 40] = "port"
+    for number in drawing.facets("outer_wall")[:2]:
+        drawing.elements[number].group = 40
+    ported = loaded(tmp_path, msh_2(drawing))
+    assert isinstance(ported, Scene)
+    assert ported.tube.port_radius == pytest.approx(0.0385, rel=0.02)
+    assert ported.origin_of("tube.port_radius") == "derived"
+    for unit, radius, message in (
+        ("mm", "30 mm", 'port_radius is 30 mm, but the boundary "port" lies from'),
+        ("cm", "40 mm", 'wrong scale; allowed: mesh_unit = "mm"'),
+    ):
+        text = scene_text("chamber.msh", mesh_unit=unit)
+        text = text.replace("[tube]\n", f'[tube]\nport_radius = "{radius}"\n')
+        (tmp_path / "my_disc.toml").write_text(text, encoding="utf-8")
+        with pytest.raises(SceneError) as caught:
+            load_scene(tmp_path / "my_disc.toml")
+        assert message in str(caught.value)
+
+
+def test_the_file_is_found_from_the_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "discs").mkdir()
+    one = scene_of(tmp_path / "discs")
+    monkeypatch.chdir(tmp_path)
+    two = load_scene("discs/my_disc.toml")
+    assert replace(one, file="discs/my_disc.toml") == two
+
+
+@pytest.mark.skipif(find_spec("gmsh") is not None, reason="the extra cad is installed")
+def test_a_solid_needs_the_extra(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=r'needs the extra cad.*pip install "ringbalance\[cad\]"'):
+        loaded(tmp_path, b"ISO-10303-21;\n", "chamber.step", mesh_unit="")
+
+
+def test_a_solid_has_its_own_unit(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match='mesh_unit = "mm": a STEP file has its own unit'):
+        loaded(tmp_path, b"ISO-10303-21;\n", "chamber.step")
+
+
+def test_the_page_has_the_names() -> None:
+    page = (Path(__file__).resolve().parents[3] / "docs" / "imported-geometry.md").read_text(encoding="utf-8")
+    rows = [f"| `{name}` | {meaning} |" for name, meaning in MEANINGS.items()]
+    assert "\n".join(rows) in page
+
+
+@pytest.mark.skipif(find_spec("gmsh") is None, reason="the extra cad is not installed")
+def test_a_solid_is_meshed(tmp_path: Path) -> None:
+    """Drawn by Gmsh in another process, as its settings are those of a whole process."""
+    code = (
+        "import gmsh, math; gmsh.initialize(); gmsh.option.setNumber('General.Terminal', 0)\n"
+        "occ, angle = gmsh.model.occ, math.radians(80)\n"
+        "both = [occ.addCylinder(0, 0, 0, 0, 0, 30, radius, angle=angle) for radius in (40, 20)]\n"
+        "occ.cut([(3, both[0])], [(3, both[1])]); occ.synchronize(); gmsh.write('chamber.step')"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path, capture_output=True)
+    content = (tmp_path / "chamber.step").read_bytes()
+    scene = loaded(tmp_path, content, "chamber.step", mesh_unit="")
+    assert isinstance(scene, Scene)
+    assert scene.disc.geometry is not None
+    assert set(scene.disc.geometry.boundaries) == {
+        "outer_wall",
+        "inner_wall",
+        "end_back",
+        "end_front",
+        "walls",
+    }
+    assert scene.disc.outer_radius == pytest.approx(0.04)
+    assert scene.disc.inner_radius == pytest.approx(0.02, rel=1e-3)
+    assert np.degrees(scene.disc.central_angle) == pytest.approx(80)
+    with pytest.raises(SceneError, match="Gmsh cannot mesh the solid"):
+        loaded(tmp_path, content[: len(content) // 3], "chamber.step", mesh_unit="")

@@ -1,4 +1,4 @@
-"""Waves on the ring in an imported chamber: natural frequencies, the answer to gravity across the shaft."""
+"""Waves on the ring in an imported chamber: natural frequencies, and the answer to gravity across a shaft."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -178,7 +178,7 @@ def _swing(found: Record) -> Drawing:
 
     def paint(axes: Axes) -> None:
         marker = "o" if found["imported"] else ""
-        lines = {"marker": marker, "markersize": 3}
+        lines: dict[str, Any] = {"marker": marker, "markersize": 3}
         axes.plot(fills, found["amplification"], color=style.FOUND, label="moment", **lines)
         axes.plot(fills, found["pressure_amplification"], color=style.THIRD, label="wall pressure", **lines)
         axes.axhline(

@@ -12,7 +12,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from ringbalance.mesh.chamber import chamber_mesh
 from ringbalance.mesh.cut.faceting import drawing_error
 from ringbalance.mesh.cut.integrals import integrals, walls_about
 from ringbalance.mesh.cut.patches import split_patches, wall_patches
@@ -31,7 +30,7 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import CellKind, ChamberGeometry
 from ringbalance.scene.chamber_file.stretching import STRETCHED, stretched
 from ringbalance.scene.models import Disc
-from ringbalance.verification.reference.block_chambers import block_chamber
+from ringbalance.verification.reference.block_chambers import block_chamber, disc_chamber
 
 KINDS = get_args(CellKind)
 X0, X1, HALF, WIDTH = 0.02, 0.045, 0.02, 0.06
@@ -46,13 +45,6 @@ def box(*, kind: CellKind = "hexahedron", turned: float = 0.0) -> ChamberGeometr
         return np.stack([c * x - s * y, s * x + c * y, WIDTH * (cube[..., 2] - 0.5)], axis=-1)
 
     return block_chamber((2, 3, 2), place, kind=kind)
-
-
-def sector(disc: Disc, *, cells: tuple[int, int, int], kind: CellKind) -> ChamberGeometry:
-    """The built-in chamber of a disc, plates and all."""
-    nodes = chamber_mesh(disc=disc, surface_radius=disc.inner_radius, cells=cells)
-    places = nodes.places[:, nodes.grid]
-    return block_chamber(cells, lambda _: np.moveaxis(places, 0, -1), kind=kind)
 
 
 def in_box(a: float) -> tuple[float, float, float, float]:
@@ -96,7 +88,7 @@ def test_the_built_in_chamber_as_a_mesh_is_the_closed_form_but_for_its_drawn_arc
 ) -> None:
     """An arc of angle h is drawn R (h/2)^4/32 away at most: that times its length is missing, at most."""
     cells = (3, 16, 2)
-    imported = replace(disc, geometry=sector(disc, cells=cells, kind=kind))
+    imported = replace(disc, geometry=disc_chamber(disc, cells, kind=kind))
     away = disc.outer_radius * (disc.central_angle / cells[1] / 2) ** 4 / 32
     x = np.linspace(0.05, 0.95, 7)
     a, b = surface_radius(disc=disc, fill_ratio=x), surface_radius(disc=imported, fill_ratio=x)
@@ -119,7 +111,7 @@ def test_drawn_arcs_converge(disc: Disc, kind: CellKind, order: float) -> None:
     """Chords leave (h^2/24) of R^2 for arcs of angle h, quadratic ones a part of h^4."""
     errors = []
     for angular in (6, 12, 24):
-        meshed = replace(disc, geometry=sector(disc, cells=(1, angular, 1), kind=kind))
+        meshed = replace(disc, geometry=disc_chamber(disc, (1, angular, 1), kind=kind))
         errors.append(abs(chamber_volume(disc=meshed) / chamber_volume(disc=disc) - 1))
     rates = np.log2(np.array(errors[:-1]) / errors[1:])
     np.testing.assert_allclose(rates, order, atol=0.05)
@@ -171,7 +163,7 @@ def test_the_wall_pressure_counts_the_wet_part_of_a_flat_wall(disc: Disc) -> Non
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_facets_may_miss_holds_what_they_miss(disc: Disc, kind: CellKind) -> None:
     """The true chamber is known here; an interval three times too wide would say little."""
-    geometry, fills = sector(disc, cells=(2, 8, 3), kind=kind), np.linspace(0.05, 0.9, 5)
+    geometry, fills = disc_chamber(disc, (2, 8, 3), kind=kind), np.linspace(0.05, 0.9, 5)
     meshed, error = replace(disc, geometry=geometry), drawing_error(geometry, fill_ratio=fills)
     missing = abs(chamber_volume(disc=meshed) - chamber_volume(disc=disc))
     assert error.volume / 3 < missing < error.volume
@@ -198,7 +190,7 @@ def test_flat_walls_miss_nothing() -> None:
 def test_a_stretched_chamber_has_the_table_of_its_mesh_moved(disc: Disc, quantity: str) -> None:
     """Stretched sectors stay sectors; the integrals over the moved nodes are made again for comparison."""
     plain = replace(disc, plate_thickness=0.0)
-    geometry = sector(plain, cells=(3, 16, 2), kind="hexahedron27")
+    geometry = disc_chamber(plain, (3, 16, 2), kind="hexahedron27")
     dimensions = {name: getattr(plain, name) for name in STRETCHED}
     value = 1.02 * dimensions[quantity]
     moved = stretched(geometry, dimensions=dimensions, quantity=quantity, value=value)
@@ -216,7 +208,7 @@ def test_a_stretched_chamber_has_the_table_of_its_mesh_moved(disc: Disc, quantit
 
 
 def test_a_chamber_stretched_twice_comes_from_its_own_mesh(disc: Disc) -> None:
-    geometry = sector(disc, cells=(2, 8, 1), kind="hexahedron27")
+    geometry = disc_chamber(disc, (2, 8, 1), kind="hexahedron27")
     dimensions = {name: getattr(disc, name) for name in STRETCHED}
     once = stretched(geometry, dimensions=dimensions, quantity="outer_radius", value=45e-3)
     twice = stretched(

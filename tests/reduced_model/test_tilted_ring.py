@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_first_moment, surface_radius
 from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing, tilted_ring
 from ringbalance.scene import loop_models, models
-from ringbalance.verification.reference.chamber_record import imported
+from ringbalance.verification.reference.block_chambers import imported
 
 
 def by_grid(

@@ -120,3 +120,8 @@ def disc_chamber(
         return np.stack([radius * np.cos(turned), radius * np.sin(turned), axial], axis=-1)
 
     return block_chamber(cells, place, kind=kind)
+
+
+def imported(disc: Disc, *, cells: tuple[int, int, int] = (4, 16, 2)) -> Disc:
+    """The disc with its own chamber imported, and no other dimensions."""
+    return replace(disc, geometry=disc_chamber(disc, cells))

@@ -87,7 +87,9 @@ def fit(
     else:
         results_console().print(fit_view(result, data=observations, told=told, following=following))
     if save is not None:
-        save_result(save, text=text, result=result, data=observations, said=told.sentences)
+        save_result(
+            save, text=text, result=result, data=observations, folder=scene.parent, said=told.sentences
+        )
         messages_console().print(f"fitted scene written to {save}", highlight=False, soft_wrap=True)
     return DONE if told.holds else FAILED
 

@@ -18,7 +18,7 @@ from ringbalance.identification.predict.device import device_of, models_of
 from ringbalance.reduced_model.chamber.inputs import half_widths
 from ringbalance.scene.faults import did_you_mean
 from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import NORMAL_95, UNCERTAIN_QUANTITIES, nominal_value, with_value
+from ringbalance.scene.uncertain import NORMAL_95, SHAPE, UNCERTAIN_QUANTITIES, nominal_value, with_value
 
 
 class FitError(ValueError):
@@ -94,6 +94,8 @@ def scene_parameter(scene: Scene, name: str) -> Parameter:
         return _of_start(scene, name)
     if name not in UNCERTAIN_QUANTITIES:
         raise unknown_name(name, sorted((*UNCERTAIN_QUANTITIES, *START)))
+    if scene.disc.geometry is not None and name in SHAPE:
+        raise FitError(f"{name} follows from the mesh of the chamber; fit lambda_factor in its place")
     value = nominal_value(scene=scene, quantity=name)
     start = _NATURAL.get(name) if value is None else value
     if start is None:

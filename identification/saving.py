@@ -7,6 +7,7 @@ such as lambda^2/(k + 1), and too narrow for one of parts that err together; a f
 
 from __future__ import annotations
 
+import os
 import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -77,12 +78,19 @@ class Fitted:
 
 
 def save_result(
-    path: Path, *, text: str, result: FitResult, data: Sequence[Observations], said: Sequence[str] = ()
+    path: Path,
+    *,
+    text: str,
+    result: FitResult,
+    data: Sequence[Observations],
+    folder: Path,
+    said: Sequence[str] = (),
 ) -> Path:
     """Write the scene that a fit found, see `save_fitted`.
 
-    Args: `said`: what the criticism of the fit says.
+    Args: `folder`: of the scene file that was fitted. `said`: what the criticism of the fit says.
     """
+    text = found_from(text, folder=folder, to=path.parent)
     files = [
         MeasuredFile(file=PurePath(each.file).name, kind=each.kind, rows=len(each), sha256=each.sha256)
         for each in data
@@ -102,6 +110,16 @@ def save_result(
     both = zip(result.parameters, scales, strict=True)
     fitted = [_fitted(each, scale) for each, scale in both if each.name not in START]
     return save_fitted(path, text=text, fitted=fitted, files=files, findings=findings)
+
+
+def found_from(text: str, *, folder: Path, to: Path) -> str:
+    """A scene whose mesh, if it names one, is found from another folder."""
+    document = tomllib.loads(text)
+    mesh = document.get("disc", {}).get("mesh")
+    if mesh is None or folder.resolve() == to.resolve():
+        return text
+    document["disc"]["mesh"] = Path(os.path.relpath(folder / mesh, to)).as_posix()
+    return toml_bytes(document).decode()
 
 
 def _fitted(parameter: FittedParameter, scale: Parameter) -> Fitted:

@@ -145,7 +145,9 @@ def test_the_saved_scene_is_the_fitted_one(found: FitResult, tmp_path: Path) -> 
     target = tmp_path / "fitted.toml"
     data = [b.observations for b in found.optimum.residuals.problem.blocks]
     text = bundled_scene("liquid_ring_paper").read_text(encoding="utf-8")
-    save_result(target, text=text, result=found, data=data, said=review(found).sentences)
+    save_result(
+        target, text=text, result=found, data=data, folder=target.parent, said=review(found).sentences
+    )
     scene = liquid_ring_scene(load_scene(target))
     assert scene.tube.bore == pytest.approx(found.parameter("bore").value, rel=1e-8)
     widths = {each.quantity: each.half_width for each in scene.uncertainty}

@@ -84,6 +84,12 @@ def split_in_two(drawing: Drawing) -> None:
             each.nodes = [fresh[node] for node in each.nodes]
 
 
+def triangles_on_hexahedra(drawing: Drawing) -> None:
+    for number in drawing.facets("end_back"):
+        facet = drawing.elements[number]
+        facet.kind, facet.nodes = "triangle", facet.nodes[:3]
+
+
 def far_copy(drawing: Drawing) -> None:
     nodes = drawing.elements[drawing.cells()[0]].nodes
     fresh = [node + 1000 for node in nodes]
@@ -210,6 +216,13 @@ def exchanged(drawing: Drawing) -> None:
     named(drawing, "end_wall", "inner_wall")
 
 
+def pinched(drawing: Drawing) -> Drawing:
+    """Five of twelve cells, in one piece, of which two have only an edge in common."""
+    cells = drawing.cells()
+    keep = [cells[place] for place in (0, 8, 1, 3, 9)]
+    return without(drawing, *(number for number in cells if number not in keep))
+
+
 def in_part(drawing: Drawing) -> None:
     drawing.elements[drawing.cells()[0]].group = 0
 
@@ -252,6 +265,9 @@ MESHES: dict[str, Broken] = {
     ),
     "two volumes": Broken(spoilt(far_copy), ("falls into 2 separate volumes", "cell 1", "mm")),
     "touching at an edge": Broken(spoilt(two_apart), ("separate volumes",)),
+    "open along an edge": Broken(
+        spoilt(pinched, "hexahedron"), ("touches itself along edges (1): edge (nodes", "no side of any cell")
+    ),
     "three cells at a facet": Broken(
         spoilt(third_cell), ("belong to more than two cells (1): facet (nodes",)
     ),
@@ -298,6 +314,9 @@ MESHES: dict[str, Broken] = {
     ),
     "facet inside": Broken(
         spoilt(inner_facet), ('named "outer_wall" lie between two cells (1): facet (element',)
+    ),
+    "triangles on hexahedra": Broken(
+        spoilt(triangles_on_hexahedra, "hexahedron"), ('named "end_back" are no side of any cell (6)',)
     ),
     "facet of no cell": Broken(
         spoilt(lambda d: grouped(d, add(d, "triangle", [1, 2, 30]), "outer_wall")),

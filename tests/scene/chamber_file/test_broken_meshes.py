@@ -292,10 +292,11 @@ MESHES: dict[str, Broken] = {
     ),
     "misspelt name": Broken(
         spoilt(lambda d: named(d, "outer_wall", "outerwall")),
-        (
-            'unknown name of a boundary, "outerwall" (did you mean "outer_wall"?): facet (element',
-            "no facets have",
-        ),
+        ('unknown name of a boundary, "outerwall" (did you mean "outer_wall"?): facet (element',),
+    ),
+    "name of another wall": Broken(
+        spoilt(lambda d: named(d, "outer_wall", "rim")),
+        ('no facets have the name "outer_wall"; names in the file: ', '"rim"'),
     ),
     "number for a name": Broken(
         spoilt(lambda d: d.names.pop((2, 5))), ('"physical group 5"', "facet (element")

@@ -14,6 +14,7 @@ _HOME: Final = MappingProxyType(
         "factorised": "ringbalance.physics.pressure.sparse",
         "multigrid": "ringbalance.physics.pressure.multigrid",
         "sloshing_response": "ringbalance.physics.sloshing.response",
+        "solved_ring": "ringbalance.physics.pressure.imported",
         "nnls": "scipy.optimize",
         "Sobol": "scipy.stats.qmc",
     }

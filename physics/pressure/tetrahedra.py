@@ -151,6 +151,10 @@ class TetrahedronSpace:
             np.einsum("pn,enx->epx", shapes(_CELL_POINTS), self.body.nodes[self.body.cells])
         ).reshape(-1, 3)
 
+    def at_points(self, nodal: FloatArray) -> FloatArray:
+        """Values at the quadrature points of a field given at the nodes."""
+        return np.asarray(nodal[self.body.cells] @ shapes(_CELL_POINTS).T).ravel()
+
     @cached_property
     def gradient(self) -> csr_matrix:
         """Matrix that takes nodal values to gradients at the quadrature points, three rows a point."""

@@ -56,7 +56,7 @@ class RingWaves:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _System:
+class WaveSystem:
     """What one surface in one chamber gives, whatever the speed."""
 
     reduced: ReducedWaves
@@ -101,13 +101,14 @@ def ring_waves(
     """
     _check(angular_velocity, kinematic_viscosity, gravity, frequency_ratio, modes, levels)
     tilt = -axial_gravity / angular_velocity**2
-    system = _system(geometry, surface_radius, tilt, modes, levels)
+    system = wave_system(geometry, surface_radius, tilt, modes, levels)
     ekman = kinematic_viscosity / (abs(angular_velocity) * system.scale**2)
-    values, shares, widths = _frequencies(system, modes)
+    values, shares, widths = frequencies(system, modes)
     counts = system.reduced.levels[-2:]
-    before, last = (np.array(_answer(system.reduced, n, frequency_ratio, ekman)) for n in counts)
+    before, last = (np.array(answer(system.reduced, n, frequency_ratio, ekman)) for n in counts)
     scale = gravity / angular_velocity**2
-    change = _SAFETY * np.abs(last - before) + last * (system.faceting + system.reduced.squared_errors[0])
+    relative = system.faceting + system.reduced.squared_errors[0] + system.reduced.left_out
+    change = _SAFETY * np.abs(last - before) + relative * last
     amplitude = Estimate(value=np.array(scale * last[2]), uncertainty=np.array(scale * change[2]))
     return RingWaves(
         surface_radius=surface_radius,
@@ -134,7 +135,8 @@ def _check(omega: float, viscosity: float, gravity: float, ratio: float, modes: 
 
 
 @lru_cache(maxsize=16)
-def _system(geometry: ChamberGeometry, radius: float, tilt: float, modes: int, levels: int) -> _System:
+def wave_system(geometry: ChamberGeometry, radius: float, tilt: float, modes: int, levels: int) -> WaveSystem:
+    """The waves' small problem below a surface of this radius, m; `tilt`: gravity along z over omega^2, m."""
     body = liquid_body(tetrahedra(geometry), Level(constant=radius**2 / 2, tilt=(0.0, 0.0, tilt)))
     scale = float(np.hypot(*body.nodes[:, :2].T).max())
     space = TetrahedronSpace(body=replace(body, nodes=body.nodes / scale))
@@ -142,17 +144,19 @@ def _system(geometry: ChamberGeometry, radius: float, tilt: float, modes: int, l
     reduced = reduced_waves(space=space, level=level, wall=WALL, potentials=modes + _SPARE, levels=levels)
     # Frequencies grow with the root of the depth.
     faceting = space.facets(WALL).depth_to_smooth() / (2 * (1 - radius / scale))
-    return _System(reduced=reduced, scale=scale, faceting=faceting, unknowns=space.unknowns)
+    return WaveSystem(reduced=reduced, scale=scale, faceting=faceting, unknowns=space.unknowns)
 
 
-def _frequencies(system: _System, modes: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+def frequencies(system: WaveSystem, modes: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Frequencies of the surface's waves, their vortical shares and expanded uncertainties."""
     reduced = system.reduced
     values, potential, weights = _waves(reduced, reduced.levels[-1], _OF_SURFACE)
     before = _waves(reduced, reduced.levels[-2], _PERHAPS)[0]
     errors = reduced.squared_errors
     change = np.abs(values[:, None] - before).min(axis=1)
-    widths = _SAFETY * change + values * (weights[:, : errors.size] @ errors / 2 + system.faceting)
+    # What is left out acts on a frequency by its square.
+    relative = weights[:, : errors.size] @ errors / 2 + reduced.left_out + system.faceting
+    widths = _SAFETY * change + values * relative
     return values[:modes], 1 - potential[:modes], widths[:modes]
 
 
@@ -179,7 +183,7 @@ _SLOWEST: Final = 1e-4
 """Frequency ratio below which a field is at rest."""
 
 
-def _answer(reduced: ReducedWaves, fields: int, ratio: float, ekman: float) -> tuple[float, ...]:
+def answer(reduced: ReducedWaves, fields: int, ratio: float, ekman: float) -> tuple[float, ...]:
     """Amplification of moment and wall pressure, largest displacement for g/omega^2 = 1 (any unit of length),
 
     and the share that damping leaves.
@@ -203,7 +207,7 @@ def _answer(reduced: ReducedWaves, fields: int, ratio: float, ekman: float) -> t
     )
 
 
-def _status(system: _System, radius: float, amplitude: float, tilt: float) -> Status:
+def _status(system: WaveSystem, radius: float, amplitude: float, tilt: float) -> Status:
     if system.reduced.residual > _ACCEPTED:
         text = f"a linear solve left a relative residual of {system.reduced.residual:.1e}: use a better mesh"
         return Status(code=StatusCode.NOT_CONVERGED, text=text)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from hashlib import sha256
 from typing import Final
 
 import numpy as np
@@ -62,7 +63,7 @@ def block_chamber(
     }
     return ChamberGeometry(
         file="block",
-        digest=f"{hash(points.tobytes())}",
+        digest=sha256(points.tobytes() + nodes.tobytes()).hexdigest(),
         kind=kind,
         points=points,
         cells=nodes,

@@ -16,10 +16,10 @@ from ringbalance.scene.models import Disc
 VERSION = ng.__version__
 SETTINGS = tuple(
     (order, size)
-    for size, highest in ((1.0, 10), (0.6, 9), (0.3, 8), (0.2, 7), (0.15, 6), (0.1, 4))
+    for size, highest in ((1.0, 8), (0.6, 8), (0.3, 7), (0.2, 6), (0.15, 5))
     for order in range(2, highest + 1)
 )
-"""Finer meshes of the highest orders take seconds and are better than any target."""
+"""Finer meshes of the highest orders take seconds and are far better than any target."""
 
 
 def geometry(disc: Disc) -> OCCGeometry:

@@ -23,7 +23,7 @@ from ringbalance.mesh.chamber import chamber_mesh
 from ringbalance.physics.pressure.solve import solve_pressure
 
 ORDER = 4
-CELLS = ((4, 12, 2), (6, 18, 3), (8, 24, 4), (12, 36, 6), (16, 48, 8), (22, 66, 11), (23, 68, 11))
+CELLS = ((4, 12, 2), (6, 18, 3), (8, 24, 4), (12, 36, 6), (16, 48, 8), (22, 66, 11))
 
 
 @dataclass(frozen=True, kw_only=True)

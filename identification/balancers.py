@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
-from ringbalance.identification import eccentric_parameters as eccentric
-from ringbalance.identification import parameters as ring
 from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.eccentric_parameters import (
+    eccentric_parameter,
+    eccentric_shifted,
+    eccentric_widths,
+    fitted_names,
+)
 from ringbalance.identification.model_errors import MODEL_ERRORS, model_errors, with_model_error
-from ringbalance.identification.parameters import Parameter
+from ringbalance.identification.parameters import FitError, Parameter, scene_parameter
 from ringbalance.identification.predict.device import Models, models_of
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.reduced_model.chamber.inputs import half_widths, shifted
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
-from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, eccentric_value, nominal_value
+from ringbalance.scene.uncertain import (
+    NORMAL_95,
+    UNCERTAIN_QUANTITIES,
+    eccentric_value,
+    nominal_value,
+)
 
 _LITTLE: Final = 1e-4
 """Of a quantity, or in SI units where it is zero."""
@@ -28,9 +37,11 @@ def models_for(scene: AnyScene) -> Models | None:
 
 def parameters_for(scene: AnyScene, names: Sequence[str]) -> tuple[Parameter, ...]:
     """Parameters by name. Raises: FitError: a name that cannot be fitted, or twice the same, or none."""
+    if not names or len(set(names)) < len(names):
+        raise FitError("name at least one parameter, and each once")
     if isinstance(scene, Scene):
-        return ring.scene_parameters(scene, names)
-    return eccentric.eccentric_parameters(scene, names)
+        return tuple(scene_parameter(scene, name) for name in names)
+    return tuple(eccentric_parameter(scene, name) for name in names)
 
 
 def informed(scene: AnyScene, data: Sequence[Observations]) -> list[str]:
@@ -43,20 +54,33 @@ def informed(scene: AnyScene, data: Sequence[Observations]) -> list[str]:
 def held_for(scene: AnyScene, fitted: Sequence[str]) -> dict[str, float]:
     """Standard deviation, SI, of every uncertain quantity of the scene that is not fitted, and of what its
     models may be off by."""
-    if isinstance(scene, Scene):
-        return {**ring.held_inputs(scene, fitted), **dict.fromkeys(model_errors(scene), 1.0)}
-    return eccentric.eccentric_held(scene, fitted)
+    inputs = {name: width / NORMAL_95 for name, width in _widths(scene).items() if name not in fitted}
+    return inputs | (dict.fromkeys(model_errors(scene), 1.0) if isinstance(scene, Scene) else {})
+
+
+def _widths(scene: AnyScene) -> Mapping[str, float]:
+    """Expanded uncertainties (95 %), SI."""
+    return half_widths(scene) if isinstance(scene, Scene) else eccentric_widths(scene)
+
+
+def _values(scene: AnyScene) -> dict[str, float]:
+    """Value, SI, of every quantity that may be uncertain and that the scene has."""
+    if not isinstance(scene, Scene):
+        return {name: eccentric_value(scene, name) for name in fitted_names(scene)}
+    values = {name: nominal_value(scene=scene, quantity=name) for name in UNCERTAIN_QUANTITIES}
+    return {name: value for name, value in values.items() if value is not None}
 
 
 def both_sides(scene: AnyScene, name: str, change: float) -> tuple[AnyScene, AnyScene]:
     """The scene with one of these lower and higher by a change, SI, as far as a device can have it."""
-    low, high = (_changed(scene, name, side * change) for side in (-1, 1))
-    return low, high
+    # Errors of models are nearly linear, and there are many of them.
+    low = scene if name in MODEL_ERRORS else _changed(scene, name, -change)
+    return low, _changed(scene, name, change)
 
 
 def _changed(scene: AnyScene, name: str, change: float) -> AnyScene:
     if not isinstance(scene, Scene):
-        return eccentric.eccentric_shifted(scene, name, change)
+        return eccentric_shifted(scene, name, change)
     if name in MODEL_ERRORS:
         return with_model_error(scene, name, change)
     return shifted(scene=scene, quantity=name, change=change)
@@ -64,21 +88,11 @@ def _changed(scene: AnyScene, name: str, change: float) -> AnyScene:
 
 def nearby(scene: AnyScene, name: str) -> AnyScene:
     """The scene with one of its quantities a little lower, or a little above zero."""
-    if isinstance(scene, Scene):
-        value = nominal_value(scene=scene, quantity=name)
-    else:
-        value = eccentric_value(scene, name)
-    return both_sides(scene, name, _LITTLE * abs(value) if value else -_LITTLE)[0]
+    value = _values(scene)[name]
+    return _changed(scene, name, -_LITTLE * abs(value) if value else _LITTLE)
 
 
 def exact_for(scene: AnyScene, fitted: Sequence[str]) -> list[str]:
     """Quantities that are neither fitted nor stated as uncertain."""
-    if not isinstance(scene, Scene):
-        known = {*eccentric.eccentric_held(scene, fitted), *fitted}
-        return [name for name in eccentric.fitted_names(scene) if name not in known]
-    known = {*half_widths(scene), *fitted}
-    return [
-        name
-        for name in UNCERTAIN_QUANTITIES
-        if name not in known and nominal_value(scene=scene, quantity=name) is not None
-    ]
+    known = {*_widths(scene), *fitted}
+    return [name for name in _values(scene) if name not in known]

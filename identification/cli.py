@@ -65,12 +65,12 @@ def fit(
         print(template_of(template), end="")
         return DONE
     if scene is None or not data:
-        raise _missing("SCENE" if scene is None else "DATA")
+        raise _usage("command line", f"{'SCENE' if scene is None else 'DATA'} is missing")
     if save is not None:
         _keep_inputs(save, (scene, *data))
         check_file(save)
     if scene.suffix.lower() == ".csv":
-        raise _not_a_scene(scene)
+        raise _usage(str(scene), "this looks like a file of measurements, and the scene comes first")
     given, text = read_scene(scene)
     observations = read_observations(data, scene=given)
     names = None if parameters is None else _names(parameters)
@@ -87,7 +87,9 @@ def fit(
     else:
         results_console().print(fit_view(result, data=observations, told=told, following=following))
     if save is not None:
-        save_result(save, text=text, result=result, data=observations, said=told.sentences)
+        save_result(
+            save, text=text, result=result, data=observations, folder=scene.parent, said=told.sentences
+        )
         messages_console().print(f"fitted scene written to {save}", highlight=False, soft_wrap=True)
     return DONE if told.holds else FAILED
 
@@ -108,14 +110,9 @@ def _keep_inputs(save: Path, inputs: Sequence[Path]) -> None:
             raise option_error(option="--save", value=str(save), problem=problem, allowed="another file")
 
 
-def _not_a_scene(path: Path) -> SceneError:
-    problem = f"this looks like a file of measurements, and the scene comes first: {_USAGE}"
-    return SceneError([Fault(file=str(path), table="", key="", value="", problem=problem, allowed="")])
-
-
-def _missing(word: str) -> SceneError:
-    problem = f"{word} is missing: {_USAGE}"
-    return SceneError([Fault(file="command line", table="", key="", value="", problem=problem, allowed="")])
+def _usage(file: str, problem: str) -> SceneError:
+    text = f"{problem}: {_USAGE}"
+    return SceneError([Fault(file=file, table="", key="", value="", problem=text, allowed="")])
 
 
 def _names(text: str) -> list[str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from functools import partial
 from typing import Final
 
@@ -14,16 +13,6 @@ from ringbalance.scene.uncertain import NORMAL_95, eccentric_value, eccentric_wi
 
 _REACH: Final = 30.0
 """Factor up to which a value is looked for."""
-
-
-def eccentric_parameters(scene: EccentricScene, names: Sequence[str]) -> tuple[Parameter, ...]:
-    """Parameters by path, such as "rotor.damping"; a list's entries by "masses.friction_arm[0]".
-
-    Raises: FitError: no such quantity, a name twice, or a value that is zero.
-    """
-    if not names or len(set(names)) < len(names):
-        raise FitError("name at least one parameter, and each once")
-    return tuple(_parameter(scene, name) for name in names)
 
 
 def fitted_names(scene: EccentricScene) -> tuple[str, ...]:
@@ -38,13 +27,17 @@ def fitted_names(scene: EccentricScene) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _parameter(scene: EccentricScene, name: str) -> Parameter:
+def eccentric_parameter(scene: EccentricScene, name: str) -> Parameter:
+    """A quantity by its path, such as "rotor.damping"; a list's entries by "masses.friction_arm[0]".
+
+    Raises: FitError: no such quantity, or a value that is zero.
+    """
     if name not in fitted_names(scene):
         raise unknown_name(name, fitted_names(scene))
     start, is_angle = eccentric_value(scene, name), name == "imbalance.phase"
     if start <= 0 and not is_angle:
         raise FitError(f"{name} is zero: give a value above zero to fit it")
-    width = _half_width(scene, name)
+    width = eccentric_widths(scene).get(name)
     low, high = (start - math.pi, start + math.pi) if is_angle else (start / _REACH, start * _REACH)
     return Parameter(
         name=name,
@@ -58,16 +51,15 @@ def _parameter(scene: EccentricScene, name: str) -> Parameter:
     )
 
 
-def _half_width(scene: EccentricScene, name: str) -> float:
-    """Expanded uncertainty (95 %) that the scene states, SI; zero where it states none."""
-    stated = {each.quantity: each for each in scene.uncertainty}.get(name.split("[")[0])
-    return 0.0 if stated is None else stated.absolute(eccentric_value(scene, name))
-
-
-def eccentric_held(scene: EccentricScene, fitted: Sequence[str]) -> dict[str, float]:
-    """Standard deviation, SI, of every uncertain quantity of the scene that is not fitted."""
-    widths = {name: _half_width(scene, name) for name in fitted_names(scene) if name not in fitted}
-    return {name: width / NORMAL_95 for name, width in widths.items() if width > 0}
+def eccentric_widths(scene: EccentricScene) -> dict[str, float]:
+    """Expanded uncertainties (95 %) that the scene states, SI."""
+    stated = {each.quantity: each for each in scene.uncertainty}
+    widths = {
+        name: stated[path].absolute(eccentric_value(scene, name))
+        for name in fitted_names(scene)
+        if (path := name.split("[")[0]) in stated
+    }
+    return {name: width for name, width in widths.items() if width > 0}
 
 
 def eccentric_shifted(scene: EccentricScene, name: str, change: float) -> EccentricScene:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
@@ -18,7 +17,6 @@ from ringbalance.identification.optimisation import Optimum, optimum
 from ringbalance.identification.parameters import FitError, Parameter
 from ringbalance.identification.predict.kinds import PREDICTED, rows_of
 from ringbalance.identification.result import FileResiduals, FitResult, FittedParameter, Noise
-from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.uncertain import NORMAL_95
 
@@ -76,35 +74,18 @@ def problem_of(
     )
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Findings:
-    profiles: tuple[Profile, ...]
-    verdicts: tuple[Verdict, ...]
-    combinations: tuple[Combination, ...]
-    spread: FloatArray
-
-
-def _findings(best: Optimum) -> _Findings:
-    spread, factors = covariance(best.slopes), student(best)
-    parameters = best.residuals.problem.parameters
-    data = best.slopes[: best.slopes.shape[0] - int(np.count_nonzero(best.residuals.problem.with_prior))]
-    profiles = tuple(profile(best, i, float(f), spread) for i, f in enumerate(factors))
-    found = verdicts(parameters, best.t, data, profiles)
-    return _Findings(
-        profiles=profiles,
-        verdicts=found,
-        combinations=combinations(parameters, best.t, data, found, profiles),
-        spread=spread,
-    )
-
-
 def _result(best: Optimum, held: dict[str, float], loss: str) -> FitResult:
-    problem, found = best.residuals.problem, _findings(best)
-    size = np.sqrt(np.diag(found.spread))
+    problem, spread = best.residuals.problem, covariance(best.slopes)
+    data = best.slopes[: best.slopes.shape[0] - int(np.count_nonzero(problem.with_prior))]
+    profiles = [profile(best, i, float(f), spread) for i, f in enumerate(student(best))]
+    found = verdicts(problem.parameters, best.t, data, profiles)
+    products = combinations(problem.parameters, best.t, data, found, profiles)
+    each = zip(problem.parameters, best.t.tolist(), profiles, found, strict=True)
+    size = np.sqrt(np.diag(spread))
     return FitResult(
-        parameters=tuple(_fitted(best, i, found) for i in range(best.t.size)),
-        correlations=found.spread / np.outer(size, size),
-        combinations=found.combinations,
+        parameters=tuple(_fitted(*one, products) for one in each),
+        correlations=spread / np.outer(size, size),
+        combinations=products,
         noise=_noises(best),
         residuals=_residuals(best),
         held=held,
@@ -118,22 +99,23 @@ def _result(best: Optimum, held: dict[str, float], loss: str) -> FitResult:
     )
 
 
-def _fitted(best: Optimum, i: int, found: _Findings) -> FittedParameter:
-    parameter, profile_, verdict = best.residuals.problem.parameters[i], found.profiles[i], found.verdicts[i]
+def _fitted(
+    parameter: Parameter, t: float, found: Profile, verdict: Verdict, products: Sequence[Combination]
+) -> FittedParameter:
     before = None
     if parameter.prior:
         width = NORMAL_95 * parameter.prior
         before = parameter.start - width, parameter.start + width
     return FittedParameter(
         name=parameter.name,
-        value=parameter.value(float(best.t[i])),
-        interval=(parameter.value(profile_.low), parameter.value(profile_.high)),
-        at_bound=(profile_.low_bound, profile_.high_bound),
+        value=parameter.value(t),
+        interval=(parameter.value(found.low), parameter.value(found.high)),
+        at_bound=(found.low_bound, found.high_bound),
         before=parameter.start,
         before_interval=before,
         verdict=verdict,
-        text=_verdict_text(parameter, verdict, found.combinations),
-        profile=profile_,
+        text=_verdict_text(parameter, verdict, products),
+        profile=found,
     )
 
 

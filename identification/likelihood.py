@@ -165,22 +165,13 @@ class Problem:
 
     def priors(self, t: FloatArray) -> FloatArray:
         """(x - x0)/sigma_x of the parameters that have a prior."""
-        return np.array(
-            [
-                (p.value(x) - p.start) / p.prior
-                for p, x in zip(self.parameters, t.tolist(), strict=True)
-                if p.prior
-            ]
-        )
+        both = zip(self.parameters, t.tolist(), strict=True)
+        return np.array([(p.value(x) - p.start) / p.prior for p, x in both if p.prior])
 
     def prior_slopes(self, t: FloatArray) -> FloatArray:
         """d(priors)/dt, shape (priors, parameters)."""
-        rows = np.diag(
-            [
-                p.slope(x) / p.prior if p.prior else 0.0
-                for p, x in zip(self.parameters, t.tolist(), strict=True)
-            ]
-        )
+        both = zip(self.parameters, t.tolist(), strict=True)
+        rows = np.diag([p.slope(x) / p.prior if p.prior else 0.0 for p, x in both])
         return np.asarray(rows[self.with_prior])
 
     @cached_property
@@ -262,10 +253,14 @@ class Residuals:
 def held_effects(problem: Problem, t: FloatArray, changes: Sequence[tuple[Any, Any]]) -> FloatArray:
     """L^-1 J: change of the prediction per standard deviation of each held input, shape (n, inputs).
 
-    Args: `changes`: the problem's scene with each input one standard deviation lower, and higher.
+    Args: `changes`: the problem's scene with each input one standard deviation lower, or as it is, and
+        higher.
     """
     columns = [np.zeros((problem.measured.size, 0))]
     for low, high in changes:
-        sides = [replace(problem, scene=scene).at(t) for scene in (low, high)]
-        columns.append((sides[1] - sides[0])[:, None] / 2)
+        above = replace(problem, scene=high).at(t)
+        if low == problem.scene:
+            columns.append((above - problem.at(t))[:, None])
+        else:
+            columns.append((above - replace(problem, scene=low).at(t))[:, None] / 2)
     return np.concatenate(columns, axis=1)

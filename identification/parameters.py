@@ -18,7 +18,7 @@ from ringbalance.identification.predict.device import device_of, models_of
 from ringbalance.reduced_model.chamber.inputs import half_widths
 from ringbalance.scene.faults import did_you_mean
 from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import NORMAL_95, UNCERTAIN_QUANTITIES, nominal_value, with_value
+from ringbalance.scene.uncertain import NORMAL_95, SHAPE, UNCERTAIN_QUANTITIES, nominal_value, with_value
 
 
 class FitError(ValueError):
@@ -94,6 +94,8 @@ def scene_parameter(scene: Scene, name: str) -> Parameter:
         return _of_start(scene, name)
     if name not in UNCERTAIN_QUANTITIES:
         raise unknown_name(name, sorted((*UNCERTAIN_QUANTITIES, *START)))
+    if scene.disc.geometry is not None and name in SHAPE:
+        raise FitError(f"{name} follows from the mesh of the chamber; fit lambda_factor in its place")
     value = nominal_value(scene=scene, quantity=name)
     start = _NATURAL.get(name) if value is None else value
     if start is None:
@@ -200,16 +202,3 @@ def _range(scene: Scene, name: str, start: float, offset: float) -> tuple[float,
         return fixed[name]
     reach = _REACH.get(name, _WIDE)
     return start / reach, start * reach
-
-
-def scene_parameters(scene: Scene, names: Sequence[str]) -> tuple[Parameter, ...]:
-    """Parameters by name. Raises: FitError: as `scene_parameter`, or a name twice, or none at all."""
-    if not names or len(set(names)) < len(names):
-        raise FitError("name at least one parameter, and each once")
-    return tuple(scene_parameter(scene, name) for name in names)
-
-
-def held_inputs(scene: Scene, fitted: Sequence[str]) -> dict[str, float]:
-    """Standard deviation, SI, of every uncertain quantity of the scene that is not fitted."""
-    widths = half_widths(scene)
-    return {name: width / NORMAL_95 for name, width in widths.items() if name not in fitted}

@@ -7,12 +7,12 @@ such as lambda^2/(k + 1), and too narrow for one of parts that err together; a f
 
 from __future__ import annotations
 
+import os
 import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from itertools import combinations, groupby
-from operator import attrgetter
+from itertools import combinations
 from pathlib import Path, PurePath
 from typing import Any, Final
 
@@ -78,12 +78,19 @@ class Fitted:
 
 
 def save_result(
-    path: Path, *, text: str, result: FitResult, data: Sequence[Observations], said: Sequence[str] = ()
+    path: Path,
+    *,
+    text: str,
+    result: FitResult,
+    data: Sequence[Observations],
+    folder: Path,
+    said: Sequence[str] = (),
 ) -> Path:
     """Write the scene that a fit found, see `save_fitted`.
 
-    Args: `said`: what the criticism of the fit says.
+    Args: `folder`: of the scene file that was fitted. `said`: what the criticism of the fit says.
     """
+    text = found_from(text, folder=folder, to=path.parent)
     files = [
         MeasuredFile(file=PurePath(each.file).name, kind=each.kind, rows=len(each), sha256=each.sha256)
         for each in data
@@ -103,6 +110,16 @@ def save_result(
     both = zip(result.parameters, scales, strict=True)
     fitted = [_fitted(each, scale) for each, scale in both if each.name not in START]
     return save_fitted(path, text=text, fitted=fitted, files=files, findings=findings)
+
+
+def found_from(text: str, *, folder: Path, to: Path) -> str:
+    """A scene whose mesh, if it names one, is found from another folder."""
+    document = tomllib.loads(text)
+    mesh = document.get("disc", {}).get("mesh")
+    if mesh is None or folder.resolve() == to.resolve():
+        return text
+    document["disc"]["mesh"] = Path(os.path.relpath(folder / mesh, to)).as_posix()
+    return toml_bytes(document).decode()
 
 
 def _fitted(parameter: FittedParameter, scale: Parameter) -> Fitted:
@@ -169,13 +186,13 @@ def fitted_scene(
 ) -> bytes:
     """The bytes of that scene, not yet tried."""
     document: dict[str, Any] = tomllib.loads(text)
-    placed = [_Placed(fitted=each, place=_place(each.path, document)) for each in fitted]
-    for each in placed:
-        _put_value(document, each)
+    placed = [(_place(each.path, document), each) for each in fitted]
+    for place, each in placed:
+        _put_value(document, place, each)
     cut = tuple(_put_widths(document, placed))
     document["measured"] = {
         "files": [asdict(each) for each in files],
-        "quantities": [_record(each) for each in placed],
+        "quantities": [_record(place, each) for place, each in placed],
         "findings": [asdict(each) for each in (*findings, *cut)],
     }
     return toml_bytes(document)
@@ -205,12 +222,6 @@ class _Place:
         if self.dimension is None:
             return float(f"{value:.{_DIGITS}g}")
         return float(format_quantity(value, self.dimension, self.unit, digits=_DIGITS).split(" ")[0])
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Placed:
-    fitted: Fitted
-    place: _Place
 
 
 def _place(path: str, document: Mapping[str, Any]) -> _Place:
@@ -245,8 +256,8 @@ def _unit(here: object, path: str, dimension: str | None) -> str:
     )
 
 
-def _put_value(document: dict[str, Any], placed: _Placed) -> None:
-    place, value = placed.place, placed.place.written(placed.fitted.value)
+def _put_value(document: dict[str, Any], place: _Place, fitted: Fitted) -> None:
+    value = place.written(fitted.value)
     content = document.setdefault(place.table, {})
     if place.entry is not None:
         both = list(content.get(place.key) or [place.written(0.0)] * 2)
@@ -254,34 +265,36 @@ def _put_value(document: dict[str, Any], placed: _Placed) -> None:
         content[place.key] = both
     else:
         content[place.key] = value
-    content.setdefault(ORIGIN, {})[place.key] = placed.fitted.origin
+    content.setdefault(ORIGIN, {})[place.key] = fitted.origin
 
 
-def _put_widths(document: dict[str, Any], placed: Iterable[_Placed]) -> Iterator[MeasuredFinding]:
+def _put_widths(
+    document: dict[str, Any], placed: Iterable[tuple[_Place, Fitted]]
+) -> Iterator[MeasuredFinding]:
     """Write the uncertainties; entries of a list share the largest. Yields: What a scene cannot state."""
-    keyfunc = attrgetter("place.table", "place.key")
-    for _, group in groupby(sorted(placed, key=keyfunc), key=keyfunc):
-        each = list(group)
-        widths = [one.fitted.half_width for one in each]
-        width, place = max((w for w in widths if w is not None), default=None), each[0].place
+    by_key: dict[tuple[str, str], list[tuple[_Place, Fitted]]] = {}
+    for place, one in placed:
+        by_key.setdefault((place.table, place.key), []).append((place, one))
+    for group in by_key.values():
+        place, each = group[0][0], [one for _, one in group]
+        width = max((w for one in each if (w := one.half_width) is not None), default=None)
         if width is None:
             continue
-        largest = min(abs(one.fitted.value) for one in each)
+        largest = min(abs(one.value) for one in each)
         cut = width > largest and place.key not in _ANY_SIGN
         inside = document.setdefault("uncertainty", {})
         inside = inside.setdefault(place.table, {}) if place.by_table else inside
         if place.entry is not None and len(each) < _ENTRIES and place.key in inside:
             # The uncertainty stands for both entries, and nothing was learnt of the other one.
-            yield MeasuredFinding(about="uncertainty", text=_KEPT.format(each[0].fitted.path))
+            yield MeasuredFinding(about="uncertainty", text=_KEPT.format(each[0].path))
             continue
         inside[place.key] = place.written(largest if cut else width)
         if cut:
-            yield MeasuredFinding(about="uncertainty", text=_CUT.format(each[0].fitted.path))
+            yield MeasuredFinding(about="uncertainty", text=_CUT.format(each[0].path))
 
 
-def _record(placed: _Placed) -> dict[str, Any]:
+def _record(place: _Place, fitted: Fitted) -> dict[str, Any]:
     """One quantity of [measured]; ends that there are not are left out."""
-    fitted, place = placed.fitted, placed.place
     numbers = {
         "before": fitted.before,
         "before_low": fitted.before_interval[0],

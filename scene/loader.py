@@ -12,8 +12,10 @@ from pathlib import Path, PurePath
 from typing import Any
 
 from ringbalance.scene import deferred
+from ringbalance.scene.chamber_file.keys import MeshKeys
 from ringbalance.scene.faults import Fault, SceneError, closest, did_you_mean, toml_text
 from ringbalance.scene.keys.completion import completed, missing_faults
+from ringbalance.scene.keys.declaration import keys_of
 from ringbalance.scene.keys.reading import Reading, read_document
 from ringbalance.scene.keys.schema import BALANCERS, LIQUID_RING, ORIGIN, Schema
 from ringbalance.scene.models import InputUncertainty
@@ -160,7 +162,7 @@ def _origin_faults(reading: Reading, found: Iterable[Fault]) -> Iterator[Fault]:
 
 def _read_liquid_ring(document: Mapping[str, Any], *, file: str) -> tuple[Reading, tuple[Fault, ...]]:
     reading, faults = read_document(document, file=file, schema=LIQUID_RING)
-    if reading.given("disc.mesh"):
+    if any(reading.given(f"disc.{key}") for key in keys_of(MeshKeys)):
         reading, mesh_faults = deferred.with_chamber(reading)
         faults = (*faults, *mesh_faults)
     reading, liquid_faults = with_liquid(completed(reading))

@@ -26,8 +26,6 @@ class TubeModels:
     """Left out: their arcs as straight tube; by correlation: as if all flow were turbulent."""
     ends: Fidelity = FINEST
     """Left out: no entrance loss, alpha = 1; by correlation: as if all flow were turbulent."""
-    bends_before: tuple[int, int] | None = None
-    """Bends between either chamber and the crest's end; None: as many as lie there when spread evenly."""
     errors: tuple[tuple[str, float, float], ...] = ()
     """Errors of the models themselves, supposed or drawn: cause, and two parts in standard deviations, of
     which the second belongs to k alone; see `physics.tube.uncertainty.with_errors`."""

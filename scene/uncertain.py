@@ -27,7 +27,8 @@ UNCERTAIN_QUANTITIES: Mapping[str, str] = MappingProxyType(
 """Keys of [uncertainty], each with the table of its quantity, which is an attribute of `Scene` too."""
 
 
-_SHAPE: Final = (*STRETCHED, "plate_thickness")
+SHAPE: Final = (*STRETCHED, "plate_thickness")
+"""Keys of [disc] that follow from a mesh where there is one."""
 
 
 def nominal_value(*, scene: Scene, quantity: str) -> float | None:
@@ -45,7 +46,7 @@ def with_value(*, scene: Scene, quantity: str, value: float) -> Scene:
     table = _table_of(quantity)
     changed: dict[str, Any] = {quantity: value}
     disc, geometry = scene.disc, scene.disc.geometry
-    if geometry is not None and quantity in _SHAPE:
+    if geometry is not None and quantity in SHAPE:
         if quantity not in STRETCHED:
             raise ValueError(f"the mesh of a chamber has no {quantity} of its own")
         dimensions = {each: getattr(disc, each) for each in STRETCHED}

@@ -24,7 +24,7 @@ from ringbalance.scene.chamber_file.elements import (
 GMSH_NUMBERS = {name: number for number, name in GMSH_KINDS.items()}
 DIVISIONS = (2, 3, 2)
 """Cells in the directions of radius, angle and shaft."""
-CHAMBER, NAMES = 7, ("inner_wall", "outer_wall", "plate_left", "plate_right", "end_back", "end_front")
+CHAMBER, NAMES = 7, ("inner_wall", "outer_wall", "plate_right", "plate_left", "end_back", "end_front")
 """Physical number of the volume, and names of the sides, whose physical numbers count from 1."""
 _SIX_TETRAHEDRA = ((0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6))
 

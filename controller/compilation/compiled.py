@@ -28,9 +28,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 _OPTIONS: Final[dict[str, Any]] = {"nogil": True, "fastmath": False, "error_model": "numpy"}
-_PLAIN: Final = frozenset(
-    {"None", "bool", "int", "float", "complex", "tuple", "FloatArray", "IntArray", "Pair"}
-)
+_PLAIN: Final = frozenset({"None", "bool", "int", "float", "complex", "tuple", "Pair"})
 """Names in the annotation of a result that numba makes without calling a Python function."""
 _MARK: Final = f"from {__name__} import".encode()
 """In each source that holds compiled functions."""
@@ -72,7 +70,7 @@ def inlined(function: Callable[P, R]) -> Callable[P, R]:
 def _dispatcher(function: Callable[P, R], **options: Any) -> Callable[P, R]:
     dispatcher = numba.njit(function, **_OPTIONS, **options)
     if _Dispatcher is not object:
-        kind = _Guarded if _gives_records(function) else _Called
+        kind = _Guarded if _calls_python(function) else _Called
         dispatcher = kind(py_func=function, locals=dispatcher.locals, targetoptions=dispatcher.targetoptions)
     try:
         dispatcher._cache = KeptCode(function, code_folder())
@@ -82,8 +80,8 @@ def _dispatcher(function: Callable[P, R], **options: Any) -> Callable[P, R]:
     return cast(Callable[P, R], dispatcher)
 
 
-def _gives_records(function: Callable[..., Any]) -> bool:
-    """Whether the result may hold a named tuple, as far as the annotation tells."""
+def _calls_python(function: Callable[..., Any]) -> bool:
+    """Whether the result may hold an array or a named tuple, as far as the annotation tells."""
     told = str(function.__annotations__.get("return", "unknown"))
     return not set(re.findall(r"\w+", told)) <= _PLAIN
 

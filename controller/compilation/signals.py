@@ -1,9 +1,10 @@
 """Signals kept back while compiled code hands its result to Python.
 
-Numba turns a result that is a named tuple into a Python object by calling Python functions, and does not look
-whether such a call failed.  A signal that has arrived during the compiled call is handled inside the first of
-them: when its handler raises, as that of Ctrl-C does, a null pointer goes into the tuple and the process ends
-with a segmentation fault.  Handlers therefore only take note during the call, and act after it.
+Numba turns a result that is an array or a named tuple into a Python object by calling Python functions, and
+does not look whether such a call failed.  A signal that has arrived during the compiled call is handled in
+the first of them: when its handler raises, as that of Ctrl-C does, an array ends in an error of the
+interpreter, and a named tuple, with a null pointer in it, the process in a segmentation fault.  Handlers
+therefore only take note during the call, and act after it.
 """
 
 from __future__ import annotations

@@ -43,8 +43,3 @@ class LinearFit:
     def freedom(self, chosen: BoolArray) -> float:
         """Degrees of freedom that some rows have left: their number less the parameters they determine."""
         return float(np.count_nonzero(chosen) - np.sum(self._basis[chosen] ** 2))
-
-    @cached_property
-    def information(self) -> FloatArray:
-        """Fisher information of the parameters, priors included, shape (p, p)."""
-        return np.asarray(self.derivatives.T @ self.derivatives)

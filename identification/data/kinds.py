@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from types import MappingProxyType
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
+from ringbalance.identification.data.columns import dimension_of, split_head
 from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.faults import did_you_mean
 from ringbalance.scene.units import FieldError
@@ -128,87 +130,58 @@ class DataKind:
     def uncertainties(self) -> Iterator[Column]:
         """The columns that may state how well each row is known."""
         for column in self.measured:
-            yield Column(
+            yield replace(
+                _WIDTH,
                 name=f"uncertainty_{column.name}",
                 dimension=column.dimension,
                 unit=column.unit,
                 meaning=f"expanded uncertainty (95 %) of {column.name}",
                 amplitude=column.amplitude,
-                optional=True,
-                above_zero=True,
+                highest=math.inf,
             )
-        yield Column(
-            name="uncertainty",
-            dimension=None,
-            unit="",
-            meaning="expanded uncertainty (95 %) relative to the measured values, as a number such as 0.02",
-            optional=True,
-            above_zero=True,
-            highest=1.0,
-        )
+        yield _WIDTH
 
 
-def _amplitude(name: str, meaning: str) -> Column:
+def _column(head: str, meaning: str, **declared: Any) -> Column:
+    """A column by its head in the template, such as "time [s]"."""
+    name, unit = split_head(head) or (head, "")
     return Column(
-        name=name, dimension="length", unit="um", meaning=meaning, measured=True, amplitude=True, lowest=0.0
+        name=name, dimension=dimension_of(unit) if unit else None, unit=unit, meaning=meaning, **declared
     )
 
 
-def _angle(name: str, meaning: str, *, measured: bool = False) -> Column:
-    return Column(
-        name=name,
-        dimension="angle",
-        unit="deg",
-        meaning=meaning,
-        measured=measured,
-        lowest=-_TURNS,
-        highest=_TURNS,
-    )
-
-
-def _positive(name: str, dimension: str, unit: str, meaning: str, *, measured: bool = False) -> Column:
-    return Column(
-        name=name, dimension=dimension, unit=unit, meaning=meaning, measured=measured, above_zero=True
-    )
-
-
-def _fill(meaning: str, *, optional: bool = False) -> Column:
-    return Column(
-        name="fill_ratio",
-        dimension=None,
-        unit="",
-        meaning=meaning,
-        optional=optional,
-        lowest=0.0,
-        highest=1.0,
-    )
-
-
-_PHASE: Final = "of that vibration, positive with the rotation, from the mark of the rotor"
-_GAS: Final = "gas pressure in the driven chamber, gauge"
-_GAS_TIME: Final = Column(
-    name="gas_time",
-    dimension="time",
-    unit="ms",
-    meaning="valve-open time",
-    above_zero=True,
-    highest=100.0,  # of the order of what empties a chamber of an oil; beyond it milliseconds were meant
+_measured: Final = partial(_column, measured=True)
+_positive: Final = partial(_column, above_zero=True)
+_amplitude: Final = partial(_measured, amplitude=True, lowest=0.0)
+_fill: Final = partial(_column, "fill_ratio", lowest=0.0, highest=1.0)
+_angle: Final = partial(_column, lowest=-_TURNS, highest=_TURNS)
+_phase: Final = partial(
+    _angle,
+    meaning="of that vibration, positive with the rotation, from the mark of the rotor",
+    measured=True,
 )
+_WIDTH: Final = _positive(
+    "uncertainty",
+    "expanded uncertainty (95 %) relative to the measured values, as a number such as 0.02",
+    optional=True,
+    highest=1.0,
+)
+_GAS: Final = _positive("pressure [MPa]", "gas pressure in the driven chamber, gauge")
+# At most of the order of what empties a chamber of an oil; beyond it milliseconds were meant.
+_GAS_TIME: Final = _positive("gas_time [ms]", "valve-open time", highest=100.0)
 
 _TRIAL_WEIGHT: Final = DataKind(
     title="vibration with a known unbalance on the rotor",
     balancer="liquid_ring",
     columns=(
-        Column(
-            name="unbalance",
-            dimension="unbalance",
-            unit="g*mm",
-            meaning="of the trial weight, mass times radius; 0 is the run without it",
+        _column(
+            "unbalance [g*mm]",
+            "of the trial weight, mass times radius; 0 is the run without it",
             lowest=0.0,
         ),
-        _angle("angle", "of the trial weight on the rotor, positive with the rotation"),
-        _amplitude("amplitude", "of the vibration"),
-        _angle("phase", _PHASE, measured=True),
+        _angle("angle [deg]", "of the trial weight on the rotor, positive with the rotation"),
+        _amplitude("amplitude [um]", "of the vibration"),
+        _phase("phase [deg]"),
     ),
 )
 
@@ -224,14 +197,14 @@ _INJECTION: Final = DataKind(
     has_chamber=True,
     columns=(
         _GAS_TIME,
-        _positive("pressure", "pressure", "MPa", _GAS),
-        _amplitude("amplitude_before", "of the vibration before the injection"),
-        _angle("phase_before", _PHASE, measured=True),
-        _amplitude("amplitude_after", "of the vibration after it"),
-        _angle("phase_after", _PHASE, measured=True),
+        _GAS,
+        _amplitude("amplitude_before [um]", "of the vibration before the injection"),
+        _phase("phase_before [deg]"),
+        _amplitude("amplitude_after [um]", "of the vibration after it"),
+        _phase("phase_after [deg]"),
         _fill(
-            "fill ratio of the driven chamber before; without this column it follows from the injections "
-            "above in the same series, and at first from the scene's initial_fill",
+            meaning="fill ratio of the driven chamber before; without this column it follows from the "
+            "injections above in the same series, and at first from the scene's initial_fill",
             optional=True,
         ),
     ),
@@ -241,18 +214,11 @@ _TRANSFER: Final = DataKind(
     title="liquid that one injection moves, weighed or measured by volume",
     balancer="liquid_ring",
     columns=(
-        _fill("fill ratio of the driven chamber before"),
-        _positive("pressure", "pressure", "MPa", _GAS),
+        _fill(meaning="fill ratio of the driven chamber before"),
+        _GAS,
         _GAS_TIME,
-        Column(name="mass", dimension="mass", unit="g", meaning="moved, weighed", measured=True, lowest=0.0),
-        Column(
-            name="volume",
-            dimension="volume",
-            unit="ml",
-            meaning="moved, measured by volume",
-            measured=True,
-            lowest=0.0,
-        ),
+        _measured("mass [g]", "moved, weighed", lowest=0.0),
+        _measured("volume [ml]", "moved, measured by volume", lowest=0.0),
     ),
     one_of=("mass", "volume"),
 )
@@ -261,8 +227,8 @@ _FLOW: Final = DataKind(
     title="flow through the tube alone, at rest",
     balancer="liquid_ring",
     columns=(
-        _positive("pressure_difference", "pressure", "kPa", "between the ends of the tube"),
-        _positive("flow_rate", "flow_rate", "ml/s", "volume flow", measured=True),
+        _positive("pressure_difference [kPa]", "between the ends of the tube"),
+        _positive("flow_rate [ml/s]", "volume flow", measured=True),
     ),
 )
 
@@ -270,25 +236,11 @@ _PRESSURE: Final = DataKind(
     title="pressure of the turning liquid at a wall or port",
     balancer="liquid_ring",
     columns=(
-        _positive("radius", "length", "mm", "of the place where the pressure is measured"),
-        _fill("fill ratio of the chamber"),
-        _positive("surface_radius", "length", "mm", "of the free surface"),
-        Column(
-            name="speed",
-            dimension="speed",
-            unit="rpm",
-            meaning="of the rotor; that of the scene without this column",
-            optional=True,
-            above_zero=True,
-        ),
-        Column(
-            name="pressure",
-            dimension="pressure",
-            unit="kPa",
-            meaning="measured, over that of the gas in the chamber",
-            measured=True,
-            lowest=0.0,
-        ),
+        _positive("radius [mm]", "of the place where the pressure is measured"),
+        _fill(meaning="fill ratio of the chamber"),
+        _positive("surface_radius [mm]", "of the free surface"),
+        _positive("speed [rpm]", "of the rotor; that of the scene without this column", optional=True),
+        _measured("pressure [kPa]", "measured, over that of the gas in the chamber", lowest=0.0),
     ),
     one_of=("fill_ratio", "surface_radius"),
 )
@@ -297,9 +249,9 @@ _RUN_UP: Final = DataKind(
     title="vibration of the rotor over its speed, both masses clamped",
     balancer="eccentric_mass",
     columns=(
-        _positive("speed", "speed", "rpm", "of the rotor"),
-        _amplitude("amplitude", "of the vibration"),
-        _angle("phase", _PHASE, measured=True),
+        _positive("speed [rpm]", "of the rotor"),
+        _amplitude("amplitude [um]", "of the vibration"),
+        _phase("phase [deg]"),
     ),
 )
 
@@ -307,30 +259,13 @@ _POSITIONING: Final = DataKind(
     title="angle of one mass under a constant motor voltage",
     balancer="eccentric_mass",
     columns=(
-        Column(
-            name="time",
-            dimension="time",
-            unit="s",
-            meaning="from when the voltage was applied",
-            lowest=0.0,
-            highest=100.0,
-        ),
-        Column(name="voltage", dimension="voltage", unit="V", meaning="of the motor", highest=1000.0),
-        Column(
-            name="speed", dimension="speed", unit="rpm", meaning="of the rotor", lowest=0.0, highest=1000.0
-        ),
-        Column(
-            name="angle",
-            dimension="angle",
-            unit="deg",
-            meaning="moved by the mass on its track since then, not wrapped",
-            measured=True,
-        ),
-        Column(
-            name="moved_mass",
-            dimension=None,
-            unit="",
-            meaning="1 or 2, the mass that moves while the other one is clamped; 1 without this column",
+        _column("time [s]", "from when the voltage was applied", lowest=0.0, highest=100.0),
+        _column("voltage [V]", "of the motor", highest=1000.0),
+        _column("speed [rpm]", "of the rotor", lowest=0.0, highest=1000.0),
+        _measured("angle [deg]", "moved by the mass on its track since then, not wrapped"),
+        _column(
+            "moved_mass",
+            "1 or 2, the mass that moves while the other one is clamped; 1 without this column",
             optional=True,
             lowest=1.0,
             highest=2.0,

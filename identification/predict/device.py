@@ -26,7 +26,6 @@ from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.model import balancer_model
 from ringbalance.reduced_model.selection.estimates import FILLING, INERTIA, LAG
 from ringbalance.reduced_model.selection.tube_terms import tube_models
-from ringbalance.reduced_model.tube.path import with_bends_kept
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.tube_models import START_ERROR, TubeModels
@@ -56,7 +55,7 @@ class Models:
 
 def models_of(scene: Scene) -> Models:
     """The models that `calibrate` takes."""
-    tube = with_bends_kept(tube_models(scene), scene.tube)
+    tube = tube_models(scene)
     gravity = mean_gravity(scene) > scene.tolerance
     law = nominal_law(replace(scene, tube=replace(scene.tube, models=tube)), gravity=gravity)
     return Models(tube=tube, gravity=gravity, velocity=primed_velocity(law, scene))

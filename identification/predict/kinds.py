@@ -17,16 +17,11 @@ from ringbalance.identification.predict import (
     pressures,
     run_ups,
     transfers,
-    trial_amplitudes,
     trial_weights,
 )
-from ringbalance.identification.predict.scalars import scalar_covariance
-from ringbalance.identification.predict.vibration import (
-    measured_covariance,
-    measured_vectors,
-    vector_noise_given,
-)
+from ringbalance.identification.predict.vibration import parts, spread_out, vector_covariance, vectors
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.uncertain import NORMAL_95
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,6 +49,12 @@ def _always(*names: str) -> Callable[[Observations], tuple[str, ...]]:
     return lambda _: names
 
 
+def _scalar_covariance(observations: Observations, column: str) -> FloatArray:
+    """Of errors that are independent from row to row, shape (n, n); unit where their noise is not given."""
+    given = observations.uncertainty.get(column)
+    return np.diag(np.ones(len(observations)) if given is None else (given / NORMAL_95) ** 2)
+
+
 def _never(_scene: Any, _observations: Observations) -> str:
     return ""
 
@@ -78,7 +79,7 @@ def _numbers(
     return PredictedKind(
         predict=predict,
         measured=lambda observations: observations.columns[column(observations)],
-        covariance=lambda observations: scalar_covariance(observations, column(observations)),
+        covariance=lambda observations: _scalar_covariance(observations, column(observations)),
         noise_given=lambda observations: column(observations) in observations.uncertainty,
         free=_nothing_free(1),
         column=column,
@@ -95,9 +96,11 @@ def _vibrations(
     """One measured vibration a row."""
     return PredictedKind(
         predict=_by_scene_alone(predict),
-        measured=measured_vectors,
-        covariance=measured_covariance,
-        noise_given=vector_noise_given,
+        measured=lambda observations: parts(vectors(observations)),
+        covariance=lambda observations: spread_out(
+            vector_covariance(observations, given="amplitude" in observations.uncertainty)
+        ),
+        noise_given=lambda observations: "amplitude" in observations.uncertainty,
         free=free,
         column=lambda _: "amplitude",
         too_long=_never,
@@ -111,7 +114,7 @@ PREDICTED: Final[Mapping[str, PredictedKind]] = MappingProxyType(
             trial_weights.predict, _always("influence_coefficient", "lag_angle"), trial_weights.free
         ),
         "trial_amplitude": _numbers(
-            _by_scene_alone(trial_amplitudes.predict),
+            _by_scene_alone(trial_weights.amplitudes),
             lambda _: "amplitude",
             _always("influence_coefficient", "initial_amplitude", "initial_phase"),
         ),

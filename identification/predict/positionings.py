@@ -11,7 +11,6 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from ringbalance.controller.compilation.signals import signals_deferred
 from ringbalance.controller.eccentric_mass.plant.friction import LOCKED, STUCK
 from ringbalance.controller.eccentric_mass.plant.integrate import plant_step, substeps
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
@@ -94,9 +93,7 @@ def _moved(
     for place, time in enumerate(times.tolist()):
         parts = math.ceil(substeps(plant, speed, 0.0, time - now) / _MOST_SUBSTEPS) if time > now else 0
         for _ in range(parts):
-            # Numba hands arrays over through a Python function, in which an interrupt would be an error.
-            with signals_deferred():
-                state, flags = plant_step(plant, state, flags, command, speed, 0.0, (time - now) / parts)
+            state, flags = plant_step(plant, state, flags, command, speed, 0.0, (time - now) / parts)
         now = time
         found[place] = state[4 + mass] - angles[mass]
     return found

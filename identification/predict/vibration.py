@@ -39,21 +39,6 @@ def vector_covariance(observations: Observations, *, when: str = "", given: bool
     )
 
 
-def measured_vectors(observations: Observations) -> FloatArray:
-    """`parts` of one vibration a row, m, shape (2 n,)."""
-    return parts(vectors(observations))
-
-
-def measured_covariance(observations: Observations) -> FloatArray:
-    """Of `measured_vectors`, shape (2 n, 2 n); unit where the noise is not given."""
-    return spread_out(vector_covariance(observations, given=vector_noise_given(observations)))
-
-
-def vector_noise_given(observations: Observations) -> bool:
-    """Whether one vibration a row has its uncertainty."""
-    return "amplitude" in observations.uncertainty
-
-
 def spread_out(blocks: FloatArray) -> FloatArray:
     """Covariance of `parts` of vectors that are independent of each other, shape (2 n, 2 n)."""
     count = blocks.shape[0]

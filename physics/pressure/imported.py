@@ -146,7 +146,7 @@ def solve_on(space: TetrahedronSpace, problem: PressureProblem) -> LinearSolutio
     free = np.setdiff1d(np.arange(space.unknowns), surface)
     rows = space.stiffness[free]
     linear = solve_linear(
-        csr_matrix(rows[:, free]), load[free] - rows @ values, dimension=3, prolongation=_coarse(space, free)
+        csr_matrix(rows[:, free]), load[free] - rows @ values, prolongation=_coarse(space, free)
     )
     values[free] = linear.values
     return LinearSolution(values=values, status=linear.status, statistics=linear.statistics)

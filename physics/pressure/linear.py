@@ -16,8 +16,8 @@ from ringbalance.scene.arrays import FloatArray
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-# Above these a factorisation costs more time and memory than multigrid does.
-DIRECT_LIMIT = {2: 100_000, 3: 20_000}
+DIRECT_LIMIT = 20_000
+"""Unknowns of a body above which a factorisation costs more time and memory than multigrid does."""
 _TOLERANCE = 1e-14
 """Of the error in the form's own norm, as its near inverse sees it, over that of zero."""
 _MAX_ITERATIONS = 500
@@ -53,39 +53,35 @@ def solve_form(form: Form, right: FloatArray, *, inverse: Form, magnitude: Form)
     Source: Hestenes and Stiefel (1952), doi:10.6028/jres.049.044.
     """
     values, iterations = _conjugate_gradients(form, right, inverse)
-    return _judged(values, form(values), right, magnitude, iterations, {})
+    return _judged(values, form(values), right, magnitude, iterations)
 
 
 def solve_linear(
     matrix: csr_matrix,
     right: FloatArray,
     *,
-    dimension: int,
     prolongation: Callable[[], csr_matrix] | None = None,
-    direct_limit: int | None = None,
+    direct_limit: int = DIRECT_LIMIT,
 ) -> LinearSolution:
     """Solve A u = b: by factorisation when small, else by conjugate gradients with algebraic multigrid.
 
     Args:
         matrix: A, symmetric positive definite.
         right: b, shape (unknowns,).
-        dimension: of the mesh behind the matrix, 2 or 3; decides where factorisation ends.
         prolongation: gives, when multigrid asks for it, the interpolation from linear elements on the same
             mesh; None lets multigrid find its own coarse levels.
-        direct_limit: unknowns up to which to factorise; default 100 000 in two dimensions, 20 000 in three.
+        direct_limit: unknowns up to which to factorise.
     Returns: u with the true relative residual |b - A u| / |b|; the status is NOT_CONVERGED when that is above
         1e-10, unless it is rounding, at most 8 eps | |A| |u| + |b| | / |b|, and at most 1e-6: elongated cells
         make terms cancel that are larger than b by the square of their elongation.
     Source: smoothed aggregation of Vanek, Mandel and Brezina (1996), doi:10.1007/BF02238511, through pyamg.
     """
-    limit = DIRECT_LIMIT[dimension] if direct_limit is None else direct_limit
-    if right.size <= limit:
-        values, iterations, extra = _factorised(matrix, right), 0, dict[str, float]()
+    if right.size <= direct_limit:
+        values, iterations = _factorised(matrix, right), 0
     else:
-        values, iterations, extra = deferred.multigrid(
-            matrix, right, prolongation() if prolongation else None
-        )
-    return _judged(values, matrix @ values, right, lambda u: abs(matrix) @ np.abs(u), iterations, extra)
+        inverse = deferred.multigrid(matrix, prolongation() if prolongation else None)
+        values, iterations = _conjugate_gradients(lambda u: matrix @ u, right, inverse)
+    return _judged(values, matrix @ values, right, lambda u: abs(matrix) @ np.abs(u), iterations)
 
 
 def _conjugate_gradients(form: Form, right: FloatArray, inverse: Form) -> tuple[FloatArray, int]:
@@ -118,7 +114,6 @@ def _judged(
     right: FloatArray,
     magnitude: Form,
     iterations: int,
-    extra: dict[str, float],
 ) -> LinearSolution:
     size = float(np.linalg.norm(right))
     size = size if size > 0 else 1.0
@@ -130,9 +125,7 @@ def _judged(
     return LinearSolution(
         values=values,
         status=_status(residual, limit),
-        statistics=Statistics(
-            unknowns=right.size, iterations=iterations, relative_residual=residual, extra=extra
-        ),
+        statistics=Statistics(unknowns=right.size, iterations=iterations, relative_residual=residual),
     )
 
 

@@ -71,23 +71,25 @@ class TubeState:
     def upstream_loss(self, *, tube: Tube) -> FloatArray:
         """The part of k between the driven chamber and the crest.
 
-        Entrance, the share `hump_position` of friction, rotation and extra loss, and the bends before the
-        crest (`bends_before`); of a prescribed k the share `hump_position`.
+        Entrance, the share `hump_position` of friction, rotation and extra loss, and the bends of the first
+        leg (`bends_before`); of a prescribed k the share `hump_position`.
         Source: energy balance from the chamber to the crest; the scene does not say where the bends lie.
         """
         share = tube.hump_position
         if "decree" in self.terms:
             return np.asarray(share * self.terms["decree"], dtype=np.float64)
         along = share * (self.terms["friction"] + self.terms["rotation"] + self.terms["extra"])
-        before = self.bends[: bends_before(tube)]
-        return np.asarray(self.terms["entrance"] + along + sum(before), dtype=np.float64)
+        bends = sum(part * bend for part, bend in zip(bends_before(len(tube.bends)), self.bends, strict=True))
+        return np.asarray(self.terms["entrance"] + along + bends, dtype=np.float64)
 
 
-def bends_before(tube: Tube) -> int:
-    """Bends between the driven chamber and the crest: as the tube's models have it, or spread evenly."""
-    if tube.models.bends_before is not None:
-        return tube.models.bends_before[0]
-    return sum((i + 0.5) / len(tube.bends) < tube.hump_position for i in range(len(tube.bends)))
+def bends_before(count: int) -> tuple[float, ...]:
+    """Fraction of each bend that lies between the driven chamber and the crest.
+
+    A bend belongs to a leg, wherever the crest is, so that nothing jumps when the crest moves.  Both legs
+    have equal numbers; the crest halves the middle one of an odd number.
+    """
+    return tuple(min(max(count / 2 - i, 0.0), 1.0) for i in range(count))
 
 
 def tube_state(*, tube: Tube, liquid: Liquid, angular_velocity: float, velocity: npt.ArrayLike) -> TubeState:

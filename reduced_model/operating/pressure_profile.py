@@ -86,7 +86,7 @@ def hump_profile(
         points: number of even places along the path; more stand where something changes.
     Raises: ValueError: a fill ratio outside the range, a NaN, a negative absolute pressure, or under 2
         points.
-    Range: legs as in `path`; the scene does not give where the bends lie: evenly.
+    Range: legs as in `path`; the scene does not give where the bends lie: evenly over both legs.
     Source: Eqs. 13 to 18 of the liquid-ring paper, taken along the path.
     """
     if points < 2:

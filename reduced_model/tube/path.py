@@ -2,8 +2,8 @@
 
 A crest shaped as an arc: straight legs from the ports touch the crest's circle, which the tube follows in
 between, as the shortest path between opposite ports does; a longer tube is taken as that path stretched.  A
-crest shaped as a point: both legs run straight in r.  Bends sit where they are when spread evenly along the
-path.  Without a crest the path stays at the port's radius.
+crest shaped as a point: both legs run straight in r.  A bend belongs to a leg and stays at its fraction of it
+when the crest moves.  Without a crest the path stays at the port's radius.
 """
 
 from __future__ import annotations
@@ -15,11 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.physics.tube.state import TubeState, bends_before
+from ringbalance.physics.tube.state import TubeState
 from ringbalance.scene.arrays import BoolArray, FloatArray, distinct
 from ringbalance.scene.keys.derivations import shortest_path
 from ringbalance.scene.models import Tube
-from ringbalance.scene.tube_models import TubeModels
 
 _SAME = 1e-9
 
@@ -36,19 +35,7 @@ class Places:
 
 def reversed_tube(tube: Tube) -> Tube:
     """The tube as the opposite chamber sees it. Returns: The tube with crest and bends from the other end."""
-    models = tube.models
-    if models.bends_before is not None:
-        models = replace(models, bends_before=models.bends_before[::-1])
-    return replace(tube, hump_position=1 - tube.hump_position, bends=tube.bends[::-1], models=models)
-
-
-def with_bends_kept(models: TubeModels, tube: Tube) -> TubeModels:
-    """The models with each bend on the side of the crest's end where a tube has it.
-
-    A bend belongs to a leg: it does not jump over the crest when the crest moves within its tolerance.
-    """
-    counts = bends_before(to_crest_end(tube)), bends_before(to_crest_end(reversed_tube(tube)))
-    return replace(models, bends_before=counts)
+    return replace(tube, hump_position=1 - tube.hump_position, bends=tube.bends[::-1])
 
 
 def crest_span(tube: Tube) -> tuple[float, float]:
@@ -122,15 +109,18 @@ def _far_leg(
     return along * (1 - crest_span(tube)[1]), square * (tube.port_radius**2 - tube.hump_radius**2)
 
 
-def _bend_shares(tube: Tube) -> FloatArray:
-    """Where the bends sit, s/L: (i + 1/2)/n, but not nearer to a crest's arc than to a port."""
+def _bend_shares(tube: Tube) -> tuple[FloatArray, FloatArray]:
+    """Where both halves of every bend sit, s/L: (i + 1/2)/n of the legs put together, or of a plain tube.
+
+    The halves of a bend in the middle sit at both ends of the crest.
+    """
     count = len(tube.bends)
     even = (np.arange(count) + 0.5) / max(count, 1)
-    if tube.hump_radius is None or tube.hump_shape == "point":
-        return even
+    if tube.hump_radius is None:
+        return even, even
     start, end = crest_span(tube)
-    before = np.where(even < start, np.minimum(even, start / 2), even)
-    return np.where(even > end, np.maximum(even, (1 + end) / 2), before)
+    near, far = 2 * even * start, end + (2 * even - 1) * (1 - end)
+    return np.where(even <= 0.5, near, far), np.where(even < 0.5, near, far)
 
 
 def places(*, tube: Tube, points: int, doubled: tuple[float, ...] = ()) -> Places:
@@ -138,7 +128,7 @@ def places(*, tube: Tube, points: int, doubled: tuple[float, ...] = ()) -> Place
 
     Args: `points`: number of even places. `doubled`: further shares at which something changes at once.
     """
-    twice = distinct(np.concatenate([[0.0, 1.0], _bend_shares(tube), doubled]))
+    twice = distinct(np.concatenate([[0.0, 1.0], *_bend_shares(tube), doubled]))
     crest = () if tube.hump_radius is None else crest_span(tube)
     kept = np.append(twice, crest)
     even = np.linspace(0.0, 1.0, points)
@@ -212,8 +202,9 @@ def loss_before(*, tube: Tube, state: TubeState, at: Places) -> FloatArray:
     entrance = float(state.terms.get("entrance", np.zeros(())))
     inside = float(state.kinetic_factor) + entrance + float(loss_along(state.terms)) * at.share
     if "decree" not in state.terms:
-        for share, bend in zip(_bend_shares(tube), state.bends, strict=True):
-            inside = inside + float(bend) * ((at.share > share) | ((at.share == share) & at.after))
+        for first, second, bend in zip(*_bend_shares(tube), state.bends, strict=True):
+            halves = [(at.share > share) | ((at.share == share) & at.after) for share in (first, second)]
+            inside = inside + float(bend) / 2 * np.sum(halves, axis=0)
     entered = (at.share > 0) | at.after
     left = (at.share == 1) & at.after
     return np.where(left, float(state.k) + 1, np.where(entered, inside, 0.0))

@@ -15,7 +15,8 @@ from ringbalance.scene.chamber_file.record import CellKind
 from ringbalance.scene.rules.check import Finding
 
 _MOST: Final = 2_000_000
-"""Nodes, and cells; three numbers of nodes then make one of 64 bits, and the checks take about 2 GB."""
+"""Nodes, and cells; three numbers of nodes then make one of 64 bits, and the checks of
+as many tetrahedra take 15 s and 1.5 GB."""
 _KINDS: Final = f"cells of one kind: {', '.join(CELL_KINDS)}"
 
 

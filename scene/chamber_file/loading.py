@@ -28,7 +28,6 @@ from ringbalance.scene.chamber_file.reading import content_of, contents_of, is_s
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.chamber_file.shape import oriented
 from ringbalance.scene.chamber_file.step_file import STEP_UNIT
-from ringbalance.scene.chamber_file.stretching import STRETCHED
 from ringbalance.scene.chamber_file.topology import facets_of, topology_findings
 from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.faults import Fault
@@ -36,32 +35,42 @@ from ringbalance.scene.keys.declaration import keys_of
 from ringbalance.scene.keys.derivations import even_number_of_chambers
 from ringbalance.scene.keys.reading import Reading
 from ringbalance.scene.rules.check import Finding, written
+from ringbalance.scene.uncertain import SHAPE
 
-_FOLLOWING: Final = (*STRETCHED, "plate_thickness")
-"""Keys of [disc] that a mesh decides."""
 _PORT: Final = "tube.port_radius"
 
 
 def with_chamber(reading: Reading) -> tuple[Reading, tuple[Fault, ...]]:
     """The reading with the geometry and the dimensions of the mesh that it names, and all errors of it."""
+    keys = [f"disc.{key}" for key in keys_of(MeshKeys)]
     if not reading.given("disc.mesh"):
-        return reading, ()
-    faults = [*_superfluous(reading), *_unit_faults(reading)]
-    paths = frozenset(f"disc.{key}" for key in (*_FOLLOWING, "geometry"))
-    unknown = replace(reading, broken=reading.broken | paths)
-    unread = {f"disc.{key}" for key in keys_of(MeshKeys)} & reading.broken
-    if faults or unread or not reading.known("disc.mesh", "accuracy.tolerance"):
-        return unknown, tuple(faults)
+        return reading, tuple(_pointless(reading, key) for key in keys if reading.given(key))
+    superfluous, unit = tuple(_superfluous(reading)), tuple(_unit_faults(reading))
+    unknown = replace(reading, broken=reading.broken | {f"disc.{key}" for key in (*SHAPE, "geometry")})
+    if unit or reading.broken & set(keys) or not reading.known("accuracy.tolerance"):
+        return unknown, (*superfluous, *unit)
     try:
-        return _following(reading, *_chamber(reading)), ()
-    except MeshFileError as error:
-        return unknown, tuple(
-            reading.fault("disc.mesh", problem=each.problem, allowed=each.allowed) for each in error.findings
-        )
+        known = _following(reading, *_chamber(reading))
+    except (MeshFileError, MemoryError) as error:
+        return unknown, (*superfluous, *_mesh_faults(reading, error))
+    return (unknown, superfluous) if superfluous else (known, ())
+
+
+def _mesh_faults(reading: Reading, error: MeshFileError | MemoryError) -> Iterator[Fault]:
+    """One error for each finding; what a file calls its parts is printable in it."""
+    scarce = Finding(problem="memory does not suffice to check a mesh of this size", allowed="a coarser mesh")
+    for each in error.findings if isinstance(error, MeshFileError) else (scarce,):
+        problem = "".join(letter if letter.isprintable() else "?" for letter in each.problem)
+        yield reading.fault("disc.mesh", problem=problem, allowed=each.allowed)
+
+
+def _pointless(reading: Reading, path: str) -> Fault:
+    problem = "it has no meaning without mesh"
+    return reading.fault(path, problem=problem, allowed="mesh as well, or leave the key out")
 
 
 def _superfluous(reading: Reading) -> Iterator[Fault]:
-    for key in _FOLLOWING:
+    for key in SHAPE:
         if reading.given(f"disc.{key}"):
             allowed = "either mesh or this key; the mesh decides"
             yield reading.fault(f"disc.{key}", problem="it follows from the mesh", allowed=allowed)

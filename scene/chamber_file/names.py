@@ -24,12 +24,13 @@ MEANINGS: Final[Mapping[str, str]] = MappingProxyType(
     {
         OUTER_WALL: "farthest from the shaft, where the liquid lies; needed",
         "inner_wall": "nearest to the shaft",
-        "plate_left": "radial plate on the side that rotation comes from",
-        "plate_right": "radial plate on the side that rotation goes to",
+        "plate_left": "radial plate at the higher angle about the shaft",
+        "plate_right": "radial plate at the lower angle",
         "end_back": "end wall at the lower coordinate along the shaft",
         "end_front": "end wall at the higher coordinate along the shaft",
         "gas_tube": "outside of a tube or a pin inside the chamber",
-        PORT: "opening of the connecting tube",
+        "gas_hole": "mouth of the gas line, or of a gas tube",
+        PORT: "opening of the connecting tube; without `port_radius` its mean radius is used",
         WALLS: "any other wall; facets without a name count as this",
     }
 )
@@ -42,7 +43,7 @@ def boundaries_of(body: Body, facets: Facets) -> tuple[dict[str, IntArray], tupl
     sides = facets.outer[np.argsort(facets.keys[facets.outer], kind="stable")]
     held = np.zeros((len(KNOWN_NAMES), len(sides)), dtype=np.bool_)
     for block in body.named:
-        at, real = _places(body, block, facets.keys[sides])
+        at, real = _places(body, facets, block, facets.keys[sides])
         found += _no_facets(body, facets, block, real)
         found += _other_middles(body, facets.nodes[sides[at[real]]], block, real)
         for name in set(block.names) & set(KNOWN_NAMES):
@@ -53,11 +54,11 @@ def boundaries_of(body: Body, facets: Facets) -> tuple[dict[str, IntArray], tupl
     return {name: each for name, each in marked.items() if len(each)}, tuple(found)
 
 
-def _places(body: Body, block: Elements, keys: IntArray) -> tuple[IntArray, BoolArray]:
+def _places(body: Body, facets: Facets, block: Elements, keys: IntArray) -> tuple[IntArray, BoolArray]:
     """Where the facets of a block stand among sorted keys, and which of them do."""
     wanted = key_of(block.nodes[:, : CORNERS[block.kind]], len(body.points))
     at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-    return at, keys[at] == wanted
+    return at, (keys[at] == wanted) & (CORNERS[block.kind] == facets.corners)
 
 
 def _volume_names(body: Body) -> Iterator[Finding]:
@@ -108,7 +109,7 @@ def _missing(body: Body) -> Iterator[Finding]:
 def _no_facets(body: Body, facets: Facets, block: Elements, real: BoolArray) -> Iterator[Finding]:
     """Named elements that are no outer facet: between two cells, or of no cell."""
     every = np.sort(facets.keys)
-    _, side = _places(body, block, every)
+    _, side = _places(body, facets, block, every)
     names = " and ".join(toml_text(name) for name in block.names)
     for wrong, what in ((side & ~real, "lie between two cells"), (~side, "are no side of any cell")):
         if wrong.any():

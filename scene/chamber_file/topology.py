@@ -20,7 +20,8 @@ _SAME: Final = 1e-7
 """Distance, as a share of the body, below which two nodes are meant to be one."""
 _ON: Final = 1e-6
 """Distance from a facet, as a share of its size, below which a node lies on it."""
-_MOST_NEAR: Final = 1000
+_MOST_NEAR: Final = 5_000_000
+"""Pairs of facets and nodes near them that are looked at, the facets with the fewest first."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,7 +153,8 @@ def _on_triangles(points: FloatArray, triangles: IntArray, owners: IntArray) -> 
     radii = np.linalg.norm(corners - middles[:, None], axis=2).max(axis=1)
     tree = cKDTree(points[nodes])
     counts = tree.query_ball_point(middles, radii, return_length=True)
-    near = np.flatnonzero(counts <= _MOST_NEAR)
+    order = np.argsort(counts, kind="stable")
+    near = order[np.cumsum(counts[order]) <= _MOST_NEAR]
     lists = tree.query_ball_point(middles[near], radii[near])
     which = np.repeat(near, [len(each) for each in lists])
     candidates = nodes[np.fromiter((node for each in lists for node in each), dtype=np.int64)]

@@ -73,19 +73,15 @@ def test_injections_are_those_of_the_closed_loop(paper_scene: Scene) -> None:
     np.testing.assert_allclose(found[:3] + 1j * found[3:], expected, rtol=2e-4)
 
 
-def test_no_bend_jumps_over_the_crest_within_its_tolerance() -> None:
-    """Injections bend with the crest's place and do not step, from whichever chamber.
+@pytest.mark.parametrize("bends", [1, 2, 3])
+def test_injections_do_not_step_as_the_crest_moves(bends: int) -> None:
+    """A straight line through five places, 0.5 +- 0.05, misses by less than 0.2 %, from whichever chamber.
 
-    A straight line through five places, 0.5 +- 0.05, misses by less than a quarter of the step that a bend
-    makes which sits where all are spread evenly.
+    A bend that changed its leg would make a step of 1 to 7 % of the velocity.
     """
     scene = liquid_ring_scene(load_scene(bundled_scene("six_chamber")))
-    models = models_of(scene)
-    free = replace(models, tube=replace(models.tube, bends_before=None))
-    kept, jumping = (_misses_a_line(scene, each) for each in (models, free))
-    assert models.tube.bends_before == (1, 1)
-    assert jumping > 0.01
-    assert kept < jumping / 4
+    scene = replace(scene, tube=replace(scene.tube, bends=scene.tube.bends[:1] * bends))
+    assert _misses_a_line(scene, models_of(scene)) < 2e-3
 
 
 def _misses_a_line(scene: Scene, models: Models) -> float:

@@ -124,7 +124,6 @@ def test_the_expected_gain_is_that_of_fits_made_again(paper_scene: Scene, true: 
     data = some(transfers(true, models_of(paper_scene), seed=0, share=0.02), [0, 6, 13, 19])
     first = fit(paper_scene, data=[data], parameters=["bore"])
     told = next_measurement(first, "bore")
-    assert told is not None
     offered = offered_rows(first.scene, "transfer", data)
     chosen = next(g for g in told.gains if g.candidate == words_of(offered, row))
     volume = PREDICTED["transfer"].predict(first.scene, offered, models_of(paper_scene))
@@ -136,7 +135,6 @@ def test_the_expected_gain_is_that_of_fits_made_again(paper_scene: Scene, true: 
 
 def test_weak_parameters_are_asked_for_first(found: FitResult) -> None:
     told = next_measurement(found)
-    assert told is not None
     widths = {p.name: p.profile.high - p.profile.low for p in found.parameters}
     assert told.parameter in widths
     assert told.gains[0].after <= told.gains[-1].after
@@ -147,7 +145,9 @@ def test_the_saved_scene_is_the_fitted_one(found: FitResult, tmp_path: Path) -> 
     target = tmp_path / "fitted.toml"
     data = [b.observations for b in found.optimum.residuals.problem.blocks]
     text = bundled_scene("liquid_ring_paper").read_text(encoding="utf-8")
-    save_result(target, text=text, result=found, data=data, said=review(found).sentences)
+    save_result(
+        target, text=text, result=found, data=data, folder=target.parent, said=review(found).sentences
+    )
     scene = liquid_ring_scene(load_scene(target))
     assert scene.tube.bore == pytest.approx(found.parameter("bore").value, rel=1e-8)
     widths = {each.quantity: each.half_width for each in scene.uncertainty}

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.identification.saving import Fitted, fitted_scene, save_fitted
+from ringbalance.identification.saving import Fitted, fitted_scene, found_from, save_fitted
 from ringbalance.scene import SceneError, bundled_scene, load_scene
 from ringbalance.scene.describe import scene_table
 from ringbalance.scene.loader import scene_from
@@ -136,3 +136,14 @@ def test_saving_loses_nothing_that_matters(value: float, share: float) -> None:
     assert scene.tube.bore == pytest.approx(value, rel=1e-8)
     width = {each.quantity: each.half_width for each in scene.uncertainty}["bore"]
     assert width == pytest.approx(share * value, rel=1e-7)
+
+
+def test_a_mesh_is_found_from_another_folder(tmp_path: Path) -> None:
+    text = text_of("chamber_with_gas_tube")
+    folder = bundled_scene("chamber_with_gas_tube").parent
+    assert found_from(text, folder=folder, to=folder) == text
+    (tmp_path / "disc.toml").write_text(found_from(text, folder=folder, to=tmp_path), encoding="utf-8")
+    there = load_scene(tmp_path / "disc.toml")
+    assert there.values_sha256 == load_scene(folder / "chamber_with_gas_tube.toml").values_sha256
+    plain = text_of("six_chamber")
+    assert found_from(plain, folder=folder, to=tmp_path) == plain

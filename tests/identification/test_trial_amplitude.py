@@ -7,6 +7,7 @@ The published numbers are amplitudes of Fig. 12 in J. Sound Vib. 330 (2011) 385,
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -119,10 +120,20 @@ def test_the_rotor_of_rodrigues_has_one_coefficient(paper_scene: Scene) -> None:
         assert found.verdict is Verdict.IDENTIFIED
 
 
+def test_the_page_has_what_the_fits_find(paper_scene: Scene) -> None:
+    text = (Path(__file__).resolve().parents[2] / "docs" / "fit.md").read_text(encoding="utf-8")
+    free, aligned = (
+        fitted(paper_scene).parameter("influence_coefficient") for fitted in (by_vectors, in_line)
+    )
+    low, high = (end / PER_G_MM for end in free.interval)
+    assert f"{free.value / PER_G_MM:.2f} ({low:.2f} to {high:.2f}) µm per" in text
+    half = (aligned.interval[1] - aligned.interval[0]) / 2 / PER_G_MM
+    assert f"{aligned.value / PER_G_MM:.3f} ± {half:.3f} where" in text
+
+
 def test_a_washer_elsewhere_would_tell_most_of_the_phase(paper_scene: Scene) -> None:
     """All washers stood at one angle: one elsewhere tells the angle to the own unbalance."""
     told = next_measurement(by_vectors(paper_scene), "initial_phase")
-    assert told is not None
     best = next(g for g in told.gains if g.candidate.startswith("trial amplitude"))
     assert "angle 0 deg" not in best.candidate
     assert best.ratio < 0.5

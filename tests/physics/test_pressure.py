@@ -14,7 +14,6 @@ from ringbalance.mesh.chamber import Geometry, chamber_mesh
 from ringbalance.mesh.export import scikit_fem_mesh
 from ringbalance.physics.pressure import assembly as pressure_assembly
 from ringbalance.physics.pressure import linear as pressure_linear
-from ringbalance.physics.pressure import multigrid as pressure_multigrid
 from ringbalance.physics.pressure.assembly import Facets, Stiffness, facet_points, volume_points
 from ringbalance.physics.pressure.linear import solve_linear
 from ringbalance.physics.pressure.solve import PressureProblem, RotatingLiquid, solve_pressure
@@ -236,7 +235,7 @@ def test_the_solve_agrees_with_a_factorised_matrix_and_repeats_bit_for_bit(disc:
     np.testing.assert_array_equal(first.pressure, again.pressure)
     assert first.statistics.relative_residual < 1e-12
     discrete, free = WATER.problem().discretise(chamber=chamber), chamber.grid[1:].ravel()
-    direct = solve_linear(stiffness_matrix(chamber)[free][:, free], discrete.load[free], dimension=3)
+    direct = solve_linear(stiffness_matrix(chamber)[free][:, free], discrete.load[free])
     np.testing.assert_allclose(first.pressure[free], direct.values, atol=1e-11 * first.pressure.max())
 
 
@@ -244,8 +243,8 @@ def test_multigrid_agrees_with_factorisation_bit_for_bit_from_run_to_run(disc: D
     chamber = chamber_mesh(disc=disc, surface_radius=30e-3, cells=(4, 12, 2))
     free = chamber.grid[1:].ravel()
     matrix, right = stiffness_matrix(chamber)[free][:, free], np.ones(free.size)
-    direct = solve_linear(matrix, right, dimension=3)
-    runs = [solve_linear(matrix, right, dimension=3, direct_limit=0) for _ in range(2)]
+    direct = solve_linear(matrix, right)
+    runs = [solve_linear(matrix, right, direct_limit=0) for _ in range(2)]
     assert runs[0].status.ok
     assert runs[0].statistics.iterations > 0
     np.testing.assert_allclose(runs[0].values, direct.values, atol=1e-9 * direct.values.max())
@@ -257,12 +256,11 @@ def test_a_solve_that_does_not_converge_says_so(disc: Disc, monkeypatch: pytest.
     free = chamber.grid[1:].ravel()
     matrix = stiffness_matrix(chamber)[free][:, free]
     monkeypatch.setattr(pressure_linear, "_MAX_ITERATIONS", 2)
-    monkeypatch.setattr(pressure_multigrid, "_MAX_ITERATIONS", 2)
     solution = solve_pressure(chamber=chamber, problem=WATER.problem())
     assert solution.status.code is StatusCode.NOT_CONVERGED
     assert "residual" in solution.status.text
     assert np.all(np.isfinite(solution.pressure))
-    assert not solve_linear(matrix, np.ones(free.size), dimension=3, direct_limit=0).status.ok
+    assert not solve_linear(matrix, np.ones(free.size), direct_limit=0).status.ok
 
 
 def test_linear_solver_reports_the_true_residual() -> None:
@@ -270,15 +268,15 @@ def test_linear_solver_reports_the_true_residual() -> None:
     sparse = random_array((300, 300), density=0.02, rng=rng)
     matrix = (sparse + sparse.T + diags_array(np.full(300, 10.0))).tocsr()
     right = rng.standard_normal(300)
-    found = solve_linear(matrix, right, dimension=2)
+    found = solve_linear(matrix, right)
     residual = np.linalg.norm(matrix @ found.values - right) / np.linalg.norm(right)
     assert found.statistics.relative_residual == pytest.approx(residual, rel=1e-12)
     assert found.statistics.unknowns == 300
-    assert solve_linear(matrix, np.zeros(300), dimension=2).status.ok
+    assert solve_linear(matrix, np.zeros(300)).status.ok
 
 
 def test_a_singular_matrix_is_a_status_and_not_an_exception() -> None:
-    found = solve_linear(csr_matrix(diags_array([1.0, 1.0, 0.0])), np.ones(3), dimension=2)
+    found = solve_linear(csr_matrix(diags_array([1.0, 1.0, 0.0])), np.ones(3))
     assert found.status.code is StatusCode.NOT_CONVERGED
     assert np.all(np.isfinite(found.values))
 

@@ -84,6 +84,12 @@ def split_in_two(drawing: Drawing) -> None:
             each.nodes = [fresh[node] for node in each.nodes]
 
 
+def triangles_on_hexahedra(drawing: Drawing) -> None:
+    for number in drawing.facets("end_back"):
+        facet = drawing.elements[number]
+        facet.kind, facet.nodes = "triangle", facet.nodes[:3]
+
+
 def far_copy(drawing: Drawing) -> None:
     nodes = drawing.elements[drawing.cells()[0]].nodes
     fresh = [node + 1000 for node in nodes]
@@ -298,6 +304,9 @@ MESHES: dict[str, Broken] = {
     ),
     "facet inside": Broken(
         spoilt(inner_facet), ('named "outer_wall" lie between two cells (1): facet (element',)
+    ),
+    "triangles on hexahedra": Broken(
+        spoilt(triangles_on_hexahedra, "hexahedron"), ('named "end_back" are no side of any cell (6)',)
     ),
     "facet of no cell": Broken(
         spoilt(lambda d: grouped(d, add(d, "triangle", [1, 2, 30]), "outer_wall")),

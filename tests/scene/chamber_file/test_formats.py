@@ -140,7 +140,7 @@ def test_a_surface_of_abaqus(tmp_path: Path) -> None:
     cells = [n for n in drawing.cells() for each in corners if each < set(drawing.elements[n].nodes)]
     text = inp(drawing).decode()
     start = text.index("*ELEMENT, TYPE=S4, ELSET=OUTER_WALL")
-    text = text[:start] + text[text.index("*ELEMENT, TYPE=S4, ELSET=PLATE_LEFT") :]
+    text = text[:start] + text[text.index("*ELEMENT, TYPE=S4, ELSET=PLATE_RIGHT") :]
     half = len(cells) // 2
     text += "*ELSET, ELSET=_some\n" + ",".join(map(str, cells[:half])) + "\n"
     text += "*SURFACE, NAME=OUTER_WALL, TYPE=ELEMENT\n_some, S4\n"

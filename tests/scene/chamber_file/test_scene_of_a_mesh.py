@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -10,7 +12,8 @@ import numpy as np
 import pytest
 from drawn_chamber import drawn, loaded, msh_2, msh_4, scene_text
 
-from ringbalance.scene import Scene, SceneError, load_scene, scene_table
+from ringbalance.scene import Scene, SceneError, bundled_scene, load_scene, scene_table
+from ringbalance.scene.chamber_file.names import MEANINGS
 from ringbalance.scene.uncertain import with_value
 
 
@@ -77,6 +80,26 @@ def test_a_dimension_beside_a_mesh_is_refused(key: str, tmp_path: Path) -> None:
     assert len(caught.value.faults) == 1
 
 
+def test_a_dimension_hides_no_error_of_the_mesh(tmp_path: Path) -> None:
+    drawing = drawn()
+    drawing.names[2, 2] = "outside\x07wall"
+    with pytest.raises(SceneError) as caught:
+        loaded(tmp_path, msh_2(drawing), outer_radius="40 mm")
+    assert [fault.key for fault in caught.value.faults] == ["outer_radius", "mesh", "mesh"]
+    assert str(caught.value).replace("\n", "").isprintable()
+
+
+def test_keys_of_a_mesh_need_one(tmp_path: Path) -> None:
+    text = bundled_scene("six_chamber").read_text(encoding="utf-8")
+    (tmp_path / "my_disc.toml").write_text(
+        text.replace("[disc]\n", '[disc]\nmesh_unit = "mm"\nmesh_axis = "y"\n'), encoding="utf-8"
+    )
+    with pytest.raises(SceneError) as caught:
+        load_scene(tmp_path / "my_disc.toml")
+    assert [fault.key for fault in caught.value.faults] == ["mesh_unit", "mesh_axis"]
+    assert all("no meaning without mesh" in fault.problem for fault in caught.value.faults)
+
+
 def test_the_number_of_chambers_is_given_or_follows(tmp_path: Path) -> None:
     drawing = drawn()
     assert scene_of(tmp_path).disc.chambers == 4
@@ -133,3 +156,37 @@ def test_a_solid_needs_the_extra(tmp_path: Path) -> None:
 def test_a_solid_has_its_own_unit(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match='mesh_unit = "mm": a STEP file has its own unit'):
         loaded(tmp_path, b"ISO-10303-21;\n", "chamber.step")
+
+
+def test_the_page_has_the_names() -> None:
+    page = (Path(__file__).resolve().parents[3] / "docs" / "imported-geometry.md").read_text(encoding="utf-8")
+    rows = [f"| `{name}` | {meaning} |" for name, meaning in MEANINGS.items()]
+    assert "\n".join(rows) in page
+
+
+@pytest.mark.skipif(find_spec("gmsh") is None, reason="the extra cad is not installed")
+def test_a_solid_is_meshed(tmp_path: Path) -> None:
+    """Drawn by Gmsh in another process, as its settings are those of a whole process."""
+    code = (
+        "import gmsh, math; gmsh.initialize(); gmsh.option.setNumber('General.Terminal', 0)\n"
+        "occ, angle = gmsh.model.occ, math.radians(80)\n"
+        "both = [occ.addCylinder(0, 0, 0, 0, 0, 30, radius, angle=angle) for radius in (40, 20)]\n"
+        "occ.cut([(3, both[0])], [(3, both[1])]); occ.synchronize(); gmsh.write('chamber.step')"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path, capture_output=True)
+    content = (tmp_path / "chamber.step").read_bytes()
+    scene = loaded(tmp_path, content, "chamber.step", mesh_unit="")
+    assert isinstance(scene, Scene)
+    assert scene.disc.geometry is not None
+    assert set(scene.disc.geometry.boundaries) == {
+        "outer_wall",
+        "inner_wall",
+        "end_back",
+        "end_front",
+        "walls",
+    }
+    assert scene.disc.outer_radius == pytest.approx(0.04)
+    assert scene.disc.inner_radius == pytest.approx(0.02, rel=1e-3)
+    assert np.degrees(scene.disc.central_angle) == pytest.approx(80)
+    with pytest.raises(SceneError, match="Gmsh cannot mesh the solid"):
+        loaded(tmp_path, content[: len(content) // 3], "chamber.step", mesh_unit="")

@@ -22,7 +22,7 @@ from ringbalance.verification.orders import OrderStudy, order_figure, order_stud
 from ringbalance.verification.reference.block_chambers import disc_chamber
 from ringbalance.verification.reference.manufactured import Manufactured
 
-_LEVELS: Final = {"light": (4, 8, 16), "heavy": (4, 8, 16, 24)}
+_LEVELS: Final = {"light": (3, 6, 12), "heavy": (4, 8, 16, 24)}
 """Radial cells; half of them lie in the liquid."""
 _FILL: Final = 0.4
 _OWN: Final = ("surface_off_by_a_percent", "facets_taken_for_the_wall")

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from ringbalance.mesh.liquid_body import Level, liquid_body
 from ringbalance.mesh.quadratic_tetrahedra import tetrahedra
+from ringbalance.physics import deferred
 from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
 from ringbalance.physics.results import Estimate, Statistics, Status, StatusCode
-from ringbalance.physics.sloshing.body import ReducedWaves, reduced_waves
 from ringbalance.physics.sloshing.range import SMALL
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import ChamberGeometry
+
+if TYPE_CHECKING:
+    from ringbalance.physics.sloshing.body import ReducedWaves
 
 WALL: Final = "outer_wall"
 LEVELS: Final = 2
@@ -90,8 +93,8 @@ def ring_waves(
         gravity: across the shaft, m/s^2: turns in the disc's frame.
         axial_gravity: along the shaft, m/s^2: shapes the surface and excites no wave.
         frequency_ratio: s of the force, above 0; 1 for gravity.
-        modes: number of frequencies, 1 to 12; fewer come back where a coarse mesh does not tell waves of the
-            surface from inertial ones.
+        modes: number of frequencies, 1 to 12; where a coarse mesh does not tell waves of the surface from
+            inertial ones, some of the latter are among them.
         levels: of the Coriolis force, 2 or more; the change from the last one is part of the uncertainty.
     Returns: RingWaves.  Status NO_RING where gravity exceeds omega^2 a, OUT_OF_RANGE where waves would not be
         small, NOT_CONVERGED where a linear solve failed.
@@ -134,14 +137,16 @@ def _check(omega: float, viscosity: float, gravity: float, ratio: float, modes: 
         raise ValueError("modes must be 1 to 12, and levels at least 2")
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=32)
 def wave_system(geometry: ChamberGeometry, radius: float, tilt: float, modes: int, levels: int) -> WaveSystem:
     """The waves' small problem below a surface of this radius, m; `tilt`: gravity along z over omega^2, m."""
     body = liquid_body(tetrahedra(geometry), Level(constant=radius**2 / 2, tilt=(0.0, 0.0, tilt)))
     scale = float(np.hypot(*body.nodes[:, :2].T).max())
     space = TetrahedronSpace(body=replace(body, nodes=body.nodes / scale))
     level = Level(constant=radius**2 / 2 / scale**2, tilt=(0.0, 0.0, tilt / scale))
-    reduced = reduced_waves(space=space, level=level, wall=WALL, potentials=modes + _SPARE, levels=levels)
+    reduced = deferred.reduced_waves(
+        space=space, level=level, wall=WALL, potentials=modes + _SPARE, levels=levels
+    )
     # Frequencies grow with the root of the depth.
     faceting = space.facets(WALL).depth_to_smooth() / (2 * (1 - radius / scale))
     return WaveSystem(reduced=reduced, scale=scale, faceting=faceting, unknowns=space.unknowns)
@@ -150,17 +155,20 @@ def wave_system(geometry: ChamberGeometry, radius: float, tilt: float, modes: in
 def frequencies(system: WaveSystem, modes: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Frequencies of the surface's waves, their vortical shares and expanded uncertainties."""
     reduced = system.reduced
-    values, potential, weights = _waves(reduced, reduced.levels[-1], _OF_SURFACE)
-    before = _waves(reduced, reduced.levels[-2], _PERHAPS)[0]
+    values, potential, weights = _waves(reduced, reduced.levels[-1])
+    before, probable, _ = _waves(reduced, reduced.levels[-2])
+    # Waves of the surface by their frequency; the likeliest of the others if these do not suffice.
+    by_rank = np.lexsort((values, np.where(potential > _OF_SURFACE, -1.0, -potential)))
+    chosen = np.sort(by_rank[:modes])
+    values, potential, weights = values[chosen], potential[chosen], weights[chosen]
     errors = reduced.squared_errors
-    change = np.abs(values[:, None] - before).min(axis=1)
+    change = np.abs(values[:, None] - before[probable > _PERHAPS]).min(axis=1)
     # What is left out acts on a frequency by its square.
     relative = weights[:, : errors.size] @ errors / 2 + reduced.left_out + system.faceting
-    widths = _SAFETY * change + values * relative
-    return values[:modes], 1 - potential[:modes], widths[:modes]
+    return values, 1 - potential, _SAFETY * change + values * relative
 
 
-def _waves(reduced: ReducedWaves, fields: int, least: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _waves(reduced: ReducedWaves, fields: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Frequencies with so many fields, the kinetic energy's potential share, and its parts by field.
 
     The oscillator c'' + 2 C c' + A c = 0 is d/dt (c', A^(1/2) c) = B (...) with a real antisymmetric B, whose
@@ -175,8 +183,12 @@ def _waves(reduced: ReducedWaves, fields: int, least: float) -> tuple[FloatArray
     kinetic = np.abs(shapes[:fields].T) ** 2
     parts = kinetic / kinetic.sum(axis=1, keepdims=True)
     potential = parts[:, : reduced.levels[0]].sum(axis=1)
-    kept = (potential > least) & (values[values > 0] > _SLOWEST)
-    return values[values > 0][kept], potential[kept], parts[kept]
+    # Of a potential with l = s^2 without rotation, |s| <= 1 + sqrt(1 + l): what is faster is not resolved.
+    slowest = slice(0, reduced.squared_errors.size)
+    fastest = 1 + np.sqrt(1 + np.linalg.eigvalsh(stiff[slowest, slowest])[-1])
+    found = values[values > 0]
+    kept = (found > _SLOWEST) & (found < fastest)
+    return found[kept], potential[kept], parts[kept]
 
 
 _SLOWEST: Final = 1e-4

@@ -12,7 +12,8 @@ from skfem import MeshHex1, MeshHex2, MeshQuad1, MeshQuad2
 from skfem.io.meshio import to_meshio
 
 from ringbalance.mesh.chamber import SIDES, ChamberMesh
-from ringbalance.scene.arrays import IntArray
+from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.chamber_file.record import CellKind
 from ringbalance.scene.platform.drafts import draft_folder
 from ringbalance.scene.platform.files import write_whole
 
@@ -59,13 +60,33 @@ def write_vtu(path: Path, *, chamber: ChamberMesh, fields: Mapping[str, npt.Arra
         if value.shape != chamber.nodes.shape[1:] or not np.all(np.isfinite(value)):
             raise ValueError(f"field {name!r} must hold one finite value per node")
     mesh, numbers = scikit_fem_mesh(chamber)
+    stored = to_meshio(
+        mesh.scaled(chamber.length_scale), {name: value[numbers] for name, value in nodal.items()}
+    )
+    # VTK has no points in the plane; meshio would say so on the console.
+    stored.points = np.pad(stored.points, ((0, 0), (0, 3 - stored.points.shape[1])))
+    return _written(path, stored)
+
+
+def write_cells(
+    path: Path,
+    *,
+    kind: CellKind,
+    points: FloatArray,
+    cells: IntArray,
+    fields: Mapping[str, FloatArray] | None = None,
+) -> Path:
+    """Write cells of one kind in metres with nodal fields to a VTU file, whole or not at all.
+
+    Args: `cells`: in meshio's order. `fields`: nodal values by name, SI.
+    Raises: OSError: the file cannot be written.
+    """
+    return _written(path, meshio.Mesh(points, {str(kind): cells}, point_data=dict(fields or {})))
+
+
+def _written(path: Path, stored: meshio.Mesh) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     with draft_folder(path.parent) as folder:
         draft = folder / path.name
-        stored = to_meshio(
-            mesh.scaled(chamber.length_scale), {name: value[numbers] for name, value in nodal.items()}
-        )
-        # VTK has no points in the plane; meshio would say so on the console.
-        stored.points = np.pad(stored.points, ((0, 0), (0, 3 - stored.points.shape[1])))
         meshio.write(draft, stored)
         return write_whole(path, draft.read_bytes())

@@ -1,19 +1,27 @@
-"""The chamber's cross-section in closed form: the exact area between two radii, and fill ratio to radius.
+"""The chamber's shape, by closed forms or, where a mesh file gives it, by integrals over its walls.
 
 A chamber is the set R1 <= r <= R2, |phi| <= alpha(r) with alpha(r) = theta/2 - asin(t/r): a plate takes a
-strip of thickness t, with faces parallel to the bounding radii.
+strip of thickness t, with faces parallel to the bounding radii.  Of an imported one the cross-section is the
+mean over the axial width B, and alpha(r) the half-angle of the sector whose free surface is as large.
 """
 
 from __future__ import annotations
 
+import math
 from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
+from ringbalance.mesh.cut.table import ChamberTable, chamber_table
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.keys.derivations import swept_area
 from ringbalance.scene.models import Disc
+
+
+def imported_table(disc: Disc) -> ChamberTable | None:
+    """What a chamber's mesh is integrated to; None for the sector between plates."""
+    return None if disc.geometry is None else chamber_table(disc.geometry)
 
 
 def half_angle(*, disc: Disc, radius: npt.ArrayLike) -> FloatArray:
@@ -21,8 +29,10 @@ def half_angle(*, disc: Disc, radius: npt.ArrayLike) -> FloatArray:
 
     Args: `radius`: r, m, any shape; at least the plate thickness.
     Returns: alpha, rad, the shape of `radius`.
-    Source: geometry of Fig. 2(b) of the liquid-ring paper; exact.
+    Source: geometry of Fig. 2(b) of the liquid-ring paper; exact. Imported: -V'(r)/(2 r B).
     """
+    if (table := imported_table(disc)) is not None:
+        return np.asarray(table.surface(radius)[0] / (2 * disc.axial_width))
     r = np.asarray(radius, dtype=np.float64)
     return np.asarray(disc.central_angle / 2 - np.arcsin(disc.plate_thickness / r), dtype=np.float64)
 
@@ -35,6 +45,8 @@ def liquid_area(*, disc: Disc, surface_radius: npt.ArrayLike) -> FloatArray:
     Returns: Area, m^2, the shape of `surface_radius`.
     Source: integral of 2 r alpha(r); the paper's Eq. 3 is its flat-strip approximation, O(t^3) away.
     """
+    if (table := imported_table(disc)) is not None:
+        return np.asarray(table.at_radius(surface_radius, 0) / disc.axial_width)
     within = partial(swept_area, central_angle=disc.central_angle, plate_thickness=disc.plate_thickness)
     return np.asarray(within(radius=disc.outer_radius) - within(radius=surface_radius), dtype=np.float64)
 
@@ -48,6 +60,8 @@ def liquid_first_moment(*, disc: Disc, surface_radius: npt.ArrayLike) -> FloatAr
     Returns: First moment, m^3, the shape of `surface_radius`.
     Source: integral of 2 r^2 sin(alpha(r)); with t = 0 and times rho B it is Eq. 7 of the liquid-ring paper.
     """
+    if (table := imported_table(disc)) is not None:
+        return np.asarray(table.at_radius(surface_radius, 1) / disc.axial_width)
     a, outer, t = np.asarray(surface_radius, dtype=np.float64), disc.outer_radius, disc.plate_thickness
     inner_face, outer_face = np.sqrt(a**2 - t**2), np.sqrt(outer**2 - t**2)
     # Differences of powers by their factors, or a film of a micrometre would cancel.
@@ -57,8 +71,46 @@ def liquid_first_moment(*, disc: Disc, surface_radius: npt.ArrayLike) -> FloatAr
     return np.asarray(2 * np.sin(half) / 3 * cubes - np.cos(half) * t * squares, dtype=np.float64)
 
 
+def moment_across(*, disc: Disc, surface_radius: npt.ArrayLike) -> FloatArray:
+    """First moment along y, as `liquid_first_moment` along x: zero unless an imported chamber is asymmetric.
+
+    It turns the moment of every chamber by the same angle, atan(moment_across/liquid_first_moment).
+    """
+    if (table := imported_table(disc)) is not None:
+        return np.asarray(table.at_radius(surface_radius, 2) / disc.axial_width)
+    return np.zeros(np.shape(surface_radius))
+
+
+def surface_centroid(*, disc: Disc, radius: npt.ArrayLike) -> FloatArray:
+    """Mean of x over the concentric free surface, dU/dV' over the density, m.
+
+    Returns: a sin(alpha)/alpha, the shape of `radius`; half of lambda at equal fills.
+    Source: each volume that enters lies on the surface. Imported: U'(a)/V'(a).
+    """
+    if (table := imported_table(disc)) is not None:
+        return table.surface(radius)[1]
+    a, alpha = np.asarray(radius, dtype=np.float64), half_angle(disc=disc, radius=radius)
+    return np.asarray(a * np.sin(alpha) / alpha, dtype=np.float64)
+
+
+def wall_square(*, disc: Disc, surface_radius: npt.ArrayLike) -> FloatArray:
+    """Mean over the outer wall of r^2 - a^2 where it is wet, m^2: times rho omega^2/2 the wall pressure."""
+    if (table := imported_table(disc)) is not None:
+        return table.at_radius(surface_radius, 3)
+    a = np.asarray(surface_radius, dtype=np.float64)
+    return np.asarray((disc.outer_radius - a) * (disc.outer_radius + a), dtype=np.float64)
+
+
+def wall_radius(*, disc: Disc) -> float:
+    """Radius of the cylinder with the same mean pressure as the outer wall while that is wet, m."""
+    table = imported_table(disc)
+    return disc.outer_radius if table is None else math.sqrt(table.wall_square)
+
+
 def chamber_volume(*, disc: Disc) -> float:
     """Volume of one chamber between its plates, V = B A(R1), m^3: Eq. 4 with the exact area."""
+    if (table := imported_table(disc)) is not None:
+        return table.volume
     return float(disc.axial_width * liquid_area(disc=disc, surface_radius=disc.inner_radius))
 
 
@@ -73,6 +125,8 @@ def surface_radius(*, disc: Disc, fill_ratio: npt.ArrayLike) -> FloatArray:
     x = np.asarray(fill_ratio, dtype=np.float64)
     if np.any(~((x >= 0) & (x <= 1))):
         raise ValueError("fill_ratio must lie within [0, 1]")
+    if (table := imported_table(disc)) is not None:
+        return np.asarray(np.sqrt(table.level_of(x * table.volume)))
     r1, r2 = disc.inner_radius, disc.outer_radius
     within = partial(swept_area, central_angle=disc.central_angle, plate_thickness=disc.plate_thickness)
     whole = within(radius=r2)

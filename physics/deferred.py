@@ -15,6 +15,7 @@ _HOME: Final = MappingProxyType(
         "multigrid": "ringbalance.physics.pressure.multigrid",
         "reduced_waves": "ringbalance.physics.sloshing.body",
         "sloshing_response": "ringbalance.physics.sloshing.response",
+        "solved_ring": "ringbalance.physics.pressure.imported",
         "nnls": "scipy.optimize",
         "Sobol": "scipy.stats.qmc",
     }

@@ -11,6 +11,7 @@ from typing import Final, Protocol
 import numpy as np
 
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, Curve
+from ringbalance.reduced_model.chamber.imported_walls import drawing_shares
 from ringbalance.reduced_model.chamber.inputs import half_widths, shifted
 from ringbalance.reduced_model.device import HEAD_INPUTS, Device, device_of
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
@@ -120,7 +121,7 @@ def budgets(*, scene: Scene, calibration: Calibrated) -> Mapping[str, Budget]:
     again, and the larger change counts. An operating point without any velocity has no drag coefficient, and
     one without a flow over a crest neither crest pressure nor margin.
     """
-    parts = _chamber_parts(calibration.chamber) | _flow_parts(scene, calibration)
+    parts = _chamber_parts(scene, calibration.chamber) | _flow_parts(scene, calibration)
     effects = _input_effects(scene, calibration)
     return {
         name: Budget(
@@ -142,13 +143,14 @@ def budgets(*, scene: Scene, calibration: Calibrated) -> Mapping[str, Budget]:
 _Parts = tuple[float, float, float]
 
 
-def _chamber_parts(chamber: ChamberCalibration) -> dict[str, _Parts]:
+def _chamber_parts(scene: Scene, chamber: ChamberCalibration) -> dict[str, _Parts]:
     """Value, numerical and model part of the quantities of the chamber."""
     at = chamber.reported[-1]
     central, numerical = chamber.moment_per_mass, chamber.moment_per_mass_numerical
+    drawn = drawing_shares(scene.disc, np.empty(0)).volume
     model = math.sqrt(max(float(central.uncertainty) ** 2 - numerical**2, 0.0))
     return {
-        "chamber_volume": (chamber.volume, _NEGLIGIBLE * chamber.volume, 0.0),
+        "chamber_volume": (chamber.volume, _NEGLIGIBLE * chamber.volume, drawn * chamber.volume),
         "wall_pressure": _curve_parts(chamber.wall_pressure, at),
         "moment": _curve_parts(chamber.moment, at),
         "lambda": (float(central.value), numerical, model),

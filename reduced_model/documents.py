@@ -109,6 +109,8 @@ def _check(check: ElementCheck) -> dict[str, Any]:
         "excess": check.excess,
     }
     for name, unit in zip(CHECKED, ("Pa", "kg_m", "kg_m2"), strict=True):
+        if name not in check.difference:
+            continue
         estimate = getattr(check.elements, name)
         found[f"{name}_{unit}"] = _listed(estimate.value)
         found[f"{name}_uncertainty"] = _listed(estimate.uncertainty)

@@ -23,7 +23,7 @@ from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reduced_model.paper import formulas as paper
-from ringbalance.reports.pictures.fields import chamber_field
+from ringbalance.reports.pictures.imported_field import shown_field
 from ringbalance.reports.provenance import provenance
 from ringbalance.reports.section import Level, Record, Work
 from ringbalance.reports.sections import collected
@@ -135,7 +135,7 @@ def _paper() -> Record:
 
 
 def _pressure(scene: Scene) -> Record:
-    field = chamber_field(scene, fill_ratio=scene.disc.max_fill_ratio)
+    field = shown_field(scene, fill_ratio=scene.disc.max_fill_ratio)
     return {"profile": field.pressure_profile(scene=scene), "mesh": field.record()}
 
 

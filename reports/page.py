@@ -192,11 +192,15 @@ def _as_known(row: Record) -> str:
 
 
 def _mesh_facts(mesh: Record) -> Facts:
+    """Of a sector's mesh its quality too; that of an imported chamber is checked as it is read."""
+    quality = (
+        ("Smallest scaled Jacobian", "minimum_scaled_jacobian"),
+        ("Largest aspect ratio", "largest_aspect"),
+    )
     return (
         ("Cells of the 3-D pressure mesh", " × ".join(str(count) for count in mesh["cells"])),
         ("Unknowns", number(mesh["unknowns"], digits=6)),
-        ("Smallest scaled Jacobian", number(mesh["minimum_scaled_jacobian"], digits=3)),
-        ("Largest aspect ratio", number(mesh["largest_aspect"], digits=3)),
+        *((label, number(mesh[key], digits=3)) for label, key in quality if key in mesh),
         ("Solver", mesh["status"]),
     )
 

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from ringbalance.mesh.liquid_body import Level, liquid_body
+from ringbalance.mesh.cut.faceting import SAFETY, faceting
+from ringbalance.mesh.liquid_body import FREE_SURFACE, Level, liquid_body
 from ringbalance.mesh.quadratic_tetrahedra import tetrahedra
 from ringbalance.physics import deferred
 from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
@@ -66,7 +67,7 @@ class WaveSystem:
     scale: float
     """Largest distance of the liquid from the shaft, m."""
     faceting: float
-    """Relative error of a frequency by the facets of the wall."""
+    """Relative error of a frequency by the facets of the wall, and where the mesh leaves the free surface."""
     unknowns: int
 
 
@@ -147,9 +148,14 @@ def wave_system(geometry: ChamberGeometry, radius: float, tilt: float, modes: in
     reduced = deferred.reduced_waves(
         space=space, level=level, wall=WALL, potentials=modes + _SPARE, levels=levels
     )
-    # Frequencies grow with the root of the depth.
-    faceting = space.facets(WALL).depth_to_smooth() / (2 * (1 - radius / scale))
-    return WaveSystem(reduced=reduced, scale=scale, faceting=faceting, unknowns=space.unknowns)
+    surface = space.facets(FREE_SURFACE)
+    missed = np.abs(level.value(surface.points)) / (radius / scale)
+    # Frequencies grow with the root of the depth; r^2 changes by twice r times the depth.
+    deeper = SAFETY * faceting(geometry).wall / (2 * scale) + scale * np.average(
+        missed, weights=surface.weights
+    )
+    doubt = float(deeper) / (2 * (scale - radius))
+    return WaveSystem(reduced=reduced, scale=scale, faceting=doubt, unknowns=space.unknowns)
 
 
 def frequencies(system: WaveSystem, modes: int) -> tuple[FloatArray, FloatArray, FloatArray]:

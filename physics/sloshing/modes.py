@@ -17,10 +17,14 @@ from ringbalance.mesh.chamber import default_cells
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.convergence.grid import gci
 from ringbalance.physics.results import Estimate, Statistics
+from ringbalance.physics.sloshing.imported import ring_waves
 from ringbalance.physics.sloshing.system import sloshing_system
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.models import Disc
 
+IMPORTED_SHARES: Final = np.array([0.04, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0])
+"""Of the largest fill, at which the waves in an imported chamber are looked at: each takes seconds."""
 FORMAL_ORDER: Final = 4.0
 """Of an eigenvalue of quadratic elements: twice the order of its mode in the energy's norm."""
 
@@ -64,6 +68,8 @@ def sloshing_modes(
     fills = np.atleast_1d(np.asarray(fill_ratio, dtype=np.float64)).ravel()
     if fills.size == 0 or not np.all((fills > 0) & (fills <= 1)) or modes < 1:
         raise ValueError("fill_ratio must lie within (0, 1], and at least one mode must be asked for")
+    if disc.geometry is not None:
+        return _imported(disc, disc.geometry, fills, modes)
     meshes = cells or default_sloshing_cells(disc=disc, modes=modes)
     if len(meshes) < 3:
         raise ValueError("cells must list at least three meshes, finest first")
@@ -76,6 +82,23 @@ def sloshing_modes(
         frequency_ratio=Estimate(value=found[:, 0].copy(), uncertainty=widths),
         cells=meshes,
         statistics=Statistics(unknowns=(2 * meshes[0][0] + 1) * (2 * meshes[0][1] + 1)),
+    )
+
+
+def _imported(disc: Disc, geometry: ChamberGeometry, fills: FloatArray, modes: int) -> SloshingModes:
+    """Waves in three dimensions, those along the shaft among them, on a chamber's own mesh."""
+    radii = np.atleast_1d(surface_radius(disc=disc, fill_ratio=fills))
+    waves = [ring_waves(geometry=geometry, surface_radius=float(radius)) for radius in radii]
+    values, widths = (
+        np.array([getattr(each.frequency_ratio, name)[:modes] for each in waves])
+        for name in ("value", "uncertainty")
+    )
+    return SloshingModes(
+        fill_ratio=fills,
+        surface_radius=radii,
+        frequency_ratio=Estimate(value=values, uncertainty=widths),
+        cells=((len(geometry.cells), 1),),
+        statistics=waves[0].statistics,
     )
 
 
@@ -106,6 +129,8 @@ def resonant_fills(
     top = disc.max_fill_ratio if highest is None else highest
     if not 0 < top <= 1 or modes < 1:
         raise ValueError("highest must lie within (0, 1], and at least one mode must be asked for")
+    if disc.geometry is not None:
+        return _imported_resonances(disc, modes, top)
     middle = default_sloshing_cells(disc=disc, modes=modes)[1]
 
     def excess(logarithm: float, mode: int) -> float:
@@ -119,6 +144,17 @@ def resonant_fills(
             high = float(brentq(excess, low, high, args=(mode,), xtol=1e-6))
             found.append((mode, float(np.exp(high))))
     return tuple(found)
+
+
+def _imported_resonances(disc: Disc, modes: int, top: float) -> tuple[tuple[int, float], ...]:
+    """Between fills at which the waves are solved, by a straight line: to two digits."""
+    found = sloshing_modes(disc=disc, fill_ratio=top * IMPORTED_SHARES, modes=modes)
+    fills, ratios = found.fill_ratio, found.frequency_ratio.value
+    return tuple(
+        (mode + 1, float(np.interp(1.0, ratios[:, mode], fills)))
+        for mode in range(ratios.shape[1])
+        if ratios[0, mode] < 1 < ratios[-1, mode]
+    )
 
 
 def _lowest(disc: Disc, a: float, cells: tuple[int, int], modes: int) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy.typing as npt
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.convergence.grid import gci
 from ringbalance.physics.results import Estimate, Statistics, Status, StatusCode
+from ringbalance.physics.sloshing.imported import RingWaves, ring_waves
 from ringbalance.physics.sloshing.modes import FORMAL_ORDER, default_sloshing_cells
 from ringbalance.physics.sloshing.range import SMALL
 from ringbalance.physics.sloshing.system import SloshingSystem, sloshing_system
@@ -57,7 +59,8 @@ def sloshing_response(
         fill_ratio: x, any shape, flattened to (n,), above 0 and at most 1.
         kinematic_viscosity: nu, m^2/s, zero or more; zero leaves resonance without a limit.
         frequency_ratio: s, above 0; 1 for gravity.
-        cells: three meshes or more, finest first; default those of `sloshing_modes`.
+        cells: three meshes or more, finest first; default those of `sloshing_modes`. An imported chamber
+            has its own mesh.
     Returns: SloshingResponse; status says where the waves would not be small, or gravity leaves no ring.
     Raises: ValueError: fill ratios outside (0, 1], or an argument outside its range.
     Validity: small planar waves; thin Stokes layers on all walls without the Coriolis force, which makes the
@@ -66,8 +69,21 @@ def sloshing_response(
     """
     fills = np.atleast_1d(np.asarray(fill_ratio, dtype=np.float64)).ravel()
     _check(fills, angular_velocity, kinematic_viscosity, gravity, frequency_ratio)
-    meshes = cells or default_sloshing_cells(disc=disc)
     radii = np.atleast_1d(surface_radius(disc=disc, fill_ratio=fills))
+    if disc.geometry is not None:
+        waves = [
+            ring_waves(
+                geometry=disc.geometry,
+                surface_radius=float(radius),
+                angular_velocity=angular_velocity,
+                kinematic_viscosity=kinematic_viscosity,
+                gravity=gravity,
+                frequency_ratio=frequency_ratio,
+            )
+            for radius in radii
+        ]
+        return _imported(fills, radii, waves)
+    meshes = cells or default_sloshing_cells(disc=disc)
     ekman = kinematic_viscosity / (angular_velocity * disc.outer_radius**2)
 
     def on_mesh(radius: float, counts: tuple[int, int]) -> tuple[float, ...]:
@@ -87,6 +103,28 @@ def sloshing_response(
         damped_share=found[:, 0, 2].copy(),
         statistics=Statistics(unknowns=(2 * meshes[0][0] + 1) * (2 * meshes[0][1] + 1)),
         status=_status(fills, disc.outer_radius - radii, amplitude.value, scale - radii),
+    )
+
+
+def _imported(fills: FloatArray, radii: FloatArray, waves: Sequence[RingWaves]) -> SloshingResponse:
+    """Waves at each fill, in three dimensions, on a chamber's own mesh."""
+
+    def along(name: str) -> Estimate:
+        parts: list[Estimate] = [getattr(each, name) for each in waves]
+        value, uncertainty = (
+            np.array([float(getattr(p, n)) for p in parts]) for n in ("value", "uncertainty")
+        )
+        return Estimate(value=value, uncertainty=uncertainty)
+
+    return SloshingResponse(
+        fill_ratio=fills,
+        surface_radius=radii,
+        amplification=along("amplification"),
+        pressure_amplification=along("pressure_amplification"),
+        surface_amplitude=along("surface_amplitude"),
+        damped_share=np.array([each.damped_share for each in waves]),
+        statistics=waves[0].statistics,
+        status=next((each.status for each in waves if not each.status.ok), Status()),
     )
 
 

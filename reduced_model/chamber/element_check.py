@@ -11,13 +11,17 @@ import numpy as np
 
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.pressure.ring import RingQuantities
-from ringbalance.physics.results import Status, StatusCode
+from ringbalance.physics.results import Estimate, Status, StatusCode
+from ringbalance.reduced_model.chamber.imported_check import ImportedElements, imported_elements
+from ringbalance.reduced_model.chamber.inputs import chamber_closed_forms
 from ringbalance.reduced_model.chamber.ring_values import RingValues
 from ringbalance.reduced_model.chamber.scene_ring import scene_ring
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.models import Scene
 
 CHECKED: Final = ("wall_pressure", "moment", "moment_per_volume")
+"""Of an imported chamber the first two."""
 _SHARE: Final = 0.1
 """Of the tolerance, that the mesh may leave at the thinnest ring checked."""
 _RADIAL_CELLS: Final = 4
@@ -30,7 +34,7 @@ _MOST_ANGLE: Final = math.pi / 48
 class ElementCheck:
     """Finite elements at a few fills, and how far the closed forms are from them."""
 
-    elements: RingQuantities
+    elements: RingQuantities | ImportedElements
     """At the checked fills, with the half-widths of its own grid convergence."""
     gravity: bool
     """Whether it holds gravity."""
@@ -51,12 +55,16 @@ class ElementCheck:
 def element_check(scene: Scene, *, values: RingValues, gravity: bool) -> ElementCheck:
     """Solve the pressure at the thinnest ring of the table and at the largest fill.
 
+    An imported chamber is solved without gravity and compared with the integrals over its walls.
+
     Args: `values`: by the closed forms. `gravity`: whether these hold gravity.
     Returns: ElementCheck; its status is NOT_CONVERGED where the two differ by more than both errors, or where
         the finite elements found no tilted surface.
     Raises: SceneError: as `scene_ring`, a chamber so narrow that nothing could be checked.
     """
     at = _checked_fills(values)
+    if scene.disc.geometry is not None:
+        return _imported(scene, scene.disc.geometry, values.fill_ratio[at])
     held = gravity and bool(np.any(values.closed[at]))
     at = at[values.closed[at]] if held else at
     elements = scene_ring(
@@ -65,16 +73,38 @@ def element_check(scene: Scene, *, values: RingValues, gravity: bool) -> Element
         gravity=held,
         cells=_meshes(scene, float(values.fill_ratio[at].min()), 3 if _axial(scene, held) else 2),
     )
-    difference, allowed = {}, {}
-    for name in CHECKED:
-        closed_form, solved = getattr(values, name), getattr(elements, name)
-        difference[name] = closed_form.value[at] - solved.value
-        allowed[name] = closed_form.uncertainty[at] + solved.uncertainty
-    beyond = [(np.abs(difference[n]) - allowed[n]) / np.abs(getattr(values, n).value[at]) for n in CHECKED]
+    closed_forms = {name: getattr(values, name) for name in CHECKED}
+    here = {
+        name: Estimate(value=each.value[at], uncertainty=each.uncertainty[at])
+        for name, each in closed_forms.items()
+    }
+    return _compared(here, elements, gravity=held)
+
+
+def _imported(scene: Scene, geometry: ChamberGeometry, fills: FloatArray) -> ElementCheck:
+    """Without gravity, on the scene's own mesh."""
+    pressure, moment, _ = chamber_closed_forms(scene=scene, fill_ratio=fills)
+    none = np.zeros(fills.shape)
+    closed_forms = {
+        "wall_pressure": Estimate(value=pressure, uncertainty=none),
+        "moment": Estimate(value=moment, uncertainty=none),
+    }
+    return _compared(closed_forms, imported_elements(scene, geometry, fill_ratio=fills), gravity=False)
+
+
+def _compared(
+    closed_forms: Mapping[str, Estimate], elements: RingQuantities | ImportedElements, *, gravity: bool
+) -> ElementCheck:
+    difference, allowed, beyond = {}, {}, []
+    for name, closed_form in closed_forms.items():
+        solved: Estimate = getattr(elements, name)
+        difference[name] = closed_form.value - solved.value
+        allowed[name] = closed_form.uncertainty + solved.uncertainty
+        beyond.append((np.abs(difference[name]) - allowed[name]) / np.abs(closed_form.value))
     excess = max(0.0, float(np.max(beyond)))
     return ElementCheck(
         elements=elements,
-        gravity=held,
+        gravity=gravity,
         difference=difference,
         allowed=allowed,
         excess=excess,
@@ -103,7 +133,7 @@ def _meshes(scene: Scene, thinnest: float, dimension: int) -> tuple[tuple[int, .
     return tuple(tuple(n // k for n in finest) for k in (1, 2, 4))
 
 
-def _status(elements: RingQuantities, excess: float) -> Status:
+def _status(elements: RingQuantities | ImportedElements, excess: float) -> Status:
     if not elements.status.ok:
         text = f"the closed forms stand unchecked, because the finite elements failed: {elements.status.text}"
         return Status(code=StatusCode.NOT_CONVERGED, text=text)

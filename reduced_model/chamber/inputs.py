@@ -10,8 +10,13 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_first_moment, surface_radius
-from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
+from ringbalance.mesh.geometry import (
+    chamber_volume,
+    liquid_first_moment,
+    surface_centroid,
+    surface_radius,
+    wall_square,
+)
 from ringbalance.physics.tube.uncertainty import ASSUMED_ROUGHNESS_UNCERTAINTY
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
@@ -116,19 +121,17 @@ def chamber_closed_forms(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Wall pressure, moment and lambda of a chamber without gravity.
 
-    P = rho omega^2 (R2^2 - a^2)/2, U = rho B int x dA, lambda = 2 a sin(alpha)/alpha.
+    P = rho omega^2 <r^2 - a^2>/2 over the wet outer wall, U = rho B int x dA, lambda = 2 <x> over the free
+    surface: in a sector P = rho omega^2 (R2^2 - a^2)/2 and lambda = 2 a sin(alpha)/alpha.
     Returns: P, Pa, U, kg m, and lambda, m, the shape of `fill_ratio`.
-    Source: hydrostatics with the chamber's exact geometry.
+    Source: hydrostatics with the chamber's exact geometry, that of its mesh where it is imported.
     """
     disc, rho = scene.disc, scene.liquid.density
     a = surface_radius(disc=disc, fill_ratio=fill_ratio)
-    alpha = half_angle(disc=disc, radius=a)
     return (
-        hydrostatic_pressure(
-            density=rho, angular_velocity=scene.rotor.speed, inner=a, outer=disc.outer_radius
-        ),
+        rho * scene.rotor.speed**2 / 2 * wall_square(disc=disc, surface_radius=a),
         rho * disc.axial_width * liquid_first_moment(disc=disc, surface_radius=a),
-        np.asarray(2 * a * np.sin(alpha) / alpha, dtype=np.float64),
+        2 * surface_centroid(disc=disc, radius=a),
     )
 
 

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_area, surface_radius
+from ringbalance.reduced_model.chamber.imported_walls import drawing_shares, share_across
 from ringbalance.reduced_model.chamber.values import by_closed_form, by_quadrature
 from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.reduced_model.paper import formulas as paper
@@ -80,14 +81,19 @@ def wall_layers(scene: Scene, fills: FloatArray) -> tuple[FloatArray, float]:
 def unmodelled_fractions(scene: Scene, fills: FloatArray) -> Mapping[str, FloatArray]:
     """Contribution of what no model holds: surface tension, friction at the walls, waves of finite height.
 
+    An imported chamber has besides what its facets leave of smooth walls, and its moment across the middle,
+    which pairs are taken not to have.
     Returns: Relative, of "pressures" and "moments", shape (n,) each; zero without liquid.
     Source: sum of the estimates, errors of one sign at worst.
     """
     found, wet = {}, fills > 0
     common = wall_layers(scene, fills[wet])[0] + wave_mean(scene, fills[wet])
+    drawn = drawing_shares(scene.disc, fills[wet])
+    across = np.abs(share_across(scene.disc, fills[wet]))
+    own = {"pressures": drawn.wall_pressure, "moments": drawn.moment + across}
     for part, share in capillary_share(scene, fills[wet]).items():
         found[part] = np.zeros(fills.shape)
-        found[part][wet] = share + common
+        found[part][wet] = share + common + own[part]
     return found
 
 

@@ -3,7 +3,8 @@
 Its free surface is the circle |r + g/omega^2| = b (horizontal shaft) or the paraboloid r^2 = c^2 + 2 G z
 (vertical), G = g/omega^2, with b or c from the liquid's volume.  With phi = eta alpha(r) every integral over
 the chamber is smooth in eta, plates and all, so that few Gauss points give all digits.  Where part of the
-outer wall runs dry the surface is cut off there; the integrals have kinks and take more points.
+outer wall runs dry the surface is cut off there; the integrals have kinks and take more points.  An imported
+chamber is integrated over its walls instead, `mesh.cut`.
 """
 
 from __future__ import annotations
@@ -14,7 +15,15 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.mesh.geometry import half_angle, liquid_area, liquid_first_moment, surface_radius
+from ringbalance.mesh.cut.table import ChamberTable
+from ringbalance.mesh.cut.tilted import tilted_liquid
+from ringbalance.mesh.geometry import (
+    half_angle,
+    imported_table,
+    liquid_area,
+    liquid_first_moment,
+    surface_radius,
+)
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.loop_models import Shaft
 from ringbalance.scene.models import Disc
@@ -55,7 +64,7 @@ class TiltedRing:
     moment_ripple: FloatArray
     """First harmonic over a turn, kg m zero-to-peak."""
     closed: BoolArray
-    """Whether the liquid covers the whole outer wall; where not, values have about four digits."""
+    """Whether the liquid covers the whole outer wall; where not, values of a sector have four digits."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,14 +105,18 @@ def tilted_ring(
     length = gravity / angular_velocity**2
     turn = turn_samples(disc=disc, angular_velocity=angular_velocity, gravity=gravity)
 
+    table = imported_table(disc)
+
     def turned(fills: FloatArray, *, cut: bool) -> _Turned:
+        if table is not None:
+            return _imported(disc, table, length, fills, turn if shaft == "horizontal" else 0)
         if shaft == "vertical":
             return _along(disc, length, fills, cut)
         return _across(disc, length, fills, turn, cut)
 
     found = turned(fill_ratio, cut=False)
     is_open = ~np.all(found.closed, axis=1)
-    if np.any(is_open):
+    if np.any(is_open) and table is None:
         parts = turned(fill_ratio[is_open], cut=True)
         for name in ("wall_pressure", "moment", "moment_per_volume"):
             getattr(found, name)[is_open] = getattr(parts, name)
@@ -115,6 +128,19 @@ def tilted_ring(
         wall_pressure_ripple=scale * _first_harmonic(found.wall_pressure),
         moment_ripple=density * disc.axial_width * _first_harmonic(found.moment),
         closed=~is_open,
+    )
+
+
+def _imported(disc: Disc, table: ChamberTable, length: float, fills: FloatArray, turn: int) -> _Turned:
+    """By integrals over the walls of a mesh, dry parts included. Args: `turn`: 0 on a vertical shaft."""
+    found = tilted_liquid(
+        table, length=length, vertical=turn == 0, turn=turn, fills=tuple(float(x) for x in fills)
+    )
+    return _Turned(
+        wall_pressure=found.wall_square.copy(),
+        moment=found.moment / disc.axial_width,
+        moment_per_volume=found.centroid.copy(),
+        closed=found.closed,
     )
 
 

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.mesh.geometry import chamber_volume
+from ringbalance.mesh.geometry import chamber_volume, wall_radius
 from ringbalance.physics.gas.column import pressure_factor
 from ringbalance.physics.pressure.hydrostatics import Radius, hydrostatic_pressure
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes
@@ -129,7 +129,7 @@ def column_pressure(*, scene: Scene, radius: Radius) -> Radius:
         density=scene.liquid.density,
         angular_velocity=scene.rotor.speed,
         inner=radius,
-        outer=scene.disc.outer_radius,
+        outer=wall_radius(disc=scene.disc),
     )
 
 

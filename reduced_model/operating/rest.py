@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ringbalance.mesh.geometry import wall_radius
 from ringbalance.physics.pressure.hydrostatics import column_radius
 from ringbalance.physics.roots import bracketed_root
 from ringbalance.reduced_model.tube.path import share_at_radius
@@ -39,7 +40,7 @@ def rest(*, scene: Scene, ends: TubeEnds[float], cavity: float | None, crest_pre
         `crest_pressure`: D_m, column from the crest to the outer wall, Pa.
     Source: hydrostatics in the rotating frame; Boyle's law.
     """
-    outer, covered = scene.disc.outer_radius, ends.upstream_covered()
+    outer, covered = wall_radius(disc=scene.disc), ends.upstream_covered()
     near, far = ends.upstream_pressure(), ends.downstream_pressure()
 
     def leg(pressure: float, *, far_leg: bool) -> float:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
 
-from ringbalance.physics.sloshing.modes import resonant_fills, sloshing_modes
+from ringbalance.physics.sloshing.modes import IMPORTED_SHARES, resonant_fills, sloshing_modes
 from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY
 from ringbalance.physics.sloshing.response import sloshing_response
 from ringbalance.reports.figures import style
@@ -30,10 +30,13 @@ def _collect(work: Work) -> Record | None:
         return None
     largest = scene.disc.max_fill_ratio
     met = resonant_fills(disc=scene.disc, modes=_MODES)
+    imported = scene.disc.geometry is not None
     # A peak is narrower than the distance of even points.
     peaks = [x * side for _, x in met for side in (0.96, 0.99, 1.0, 1.01, 1.04) if x * side <= largest]
     even = np.linspace(0.02, 1.0, _POINTS) * largest
-    fills = np.append(np.unique([*even, *peaks]), scene.disc.initial_fill)
+    # Each fill of an imported chamber takes seconds.
+    shown = largest * IMPORTED_SHARES if imported else np.unique([*even, *peaks])
+    fills = np.append(shown, scene.disc.initial_fill)
     modes = sloshing_modes(disc=scene.disc, fill_ratio=fills[:-1], modes=_MODES, cells=_COARSE)
     answer = sloshing_response(
         disc=scene.disc,
@@ -51,6 +54,7 @@ def _collect(work: Work) -> Record | None:
         "pressure_amplification": answer.pressure_amplification.value[:-1].tolist(),
         "surface_amplitude_m": answer.surface_amplitude.value[:-1].tolist(),
         "depth_m": (scene.disc.outer_radius - answer.surface_radius[:-1]).tolist(),
+        "imported": imported,
         "resonant": [{"mode": mode, "fill_ratio": x} for mode, x in met],
         "equal": {
             "fill_ratio": scene.disc.initial_fill,
@@ -88,8 +92,8 @@ def _equal(found: Record) -> str:
 
 def _avoid(found: Record) -> str:
     fills, top = np.asarray(found["fill_ratio"]), found["frequency_ratio"][0][-1]
-    # Even modes hardly feel gravity, which pulls the whole chamber one way.
-    strong = [item for item in found["resonant"] if item["mode"] % 2]
+    # Even modes of a sector hardly feel gravity, which pulls the whole chamber one way.
+    strong = [item for item in found["resonant"] if found["imported"] or item["mode"] % 2]
     if not strong and abs(top - 1) > _NEAR:
         return f"No mode that gravity can drive meets the speed up to a fill ratio of {short(fills[-1])}."
     told = [f"{' to '.join(_within(found, item['mode']))} (mode {item['mode']})" for item in strong]
@@ -160,12 +164,23 @@ def _frequencies(found: Record) -> Drawing:
     )
 
 
+def _quiet(found: Record) -> str:
+    """Which modes count for little."""
+    if found["imported"]:
+        return (
+            "; those along the shaft hardly feel gravity, and a peak between two of the points may be missed"
+        )
+    return "; even modes hardly feel gravity"
+
+
 def _swing(found: Record) -> Drawing:
     fills = np.asarray(found["fill_ratio"])
 
     def paint(axes: Axes) -> None:
-        axes.plot(fills, found["amplification"], color=style.FOUND, label="moment")
-        axes.plot(fills, found["pressure_amplification"], color=style.THIRD, label="wall pressure")
+        marker = "o" if found["imported"] else ""
+        lines: dict[str, Any] = {"marker": marker, "markersize": 3}
+        axes.plot(fills, found["amplification"], color=style.FOUND, label="moment", **lines)
+        axes.plot(fills, found["pressure_amplification"], color=style.THIRD, label="wall pressure", **lines)
         axes.axhline(
             1.0, color=style.MUTED, linewidth=1.2, linestyle=(0, (5, 2)), label="surface follows at once"
         )
@@ -184,7 +199,7 @@ def _swing(found: Record) -> Drawing:
         alt="Swing of a chamber's moment and of its wall pressure under gravity over those of a surface "
         "which follows gravity at once.",
         caption="What inertia and Coriolis force make of gravity’s pull, over a surface that follows at "
-        "once. Dotted: fills at which a mode meets the speed; even modes hardly feel gravity.",
+        f"once. Dotted: fills at which a mode meets the speed{_quiet(found)}.",
     )
 
 

@@ -20,17 +20,37 @@ _LATTICE: Final = (
 """Places of VTK's 27 nodes in a triquadratic hexahedron, in half edges."""
 
 
-def split_hexahedra(grid: Any) -> Any:
-    """Eight linear hexahedra for each triquadratic one, on its nodes: VTK cuts only linear cells well."""
-    index = {place: number for number, place in enumerate(_LATTICE)}
-    starts = [(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)]
-    local = [[index[(i + a // 2, j + b // 2, k + c // 2)] for a, b, c in _LATTICE[:8]] for i, j, k in starts]
-    nodes = grid.cells_dict[int(pv.CellType.TRIQUADRATIC_HEXAHEDRON)]
-    cells = nodes[:, np.array(local)].reshape(-1, 8)
-    fine = pv.UnstructuredGrid({pv.CellType.HEXAHEDRON: cells}, np.asarray(grid.points))
+_TETRAHEDRA: Final = (
+    *((0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3)),
+    *((4, 5, 6, 7), (4, 5, 7, 8), (5, 6, 7, 9), (5, 7, 8, 9)),
+)
+"""Linear parts of a quadratic tetrahedron, by VTK's numbers of its nodes."""
+
+
+def split_cells(grid: Any) -> Any:
+    """Eight linear cells for each quadratic one, on its nodes: VTK cuts only linear cells well."""
+    quadratic = {
+        pv.CellType.TRIQUADRATIC_HEXAHEDRON: (pv.CellType.HEXAHEDRON, _hexahedra()),
+        pv.CellType.QUADRATIC_TETRA: (pv.CellType.TETRA, np.array(_TETRAHEDRA)),
+    }
+    kind = next((kind for kind in quadratic if int(kind) in grid.cells_dict), None)
+    if kind is None:
+        return grid
+    linear, local = quadratic[kind]
+    cells = grid.cells_dict[int(kind)][:, local].reshape(-1, local.shape[1])
+    fine = pv.UnstructuredGrid({linear: cells}, np.asarray(grid.points))
     for name in grid.point_data:
         fine.point_data[name] = grid.point_data[name]
     return fine
+
+
+def _hexahedra() -> Any:
+    """Linear parts of a triquadratic hexahedron, by VTK's numbers of its nodes."""
+    index = {place: number for number, place in enumerate(_LATTICE)}
+    starts = [(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)]
+    return np.array(
+        [[index[(i + a // 2, j + b // 2, k + c // 2)] for a, b, c in _LATTICE[:8]] for i, j, k in starts]
+    )
 
 
 def ring(*, inner: float, outer: float, bottom: float, top: float) -> Any:

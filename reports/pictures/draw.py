@@ -24,7 +24,7 @@ from matplotlib import colormaps
 from matplotlib.colors import ListedColormap
 from PIL import Image
 
-from ringbalance.reports.pictures.disc_shapes import chamber_outline, ring, split_hexahedra, web
+from ringbalance.reports.pictures.disc_shapes import chamber_outline, ring, split_cells, web
 from ringbalance.reports.pictures.draw_tube import draw_tube
 from ringbalance.reports.pictures.draw_view import label_at, look
 from ringbalance.reports.pictures.text import Bar, Label, bar, letter
@@ -39,6 +39,9 @@ SCALE: Final = 2
 """Drawn this much larger and then reduced, so that lines and letters are smooth."""
 _MILLIMETRES: Final = 1e3
 _COLOURS: Final = 256
+_OUTSIDE: Final = 1.002
+_SHARP: Final = 40.0
+"""Angle between faces of an imported chamber from which their edge is drawn, deg."""
 _VIRIDIS: Final = colormaps["viridis"]
 _WATER: Final = ListedColormap(colormaps["Blues"](np.linspace(0.28, 1.0, 256)))
 
@@ -49,6 +52,7 @@ def main(arguments: list[str]) -> int:
     end_with(partial(os.read, 0, 1))
     job = json.loads(Path(arguments[0]).read_text(encoding="utf-8"))
     lengths = {key: None if value is None else value * _MILLIMETRES for key, value in job["lengths"].items()}
+    walls = _walls(job["fields"].get("chamber"))
     paints = {"pressure": _draw_pressure, "disc": _draw_disc} | ({"tube": draw_tube} if job["tube"] else {})
     for name, paint in paints.items():
         field = job["fields"].get(name)
@@ -60,14 +64,23 @@ def main(arguments: list[str]) -> int:
             # The reduction smooths already.
             plotter.render_window.SetMultiSamples(0)
             plotter.set_background(theme.background)
-            labels, scale = paint(plotter, job | {"lengths": lengths}, liquid, theme)
+            labels, scale = paint(plotter, job | {"lengths": lengths, "walls": walls}, liquid, theme)
             _save(plotter, labels, scale, theme, Path(job["folder"]) / f"{name}-{theme.name}.png")
     return 0
 
 
+def _walls(path: str | None) -> Any:
+    """Surface of an imported chamber in millimetres; None for a sector between plates."""
+    if path is None:
+        return None
+    grid = split_cells(pv.read(path))
+    grid.points = np.asarray(grid.points) * _MILLIMETRES
+    return grid.extract_surface(algorithm="dataset_surface")
+
+
 def _in_millimetres(grid: Any) -> Any:
     """Linear cells in millimetres and MPa, eight for each quadratic one of the file, on its very nodes."""
-    fine = split_hexahedra(grid)
+    fine = split_cells(grid)
     fine.points = np.asarray(fine.points) * _MILLIMETRES
     fine.point_data["pressure"] = np.asarray(fine.point_data["pressure_Pa"]) * 1e-6
     fine.point_data["depth"] = np.asarray(fine.point_data["depth_m"]) * _MILLIMETRES
@@ -105,9 +118,7 @@ def _draw_pressure(
     high = float(liquid.point_data["pressure"].max())
     for part in _without_corner(liquid):
         _add_field(plotter, part, high)
-    for edge in chamber_outline(
-        inner=inner, outer=outer, half_thickness=disc["plate_thickness"], half_angle=half, width=width
-    ):
+    for edge in _outline(job, half):
         plotter.add_mesh(edge, color=theme.edge, line_width=3)
     reach = outer * math.sin(min(half, math.pi / 2))
     low = min(inner * math.cos(half), outer * math.cos(half))
@@ -119,6 +130,20 @@ def _draw_pressure(
         label_at("free surface", _polar(shallow, 0.55 * half, width / 2), shift=(-125, 150)),
         label_at("gas", _polar(0.75 * inner + 0.25 * outer, 0.0, width / 2)),
     ], bar("pressure in MPa", _VIRIDIS, (0.0, high))
+
+
+def _outline(job: Record, half: float) -> list[Any]:
+    """Edges of the whole chamber."""
+    disc, walls = job["lengths"], job["walls"]
+    if walls is not None:
+        return [walls.extract_feature_edges(_SHARP, boundary_edges=False, manifold_edges=False)]
+    return chamber_outline(
+        inner=disc["inner_radius"],
+        outer=disc["outer_radius"],
+        half_thickness=disc["plate_thickness"],
+        half_angle=half,
+        width=disc["axial_width"],
+    )
 
 
 def _without_corner(liquid: Any) -> tuple[Any, Any]:
@@ -200,17 +225,26 @@ def _add_metal(plotter: Any, job: Record, theme: Theme) -> None:
         ring(inner=hub, outer=inner, bottom=back, top=0.0),
         ring(inner=hub, outer=outer + wall, bottom=back - wall, top=back),
     ]
-    radius = np.linspace(inner, outer, 41)
-    strip = np.arcsin(disc["plate_thickness"] / radius)
-    between = math.pi / count - (job["central_angle"] / 2 - strip)
-    solid = web(
-        start=(hub + inner) / 2, end=outer + wall / 2, half_angle=between, radius=radius, bottom=back, top=0.0
-    )
-    shapes += [solid.rotate_z(360.0 * (index + 0.5) / count) for index in range(count)]
+    if job["walls"] is None:
+        shapes += _webs(job, start=(hub + inner) / 2, end=outer + wall / 2, bottom=back)
+    else:
+        # A little larger than the liquid, whose sides would else lie in its own.
+        body = job["walls"].scale(_OUTSIDE).clip(normal="z", origin=(0, 0, 0))
+        shapes += [body.rotate_z(360.0 * index / count) for index in range(count)]
     for shape in shapes:
         plotter.add_mesh(
             shape, color=theme.metal, smooth_shading=True, split_sharp_edges=True, ambient=0.2, diffuse=0.8
         )
+
+
+def _webs(job: Record, *, start: float, end: float, bottom: float) -> list[Any]:
+    """The solids between the chambers of a disc with plates."""
+    disc, count = job["lengths"], job["chambers"]
+    radius = np.linspace(disc["inner_radius"], disc["outer_radius"], 41)
+    strip = np.arcsin(disc["plate_thickness"] / radius)
+    between = math.pi / count - (job["central_angle"] / 2 - strip)
+    solid = web(start=start, end=end, half_angle=between, radius=radius, bottom=bottom, top=0.0)
+    return [solid.rotate_z(360.0 * (index + 0.5) / count) for index in range(count)]
 
 
 def _add_arrow(plotter: Any, radius: float, theme: Theme) -> tuple[FloatArray, Label]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -14,9 +14,56 @@ from ringbalance.mesh.export import write_vtu
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, solve_pressure
 from ringbalance.reduced_model.paper import formulas as paper
+from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.models import Scene
 
 Record = dict[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outside:
+    """Faces that bound the liquid, for drawing."""
+
+    places: FloatArray
+    """Of all nodes, m, shape (n, 3)."""
+    faces: IntArray
+    """Corners in order, shape (faces, 4); a triangle repeats its last."""
+    pressure: FloatArray
+    """At the nodes, Pa, shape (n,)."""
+
+
+class ShownField(Protocol):
+    """Pressure of the liquid in one chamber, gravity left out, as a report shows it."""
+
+    @property
+    def fill_ratio(self) -> float: ...
+    def record(self) -> Record: ...
+    def pressure_profile(self, *, scene: Scene) -> Record: ...
+    def write(self, *, path: Path) -> Path: ...
+    def outside(self) -> Outside: ...
+
+
+def profile(scene: Scene, fill_ratio: float, radius: FloatArray, pressure: FloatArray) -> Record:
+    """Pressure over the radius, and the profile that Eq. 12 implies, SI.
+
+    Eq. 12's wall pressure is that of a ring whose surface lies at sqrt(R2^2 - 2 V'/(B theta)).
+    Source: Eq. 12 of the liquid-ring paper.
+    """
+    disc = scene.disc
+    volume = fill_ratio * chamber_volume(disc=disc)
+    implied = math.sqrt(disc.outer_radius**2 - 2 * volume / (disc.axial_width * disc.central_angle))
+    drawn = np.linspace(implied, disc.outer_radius, radius.size)
+    factor = scene.liquid.density * scene.rotor.speed**2 / 2
+    wall = paper.wall_pressure_paper(
+        disc=disc, density=scene.liquid.density, angular_velocity=scene.rotor.speed, liquid_volume=volume
+    )
+    return {
+        "fill_ratio": fill_ratio,
+        "radius_m": radius.tolist(),
+        "pressure_Pa": pressure.tolist(),
+        "paper_radius_m": drawn.tolist(),
+        "paper_pressure_Pa": [*(factor * (drawn[:-1] ** 2 - implied**2)).tolist(), float(wall)],
+    }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,28 +90,22 @@ class ChamberField:
         }
 
     def pressure_profile(self, *, scene: Scene) -> Record:
-        """Nodal pressure along the middle of the chamber, and the profile that Eq. 12 implies.
-
-        Eq. 12's wall pressure is that of a ring whose surface lies at sqrt(R2^2 - 2 V'/(B theta)).
-        Returns: JSON-able record, SI.
-        Source: Eq. 12 of the liquid-ring paper.
-        """
-        disc, chamber = scene.disc, self.solution.chamber
+        """Nodal pressure along the middle of the chamber, and the profile that Eq. 12 implies, SI."""
+        chamber = self.solution.chamber
         line = chamber.grid[:, chamber.grid.shape[1] // 2, chamber.grid.shape[2] // 2]
-        volume = self.fill_ratio * chamber_volume(disc=disc)
-        implied = math.sqrt(disc.outer_radius**2 - 2 * volume / (disc.axial_width * disc.central_angle))
-        drawn = np.linspace(implied, disc.outer_radius, line.size)
-        factor = scene.liquid.density * scene.rotor.speed**2 / 2
-        wall = paper.wall_pressure_paper(
-            disc=disc, density=scene.liquid.density, angular_velocity=scene.rotor.speed, liquid_volume=volume
-        )
-        return {
-            "fill_ratio": self.fill_ratio,
-            "radius_m": np.hypot(*chamber.places[:2, line]).tolist(),
-            "pressure_Pa": self.solution.pressure[line].tolist(),
-            "paper_radius_m": drawn.tolist(),
-            "paper_pressure_Pa": [*(factor * (drawn[:-1] ** 2 - implied**2)).tolist(), float(wall)],
-        }
+        radius = np.hypot(*chamber.places[:2, line])
+        return profile(scene, self.fill_ratio, radius, self.solution.pressure[line])
+
+    def outside(self) -> Outside:
+        """What bounds the liquid."""
+        chamber = self.solution.chamber
+        corners = chamber.grid[(slice(None, None, chamber.order),) * 3]
+        sides = [np.take(corners, end, axis=axis) for axis in range(3) for end in (0, -1)]
+        faces = [
+            np.stack([side[:-1, :-1], side[1:, :-1], side[1:, 1:], side[:-1, 1:]], axis=-1).reshape(-1, 4)
+            for side in sides
+        ]
+        return Outside(places=chamber.places.T, faces=np.concatenate(faces), pressure=self.solution.pressure)
 
     def write(self, *, path: Path) -> Path:
         """Write the field to a VTU file: gauge pressure in Pa and depth below the free surface in m.

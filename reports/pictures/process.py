@@ -12,8 +12,10 @@ from pathlib import Path
 from typing import Any, Final
 
 from ringbalance.controller.rotor import chamber_letters
+from ringbalance.mesh.export import write_cells
 from ringbalance.reports.numbers import given, shown
-from ringbalance.reports.pictures.fields import chamber_field, shown_fill
+from ringbalance.reports.pictures.fields import shown_fill
+from ringbalance.reports.pictures.imported_field import shown_field
 from ringbalance.reports.pictures.opengl import OpenGL, find_opengl
 from ringbalance.reports.pictures.theme import PICTURE
 from ringbalance.reports.pictures.tube import tube_field
@@ -26,6 +28,8 @@ _FIGURES: Final = "figures"
 _FIELDS: Final = "fields"
 FOLDERS: Final = (_FIGURES, _FIELDS)
 """Of the files, in an output folder."""
+_WHOLE: Final = "chamber"
+"""Among the fields of a job: the space of an imported chamber, on which there is no field."""
 _JOB: Final = "drawing.json"
 _LOG: Final = "drawing.txt"
 
@@ -72,16 +76,22 @@ class Drawing3D:
 
 
 def write_fields(*, scene: Scene, folder: Path) -> dict[str, Path]:
-    """Solve and write the pressure fields that the pictures show.
+    """Solve and write the pressure fields that the pictures show, and the space of an imported chamber.
 
     Raises: OSError: a file cannot be written.
     """
     fills = {"pressure": scene.disc.max_fill_ratio, "disc": shown_fill(scene)}
     names = {"pressure": "chamber_largest_fill.vtu", "disc": "chamber_at_start.vtu"}
-    return {
-        key: chamber_field(scene, fill_ratio=fill).write(path=folder / _FIELDS / names[key])
+    written = {
+        key: shown_field(scene, fill_ratio=fill).write(path=folder / _FIELDS / names[key])
         for key, fill in fills.items()
     }
+    geometry = scene.disc.geometry
+    if geometry is None:
+        return written
+    path = folder / _FIELDS / "chamber.vtu"
+    whole = write_cells(path, kind=geometry.kind, points=geometry.points, cells=geometry.cells)
+    return {**written, _WHOLE: whole}
 
 
 def start_drawing(

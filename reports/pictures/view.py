@@ -10,12 +10,12 @@ import jinja2
 import numpy as np
 from markupsafe import Markup
 
-from ringbalance.mesh.chamber import ChamberMesh
 from ringbalance.reports.numbers import given, number
-from ringbalance.reports.pictures.fields import ChamberField, chamber_field, shown_fill
+from ringbalance.reports.pictures.fields import ShownField, shown_fill
+from ringbalance.reports.pictures.imported_field import shown_field
 from ringbalance.reports.pictures.tube_path import tube_path
 from ringbalance.scene import Scene
-from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.arrays import FloatArray
 
 VIEW: Final = "view.html"
 _MILLIMETRES: Final = 1e3
@@ -24,8 +24,8 @@ _STEPS: Final = 73
 
 def view_page(scene: Scene) -> str:
     """A page that shows the liquid of the disc at its first fill, coloured by pressure, with the tube."""
-    field = chamber_field(scene, fill_ratio=shown_fill(scene))
-    highest = float(np.max(field.solution.pressure))
+    field = shown_field(scene, fill_ratio=shown_fill(scene))
+    highest = float(np.max(field.outside().pressure))
     template = files("ringbalance.reports").joinpath("templates", VIEW).read_text(encoding="utf-8")
     fill = number(field.fill_ratio, digits=2)
     page: str = jinja2.Template(template, autoescape=True, undefined=jinja2.StrictUndefined).render(
@@ -39,14 +39,14 @@ def view_page(scene: Scene) -> str:
     return page
 
 
-def _data(scene: Scene, field: ChamberField, highest: float) -> dict[str, Any]:
-    chamber, disc = field.solution.chamber, scene.disc
-    quads = _outside(chamber)
+def _data(scene: Scene, field: ShownField, highest: float) -> dict[str, Any]:
+    outside, disc = field.outside(), scene.disc
+    quads = outside.faces
     used, places = np.unique(quads, return_inverse=True)
-    points = _MILLIMETRES * chamber.length_scale * chamber.nodes[:, used].T
+    points = _MILLIMETRES * outside.places[used]
     # Some meshes begin at zero along the shaft; the view turns about the middle.
     points[:, 2] -= points[:, 2].mean()
-    pressure = np.mean(field.solution.pressure[quads], axis=1) / highest
+    pressure = np.mean(outside.pressure[quads], axis=1) / highest
     half = _MILLIMETRES * disc.axial_width / 2
     return {
         "chambers": disc.chambers,
@@ -63,17 +63,6 @@ def _data(scene: Scene, field: ChamberField, highest: float) -> dict[str, Any]:
             {"kind": "tube", "points": _tube(scene, half)},
         ],
     }
-
-
-def _outside(chamber: ChamberMesh) -> IntArray:
-    """Corners of the faces on all six sides of the mesh, shape (faces, 4), along the cells' corners."""
-    corners = chamber.grid[(slice(None, None, chamber.order),) * 3]
-    sides = [np.take(corners, end, axis=axis) for axis in range(3) for end in (0, -1)]
-    faces = [
-        np.stack([side[:-1, :-1], side[1:, :-1], side[1:, 1:], side[:-1, 1:]], axis=-1).reshape(-1, 4)
-        for side in sides
-    ]
-    return np.concatenate(faces)
 
 
 def _circle(radius: float, height: float) -> list[list[float]]:

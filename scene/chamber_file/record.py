@@ -33,7 +33,19 @@ class ChamberGeometry:
     boundaries: Mapping[str, IntArray] = field(compare=False, repr=False)
     """Facets by name, shape (facets, nodes of a facet), in meshio's order; normals unspecified.  `outer_wall`
     is always there; no facet has two names."""
+    stretch: Stretch | None = field(default=None, compare=False, repr=False)
+    """How it came from the mesh of a file; None for that mesh itself."""
 
     def __str__(self) -> str:
         """The file and what it holds, for people."""
         return f"{self.file}: {len(self.cells)} {self.kind} cells, {', '.join(self.boundaries)}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stretch:
+    """A mesh drawn out along radius, angle and shaft, each evenly."""
+
+    base: ChamberGeometry
+    before: Mapping[str, float]
+    """Dimensions of the mesh, SI, by their keys in [disc]."""
+    after: Mapping[str, float]

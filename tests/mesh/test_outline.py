@@ -12,7 +12,7 @@ from ringbalance.mesh.outline import outlines
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import CellKind
 from ringbalance.scene.models import Disc
-from ringbalance.verification.reference.chamber_record import chamber_record
+from ringbalance.verification.reference.block_chambers import disc_chamber
 
 
 def area(loop: FloatArray) -> float:
@@ -21,7 +21,7 @@ def area(loop: FloatArray) -> float:
 
 
 def test_sections_have_the_area_of_the_chamber(disc: Disc) -> None:
-    record = chamber_record(disc, cells=(2, 16, 2))
+    record = disc_chamber(disc, (2, 16, 2))
     (across,), (along,) = outlines(record, axis=2), outlines(record, axis=1)
     exact = float(liquid_area(disc=disc, surface_radius=disc.inner_radius))
     # Chords between 33 nodes of a right angle take (90 deg/32)^2/6 off the outer circle's sector.
@@ -35,10 +35,10 @@ def test_cells_with_fewer_nodes_give_the_chords_that_they_have(
     disc: Disc, kind: CellKind, nodes: int
 ) -> None:
     """Away from the nodes: straight cells have the columns of their corners, others some of those between."""
-    record = chamber_record(disc, cells=(2, 16, 1))
+    record = disc_chamber(disc, (2, 16, 1))
     fewer = replace(record, kind=kind, cells=record.cells[:, :nodes], boundaries={})
     (across,) = outlines(fewer, axis=2, place=0.25 * disc.axial_width)
-    coarser = chamber_record(disc, cells=(2, 8, 1))
+    coarser = disc_chamber(disc, (2, 8, 1))
     (chords,) = outlines(coarser, axis=2, place=0.25 * disc.axial_width)
     if kind == "hexahedron":
         assert area(across) == pytest.approx(area(chords), rel=1e-6)
@@ -49,6 +49,6 @@ def test_cells_with_fewer_nodes_give_the_chords_that_they_have(
 def test_a_plane_may_cut_a_chamber_twice(disc: Disc) -> None:
     """Across x below the outer wall's ends: both flanks of a half circle, and nothing beyond its rim."""
     half = replace(disc, central_angle=np.pi, chambers=2)
-    record = chamber_record(half, cells=(2, 16, 2))
+    record = disc_chamber(half, (2, 16, 2))
     assert len(outlines(record, axis=0, place=0.5 * disc.inner_radius)) == 2
     assert outlines(record, axis=0, place=1.01 * disc.outer_radius) == ()

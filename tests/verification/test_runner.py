@@ -17,7 +17,7 @@ from ringbalance.verification import runner
 from ringbalance.verification.assumptions import overridden
 from ringbalance.verification.case import CaseDefinition, parse_case
 from ringbalance.verification.evidence import Evidence, Found, Level, NotRunError, Reference
-from ringbalance.verification.reference.chamber_record import imported
+from ringbalance.verification.reference.block_chambers import imported
 from ringbalance.verification.runner import mutate_definition, run_case, run_cases, run_definition
 from ringbalance.verification.verdicts import Verdict
 

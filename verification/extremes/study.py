@@ -11,6 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from ringbalance.scene.faults import Fault, SceneError, toml_text
 from ringbalance.scene.loader import read_scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.verification.evidence import Level
@@ -101,9 +102,23 @@ class _Extremes:
 
 
 def scene_base(path: Path) -> Base:
-    """Take a scene file as the scene to vary. Raises: SceneError: the file is no liquid-ring scene."""
-    scene, text = read_scene(path)
-    return Base(document=tomllib.loads(text), file=liquid_ring_scene(scene).source)
+    """Take a scene file as the scene to vary.
+
+    Raises: SceneError: the file is no liquid-ring scene, or its chamber is imported.
+    """
+    read, text = read_scene(path)
+    scene = liquid_ring_scene(read)
+    if scene.disc.geometry is not None:
+        fault = Fault(
+            file=scene.file,
+            table="disc",
+            key="mesh",
+            value=toml_text(scene.disc.geometry.file),
+            problem="the study takes the dimensions of a sector between plates to their extremes",
+            allowed="a scene that gives the dimensions of its chambers",
+        )
+        raise SceneError([fault])
+    return Base(document=tomllib.loads(text), file=scene.source)
 
 
 def find_extremes(

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
-from hashlib import sha256
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from ringbalance.mesh.geometry import half_angle
-from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
-from ringbalance.scene.chamber_file.facets import CELL_FACETS
+from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.chamber_file.facets import boundary_facets
 from ringbalance.scene.chamber_file.record import CellKind, ChamberGeometry
 from ringbalance.scene.models import Disc
 
@@ -31,6 +32,9 @@ _BOUNDARIES: Final = {
     "end_front": (2, 1),
 }
 _KINDS: Final[dict[CellKind, int]] = {"hexahedron": 8, "hexahedron20": 20, "hexahedron27": 27}
+_KUHN: Final = ((0, 1, 2, 6), (0, 5, 1, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 4, 5, 6), (0, 7, 4, 6))
+"""Corners of tetrahedra that fill a cube and fit together from cube to cube."""
+_TETRA_EDGES: Final = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
 
 
 def block_chamber(
@@ -40,7 +44,7 @@ def block_chamber(
     kind: CellKind = "hexahedron27",
     closed: bool = False,
 ) -> ChamberGeometry:
-    """A mapped block of hexahedra.
+    """A mapped block of hexahedra, or of six tetrahedra in the place of each.
 
     Args:
         place: from the unit cube, shape (..., 3), to places, m; the first coordinate goes outward.
@@ -53,28 +57,33 @@ def block_chamber(
     if closed:
         numbers[:, -1] = numbers[:, 0]
     starts = np.stack(np.meshgrid(*[2 * np.arange(n) for n in cells], indexing="ij"), axis=-1)
-    at = starts.reshape(-1, 1, 3) + _PLACES[:, :]
-    nodes = numbers[at[..., 0], at[..., 1], at[..., 2]][:, : _KINDS[kind]]
-    order = np.stack(np.unravel_index(np.arange(len(nodes)), cells), axis=-1)
+    local = _local(kind)
+    at = (starts.reshape(-1, 1, 1, 3) + local).reshape(-1, local.shape[1], 3)
+    bare = ChamberGeometry(
+        file="block",
+        digest=hashlib.sha256(points.tobytes() + f"{cells} {kind}".encode()).hexdigest(),
+        kind=kind,
+        points=points,
+        cells=numbers[at[..., 0], at[..., 1], at[..., 2]],
+        boundaries={},
+    )
+    facets = boundary_facets(bare)
+    lattice = np.stack(np.unravel_index(facets, shape), axis=-1)
     boundaries = {
-        name: _side(nodes, order[:, axis] == (cells[axis] - 1) * end, kind, axis, end)
+        name: facets[np.all(lattice[..., axis] == end * (shape[axis] - 1), axis=1)]
         for name, (axis, end) in _BOUNDARIES.items()
         if not (closed and axis == 1)
     }
-    return ChamberGeometry(
-        file="block",
-        digest=sha256(points.tobytes() + nodes.tobytes()).hexdigest(),
-        kind=kind,
-        points=points,
-        cells=nodes,
-        boundaries=boundaries,
-    )
+    return replace(bare, boundaries=boundaries)
 
 
-def _side(nodes: IntArray, at_side: BoolArray, kind: CellKind, axis: int, end: int) -> IntArray:
-    """Facets of the cells at one side of the block."""
-    facet = next(f for f in CELL_FACETS[kind] if (_PLACES[list(f[:4]), axis] == 2 * end).all())
-    return np.asarray(nodes[at_side][:, list(facet)])
+def _local(kind: CellKind) -> IntArray:
+    """Places of the nodes of each cell in a cube, in halves, shape (cells, nodes, 3)."""
+    if not kind.startswith("tetra"):
+        return _PLACES[None, : _KINDS[kind]]
+    corners = _CORNERS[np.array(_KUHN)]
+    middles = [corners[:, list(pair)].sum(axis=1) // 2 for pair in _TETRA_EDGES]
+    return np.concatenate([corners, np.stack(middles, axis=1)], axis=1)[:, : 4 if kind == "tetra" else 10]
 
 
 def sector_chamber(
@@ -111,3 +120,8 @@ def disc_chamber(
         return np.stack([radius * np.cos(turned), radius * np.sin(turned), axial], axis=-1)
 
     return block_chamber(cells, place, kind=kind)
+
+
+def imported(disc: Disc, *, cells: tuple[int, int, int] = (4, 16, 2)) -> Disc:
+    """The disc with its own chamber imported, and no other dimensions."""
+    return replace(disc, geometry=disc_chamber(disc, cells))

@@ -7,10 +7,14 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import Final
 
+import numpy as np
+
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics import deferred
 from ringbalance.physics.pressure.ring import RingQuantities
+from ringbalance.reduced_model.chamber.imported_check import imported_elements
+from ringbalance.reduced_model.chamber.imported_walls import drawing_shares
 from ringbalance.reduced_model.chamber.scene_ring import scene_ring
 from ringbalance.reduced_model.chamber.values import ChamberValues
 from ringbalance.reduced_model.contribution import Contribution
@@ -18,6 +22,8 @@ from ringbalance.scene.models import Scene
 
 COARSE_MESH: Final = "coarse mesh"
 FINE_MESH: Final = "fine mesh"
+_STEP: Final = 0.01
+"""Of the fill ratio, for the slope of the moment."""
 
 
 def mesh_error(scene: Scene, angular_cells: int) -> float:
@@ -33,7 +39,17 @@ def mesh_error(scene: Scene, angular_cells: int) -> float:
 
 
 def mesh_contributions(scene: Scene) -> Mapping[str, Contribution]:
-    """Contributions of the meshes' errors, by name."""
+    """Contributions of the meshes' errors, by name; of an imported chamber what its facets leave."""
+    if scene.disc.geometry is not None:
+        shares = drawing_shares(scene.disc, np.array([0.2 * scene.disc.max_fill_ratio]))
+        return {
+            FINE_MESH: Contribution(
+                term=FINE_MESH,
+                value=float(max(shares.wall_pressure[0], shares.moment[0])),
+                formula="h delta/12",
+                source="an arc of angle delta over a facet",
+            )
+        }
     cells = default_cells(disc=scene.disc)[1]
     return {
         term: Contribution(
@@ -58,6 +74,28 @@ def by_elements(scene: Scene, fill: float, *, cells: tuple[int, ...], gravity: b
         moment=float(found.moment.value[0]),
         moment_ripple=float(found.ripple["moment"][0]),
         moment_per_mass=2 * float(found.moment_per_volume.value[0]) / scene.liquid.density,
+    )
+
+
+def by_imported_elements(scene: Scene, fill: float) -> ChamberValues:
+    """Finite elements on an imported chamber's own mesh, gravity left out.
+
+    Returns: ChamberValues; lambda as the change of the moment between two neighbouring fills.
+    Source: `imported_elements`.
+    """
+    geometry = scene.disc.geometry
+    if geometry is None:
+        raise ValueError("the scene's chamber is not imported")
+    step = min(_STEP, fill / 2, (1 - fill) / 2)
+    found = imported_elements(scene, geometry, fill_ratio=np.array([fill, fill - step, fill + step]))
+    at, low, high = found.moment.value
+    mass = scene.liquid.density * float(found.volume[2] - found.volume[1])
+    return ChamberValues(
+        wall_pressure=float(found.wall_pressure.value[0]),
+        wall_pressure_ripple=0.0,
+        moment=float(at),
+        moment_ripple=0.0,
+        moment_per_mass=2 * float(high - low) / mass,
     )
 
 

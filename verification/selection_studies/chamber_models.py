@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
 
@@ -34,9 +34,9 @@ from ringbalance.verification.selection_studies.chamber_elements import (
     COARSE_MESH,
     FINE_MESH,
     by_elements,
+    by_imported_elements,
     forget_solves,
     mesh_contributions,
-    mesh_error,
     sloshing_meshes,
     with_sloshing,
 )
@@ -72,7 +72,7 @@ def chamber_hierarchies(scene: Scene) -> tuple[ModelHierarchy, ModelHierarchy]:
     status = chamber_status(scene)
     meshes = mesh_contributions(scene)
     terms = {part: {**found, **meshes} for part, found in chamber_contributions(scene, fills).items()}
-    floor = mesh_error(scene, default_cells(disc=scene.disc)[1])
+    floor = meshes[FINE_MESH].value or 0.0
     capillary = {part: np.max(s, initial=0.0) for part, s in capillary_share(scene, fills).items()}
     swing = _swing_uncertainty(scene, fills, terms)
     memo: Memo = {}
@@ -147,6 +147,8 @@ def _kinds(scene: Scene) -> tuple[_Kind, ...]:
         _kind("the paper's formula", "none", "left out", (PLATES, *pull), by_paper, formula=4),
         _kind("closed form", "exact", "left out", pull, by_closed_form, formula=30),
     )
+    if scene.disc.geometry is not None:
+        return _imported_kinds(scene, plain)
     meshes = tuple(_mesh_kind(scene, cells, heavy=False) for cells in _meshes(scene, 2))
     solid = _mesh_kind(scene, _meshes(scene, 3)[0], heavy=False)
     if scene.environment.gravity == 0:
@@ -170,6 +172,38 @@ def _kinds(scene: Scene) -> tuple[_Kind, ...]:
     if not swing:
         return quasi_static
     return (*quasi_static, _swinging(scene, gravity[-1]), _swinging(scene, tilted[-1]))
+
+
+def _imported_kinds(scene: Scene, plain: tuple[_Kind, ...]) -> tuple[_Kind, ...]:
+    """Of an imported chamber, which has one mesh; the closed form stands for integrals over its walls."""
+    shaft, gravity = scene.environment.shaft, scene.environment.gravity
+    pull = () if gravity == 0 else (RIPPLE, MEAN, SLOSHING)
+    paper, exact = plain
+    walls = replace(exact, name="integrals over the walls", models={**exact.models, "solution": "walls"})
+    elements = _kind(
+        "3-D finite elements on its mesh",
+        "exact",
+        "left out",
+        (FINE_MESH, *pull),
+        by_imported_elements,
+        solve=9.0,
+        unknown_3d=30.0 * len(scene.disc.geometry.cells) if scene.disc.geometry else 0.0,
+    )
+    if gravity == 0:
+        return paper, walls, elements
+    swing = () if shaft == "vertical" else (SLOSHING,)
+    turns = _turns(scene)
+    tilted = _kind(
+        "integrals over the walls, gravity to all orders",
+        "exact",
+        "all orders",
+        swing,
+        by_quadrature,
+        quadrature=turns * POINTS * RADIAL_POINTS,
+        formula=60,
+    )
+    still = (paper, walls, elements, tilted)
+    return (*still, _swinging(scene, tilted)) if swing else still
 
 
 def _swinging(scene: Scene, still: _Kind) -> _Kind:

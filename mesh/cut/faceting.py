@@ -1,0 +1,148 @@
+"""How much a curved wall may differ from its drawing by facets, as far as the mesh alone shows it.
+
+Where two facets meet at a small angle delta, the wall is taken for a smooth one through their nodes.  An arc
+of angle delta over a facet of width h then stands off by h delta/12 on average where the facet is flat, and
+by h delta/60 where it is quadratic and delta is what is left of the bend.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+
+from ringbalance.mesh.cut.integrals import gauss
+from ringbalance.mesh.cut.patches import wall_patches
+from ringbalance.mesh.cut.table import SLOPE_TOLERANCE, TOLERANCE, chamber_table
+from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.chamber_file.facets import boundary_facets, corners_of
+from ringbalance.scene.chamber_file.record import ChamberGeometry
+
+SMOOTH: Final = np.pi / 6
+"""Angle between two facets above which their edge is taken for one of the chamber."""
+SAFETY: Final = 1.5
+"""On the estimate: an arc drawn by few facets has one edge less than facets."""
+_FLAT: Final = 1 / 12
+_QUADRATIC: Final = 1 / 60
+_STRAIGHT: Final = 1e-6
+"""Distance of a middle node from the middle of its edge, over the edge."""
+_MIDDLES: Final = {3: ((0.5, 0), (1, 0.5), (0, 0.5)), 4: ((0.5, 0), (1, 0.5), (0.5, 1), (0, 0.5))}
+"""Of the edges, (u, v)."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Faceting:
+    """Volumes that the drawing may miss along each smooth edge, all counted as of one sign."""
+
+    radius: FloatArray
+    """Of the edge, m."""
+    volume: FloatArray
+    """m^3."""
+    place: FloatArray
+    """x of the edge, m."""
+    wall: float
+    """Error of the mean of r^2 over the outer wall, m^2."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DrawingError:
+    """Half-widths (95 %) for facets and table, along the fills."""
+
+    volume: float
+    """Of the whole chamber, m^3."""
+    moment: FloatArray
+    """First moment along x, m^4."""
+    centroid: FloatArray
+    """Mean of x over the free surface, m."""
+    wall_square: FloatArray
+    """Mean of r^2 - a^2 over the outer wall, m^2."""
+
+
+@lru_cache(maxsize=8)
+def faceting(geometry: ChamberGeometry) -> Faceting:
+    """Estimate for the walls of a mesh."""
+    facets, corners = boundary_facets(geometry), corners_of(geometry.kind)
+    patches, outer = wall_patches(geometry)
+    first, second, ends = _shared_edges(facets[:, :corners])
+    areas = _areas(patches)
+    normals = _normals(patches, *np.array(_MIDDLES[corners]).T).reshape(-1, 3)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    bend = np.arccos(np.clip((normals[first] * normals[second]).sum(axis=1), -1, 1))
+    bend = np.where(bend < SMOOTH, bend, 0.0)
+    sides = np.stack([first, second]) // corners
+    # A triangle's height is twice its area over the edge; a quadrilateral has two edges across the bend.
+    share = _share(geometry, facets, corners) * (2 if corners == 3 else 0.5) * areas**2
+    places = geometry.points[ends]
+    missed = bend * share[sides].sum(axis=0) / np.linalg.norm(places[:, 1] - places[:, 0], axis=1)
+    middle = places.mean(axis=1)
+    radius = np.hypot(middle[:, 0], middle[:, 1])
+    on_wall = np.all(outer[sides], axis=0)
+    return Faceting(
+        radius=radius,
+        volume=missed,
+        place=middle[:, 0],
+        wall=float(2 * (radius * missed)[on_wall].sum() / areas[outer].sum()),
+    )
+
+
+def _areas(patches: FloatArray) -> FloatArray:
+    places, weights = gauss(3)
+    normals = _normals(patches, np.repeat(places, 3), np.tile(places, 3))
+    return np.asarray(np.linalg.norm(normals, axis=-1) @ np.outer(weights, weights).ravel())
+
+
+def _normals(patches: FloatArray, u: FloatArray, v: FloatArray) -> FloatArray:
+    """X_u x X_v at points, shape (patches, points, 3)."""
+    one, zero = np.ones_like(u), np.zeros_like(u)
+    at = [np.stack([one, t, t**2]) for t in (u, v)]
+    slopes = [np.stack([zero, one, 2 * t]) for t in (u, v)]
+    along = np.einsum("nijx,ip,jp->npx", patches, slopes[0], at[1])
+    return np.cross(along, np.einsum("nijx,ip,jp->npx", patches, at[0], slopes[1]))
+
+
+def _shared_edges(corners: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+    """Each edge of two facets: its place among the edges of both, facet by facet, and its ends."""
+    ends = np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1).reshape(-1, 2)
+    ends = np.sort(ends, axis=1)
+    order = np.lexsort(ends.T)
+    pair = np.flatnonzero(np.all(ends[order][1:] == ends[order][:-1], axis=1))
+    return order[pair], order[pair + 1], ends[order[pair]]
+
+
+def _share(geometry: ChamberGeometry, facets: IntArray, corners: int) -> FloatArray:
+    """Of h delta, by which a wall stands off a facet; quadratic ones with straight edges count as flat."""
+    if facets.shape[1] == corners:
+        return np.full(len(facets), _FLAT)
+    at = geometry.points[facets[:, : 2 * corners]]
+    start, stop = at[:, :corners], np.roll(at[:, :corners], -1, axis=1)
+    sag = np.linalg.norm(at[:, corners:] - (start + stop) / 2, axis=-1)
+    straight = np.all(sag < _STRAIGHT * np.linalg.norm(stop - start, axis=-1), axis=1)
+    return np.where(straight, _FLAT, _QUADRATIC)
+
+
+def drawing_error(geometry: ChamberGeometry, *, fill_ratio: FloatArray) -> DrawingError:
+    """What facets in place of curved walls, and the table between its nodes, can change at given fills.
+
+    At a fixed fill ratio the surface moves by what the whole chamber and by what the wet walls hold more;
+    each edge counts with the sign that does most, to first order.
+    """
+    table, walls, x = chamber_table(geometry), faceting(geometry), fill_ratio[:, None]
+    level = table.level_of(fill_ratio * table.volume)
+    radius, wetness = np.sqrt(level), -table.at(level)[1][3]
+    area, centroid = table.surface(radius)
+    wet = walls.radius > radius[:, None]
+    missed = SAFETY * walls.volume
+    # dV = -(area/2) dL on a concentric surface of area a times `area`.
+    moved = 2 * (np.abs(wet - x) @ missed + TOLERANCE * table.volume) / area
+    turned = np.abs(wet * (walls.place - centroid[:, None]) + x * centroid[:, None]) @ missed
+    aside = np.abs(
+        [table.surface(np.sqrt(np.maximum(level + s * moved, 0.0)))[1] - centroid for s in (-1, 1)]
+    )
+    return DrawingError(
+        volume=float(missed.sum()) + TOLERANCE * table.volume,
+        moment=turned + TOLERANCE * table.columns[1, 0],
+        centroid=aside.max(axis=0) + (missed.sum() / table.volume + SLOPE_TOLERANCE) * centroid,
+        wall_square=wetness * (moved + SAFETY * walls.wall),
+    )

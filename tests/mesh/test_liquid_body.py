@@ -9,7 +9,7 @@ from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.mesh.liquid_body import FREE_SURFACE, Level, jacobians, liquid_body
 from ringbalance.mesh.quadratic_tetrahedra import Tetrahedra, face_nodes, lonely, tetrahedra
 from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
-from ringbalance.scene import bundled_scene, load_scene
+from ringbalance.scene import Scene, bundled_scene, load_scene
 from ringbalance.scene.chamber_file.record import CellKind
 from ringbalance.verification.reference.block_chambers import block_chamber, sector_chamber
 
@@ -58,7 +58,9 @@ def test_every_face_is_shared_or_named_and_the_normals_close(kind: CellKind) -> 
 
 @pytest.mark.parametrize("fill", [0.03, 0.25, 0.5, 0.9])
 def test_a_chamber_with_fillets_and_a_gas_tube_holds_what_exact_integrals_say(fill: float) -> None:
-    disc = load_scene(bundled_scene("chamber_with_gas_tube")).disc
+    scene = load_scene(bundled_scene("chamber_with_gas_tube"))
+    assert isinstance(scene, Scene)
+    disc = scene.disc
     assert disc.geometry is not None
     radius = float(surface_radius(disc=disc, fill_ratio=fill))
     body = liquid_body(tetrahedra(disc.geometry), Level(constant=radius**2 / 2))

@@ -58,7 +58,7 @@ def test_every_face_is_shared_or_named_and_the_normals_close(kind: CellKind) -> 
 
 @pytest.mark.parametrize("fill", [0.03, 0.25, 0.5, 0.9])
 def test_a_chamber_with_fillets_and_a_gas_tube_holds_what_exact_integrals_say(fill: float) -> None:
-    scene = load_scene(bundled_scene("chamber_with_gas_tube"))
+    scene = load_scene(bundled_scene("imported_chamber"))
     assert isinstance(scene, Scene)
     disc = scene.disc
     assert disc.geometry is not None

@@ -8,8 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from ringbalance.mesh.cut.table import ChamberTable, chamber_table
-from ringbalance.scene.chamber_file.placing import rounded
-from ringbalance.scene.chamber_file.record import ChamberGeometry
+from ringbalance.scene.chamber_file.record import ChamberGeometry, rounded
 
 
 @lru_cache(maxsize=8)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Final, Literal
 
 from ringbalance.scene.arrays import FloatArray, IntArray
 
+_DIGITS: Final = 7
 CellKind = Literal["tetra", "tetra10", "hexahedron", "hexahedron20", "hexahedron27"]
 """One kind in a mesh; names and orders of nodes are meshio's."""
 
@@ -37,3 +38,11 @@ class ChamberGeometry:
     def __str__(self) -> str:
         """The file and what it holds, for people."""
         return f"{self.file}: {len(self.cells)} {self.kind} cells, {', '.join(self.boundaries)}"
+
+
+def rounded(dimensions: Mapping[str, float]) -> dict[str, float]:
+    """Dimensions of a mesh to as many digits as a file's rounding leaves.
+
+    Rounding in a file shall not put a port just outside its wall.
+    """
+    return {key: float(f"{value:.{_DIGITS}g}") for key, value in dimensions.items()}

@@ -315,13 +315,21 @@ def _too_short(facts: Facts) -> str:
         return (
             f"{_not_settled(facts)}; {last.operation.duration * 1e3:.4g} ms of gas into chamber "
             f"{last.chamber} are over before its pressure has pushed any liquid over: "
-            f"{_standing(facts) or 'raise controller.limit, or use a larger or faster valve'}"
+            f"{_standing(facts) or _pushed(facts)}"
         )
     return (
         f"{_not_settled(facts)}; the commanded valve-open times have fallen below the valves' minimum of "
         f"{facts.scene.controller.minimum_gas_time * 1e3:.4g} ms: raise controller.proportional, lower "
         "controller.minimum_gas_time or raise controller.limit"
     )
+
+
+def _pushed(facts: Facts) -> str:
+    """What moves liquid where an amplitude stands still."""
+    settings = facts.scene.controller
+    without = settings.kind == "target_vector" and settings.integral_time is None
+    first = "set controller.integral_time to some periods, " if without else ""
+    return f"{first}raise controller.limit, or use a larger or faster valve"
 
 
 def _noise(facts: Facts) -> str:

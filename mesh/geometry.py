@@ -13,8 +13,7 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.mesh.cut.table import ChamberTable
-from ringbalance.mesh.stretched import stretched_table
+from ringbalance.mesh.cut.table import ChamberTable, chamber_table
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.keys.derivations import swept_area
 from ringbalance.scene.models import Disc
@@ -22,9 +21,7 @@ from ringbalance.scene.models import Disc
 
 def imported_table(disc: Disc) -> ChamberTable | None:
     """What a chamber's mesh is integrated to; None for the sector between plates."""
-    if disc.geometry is None:
-        return None
-    return stretched_table(disc.geometry, outer_radius=disc.outer_radius, axial_width=disc.axial_width)
+    return None if disc.geometry is None else chamber_table(disc.geometry)
 
 
 def half_angle(*, disc: Disc, radius: npt.ArrayLike) -> FloatArray:

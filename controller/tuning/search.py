@@ -15,6 +15,8 @@ from ringbalance.controller.tuning.settling import Progress, SettlingTimes, trie
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.models import Scene
 
+_INTEGRAL_PERIODS: Final = 5.0
+"""Integral time in periods: it pushes a residual that stands still over the dead time in some commands."""
 _GAINS: Final = (0.6, 1.6)
 """Times the recommended gain, lower where an injection moves more than its dead time allows for."""
 _PRESSURES: Final = (1.25, 1.5)
@@ -97,17 +99,35 @@ def _candidate(before: Candidate, scene: Scene, *changes: str) -> Candidate:
 
 
 def search(
-    scene: Scene, model: BalancerModel, known: FactorUncertainty, *, base: Candidate, told: Progress
+    scene: Scene,
+    model: BalancerModel,
+    known: FactorUncertainty,
+    *,
+    base: Candidate,
+    settled: float,
+    told: Progress,
 ) -> Search:
-    """Try one candidate after the other until one settles; then the limit, where none does."""
+    """Try one candidate after the other until one settles; then the limit, where none does.
+
+    Args: `settled`: fraction of many runs that settle in the scene's time limit with `base`, which is all
+        right only where a few runs show that more time would do.
+    """
     rows: list[Tried] = []
     best, most = base, -1.0
-    for each in (base, *_others(scene, model, known, base)):
+
+    def candidates() -> Iterator[Candidate]:
+        yield base
+        yield from _others(scene, model, known, base)
+        yield from _pushed(best)
+
+    for each in candidates():
         found = _try(each, model, known, rows, told)
-        if found.settled.value > most:
-            best, most = each, found.settled.value
+        held = (found.quantiles["p95"] or 0.0) + scene.controller.hold_time
+        enough = each is base and held <= scene.run.time_limit
+        share = min(found.settled.value, settled) if enough else found.settled.value
+        if share > most:
+            best, most = each, share
         if most >= 1.0:
-            held = (found.quantiles["p95"] or 0.0) + scene.controller.hold_time
             return Search(best=each, settles=True, needs=held, limit=None, tried=tuple(rows))
     limit = next(_reached(replace(scene, gas=best.scene.gas), model, known, rows, told), None)
     return Search(best=best, settles=False, needs=None, limit=limit, tried=tuple(rows))
@@ -131,6 +151,7 @@ def _others(
         offset = replace(base.scene, controller=replace(settings, gas_time_offset=base.dead))
         yield _candidate(given, offset)
     if settings.kind == "target_vector":
+        yield from _pushed(base)
         for factor in _GAINS:
             changed = replace(settings, proportional=factor * settings.proportional)
             text = f"controller.proportional = {_gain(changed.proportional)}"
@@ -145,6 +166,17 @@ def _others(
         if settings.kind == "target_vector":
             texts.append(f"controller.proportional = {_gain(higher.scene.controller.proportional)}")
         yield _candidate(replace(higher, scene=scene), higher.scene, *texts)
+
+
+def _pushed(best: Candidate) -> Iterator[Candidate]:
+    """The same with an integral part, where the target-vector algorithm has none as fast."""
+    settings = best.scene.controller
+    integral = _INTEGRAL_PERIODS * settings.period
+    if settings.kind == "target_vector" and (settings.integral_time or math.inf) > integral:
+        pushed = replace(best.scene, controller=replace(settings, integral_time=integral))
+        text = f'controller.integral_time = "{integral:.3g} s"'
+        change = ", ".join(t for t in (text, best.change) if t)
+        yield replace(best, scene=pushed, change=change)
 
 
 def _gain(gain: float) -> str:

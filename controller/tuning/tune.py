@@ -112,7 +112,8 @@ def tune(
         told("settling times ...")
         settling = settling_times(best.scene, model, known.widths, members=members, runs=runs, told=told)
         if settling.quantiles["p95"] is None and not settling.out_of_capacity:
-            found = search(scene, model, known, base=best, told=told)
+            share = settling.settled.value
+            found = search(scene, model, known, base=best, settled=share, told=told)
             if found.best is not best:
                 best = found.best
                 told("settling times ...")

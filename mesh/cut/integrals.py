@@ -30,7 +30,7 @@ LONGEST: Final = 1 / 3
 _STEEP: Final = 0.05
 """Least over largest slope of h along the lines on which the surface is looked for."""
 _HALVINGS: Final = 30
-_NEGLIGIBLE: Final = 1e-10
+_NEGLIGIBLE: Final = 1e-12
 """Of the volume: most that a piece of wall may hold whose crossing is not looked for."""
 COLUMNS: Final = 4
 """Volume, moment along x and along y, and int h dA over the outer wall; then their derivatives by L."""
@@ -267,7 +267,7 @@ def _root(powers: FloatArray) -> FloatArray:
         low, high = np.where(value < 0, t, low), np.where(value < 0, high, t)
         step = t - value / np.where(rise > 0, rise, 1e-300)
         better = np.where((step > low) & (step < high), step, (low + high) / 2)
-        if np.all(np.abs(better - t) <= 1e-15):
+        if np.all(np.abs(better - t) <= _ROOT):
             break
         t = better
     root = np.zeros(first.shape)
@@ -275,5 +275,7 @@ def _root(powers: FloatArray) -> FloatArray:
     return root
 
 
+_ROOT: Final = 1e-12
+"""Of the side of a patch; h vanishes there, so that volumes miss its square."""
 _NEWTON_STEPS: Final = 60
 """Halvings at worst."""

@@ -7,17 +7,17 @@ at the nodes; intervals are halved until the middle of each agrees with the inte
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.mesh.cut.integrals import COLUMNS, LONGEST, Walls, integrals, walls_about
+from ringbalance.mesh.cut.integrals import COLUMNS, LONGEST, Walls, gauss, integrals, walls_about
 from ringbalance.mesh.cut.patches import split_patches, wall_patches
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
-from ringbalance.scene.chamber_file.record import ChamberGeometry
+from ringbalance.scene.chamber_file.record import ChamberGeometry, Stretch
 
 TOLERANCE: Final = 1e-9
 """Of a table between its nodes: of the whole volume and of the whole moment."""
@@ -36,9 +36,7 @@ _ROUNDS: Final = 16
 class ChamberTable:
     """One chamber; a concentric surface of radius a has L = a^2."""
 
-    patches: FloatArray
-    outer: BoolArray
-    """The walls, as `wall_patches`, small enough for the integrals."""
+    geometry: ChamberGeometry
     nodes: FloatArray
     """L, m^2, rising from the innermost to the outermost place of the chamber."""
     columns: FloatArray
@@ -51,6 +49,11 @@ class ChamberTable:
     error: FloatArray
     """Of values and slopes between two nodes, shape (8, nodes - 1): difference in the middle of the interval
     that was halved last, of which a sixteenth (slopes: an eighth) is left where the walls are smooth."""
+
+    @cached_property
+    def patches(self) -> tuple[FloatArray, BoolArray]:
+        """The walls, as `wall_patches`, small enough for the integrals."""
+        return split_patches(*wall_patches(self.geometry), longest=LONGEST)
 
     @property
     def volume(self) -> float:
@@ -123,9 +126,11 @@ def _hermite(
     return np.asarray(value), np.asarray((d0 + t * (2 * c2 + t * 3 * c3)) / width)
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=32)
 def chamber_table(geometry: ChamberGeometry) -> ChamberTable:
-    """Table of a chamber, made when it is first asked for."""
+    """Table of a chamber, made when it is first asked for; a stretched one has that of its mesh, moved."""
+    if geometry.stretch is not None:
+        return _stretched(geometry, geometry.stretch)
     patches, outer = split_patches(*wall_patches(geometry), longest=LONGEST)
     walls = walls_about(patches, outer)
     inner, outermost = _bounds(walls)
@@ -138,8 +143,7 @@ def chamber_table(geometry: ChamberGeometry) -> ChamberTable:
     start = np.linspace(inner, outermost, _START)
     nodes, columns, error = _refined(start, exact(start), exact)
     return ChamberTable(
-        patches=patches,
-        outer=outer,
+        geometry=geometry,
         nodes=nodes,
         columns=columns,
         wall_area=wall_area,
@@ -185,3 +189,41 @@ def _allowed(columns: FloatArray) -> FloatArray:
     values = TOLERANCE * np.array([size[0], moment, moment, size[3]])
     slopes = SLOPE_TOLERANCE * np.array([size[4], turning, turning, np.inf])
     return np.concatenate([values, slopes])
+
+
+def _stretched(geometry: ChamberGeometry, stretch: Stretch) -> ChamberTable:
+    """The table of a mesh that is stretched: r' = R1' + (r - R1) s, angles times k, heights times m.
+
+    The free surface at r goes to r' with k m times its area over r, which is integrated from node to node:
+    dV/dL' = k m dV/dL, and the moment's with r'/r and the sine of the turned half-angle as in a sector.
+    """
+    table = chamber_table(stretch.base)
+    before, after = stretch.before, stretch.after
+    angle, width = (after[key] / before[key] for key in ("central_angle", "axial_width"))
+    pull = (after["outer_radius"] - after["inner_radius"]) / (before["outer_radius"] - before["inner_radius"])
+
+    def moved(level: FloatArray) -> FloatArray:
+        return after["inner_radius"] + pull * (np.sqrt(level) - before["inner_radius"])
+
+    def slopes(level: FloatArray) -> FloatArray:
+        half = table.surface(np.sqrt(level))[0] / (2 * before["axial_width"])
+        turned = np.sin(angle * half) / np.sin(half) * moved(level) / np.sqrt(level)
+        one = np.ones_like(level)
+        factors = np.stack([angle * width * one, width * turned, angle * width * turned, one])
+        return np.asarray(factors * table.at(level)[1])
+
+    nodes, (places, weights) = table.nodes, gauss(4)
+    steps = np.diff(nodes)
+    within = nodes[:-1, None] + steps[:, None] * places
+    rise = 2 * moved(within) * pull / (2 * np.sqrt(within)) * steps[:, None] * weights
+    pieces = (slopes(within) * rise).sum(axis=-1)
+    values = -np.append(np.cumsum(pieces[:, ::-1], axis=1)[:, ::-1], np.zeros((COLUMNS, 1)), axis=1)
+    scale = (after["outer_radius"] / before["outer_radius"]) * angle * width
+    return replace(
+        table,
+        geometry=geometry,
+        nodes=moved(nodes) ** 2,
+        columns=np.concatenate([values, slopes(nodes)]),
+        wall_area=table.wall_area * scale,
+        wall_start=float(moved(np.array(table.wall_start)) ** 2),
+    )

@@ -16,8 +16,8 @@ from ringbalance.mesh.cut.integrals import COLUMNS, integrals, walls_about
 from ringbalance.mesh.cut.table import ChamberTable
 from ringbalance.scene.arrays import BoolArray, FloatArray
 
-_CLOSE: Final = 1e-6
-"""Of the volume: what is left is put right to first order, which leaves the square of it."""
+_CLOSE: Final = 1e-8
+"""Of the volume; what is left is put right to first order, but for the slopes by L."""
 _STEPS: Final = 12
 _WET: Final = 1e-7
 """Of the outer wall, that may look dry by rounding."""
@@ -69,7 +69,7 @@ def _deep(table: ChamberTable, fills: FloatArray, length: float) -> BoolArray:
 
 def _at_angle(table: ChamberTable, fills: FloatArray, centre: FloatArray, slope: float) -> FloatArray:
     """The eight columns of `integrals`, shape (8, n), for one direction of gravity."""
-    walls = walls_about(table.patches, table.outer, centre=centre, slope=slope)
+    walls = walls_about(*table.patches, centre=centre, slope=slope)
     wanted = fills * table.volume
     start = table.level_of(wanted)
     _, slopes = table.at(start)

@@ -31,6 +31,8 @@ def displaced_by_gravity(*, disc: Disc, density: float, gravity: float, fill_rat
     Returns: Changes of wall pressure (Pa), moment (kg m) and dU/dV' (kg/m^2), shape (3, n).
     """
     a = surface_radius(disc=disc, fill_ratio=fill_ratio)
-    reach = disc.outer_radius - a * np.cos(half_angle(disc=disc, radius=a))
+    # An imported chamber may have corners beyond the half-angle that is as large as its surface.
+    corner = half_angle(disc=disc, radius=a) if disc.geometry is None else disc.central_angle / 2
+    reach = disc.outer_radius - a * np.cos(corner)
     pressure = np.full_like(a, 2 * density * gravity * disc.outer_radius)
     return np.array([pressure, density * fill_ratio * chamber_volume(disc=disc) * reach, density * reach])

@@ -157,13 +157,11 @@ def _named(kind: str, name: str, rows: IntArray, sets: dict[str, IntArray]) -> I
     }
     if name and (name == "chamber" if solid else not _SKIPPED.fullmatch(name)):
         known[name] = np.ones(len(rows), dtype=bool)
-    weights = np.array([2.0**place for place in range(len(known))][:50])
-    code = np.zeros(len(rows))
-    for weight, inside in zip(weights, known.values(), strict=False):
-        code += weight * inside
-    for value in sorted(set(code.tolist())):
-        at = code == value
-        names = tuple(each for each, inside in known.items() if inside[at].any())
+    marks = np.array([*known.values(), np.ones(len(rows), dtype=bool)])
+    combinations, which = np.unique(marks, axis=1, return_inverse=True)
+    for place, held in enumerate(combinations[:-1].T):
+        at = which.ravel() == place
+        names = tuple(each for each, inside in zip(known, held, strict=True) if inside)
         yield Elements(kind=kind, numbers=rows[at, 0], nodes=rows[at, 1:], names=names)
 
 

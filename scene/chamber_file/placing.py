@@ -14,11 +14,12 @@ from ringbalance.scene.arrays import FloatArray, IntArray, clipped
 from ringbalance.scene.chamber_file.assembly import Body
 from ringbalance.scene.chamber_file.keys import Axis
 from ringbalance.scene.chamber_file.names import OUTER_WALL, PORT
-from ringbalance.scene.chamber_file.record import rounded
 from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.rules.check import Finding, written
 
 _DRAWING_ROUNDING: Final = 1e-5
+_DIGITS: Final = 7
+"""Of dimensions read off a mesh: rounding in a file shall not put a port just outside its wall."""
 _FRAME: Final = [0, 1, 2, -1]
 """Corners of a cell that span it; for its share of the volume."""
 _SHARES: Final = tuple(step / 32 for step in range(33))
@@ -68,6 +69,11 @@ def placed(
     }
     found = [*_about_axis(body, inner, outer, extent, where), *_walls(points, boundaries)]
     return Placed(points=points, dimensions=rounded(dimensions)), tuple(found)
+
+
+def rounded(dimensions: Mapping[str, float]) -> dict[str, float]:
+    """Dimensions to as many digits as a file's rounding leaves."""
+    return {key: float(f"{value:.{_DIGITS}g}") for key, value in dimensions.items()}
 
 
 def _turned(points: FloatArray, axis: Axis) -> FloatArray:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Final, Literal
+from typing import Literal
 
 from ringbalance.scene.arrays import FloatArray, IntArray
 
-_DIGITS: Final = 7
 CellKind = Literal["tetra", "tetra10", "hexahedron", "hexahedron20", "hexahedron27"]
 """One kind in a mesh; names and orders of nodes are meshio's."""
 
@@ -34,15 +33,19 @@ class ChamberGeometry:
     boundaries: Mapping[str, IntArray] = field(compare=False, repr=False)
     """Facets by name, shape (facets, nodes of a facet), in meshio's order; normals unspecified.  `outer_wall`
     is always there; no facet has two names."""
+    stretch: Stretch | None = field(default=None, compare=False, repr=False)
+    """How it came from the mesh of a file; None for that mesh itself."""
 
     def __str__(self) -> str:
         """The file and what it holds, for people."""
         return f"{self.file}: {len(self.cells)} {self.kind} cells, {', '.join(self.boundaries)}"
 
 
-def rounded(dimensions: Mapping[str, float]) -> dict[str, float]:
-    """Dimensions of a mesh to as many digits as a file's rounding leaves.
+@dataclass(frozen=True, kw_only=True)
+class Stretch:
+    """A mesh drawn out along radius, angle and shaft, each evenly."""
 
-    Rounding in a file shall not put a port just outside its wall.
-    """
-    return {key: float(f"{value:.{_DIGITS}g}") for key, value in dimensions.items()}
+    base: ChamberGeometry
+    before: Mapping[str, float]
+    """Dimensions of the mesh, SI, by their keys in [disc]."""
+    after: Mapping[str, float]

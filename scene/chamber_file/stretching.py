@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.scene.chamber_file.record import ChamberGeometry
+from ringbalance.scene.chamber_file.record import ChamberGeometry, Stretch
 
 STRETCHED: Final = ("outer_radius", "inner_radius", "axial_width", "central_angle")
 """Keys of [disc] that can be changed on a mesh."""
@@ -37,4 +37,6 @@ def stretched(
     points = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), z])
     points.flags.writeable = False
     digest = hashlib.sha256(f"{geometry.digest} {quantity} {value!r}".encode()).hexdigest()
-    return replace(geometry, points=points, digest=digest)
+    first = geometry.stretch or Stretch(base=geometry, before=dimensions, after=dimensions)
+    stretch = replace(first, after={**dimensions, quantity: value})
+    return replace(geometry, points=points, digest=digest, stretch=stretch)

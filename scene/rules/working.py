@@ -135,10 +135,6 @@ CHECKS: tuple[Check, ...] = (
 )
 
 
-STRETCHES = ("disc.outer_radius", "disc.axial_width")
-"""Dimensions of an imported chamber that may be uncertain: another value stretches its mesh."""
-
-
 def uncertainty_faults(reading: Reading) -> Iterator[Fault]:
     """One error for each uncertainty of a quantity that the scene lacks, or that is larger than it."""
     for key, table in UNCERTAIN_QUANTITIES.items():
@@ -146,10 +142,11 @@ def uncertainty_faults(reading: Reading) -> Iterator[Fault]:
         if not reading.known(path):
             continue
         width, relative = reading.values[path]
-        if quantity in reading.derived and quantity not in STRETCHES:
-            problem = f"{key} follows from the mesh"
-            yield reading.fault(path, problem=problem, allowed=f"{' and '.join(STRETCHES)}, which stretch it")
-        elif reading.lacks(quantity) and _may_be_unused(reading, quantity):
+        if quantity == "disc.plate_thickness" and quantity in reading.derived:
+            problem = "the mesh has the plates in its shape, and no thickness of its own"
+            yield reading.fault(path, problem=problem, allowed="central_angle's uncertainty in its place")
+            continue
+        if reading.lacks(quantity) and _may_be_unused(reading, quantity):
             problem = f"[{table}] has no {key} that could be uncertain"
             yield reading.fault(path, problem=problem, allowed=f"a scene with [{table}] {key}")
         elif (

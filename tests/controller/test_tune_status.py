@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
@@ -11,12 +12,14 @@ from ringbalance.controller.algorithms.by_name import target_vector_of
 from ringbalance.controller.ensemble.monte_carlo import binomial_share
 from ringbalance.controller.liquid_ring.reach import least_driven_fill
 from ringbalance.controller.tuning.loop_factor import loop_factor, usable_fill, with_driving_gas
-from ringbalance.controller.tuning.search import Candidate, Search
+from ringbalance.controller.tuning.recommendation import factor_uncertainty
+from ringbalance.controller.tuning.search import Candidate, Search, search
 from ringbalance.controller.tuning.settling import SettlingTimes
 from ringbalance.controller.tuning.status import status_of
 from ringbalance.controller.tuning.tune import Tuning, tune
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio
+from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.models import InputUncertainty, Scene
 
 MEMBERS = 200
@@ -90,3 +93,38 @@ def test_what_keeps_most_of_the_runs_from_settling_is_named(
         found=Search(best=best, settles=False, needs=None, limit=1e-6, tried=()),
     )
     assert words in status
+
+
+@pytest.mark.parametrize(
+    ("settles", "change"),
+    [
+        (lambda settings: settings.integral_time is not None, 'controller.integral_time = "2.5 s"'),
+        (lambda settings: settings.proportional > 1e5, 'controller.proportional = "0.128 s/um"'),
+        (
+            lambda settings: settings.integral_time is not None and settings.proportional > 1e5,
+            'controller.integral_time = "2.5 s", controller.proportional = "0.128 s/um"',
+        ),
+    ],
+)
+def test_what_settles_a_few_runs_is_recommended(
+    scene: Scene,
+    monkeypatch: pytest.MonkeyPatch,
+    settles: Callable[[ControllerSettings], bool],
+    change: str,
+) -> None:
+    """Half of the runs settle with a higher gain, which is why the integral part is tried with it too."""
+
+    def tried(asked: Scene, *_: object, **__: object) -> SettlingTimes:
+        settings = asked.controller
+        half = 0.0 if settings.proportional <= 1e5 else 0.5
+        share = binomial_share(count=8 if settles(settings) else int(8 * half), of=8)
+        return SettlingTimes(runs=8, settled=share, quantiles={"p50": 1.0, "p95": 1.0})
+
+    monkeypatch.setattr("ringbalance.controller.tuning.search.tried", tried)
+    settings = replace(scene.controller, proportional=0.08e6, integral_time=None)
+    base = Candidate(scene=replace(scene, controller=settings), change="", dead=())
+    model = paper_model(scene)
+    known = factor_uncertainty(scene, model)
+    found = search(scene, model, known, base=base, settled=0.1, told=lambda _: None)
+    assert found.settles
+    assert found.best.change == change

@@ -12,7 +12,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from ringbalance.mesh.chamber import chamber_mesh
 from ringbalance.mesh.cut.faceting import drawing_error
 from ringbalance.mesh.cut.integrals import integrals, walls_about
 from ringbalance.mesh.cut.patches import split_patches, wall_patches
@@ -29,8 +28,9 @@ from ringbalance.mesh.geometry import (
 )
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import CellKind, ChamberGeometry
+from ringbalance.scene.chamber_file.stretching import STRETCHED, stretched
 from ringbalance.scene.models import Disc
-from ringbalance.verification.reference.block_chambers import block_chamber
+from ringbalance.verification.reference.block_chambers import block_chamber, disc_chamber
 
 KINDS = get_args(CellKind)
 X0, X1, HALF, WIDTH = 0.02, 0.045, 0.02, 0.06
@@ -45,13 +45,6 @@ def box(*, kind: CellKind = "hexahedron", turned: float = 0.0) -> ChamberGeometr
         return np.stack([c * x - s * y, s * x + c * y, WIDTH * (cube[..., 2] - 0.5)], axis=-1)
 
     return block_chamber((2, 3, 2), place, kind=kind)
-
-
-def sector(disc: Disc, *, cells: tuple[int, int, int], kind: CellKind) -> ChamberGeometry:
-    """The built-in chamber of a disc, plates and all."""
-    nodes = chamber_mesh(disc=disc, surface_radius=disc.inner_radius, cells=cells)
-    places = nodes.places[:, nodes.grid]
-    return block_chamber(cells, lambda _: np.moveaxis(places, 0, -1), kind=kind)
 
 
 def in_box(a: float) -> tuple[float, float, float, float]:
@@ -79,7 +72,7 @@ def in_box(a: float) -> tuple[float, float, float, float]:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_box_holds_what_quadrature_says(kind: CellKind) -> None:
-    """The integrals' own limit: six Gauss points on graphs, and pieces of 1e-10 of the volume left alone."""
+    """The integrals' own limit: six Gauss points on graphs, and pieces of 1e-12 of the volume left alone."""
     radii = np.array([0.0201, 0.024, 0.0283, 0.033, 0.0449, 0.0455, 0.048])
     walls = walls_about(*split_patches(*wall_patches(box(kind=kind)), longest=1 / 3))
     found = integrals(walls, radii**2)[[0, 1, 4, 5]]
@@ -95,7 +88,7 @@ def test_the_built_in_chamber_as_a_mesh_is_the_closed_form_but_for_its_drawn_arc
 ) -> None:
     """An arc of angle h is drawn R (h/2)^4/32 away at most: that times its length is missing, at most."""
     cells = (3, 16, 2)
-    imported = replace(disc, geometry=sector(disc, cells=cells, kind=kind))
+    imported = replace(disc, geometry=disc_chamber(disc, cells, kind=kind))
     away = disc.outer_radius * (disc.central_angle / cells[1] / 2) ** 4 / 32
     x = np.linspace(0.05, 0.95, 7)
     a, b = surface_radius(disc=disc, fill_ratio=x), surface_radius(disc=imported, fill_ratio=x)
@@ -118,7 +111,7 @@ def test_drawn_arcs_converge(disc: Disc, kind: CellKind, order: float) -> None:
     """Chords leave (h^2/24) of R^2 for arcs of angle h, quadratic ones a part of h^4."""
     errors = []
     for angular in (6, 12, 24):
-        meshed = replace(disc, geometry=sector(disc, cells=(1, angular, 1), kind=kind))
+        meshed = replace(disc, geometry=disc_chamber(disc, (1, angular, 1), kind=kind))
         errors.append(abs(chamber_volume(disc=meshed) / chamber_volume(disc=disc) - 1))
     rates = np.log2(np.array(errors[:-1]) / errors[1:])
     np.testing.assert_allclose(rates, order, atol=0.05)
@@ -137,7 +130,7 @@ def test_turning_about_the_shaft_changes_only_the_direction_of_the_moment(
         for t in (0.0, turn)
     )
     unit = np.array([np.cos(turn), np.sin(turn)])[:, None]
-    # What pieces of 1e-10 of the volume hold differs from way of cutting to way of cutting.
+    # What pieces of 1e-12 of the volume hold differs from way of cutting to way of cutting.
     np.testing.assert_allclose(turned[0], plain[0], atol=1e-9 * plain[0].max())
     np.testing.assert_allclose(turned[1:3], unit * plain[1], atol=1e-9 * plain[1].max())
 
@@ -146,7 +139,7 @@ def test_the_table_agrees_with_the_integrals_and_falls() -> None:
     geometry = box(kind="hexahedron")
     table = chamber_table(geometry)
     levels = table.level_of(table.volume * np.linspace(0.998, 0.002, 57))
-    walls = walls_about(table.patches, table.outer)
+    walls = walls_about(*table.patches)
     found, exact = np.concatenate(table.at(levels)), integrals(walls, levels)
     size = np.abs(exact).max(axis=1)
     assert np.max(np.abs(found - exact)[:2] / size[:2, None]) < TOLERANCE
@@ -160,7 +153,7 @@ def test_the_table_agrees_with_the_integrals_and_falls() -> None:
 
 def test_the_wall_pressure_counts_the_wet_part_of_a_flat_wall(disc: Disc) -> None:
     """Of |y| <= w at x1 the part outside a is wet: mean of max(x1^2 + y^2 - a^2, 0)."""
-    flat = replace(disc, geometry=box(), axial_width=WIDTH)
+    flat = replace(disc, geometry=box(), axial_width=WIDTH, outer_radius=float(np.hypot(X1, HALF)))
     for a in (0.03, 0.047):
         first = np.sqrt(max(a * a - X1 * X1, 0.0))
         wet = quad(lambda y, a=a: X1**2 + y * y - a * a, first, HALF)[0] / HALF
@@ -170,7 +163,7 @@ def test_the_wall_pressure_counts_the_wet_part_of_a_flat_wall(disc: Disc) -> Non
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_facets_may_miss_holds_what_they_miss(disc: Disc, kind: CellKind) -> None:
     """The true chamber is known here; an interval three times too wide would say little."""
-    geometry, fills = sector(disc, cells=(2, 8, 3), kind=kind), np.linspace(0.05, 0.9, 5)
+    geometry, fills = disc_chamber(disc, (2, 8, 3), kind=kind), np.linspace(0.05, 0.9, 5)
     meshed, error = replace(disc, geometry=geometry), drawing_error(geometry, fill_ratio=fills)
     missing = abs(chamber_volume(disc=meshed) - chamber_volume(disc=disc))
     assert error.volume / 3 < missing < error.volume
@@ -191,3 +184,37 @@ def test_flat_walls_miss_nothing() -> None:
     assert drawing_error(box(kind="tetra"), fill_ratio=np.array([0.3])).volume == pytest.approx(
         TOLERANCE * (X1 - X0) * 2 * HALF * WIDTH, rel=1e-3
     )
+
+
+@pytest.mark.parametrize("quantity", ["outer_radius", "inner_radius", "axial_width", "central_angle"])
+def test_a_stretched_chamber_has_the_table_of_its_mesh_moved(disc: Disc, quantity: str) -> None:
+    """Stretched sectors stay sectors; the integrals over the moved nodes are made again for comparison."""
+    plain = replace(disc, plate_thickness=0.0)
+    geometry = disc_chamber(plain, (3, 16, 2), kind="hexahedron27")
+    dimensions = {name: getattr(plain, name) for name in STRETCHED}
+    value = 1.02 * dimensions[quantity]
+    moved = stretched(geometry, dimensions=dimensions, quantity=quantity, value=value)
+    table, fresh = (
+        chamber_table(moved),
+        chamber_table(replace(moved, digest=f"fresh {quantity}", stretch=None)),
+    )
+    volumes = fresh.volume * np.linspace(0.05, 0.95, 9)
+    assert table.volume == pytest.approx(fresh.volume, rel=1e-6)
+    # What quadratic cells draw of a stretched arc differs by R (h/2)^4/32 at most.
+    np.testing.assert_allclose(table.level_of(volumes), fresh.level_of(volumes), rtol=1e-6)
+    at = fresh.level_of(volumes)
+    np.testing.assert_allclose(table.at(at)[0][[0, 1, 3]], fresh.at(at)[0][[0, 1, 3]], rtol=3e-6)
+    np.testing.assert_allclose(table.at(at)[1][:2], fresh.at(at)[1][:2], rtol=3e-5)
+
+
+def test_a_chamber_stretched_twice_comes_from_its_own_mesh(disc: Disc) -> None:
+    geometry = disc_chamber(disc, (2, 8, 1), kind="hexahedron27")
+    dimensions = {name: getattr(disc, name) for name in STRETCHED}
+    once = stretched(geometry, dimensions=dimensions, quantity="outer_radius", value=45e-3)
+    twice = stretched(
+        once, dimensions=dimensions | {"outer_radius": 45e-3}, quantity="axial_width", value=31e-3
+    )
+    assert twice.stretch is not None
+    assert twice.stretch.base is geometry
+    volumes = [chamber_table(each).volume for each in (once, twice)]
+    assert volumes[1] == pytest.approx(volumes[0] / 2, rel=1e-12)

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_first_moment, surface_radius
 from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing, tilted_ring
 from ringbalance.scene import loop_models, models
+from ringbalance.verification.reference.block_chambers import imported
 
 
 def by_grid(
@@ -115,3 +116,25 @@ def test_the_mean_changes_with_the_square_of_gravity(angle: float, fill: float, 
     assert two.wall_pressure_ripple[0] == pytest.approx(2 * one.wall_pressure_ripple[0], rel=1e-2)
     wider = dataclasses.replace(disc, axial_width=0.12)
     assert ring(wider, tilt=small, fills=[fill]).moment[0] == pytest.approx(2 * two.moment[0], rel=1e-12)
+
+
+@pytest.mark.parametrize("shaft", ["horizontal", "vertical"])
+@pytest.mark.parametrize("tilt", [1e-4, 3e-3])
+def test_the_same_chamber_as_a_mesh_gives_the_same_ring(
+    table_1_scene: models.Scene, tilt: float, shaft: loop_models.Shaft
+) -> None:
+    """But for its drawn arcs: R (h/2)^4/32 of the wall, over the depth of the ring."""
+    disc, fills = table_1_scene.disc, [0.2, 0.4, 0.7]
+    meshed = imported(disc, cells=(3, 24, 2))
+    plain, found = (ring(each, tilt=tilt, fills=fills, shaft=shaft) for each in (disc, meshed))
+    assert np.all(plain.closed)
+    assert np.all(found.closed)
+    depth = disc.outer_radius - surface_radius(disc=disc, fill_ratio=fills)
+    drawn = 2 * disc.outer_radius * (disc.central_angle / 24 / 2) ** 4 / 32 / depth
+    for name in ("wall_pressure", "moment", "moment_per_volume"):
+        difference = np.abs(getattr(found, name) / getattr(plain, name) - 1)
+        assert np.all(difference < drawn)
+    if shaft == "horizontal":
+        for name in ("wall_pressure_ripple", "moment_ripple"):
+            size = np.max(getattr(plain, name))
+            assert np.all(np.abs(getattr(found, name) - getattr(plain, name)) < drawn.max() * size)

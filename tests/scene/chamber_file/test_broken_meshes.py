@@ -216,6 +216,13 @@ def exchanged(drawing: Drawing) -> None:
     named(drawing, "end_wall", "inner_wall")
 
 
+def pinched(drawing: Drawing) -> Drawing:
+    """Five of twelve cells, in one piece, of which two have only an edge in common."""
+    cells = drawing.cells()
+    keep = [cells[place] for place in (0, 8, 1, 3, 9)]
+    return without(drawing, *(number for number in cells if number not in keep))
+
+
 def in_part(drawing: Drawing) -> None:
     drawing.elements[drawing.cells()[0]].group = 0
 
@@ -258,6 +265,9 @@ MESHES: dict[str, Broken] = {
     ),
     "two volumes": Broken(spoilt(far_copy), ("falls into 2 separate volumes", "cell 1", "mm")),
     "touching at an edge": Broken(spoilt(two_apart), ("separate volumes",)),
+    "open along an edge": Broken(
+        spoilt(pinched, "hexahedron"), ("touches itself along edges (1): edge (nodes", "no side of any cell")
+    ),
     "three cells at a facet": Broken(
         spoilt(third_cell), ("belong to more than two cells (1): facet (nodes",)
     ),

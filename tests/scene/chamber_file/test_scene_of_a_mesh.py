@@ -55,7 +55,7 @@ def test_plates_of_a_mesh_have_no_thickness(tmp_path: Path) -> None:
         with_value(scene=scene, quantity="plate_thickness", value=1e-3)
     text = scene_text("chamber.msh", mesh_unit="mm") + '\n[uncertainty]\nplate_thickness = "0.1 mm"\n'
     (tmp_path / "my_disc.toml").write_text(text, encoding="utf-8")
-    with pytest.raises(SceneError, match=r"\[uncertainty\] plate_thickness .*follows from the mesh"):
+    with pytest.raises(SceneError, match=r"\[uncertainty\] plate_thickness .* no thickness of its own"):
         load_scene(tmp_path / "my_disc.toml")
 
 

@@ -1,6 +1,7 @@
 """Draw the example of an imported chamber: the paper's, with fillets at its plates and a gas tube inside.
 
 python tools/example_chamber.py            needs the extra cad (Gmsh); writes scenes/chamber_with_gas_tube.msh
+and, without fillets, the mesh of the case gas_tube, which compares it with closed forms.
 
 Radii, width and plates are those of scenes/liquid_ring_paper.toml.  The fillets and the tube are assumed: the
 paper draws a tube and gives no size of it.
@@ -14,7 +15,9 @@ from pathlib import Path
 
 import gmsh
 
-TARGET = Path(__file__).resolve().parents[1] / "scenes" / "chamber_with_gas_tube.msh"
+ROOT = Path(__file__).resolve().parents[1]
+EXAMPLE = ROOT / "scenes" / "chamber_with_gas_tube.msh"
+CASE = ROOT / "verification" / "cases" / "gas_tube" / "data" / "chamber.msh"
 OUTER, INNER, WIDTH, PLATE = 44.5, 20.5, 62.0, 2.777
 FILLET = 4.0
 TUBE_RADIUS, MOUTH = 2.5, 33.5
@@ -22,7 +25,7 @@ TUBE_RADIUS, MOUTH = 2.5, 33.5
 SIZE = 22.0
 
 
-def draw() -> None:
+def draw(*, fillets: bool) -> None:
     """The solid: a quarter ring between parallel strips of plate, rounded at the outer wall, less a tube."""
     occ = gmsh.model.occ
     ring = occ.cut(
@@ -35,8 +38,9 @@ def draw() -> None:
     occ.translate([(3, box)], corner, 0, 0)
     ((_, chamber),) = occ.intersect(ring, [(3, box)])[0]
     occ.synchronize()
-    occ.fillet([chamber], outer_edges(), [FILLET])
-    occ.synchronize()
+    if fillets:
+        occ.fillet([chamber], outer_edges(), [FILLET])
+        occ.synchronize()
     ((_, chamber),) = gmsh.model.getEntities(3)
     tube = occ.addCylinder(INNER - 2, 0, 0, MOUTH - INNER + 2, 0, 0, TUBE_RADIUS)
     occ.cut([(3, chamber)], [(3, tube)])
@@ -76,10 +80,16 @@ def name_of(tag: int) -> str:
 
 
 def main() -> None:
+    """Write both files."""
+    write(EXAMPLE, fillets=True)
+    write(CASE, fillets=False)
+
+
+def write(target: Path, *, fillets: bool) -> None:
     """Mesh the solid, name its faces and write the file."""
     gmsh.initialize(["gmsh"], readConfigFiles=False)
     gmsh.option.setNumber("General.Terminal", 0)
-    draw()
+    draw(fillets=fillets)
     for option, value in {
         "MeshSizeMax": SIZE,
         "MeshSizeFromCurvature": 4,
@@ -97,7 +107,7 @@ def main() -> None:
     for name, tags in faces.items():
         gmsh.model.addPhysicalGroup(2, tags, name=name)
     gmsh.model.addPhysicalGroup(3, [tag for _, tag in gmsh.model.getEntities(3)], name="chamber")
-    gmsh.write(str(TARGET))
+    gmsh.write(str(target))
     gmsh.finalize()
 
 

@@ -30,8 +30,8 @@ from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference
 
 _FILE: Final = Path(__file__).parent / "data" / "scene.toml"
-_RADIUS, _TIP = 2e-3, 31e-3
-"""Of the tube outside, and radius of its mouth, m; as tools/example_chambers.py draws them."""
+_RADIUS, _TIP = 2.5e-3, 33.5e-3
+"""Of the tube outside, and radius of its mouth, m; as tools/example_chamber.py draws them."""
 _DEEP: Final = 0.8
 """Fill ratio at which part of the tube is under the surface."""
 

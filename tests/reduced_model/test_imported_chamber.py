@@ -10,9 +10,12 @@ import pytest
 
 from ringbalance.physics import deferred
 from ringbalance.physics.pressure.imported import ImportedRing, solved_ring
+from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.chamber.calibration import calibrate_chamber
 from ringbalance.reduced_model.chamber.imported_walls import share_across
 from ringbalance.reduced_model.chamber.terms import unmodelled_fractions
+from ringbalance.reduced_model.documents import calibration_document
+from ringbalance.reduced_model.show import _summary_rows
 from ringbalance.scene.models import Scene
 from ringbalance.verification.reference.block_chambers import imported
 
@@ -73,3 +76,11 @@ def test_a_moment_across_the_middle_counts_as_uncertain(scene: Scene) -> None:
     assert np.all(np.abs(share_across(scene.disc, FILLS)) < 1e-9)
     more, less = (unmodelled_fractions(s, FILLS)["moments"] for s in (aside, scene))
     np.testing.assert_allclose(more - less, np.tan(np.radians(2.0)), atol=1e-4)
+
+
+def test_the_angle_of_the_moment_is_reported(scene: Scene) -> None:
+    calibration = calibrate(turned(scene, np.radians(2.0)))
+    told = calibration_document(calibration)["chamber"]["moment_angle_rad"]
+    np.testing.assert_allclose(told, np.radians(2.0), rtol=1e-5)
+    rows = dict(_summary_rows(calibration))
+    assert rows["direction"].startswith("moment 2 deg from the middle")

@@ -67,6 +67,7 @@ class Rival:
         lift = lift_of(scene, law=model.flow)
         assert lift is not None
         self.entrance, self.span = lift.entrance, crest_span(scene.tube)
+        self.risen = self.span[0]
         self.hold_up = model.tube_area * scene.tube.length / model.chamber_volume
 
     def gas_flow(self, p: float, outside: float) -> float:
@@ -104,15 +105,28 @@ class Rival:
         return min(float(full), (margin - upper) / (rho * self.upstream))
 
     def lift(self, y: Y, begun: float) -> float:
-        """Acceleration of liquid that the gas has to lift along the crest's circle first."""
+        """Acceleration of liquid that the gas has to lift to the crest's end first."""
         place = self.place(y, begun)
         loss = self.law.density * math.exp(float(self.hump_head(math.log(max(y[1], 1e-12)))))
         loss *= self.entrance + (1 - self.entrance) * place / self.span[1]
-        return (self.margins(y)[1] - loss) / (self.law.density * place * self.scene.tube.length)
+        out = max(1 - place / self.span[0], 0.0)
+        height = (float(self.crest.column_pressure) - self.law.path.port_pressure) * out**2
+        return (self.margins(y)[1] + height - loss) / (self.law.density * place * self.scene.tube.length)
 
     def place(self, y: Y, begun: float) -> float:
         """Fraction of the path that liquid has filled since the chamber's fill was `begun`."""
-        return self.span[0] + float(begun - y[0]) / self.hold_up
+        return self.risen + float(begun - y[0]) / self.hold_up
+
+    def set_out(self, y: Y) -> None:
+        """Front and velocity of a leg that has risen with the gas: y'' = A y^2 + B t, from the balance on."""
+        volume = (1 - y[0]) * self.model.chamber_volume
+        rate = self.gas_flow(y[2], self.ambient + self.scene.gas.pressure) / volume
+        leg = self.span[0] * self.scene.tube.length
+        b = rate / (self.law.density * leg)
+        path = self.law.path
+        a = (float(self.crest.column_pressure) - path.port_pressure) / (self.law.density * leg**3)
+        self.risen = self.span[0] - 0.54956 * (b**2 / a**3) ** 0.2 / self.scene.tube.length
+        y[1] = 0.62435 * (b**3 / a**2) ** 0.2
 
     def rates(self, y: Y, *, is_open: bool, stage: int, primed: bool, begun: float) -> list[float]:
         x, u, p, q = y
@@ -137,7 +151,9 @@ class Rival:
                 now = (is_open, stage, primed, begun)
                 y, spent, stage, primed = self.phase(y, left, now, method, tolerance)
                 left -= spent
-                begun = float(y[0]) if stage == LIFTS and now[1] == RESTS else begun
+                if stage == LIFTS and now[1] == RESTS:
+                    begun = float(y[0])
+                    self.set_out(y)
         return float(y[0])
 
     def phase(

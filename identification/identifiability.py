@@ -36,9 +36,11 @@ FACTOR: Final = math.log(2)
 """Half-width of t up to which a parameter without a prior is identified."""
 _ALIKE: Final = 2.0
 """Ratio of standard deviations up to which whole exponents serve as well as the best ones."""
-_ROUNDED: Final = 0.05
-"""Part of the largest exponent by which whole ones may differ: that of a velocity also falls as liquid
-starts to move, and as the fills change."""
+_ROUNDED: Final = 0.12
+"""Part of the largest exponent by which whole ones may differ: that of a velocity changes as the fills do,
+and as liquid has to be lifted first, by a fifth of a short injection."""
+_SIGN: Final = 0.05
+"""Part of the largest exponent from which one decides the sign of all."""
 _UNSEEN: Final = 1e-9
 """In place of a singular value or a norm of zero."""
 _WHOLE: Final = 3
@@ -188,12 +190,12 @@ def _echelon(rows: FloatArray) -> FloatArray:
 def _simple(row: FloatArray, root: FloatArray) -> FloatArray:
     """Whole exponents where they are near or the data identify them as well, else two decimals."""
     best, row = _width(row, root), row / np.max(np.abs(row))
-    row = row * np.sign(row[np.flatnonzero(np.abs(row) > _ROUNDED)[0]])
-    for largest in range(1, _WHOLE + 1):
-        whole = np.round(row * largest)
-        near = bool(np.max(np.abs(whole / largest - row)) < _ROUNDED)
-        if near or _width(whole, root) <= _ALIKE * best:
-            return np.asarray(whole / np.gcd.reduce(whole.astype(np.int64)))
+    row = row * np.sign(row[np.flatnonzero(np.abs(row) > _SIGN)[0]])
+    wholes = [(largest, np.round(row * largest)) for largest in range(1, _WHOLE + 1)]
+    near = [whole for largest, whole in wholes if np.max(np.abs(whole / largest - row)) < _ROUNDED]
+    alike = [whole for _, whole in wholes if _width(whole, root) <= _ALIKE * best]
+    for whole in (*near, *alike):
+        return np.asarray(whole / np.gcd.reduce(whole.astype(np.int64)))
     return np.asarray(np.round(row, 2))
 
 

@@ -2,9 +2,9 @@
 
 Each cause of k's uncertainty is a random function of Re, of two parts (`with_errors`).  What clears the crest
 and the pressure of the cavity there are known within the spans of `reduced_model.tube.regime`.  The start of
-the flow has no measurements to compare with: the column's inertia, the liquid that is lifted to the crest, a
-valve that does not open as fast as it closes, what runs back afterwards.  Each is a part of the time L/u in
-which the flow passes the tube once, which is taken for their expanded uncertainty (95 %).
+the flow has no measurements to compare with: the column's inertia, a valve that does not open as fast as it
+closes, and to which side liquid runs that stands on the crest when the gas is shut, up to half of the tube.
+The time L/2u in which the flow passes that half is taken for their expanded uncertainty (95 %).
 """
 
 from __future__ import annotations

@@ -37,6 +37,9 @@ _FLAT: Final = 1e-9
 _FOLDED: Final = 0.05
 """Least Jacobian of a cell after moves, over that before."""
 
+_HALVINGS: Final = 6
+"""Of a move that folds a cell, before it is given up."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Level:
@@ -294,7 +297,7 @@ def _joined(
 
 
 def _on_surface(body: Tetrahedra, level: Level) -> Tetrahedra:
-    """Mid-nodes of the free surface moved onto it along the walls, but for those that would fold a cell."""
+    """Mid-nodes of the free surface moved onto it along the walls, as far as no cell folds."""
     free = body.names.index(FREE_SURFACE)
     walls = replace(body, faces=np.where(body.faces == free, -1, body.faces))
     surface = np.concatenate(
@@ -305,11 +308,13 @@ def _on_surface(body: Tetrahedra, level: Level) -> Tetrahedra:
     for _ in range(3):
         moved[surface] += _move(level, moved[surface], tangents)
     before = jacobians(body)
-    for _ in range(10):
+    for attempt in range(10):
         result = replace(body, nodes=moved)
         folded = jacobians(result).min(axis=1) < _FOLDED * before.min(axis=1)
         if not folded.any():
             break
-        straight = body.cells[folded]
-        moved[straight] = body.nodes[straight]
+        back = np.unique(body.cells[folded])
+        moved[back] = body.nodes[back] + (0.5 if attempt < _HALVINGS else 0.0) * (
+            moved[back] - body.nodes[back]
+        )
     return result

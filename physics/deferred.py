@@ -13,6 +13,7 @@ _HOME: Final = MappingProxyType(
     {
         "factorised": "ringbalance.physics.pressure.sparse",
         "multigrid": "ringbalance.physics.pressure.multigrid",
+        "reduced_waves": "ringbalance.physics.sloshing.body",
         "sloshing_response": "ringbalance.physics.sloshing.response",
         "solved_ring": "ringbalance.physics.pressure.imported",
         "nnls": "scipy.optimize",

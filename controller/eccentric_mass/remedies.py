@@ -33,6 +33,8 @@ _LONGEST_STEPS: Final = 2_000
 """Steps in which a covariance is worked out; with fewer than the filter takes, each carries less noise."""
 _ATTAINED: Final = 0.3
 """Share of what a gate allows that a filter should come down to when its walks are lowered."""
+_ROUNDED: Final = 1.01
+"""Times a value that a remedy has already come to, with its three digits: it is not advised again."""
 _MARGIN: Final = 1.5
 _TRIALS: Final = 40
 """Of fine tuning that a longer time should allow."""
@@ -77,13 +79,22 @@ def expected_deviation(scene: EccentricScene, *, speed: float, duration: float |
 def friction_floor(scene: EccentricScene, *, speed: float) -> float:
     """Standard deviation, m, that a friction arm's estimate keeps for ever.
 
-    sqrt(s_mu s_w (J + J_add)/(b W^2)) with the walks of arm and rate: Riccati's equation of both, sensors
-    perfect.
+    P = s_mu sqrt(s_w^2 + 2 c s_mu r)/c with c = b W^2/(J + J_add), the walks of arm and rate and the density
+    r of the encoder's noise: Riccati's equation of both.
     """
-    told, track = scene.friction_filter, track_model(scene)
+    told = scene.friction_filter
     if speed == 0:
         return math.inf
-    return math.sqrt(told.friction_walk * told.rate_walk * track.inertia / (track.moment * speed**2))
+    c, r = _friction_sight(scene, speed=speed)
+    return math.sqrt(
+        told.friction_walk * math.hypot(told.rate_walk, math.sqrt(2 * c * told.friction_walk * r)) / c
+    )
+
+
+def _friction_sight(scene: EccentricScene, *, speed: float) -> tuple[float, float]:
+    """Rate of a mass per second and metre of friction arm, and density of the noise on it, rad/s^0.5."""
+    told, track = scene.friction_filter, track_model(scene)
+    return track.moment * speed**2 / track.inertia, told.rate_noise * math.sqrt(told.step)
 
 
 def _friction_allowed(scene: EccentricScene, *, arm: float, speed: float) -> float:
@@ -147,15 +158,23 @@ def _friction_remedy(scene: EccentricScene, *, arm: float, speed: float) -> Reme
     """A slower walk of the rate if the filter's own floor is above the gate; else more time, and a wider
     gate.
     """
-    floor, allowed = friction_floor(scene, speed=speed), _friction_allowed(scene, arm=arm, speed=speed)
-    told = scene.friction_filter
-    if floor > _ATTAINED * allowed:
-        return _remedy(
-            scene, ("friction_filter.rate_walk", told.rate_walk * (_ATTAINED * allowed / floor) ** 2)
-        )
+    target = _ATTAINED * _friction_allowed(scene, arm=arm, speed=speed)
+    if friction_floor(scene, speed=speed) > _ROUNDED * target:
+        return _remedy(scene, *_slower_walks(scene, target, speed=speed))
     longer = 4 * scene.supervisor.friction_time
     total = scene.run.time_limit + longer
     return _remedy(scene, ("supervisor.friction_time", longer), (_TIME, total))
+
+
+def _slower_walks(scene: EccentricScene, target: float, *, speed: float) -> list[tuple[str, float]]:
+    """Walks with which the floor is the target, m; that of the arm only where noise alone is above it."""
+    told, (c, r) = scene.friction_filter, _friction_sight(scene, speed=speed)
+    # Without a walk of the rate P = s_mu^1.5 sqrt(2 r/c); half of that walk leaves room for the other one.
+    most = (target**2 / math.sqrt(2 * r / c)) ** (2 / 3) / 2 if r > 0 else math.inf
+    arm = min(told.friction_walk, most)
+    rate = math.sqrt((target**2 * c / arm) ** 2 - 2 * c * arm * r)
+    changes = [("friction_filter.rate_walk", rate)] if rate < told.rate_walk else []
+    return changes if arm == told.friction_walk else [*changes, ("friction_filter.friction_walk", arm)]
 
 
 def _gain_remedy(scene: EccentricScene) -> Remedy | None:
@@ -202,6 +221,7 @@ _UNITS: Final = {
     "friction_filter.pair_gain": ("V/rad", 1.0),
     "friction_filter.drive_speed": ("rpm", 2 * math.pi / 60),
     "friction_filter.rate_walk": ("rad/s", 1.0),
+    "friction_filter.friction_walk": ("mm", 1e-3),
     "friction_filter.gate": ("%", 0.01),
     "imbalance_filter.gate": ("%", 0.01),
     "supervisor.limit": ("mm", 1e-3),

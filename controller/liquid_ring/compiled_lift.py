@@ -15,6 +15,7 @@ liquid is lifted the fill of the state is that of the chamber alone; `shown` is 
 from __future__ import annotations
 
 import math
+from typing import Final
 
 from ringbalance.controller.compilation.compiled import in_place, inlined
 from ringbalance.controller.liquid_ring.compiled_column import (
@@ -27,8 +28,12 @@ from ringbalance.controller.liquid_ring.compiled_column import (
     quasi_steady,
     tube_loss,
 )
-from ringbalance.controller.liquid_ring.compiled_gas import gas_volume
-from ringbalance.controller.liquid_ring.records import P, Record, X
+from ringbalance.controller.liquid_ring.compiled_gas import gas_volume, line_rates
+from ringbalance.controller.liquid_ring.records import P, Record, U, X
+
+_BEHIND: Final = 0.54956
+_ARRIVES: Final = 0.62435
+"""Of y'' = y^2 + t with y = -sqrt(-t) long before: -y and y' at t = 0."""
 
 
 @inlined
@@ -130,23 +135,26 @@ def lift_push(plant: Record, motion: Record, x: float, p: float, q: float) -> fl
 
 @in_place
 def set_out(plant: Record, motion: Record) -> None:
-    """Where the front of liquid that begins to move stands; a primed tube has none."""
+    """Where the front of liquid that begins to move stands, and its velocity; a primed tube has none."""
     direction = motion.direction
     if not plant.lifts or motion.primed:
         motion.lifting, motion.front, motion.side = 0, crest_stop(plant, direction), direction
         return
     if motion.side != direction:
-        motion.front, motion.side = _resting_front(plant, motion), direction
+        motion.front, speed = _first_front(plant, motion)
+        motion.side = direction
+        if plant.inertia:
+            motion.state[U] = direction * speed
     motion.lifting = 1 if motion.front < crest_stop(plant, direction) else 0
 
 
 @in_place
-def _resting_front(plant: Record, motion: Record) -> float:
-    """Fraction of the path where the leg stands as flow over the crest becomes possible.
+def _first_front(plant: Record, motion: Record) -> tuple[float, float]:
+    """Fraction of the path where the leg stands as flow over the crest becomes possible, and velocity, m/s.
 
-    At the level under a gas that is there at once; at the crest's start under one that a line fills slowly.
-    Between them as far as a rising pressure moves a leg of constant length: p t^2/(6 rho s L), t the time of
-    the line while choked.
+    At the level under a gas that is there at once.  Under one that a line fills slowly the leg has risen with
+    it, `_risen`.  Between them as far as a rising pressure moves a leg of constant length: p t^2/(6 rho s L),
+    t the time of the line while choked.
     """
     direction, x = motion.direction, motion.state[X]
     own = x if direction > 0 else plant.total - x
@@ -158,8 +166,34 @@ def _resting_front(plant: Record, motion: Record) -> float:
     # An entrance has the inertia of about a bore's length.
     level = max(start * (1.0 - 2.0 * part / root), math.sqrt(4.0 / math.pi * plant.tube_area) / plant.length)
     if not plant.line:
-        return float(level)
-    pressure = motion.state[P if direction > 0 else P + 1] - plant.ambient_pressure
-    time = pressure * gas_volume(plant, own) / (plant.passing * (plant.gas_pressure + plant.ambient_pressure))
-    way = pressure * time * time / (6.0 * plant.density * level * plant.length)
-    return float(max(min(level + way / plant.length, start), level))
+        return level, 0.0
+    chamber = 0 if direction > 0 else 1
+    pressure, content = motion.state[P + chamber], motion.state[P + 2 + chamber]
+    volume = gas_volume(plant, own)
+    gauge = pressure - plant.ambient_pressure
+    time = gauge * volume / (plant.passing * (plant.gas_pressure + plant.ambient_pressure))
+    way = gauge * time * time / (6.0 * plant.density * level * plant.length)
+    rate = line_rates(plant, pressure, content, volume, 0.0, True)[0]
+    place, speed = _risen(plant, start, tall, max(rate, 0.0))
+    if level + way / plant.length < place:
+        return level + way / plant.length, 0.0
+    return max(place, level), speed
+
+
+@inlined
+def _risen(plant: Record, start: float, tall: float, rate: float) -> tuple[float, float]:
+    """Front and velocity of a leg that has followed a pressure rising at a rate, as that reaches the crest's.
+
+    A leg that touches the crest's circle has no stiffness there: with y the way to the crest's start,
+    y'' = A y^2 + B t, whose solution that follows the balance y = -sqrt(-B t/A) passes t = 0 at
+    -0.5496 (B^2/A^3)^(1/5) with 0.6243 (B^3/A^2)^(1/5).  A straight leg follows its balance.
+    """
+    length = start * plant.length
+    if not plant.inertia or rate == 0.0:
+        return start, 0.0
+    if plant.lift_straight > 0.0:
+        return start, rate * length / (tall * plant.lift_straight)
+    mass = plant.density * length
+    stiff, rising = tall / (mass * length * length), rate / mass
+    behind = _BEHIND * (rising**2 / stiff**3) ** 0.2
+    return start - behind / plant.length, _ARRIVES * (rising**3 / stiff**2) ** 0.2

@@ -1,8 +1,9 @@
 """The device of a scene as predictions take it: its law, and the fills that injections leave behind.
 
 The law is the calibrated one without finite elements and uncertainties; injections run through the closed
-loop's own equations of motion, with the liquid's mass always and the gas line and the lag of the valve where
-the scene gives them.  Which models serve the scene is decided once, so that a prediction is smooth in values.
+loop's own equations of motion, with the liquid's mass and its way up to the crest always, and the gas line
+and the lag of the valve where the scene gives them.  Which models serve the scene is decided once, so that a
+prediction is smooth in values.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from ringbalance.reduced_model.chamber.range import mean_gravity
 from ringbalance.reduced_model.law.building import nominal_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.model import balancer_model
-from ringbalance.reduced_model.selection.estimates import FILLING, INERTIA, LAG
+from ringbalance.reduced_model.selection.estimates import FILLING, HELD, INERTIA, LAG
 from ringbalance.reduced_model.selection.tube_terms import tube_models
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
@@ -92,7 +93,7 @@ class Device:
     def _plant(self) -> npt.NDArray[np.void]:
         gas = self.scene.gas
         line = gas.conductance is not None and gas.critical_ratio is not None
-        terms = [INERTIA, *([FILLING] if line else []), *([LAG] if gas.valve_lag is not None else [])]
+        terms = [INERTIA, HELD, *([FILLING] if line else []), *([LAG] if gas.valve_lag is not None else [])]
         dynamics = known_dynamics(scene=self.scene, model=balancer_model(self.law), modelled=terms)
         if dynamics is None:
             raise ValueError("the calibrated law has a column in the tube")
@@ -100,9 +101,9 @@ class Device:
 
     @cached_property
     def _delay(self) -> float:
-        """By which the flow starts late, s: its error (95 %) is L/u at equal fills."""
-        error = self.scene.tube.models.error(START_ERROR) / NORMAL_95
-        return error * self.scene.tube.length / velocity if (velocity := self.models.velocity) else 0.0
+        """By which the flow starts late, s: its error (95 %) is L/2u at equal fills."""
+        length = self.scene.tube.models.error(START_ERROR) / NORMAL_95 * self.scene.tube.length / 2
+        return length / velocity if (velocity := self.models.velocity) else 0.0
 
     @cached_property
     def _kept(self) -> dict[int, tuple[Observations, FloatArray]]:

@@ -106,7 +106,8 @@ class ChamberTable:
             if np.all(np.abs(better - level) <= 1e-16 * self.nodes[-1]):
                 break
             level = better
-        return np.asarray(level, dtype=np.float64)
+        level = np.where(wanted <= 0, self.nodes[-1], level)
+        return np.where(wanted >= self.volume, self.nodes[0], level)
 
 
 _NEWTON_STEPS: Final = 60
@@ -142,6 +143,7 @@ def chamber_table(geometry: ChamberGeometry) -> ChamberTable:
 
     start = np.linspace(inner, outermost, _START)
     nodes, columns, error = _refined(start, exact(start), exact)
+    columns[:COLUMNS, -1] = 0.0  # no liquid, but for rounding
     return ChamberTable(
         geometry=geometry,
         nodes=nodes,

@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from ringbalance.mesh.cut.faceting import SAFETY, faceting
 from ringbalance.mesh.liquid_body import FREE_SURFACE, Level, liquid_body
 from ringbalance.mesh.quadratic_tetrahedra import Tetrahedra, tetrahedra
 from ringbalance.physics.pressure.linear import LinearSolution, solve_linear
@@ -91,7 +92,7 @@ def solved_ring(
     linear = solve_on(space, liquid.problem())
     exact = density * angular_velocity**2 * body.level.value(space.body.nodes) + gas_pressure
     status = _NO_RING if no_ring else (status if linear.status.ok else linear.status)
-    return _ring(space, linear, exact, density, angular_velocity, status)
+    return _ring(geometry, space, linear, exact, density, angular_velocity, status)
 
 
 _NO_RING: Final = Status(
@@ -164,6 +165,7 @@ def _flux(problem: PressureProblem, facets: Facets) -> FloatArray:
 
 
 def _ring(
+    geometry: ChamberGeometry,
     space: TetrahedronSpace,
     linear: LinearSolution,
     exact: FloatArray,
@@ -172,15 +174,14 @@ def _ring(
     status: Status,
 ) -> ImportedRing:
     walls = {name: space.facets(name) for name in space.boundaries if name != FREE_SURFACE}
-    force = density * angular_velocity**2
-    loads = {name: _load(facets, linear.values, exact, force) for name, facets in walls.items()}
+    # What the facets of the outer wall leave of r^2 there stands for the other walls, too.
+    doubt = density * angular_velocity**2 / 2 * SAFETY * faceting(geometry).wall
+    loads = {name: _load(facets, linear.values, exact, doubt) for name, facets in walls.items()}
     wall = walls[WALL]
     mean, still = (_mean(wall, values) for values in (linear.values, exact))
     weights = space.weights
     return ImportedRing(
-        wall_pressure=Estimate(
-            value=np.array(mean), uncertainty=np.array(abs(mean - still) + _facet_pressure(wall, force))
-        ),
+        wall_pressure=Estimate(value=np.array(mean), uncertainty=np.array(abs(mean - still) + doubt)),
         loads=loads,
         volume=float(weights.sum()),
         first_moment=density * weights @ space.points,
@@ -194,17 +195,12 @@ def _mean(facets: Facets, nodal: FloatArray) -> float:
     return float(np.sum(weights * facets.at_points(nodal)) / weights.sum())
 
 
-def _facet_pressure(facets: Facets, force: float) -> float:
-    """Pressure over the depth between facets and a smooth wall, Pa."""
-    outer = float(np.hypot(facets.points[..., 0], facets.points[..., 1]).max())
-    return force * outer * facets.depth_to_smooth()
-
-
-def _load(facets: Facets, nodal: FloatArray, exact: FloatArray, force: float) -> BoundaryLoad:
+def _load(facets: Facets, nodal: FloatArray, exact: FloatArray, doubt: float) -> BoundaryLoad:
+    """With a doubt of the pressure by the walls' facets, Pa."""
     found, still = (_resultants(facets, values) for values in (nodal, exact))
     area = float(facets.weights.sum())
     reach = float(np.linalg.norm(facets.points, axis=-1).max())
-    facet = _facet_pressure(facets, force) * area * np.array([[1.0], [reach]])
+    facet = doubt * area * np.array([[1.0], [reach]])
     estimates = [
         Estimate(value=value, uncertainty=np.abs(value - other) + extra)
         for value, other, extra in zip(found, still, facet, strict=True)

@@ -40,11 +40,6 @@ def _facet_weights() -> FloatArray:
 
 
 _FACET_WEIGHTS: Final = _facet_weights()
-_SIDE_SLOPES: Final = slopes(np.array([[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]]))
-_SAFETY: Final = 1.5
-"""On the depth: facets at the rim of a wall have a neighbour on one side only."""
-_SMOOTH: Final = np.pi / 6
-"""Angle between neighbouring facets up to which they are taken for one smooth wall, rad."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,17 +52,8 @@ class Facets:
     """Shape functions at the points, shape (points, 6)."""
     points: FloatArray
     """m, shape (facets, points, 3)."""
-    places: FloatArray
-    """Of all nodes of the body, m."""
     area: FloatArray
     """Outward normal times weight, m^2, shape (facets, points, 3)."""
-
-    @property
-    def normals_at_sides(self) -> FloatArray:
-        """Outward unit normals in the middle of the three sides, shape (facets, 3, 3)."""
-        tangent = np.einsum("enx,pna->epxa", self.places[self.nodes], _SIDE_SLOPES)
-        normal = np.cross(tangent[..., 0], tangent[..., 1])
-        return np.asarray(normal / np.linalg.norm(normal, axis=-1, keepdims=True))
 
     @property
     def weights(self) -> FloatArray:
@@ -86,29 +72,6 @@ class Facets:
         rows = np.repeat(self.nodes, 6, axis=1).ravel()
         columns = np.tile(self.nodes, (1, 6)).ravel()
         return csr_matrix((local.ravel(), (rows, columns)), shape=(unknowns, unknowns))
-
-    def depth_to_smooth(self) -> float:
-        """Mean depth between these facets and the smooth wall that they may stand for, m.
-
-        Where two facets meet at an angle below `_SMOOTH` they are taken as chords of one arc: a chord h that
-        turns by an angle b leaves h b / 12 on average, here with a factor of safety.  Curved facets meet at
-        far smaller angles.
-        """
-        corners = self.nodes[:, :3]
-        sides = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1), axis=-1).reshape(-1, 2)
-        order = np.lexsort(sides.T)
-        same = np.flatnonzero((sides[order][1:] == sides[order][:-1]).all(axis=1))
-        first, second = order[same], order[same + 1]
-        normals = self.normals_at_sides.reshape(-1, 3)
-        cosine = np.einsum("ni,ni->n", normals[first], normals[second])
-        angle = np.arccos(np.clip(cosine, -1.0, 1.0))
-        turn = np.zeros(len(sides))
-        turn[first] = turn[second] = np.where(angle < _SMOOTH, angle, 0.0)
-        area = np.repeat(self.weights.sum(axis=1), 3)
-        ends = self.places[corners]
-        height = 2 * area / np.linalg.norm(np.roll(ends, -1, axis=1) - ends, axis=2).ravel()
-        depth = _SAFETY * (turn * height / 12).reshape(-1, 3).max(axis=1)
-        return float(np.sum(self.weights.sum(axis=1) * depth) / self.weights.sum())
 
     def at_points(self, nodal: FloatArray) -> FloatArray:
         """Values at the points of a field given at the nodes."""
@@ -150,6 +113,10 @@ class TetrahedronSpace:
         return np.asarray(
             np.einsum("pn,enx->epx", shapes(_CELL_POINTS), self.body.nodes[self.body.cells])
         ).reshape(-1, 3)
+
+    def at_points(self, nodal: FloatArray) -> FloatArray:
+        """Values at the quadrature points of a field given at the nodes."""
+        return np.asarray(nodal[self.body.cells] @ shapes(_CELL_POINTS).T).ravel()
 
     @cached_property
     def gradient(self) -> csr_matrix:
@@ -201,7 +168,6 @@ class TetrahedronSpace:
             nodes=nodes,
             values=values,
             points=np.einsum("pn,enx->epx", values, places),
-            places=self.body.nodes,
             area=area,
         )
 

@@ -84,6 +84,8 @@ class ReducedWaves:
     """Number of fields up to each level; the first are potentials."""
     squared_errors: FloatArray
     """Of the gradient of each potential, relative, estimated on its own mesh."""
+    left_out: float
+    """Largest squared part of a field's Coriolis force that was taken for the mesh's error."""
     displacement: FloatArray
     """Rows that take c to n . xi at the nodes of the surface, shape (nodes, n)."""
     quasi_static: ComplexArray
@@ -111,12 +113,15 @@ def reduced_waves(
     waves = _potentials(fields, potentials)
     errors = _squared_errors(space, space.gradient @ waves)
     resolved = errors < _ROUGH
-    first = fields.new_directions(fields.gradient @ waves[:, resolved], [], _NOISE)
+    first, _ = fields.new_directions(fields.gradient @ waves[:, resolved], [], _NOISE)
     plane = fields.gradient @ fields.harmonic(_plane_functions(space.body.nodes))
-    blocks = [np.concatenate([first, fields.new_directions(plane, [first], _SMALL)], axis=1)]
+    blocks = [np.concatenate([first, fields.new_directions(plane, [first], _SMALL)[0]], axis=1)]
+    left_out = []
     for _ in range(levels):
-        blocks.append(fields.new_directions(fields.coriolis_part(blocks[-1]), blocks, _NOISE))
-    return _assembled(fields, wall, blocks, errors[resolved])
+        block, least = fields.new_directions(fields.coriolis_part(blocks[-1]), blocks, _NOISE)
+        blocks.append(block)
+        left_out.append(least)
+    return _assembled(fields, wall, blocks, errors[resolved], max(left_out))
 
 
 def _plane_functions(places: FloatArray) -> FloatArray:
@@ -149,7 +154,9 @@ def _potentials(fields: Fields, count: int) -> FloatArray:
     return np.asarray(waves @ np.linalg.solve(lower.T, axes[:, ::-1]))
 
 
-def _assembled(fields: Fields, wall: str, blocks: list[FloatArray], errors: FloatArray) -> ReducedWaves:
+def _assembled(
+    fields: Fields, wall: str, blocks: list[FloatArray], errors: FloatArray, left_out: float
+) -> ReducedWaves:
     surface, rows = fields.surface, fields.body_rows
     coriolis = np.block([[fields.products(left, turn(right)) for right in blocks] for left in blocks])
     sides = np.concatenate([block[rows:] for block in blocks], axis=1)
@@ -166,6 +173,7 @@ def _assembled(fields: Fields, wall: str, blocks: list[FloatArray], errors: Floa
         outflow=moments @ flux,
         levels=tuple(int(n) for n in np.cumsum([block.shape[1] for block in blocks])),
         squared_errors=errors,
+        left_out=left_out,
         displacement=over / np.linalg.norm(fields.level.gradient(places), axis=1)[:, None],
         quasi_static=_quasi_static(fields),
         wall=_wall_mean(fields, wall, blocks, over),

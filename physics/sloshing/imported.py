@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from ringbalance.mesh.liquid_body import Level, liquid_body
+from ringbalance.mesh.cut.faceting import SAFETY, faceting
+from ringbalance.mesh.liquid_body import FREE_SURFACE, Level, liquid_body
 from ringbalance.mesh.quadratic_tetrahedra import tetrahedra
+from ringbalance.physics import deferred
 from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
 from ringbalance.physics.results import Estimate, Statistics, Status, StatusCode
-from ringbalance.physics.sloshing.body import ReducedWaves, reduced_waves
 from ringbalance.physics.sloshing.range import SMALL
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import ChamberGeometry
+
+if TYPE_CHECKING:
+    from ringbalance.physics.sloshing.body import ReducedWaves
 
 WALL: Final = "outer_wall"
 LEVELS: Final = 2
@@ -56,14 +60,14 @@ class RingWaves:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _System:
+class WaveSystem:
     """What one surface in one chamber gives, whatever the speed."""
 
     reduced: ReducedWaves
     scale: float
     """Largest distance of the liquid from the shaft, m."""
     faceting: float
-    """Relative error of a frequency by the facets of the wall."""
+    """Relative error of a frequency by the facets of the wall, and where the mesh leaves the free surface."""
     unknowns: int
 
 
@@ -90,8 +94,8 @@ def ring_waves(
         gravity: across the shaft, m/s^2: turns in the disc's frame.
         axial_gravity: along the shaft, m/s^2: shapes the surface and excites no wave.
         frequency_ratio: s of the force, above 0; 1 for gravity.
-        modes: number of frequencies, 1 to 12; fewer come back where a coarse mesh does not tell waves of the
-            surface from inertial ones.
+        modes: number of frequencies, 1 to 12; where a coarse mesh does not tell waves of the surface from
+            inertial ones, some of the latter are among them.
         levels: of the Coriolis force, 2 or more; the change from the last one is part of the uncertainty.
     Returns: RingWaves.  Status NO_RING where gravity exceeds omega^2 a, OUT_OF_RANGE where waves would not be
         small, NOT_CONVERGED where a linear solve failed.
@@ -101,13 +105,14 @@ def ring_waves(
     """
     _check(angular_velocity, kinematic_viscosity, gravity, frequency_ratio, modes, levels)
     tilt = -axial_gravity / angular_velocity**2
-    system = _system(geometry, surface_radius, tilt, modes, levels)
+    system = wave_system(geometry, surface_radius, tilt, modes, levels)
     ekman = kinematic_viscosity / (abs(angular_velocity) * system.scale**2)
-    values, shares, widths = _frequencies(system, modes)
+    values, shares, widths = frequencies(system, modes)
     counts = system.reduced.levels[-2:]
-    before, last = (np.array(_answer(system.reduced, n, frequency_ratio, ekman)) for n in counts)
+    before, last = (np.array(answer(system.reduced, n, frequency_ratio, ekman)) for n in counts)
     scale = gravity / angular_velocity**2
-    change = _SAFETY * np.abs(last - before) + last * (system.faceting + system.reduced.squared_errors[0])
+    relative = system.faceting + system.reduced.squared_errors[0] + system.reduced.left_out
+    change = _SAFETY * np.abs(last - before) + relative * last
     amplitude = Estimate(value=np.array(scale * last[2]), uncertainty=np.array(scale * change[2]))
     return RingWaves(
         surface_radius=surface_radius,
@@ -133,30 +138,43 @@ def _check(omega: float, viscosity: float, gravity: float, ratio: float, modes: 
         raise ValueError("modes must be 1 to 12, and levels at least 2")
 
 
-@lru_cache(maxsize=16)
-def _system(geometry: ChamberGeometry, radius: float, tilt: float, modes: int, levels: int) -> _System:
+@lru_cache(maxsize=32)
+def wave_system(geometry: ChamberGeometry, radius: float, tilt: float, modes: int, levels: int) -> WaveSystem:
+    """The waves' small problem below a surface of this radius, m; `tilt`: gravity along z over omega^2, m."""
     body = liquid_body(tetrahedra(geometry), Level(constant=radius**2 / 2, tilt=(0.0, 0.0, tilt)))
     scale = float(np.hypot(*body.nodes[:, :2].T).max())
     space = TetrahedronSpace(body=replace(body, nodes=body.nodes / scale))
     level = Level(constant=radius**2 / 2 / scale**2, tilt=(0.0, 0.0, tilt / scale))
-    reduced = reduced_waves(space=space, level=level, wall=WALL, potentials=modes + _SPARE, levels=levels)
-    # Frequencies grow with the root of the depth.
-    faceting = space.facets(WALL).depth_to_smooth() / (2 * (1 - radius / scale))
-    return _System(reduced=reduced, scale=scale, faceting=faceting, unknowns=space.unknowns)
+    reduced = deferred.reduced_waves(
+        space=space, level=level, wall=WALL, potentials=modes + _SPARE, levels=levels
+    )
+    surface = space.facets(FREE_SURFACE)
+    missed = np.abs(level.value(surface.points)) / (radius / scale)
+    # Frequencies grow with the root of the depth; r^2 changes by twice r times the depth.
+    deeper = SAFETY * faceting(geometry).wall / (2 * scale) + scale * np.average(
+        missed, weights=surface.weights
+    )
+    doubt = float(deeper) / (2 * (scale - radius))
+    return WaveSystem(reduced=reduced, scale=scale, faceting=doubt, unknowns=space.unknowns)
 
 
-def _frequencies(system: _System, modes: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+def frequencies(system: WaveSystem, modes: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Frequencies of the surface's waves, their vortical shares and expanded uncertainties."""
     reduced = system.reduced
-    values, potential, weights = _waves(reduced, reduced.levels[-1], _OF_SURFACE)
-    before = _waves(reduced, reduced.levels[-2], _PERHAPS)[0]
+    values, potential, weights = _waves(reduced, reduced.levels[-1])
+    before, probable, _ = _waves(reduced, reduced.levels[-2])
+    # Waves of the surface by their frequency; the likeliest of the others if these do not suffice.
+    by_rank = np.lexsort((values, np.where(potential > _OF_SURFACE, -1.0, -potential)))
+    chosen = np.sort(by_rank[:modes])
+    values, potential, weights = values[chosen], potential[chosen], weights[chosen]
     errors = reduced.squared_errors
-    change = np.abs(values[:, None] - before).min(axis=1)
-    widths = _SAFETY * change + values * (weights[:, : errors.size] @ errors / 2 + system.faceting)
-    return values[:modes], 1 - potential[:modes], widths[:modes]
+    change = np.abs(values[:, None] - before[probable > _PERHAPS]).min(axis=1)
+    # What is left out acts on a frequency by its square.
+    relative = weights[:, : errors.size] @ errors / 2 + reduced.left_out + system.faceting
+    return values, 1 - potential, _SAFETY * change + values * relative
 
 
-def _waves(reduced: ReducedWaves, fields: int, least: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _waves(reduced: ReducedWaves, fields: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Frequencies with so many fields, the kinetic energy's potential share, and its parts by field.
 
     The oscillator c'' + 2 C c' + A c = 0 is d/dt (c', A^(1/2) c) = B (...) with a real antisymmetric B, whose
@@ -171,15 +189,19 @@ def _waves(reduced: ReducedWaves, fields: int, least: float) -> tuple[FloatArray
     kinetic = np.abs(shapes[:fields].T) ** 2
     parts = kinetic / kinetic.sum(axis=1, keepdims=True)
     potential = parts[:, : reduced.levels[0]].sum(axis=1)
-    kept = (potential > least) & (values[values > 0] > _SLOWEST)
-    return values[values > 0][kept], potential[kept], parts[kept]
+    # Of a potential with l = s^2 without rotation, |s| <= 1 + sqrt(1 + l): what is faster is not resolved.
+    slowest = slice(0, reduced.squared_errors.size)
+    fastest = 1 + np.sqrt(1 + np.linalg.eigvalsh(stiff[slowest, slowest])[-1])
+    found = values[values > 0]
+    kept = (found > _SLOWEST) & (found < fastest)
+    return found[kept], potential[kept], parts[kept]
 
 
 _SLOWEST: Final = 1e-4
 """Frequency ratio below which a field is at rest."""
 
 
-def _answer(reduced: ReducedWaves, fields: int, ratio: float, ekman: float) -> tuple[float, ...]:
+def answer(reduced: ReducedWaves, fields: int, ratio: float, ekman: float) -> tuple[float, ...]:
     """Amplification of moment and wall pressure, largest displacement for g/omega^2 = 1 (any unit of length),
 
     and the share that damping leaves.
@@ -203,7 +225,7 @@ def _answer(reduced: ReducedWaves, fields: int, ratio: float, ekman: float) -> t
     )
 
 
-def _status(system: _System, radius: float, amplitude: float, tilt: float) -> Status:
+def _status(system: WaveSystem, radius: float, amplitude: float, tilt: float) -> Status:
     if system.reduced.residual > _ACCEPTED:
         text = f"a linear solve left a relative residual of {system.reduced.residual:.1e}: use a better mesh"
         return Status(code=StatusCode.NOT_CONVERGED, text=text)

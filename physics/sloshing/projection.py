@@ -128,14 +128,20 @@ class Fields:
         turned -= self.inner_gradient @ potential
         return turned
 
-    def new_directions(self, fields: FloatArray, before: list[FloatArray], least: float) -> FloatArray:
-        """Orthonormal columns of what is new in fields of norm 1, without what is smaller than `least`."""
+    def new_directions(
+        self, fields: FloatArray, before: list[FloatArray], least: float
+    ) -> tuple[FloatArray, float]:
+        """Orthonormal columns of what is new in fields of norm 1, without what is smaller than `least`.
+
+        Returns: The columns, and the largest squared norm of what was left out.
+        """
         for _ in range(2):
             for block in before:
                 fields = fields - block @ self.products(block, fields)
         squares, axes = np.linalg.eigh(self.products(fields, fields))
         kept = squares > least**2
-        return np.asarray(fields @ (axes[:, kept] / np.sqrt(squares[kept])))
+        left_out = float(squares[~kept].max(initial=0.0))
+        return np.asarray(fields @ (axes[:, kept] / np.sqrt(squares[kept]))), left_out
 
 
 def turn(fields: FloatArray) -> FloatArray:

@@ -13,7 +13,7 @@ from ringbalance.scene.chamber_file.assembly import Body
 from ringbalance.scene.chamber_file.contents import Elements
 from ringbalance.scene.chamber_file.elements import CORNERS
 from ringbalance.scene.chamber_file.topology import Facets, key_of
-from ringbalance.scene.faults import did_you_mean, toml_text
+from ringbalance.scene.faults import closest, did_you_mean, toml_text
 from ringbalance.scene.rules.check import Finding
 
 OUTER_WALL: Final = "outer_wall"
@@ -91,7 +91,7 @@ def _unknown(body: Body) -> Iterator[Finding]:
 def _missing(body: Body) -> Iterator[Finding]:
     """An error where no facet is the outer wall, with the names that the file does have."""
     names = dict.fromkeys(name for block in body.named for name in block.names)
-    if OUTER_WALL in names:
+    if any(closest(name, KNOWN_NAMES) == OUTER_WALL for name in names):
         return
     volumes = [name for name, _ in body.cell_names]
     if OUTER_WALL in (*body.lesser, *volumes):

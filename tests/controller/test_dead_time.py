@@ -120,8 +120,8 @@ def test_many_runs_have_the_offsets_of_one(offset: Scene, calibrated: BalancerMo
     one, many = simulate(exact, calibrated), simulate_members(exact, calibrated)
     assert many.settled[0]
     assert many.settling_time[0] == pytest.approx(one.settling_time, rel=1e-4)
-    # 1e-5 in fill, as in the other comparisons of both, is 2e-10 m.
-    assert many.final_amplitude[0] == pytest.approx(one.amplitude[-1], abs=2e-10)
+    # One injection is within 3e-6 in fill at the ensemble's error; some tens of them are 1e-9 m at most.
+    assert many.final_amplitude[0] == pytest.approx(one.amplitude[-1], abs=1e-9)
 
 
 def test_every_chamber_has_its_own_offset(scene: Scene) -> None:

@@ -69,7 +69,8 @@ def test_a_members_own_gas_line_moves_the_plant_and_not_what_the_controller_know
     assert abs(amplitude[1] - amplitude[0]) > 0.05e-6
     for number in range(3):
         run = simulate(replace(asked, gas=members.gas_of(asked.gas, number)), calibrated)
-        assert amplitude[number] == pytest.approx(run.amplitude[-1], abs=1e-10)
+        # Some tens of injections, each within 3e-6 in fill at the ensemble's error.
+        assert amplitude[number] == pytest.approx(run.amplitude[-1], abs=1e-9)
         assert found.samples[number] == len(run.samples)
     # Had the controller known of the slow line it would have added more, and the run would end elsewhere.
     told = simulate(replace(piped(scene, 0.03), gas=members.gas_of(asked.gas, 1)), calibrated)

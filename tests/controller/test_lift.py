@@ -9,12 +9,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
-from ringbalance.controller.liquid_ring.interval import Passage
-from ringbalance.controller.liquid_ring.motion import Dynamics
+from ringbalance.controller.liquid_ring.interval import Passage, pass_time
+from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, Switch
 from ringbalance.physics.tube.state import tube_state
 from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.gas_line import line_ends
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.models import Scene
 
 Plant = Callable[..., Dynamics]
@@ -112,7 +115,7 @@ def test_liquid_passes_the_crest_when_a_second_model_has_it_there(
     model = calibrate(scene).model
     assert isinstance(model.flow, CalibratedLaw)
     column = Column(scene, model.flow)
-    time, speed = column.lifted(0.25, lambda _: scene.gas.pressure, column.rest(0.25))
+    time = column.lifted(0.25, lambda _: scene.gas.pressure, column.rest(0.25))[0]
     own = plant_of(scene, model, INERTIA, LIFT)
     instants = np.linspace(1e-5, 2 * time, 4001)
     seen = pulse(own, 1.0, instants)
@@ -120,5 +123,113 @@ def test_liquid_passes_the_crest_when_a_second_model_has_it_there(
     # What lies beyond the middle of the crest counts, and the front goes on at the velocity of the reference.
     beyond = (column.leg[1] - column.leg[0]) / 2
     found = float(np.interp(beyond + 1e-6, through, instants))
-    print(shape, time, found, speed)
     assert found == pytest.approx(time, rel=0.02)
+
+
+def test_without_inertia_the_front_moves_at_the_velocity_of_its_balance(
+    smooth: Scene, plant_of: Callable[..., Dynamics], pulse: Pulse
+) -> None:
+    """t = integral of ds/u(s), with u from the reference's own loss."""
+    model = calibrate(smooth).model
+    assert isinstance(model.flow, CalibratedLaw)
+    column, scene, factor = Column(smooth, model.flow), smooth, model.flow.gas_factor
+
+    def speed(s: float) -> float:
+        push = factor * scene.gas.pressure + column.level(0.25)
+        push -= column.head(column.radius(s))
+        return float(brentq(lambda u: column.loss(s, u) - push, 0.1, 100.0))
+
+    places = np.linspace(column.rest(0.25), column.leg[1], 201)
+    slow = np.array([1 / speed(s) for s in places])
+    time = float(np.sum((slow[1:] + slow[:-1]) / 2 * np.diff(places)))
+    instants = np.linspace(1e-5, 2 * time, 2001)
+    seen = pulse(plant_of(scene, model, LIFT), 1.0, instants)
+    through = (0.25 - seen.fills) * model.chamber_volume / model.tube_area
+    beyond = (column.leg[1] - column.leg[0]) / 2
+    assert float(np.interp(beyond, through, instants)) == pytest.approx(time, rel=0.02)
+
+
+@pytest.mark.parametrize("inertia", [[], [INERTIA]])
+def test_an_opening_too_short_to_reach_the_crest_moves_nothing(
+    inertia: list[str],
+    scene: Scene,
+    calibrated: BalancerModel,
+    plant_of: Callable[..., Dynamics],
+    pulse: Pulse,
+) -> None:
+    own = plant_of(scene, calibrated, LIFT, *inertia)
+    assert gained(own, pulse, 0.5e-3, 0.5) == pytest.approx(0.0, abs=1e-15)
+    assert gained(plant_of(scene, calibrated, INERTIA), pulse, 0.5e-3, 0.5) > 1e-5
+    assert gained(own, pulse, 8e-3, 0.5) > 1e-4
+
+
+def test_a_long_injection_lacks_what_fell_back(
+    scene: Scene, calibrated: BalancerModel, plant_of: Callable[..., Dynamics], pulse: Pulse
+) -> None:
+    """From the level to the middle of the crest, at a front that is faster than the column."""
+    late = replace(scene, gas=replace(scene.gas, valve_lag=0.0))
+    own, bare = (
+        gained(plant_of(late, calibrated, "valve lag", *terms), pulse, 0.1, 0.5) for terms in ((LIFT,), ())
+    )
+    lost = (bare - own) * calibrated.chamber_volume / calibrated.tube_area
+    assert isinstance(calibrated.flow, CalibratedLaw)
+    column = Column(scene, calibrated.flow)
+    lifted = sum(column.leg) / 2 - column.rest(0.25)
+    assert 0.6 * lifted < lost < lifted
+
+
+def test_a_primed_tube_lifts_nothing(
+    scene: Scene, calibrated: BalancerModel, plant_of: Callable[..., Dynamics], pulse: Pulse
+) -> None:
+    instants = np.array([0.05, 0.06])
+    with_it, without = (
+        pulse(plant_of(scene, calibrated, INERTIA, *terms), 0.05, instants, primed=True).fills
+        for terms in ((LIFT,), ())
+    )
+    assert with_it == pytest.approx(without, abs=1e-9)
+
+
+@pytest.mark.parametrize("inertia", [[], [INERTIA]])
+def test_a_lift_goes_on_where_an_interval_ends(
+    inertia: list[str], scene: Scene, calibrated: BalancerModel, plant_of: Callable[..., Dynamics]
+) -> None:
+    """Within what the liquid in the tube takes from the chamber's level, 0.1 % of the pressure."""
+    own = plant_of(scene, calibrated, LIFT, *inertia)
+    valve = (Switch(after=0.0, chamber=0, opens=True), Switch(after=0.02, chamber=0, opens=False))
+    whole = pass_time(
+        own, fill=0.25, total=0.5, primed=False, motion=Motion(pending=valve), instants=np.array([0.5])
+    )
+    first = pass_time(
+        own, fill=0.25, total=0.5, primed=False, motion=Motion(pending=valve), instants=np.array([2e-3])
+    )
+    assert first.fill == 0.25
+    second = pass_time(
+        own, fill=first.fill, total=0.5, primed=first.primed, motion=first.motion, instants=np.array([0.498])
+    )
+    assert second.fill == pytest.approx(whole.fill, abs=2e-6)
+
+
+@pytest.mark.parametrize("conductance", [0.2e-8, 1e-8, 4e-8, 20e-8])
+def test_a_leg_rises_with_the_gas_of_a_line(
+    conductance: float, smooth: Scene, plant_of: Callable[..., Dynamics], pulse: Pulse
+) -> None:
+    """Within 0.4 ms, or 1 %, of a front that the reference has carried from the level by the rising pressure.
+
+    The reference leaves out that the gas expands by what it lifts, 0.1 % of its volume.
+    """
+    gas = replace(smooth.gas, conductance=conductance, critical_ratio=0.3, valve_lag=0.0)
+    scene = replace(smooth, gas=gas)
+    model = calibrate(scene).model
+    assert isinstance(model.flow, CalibratedLaw)
+    column, (end,) = Column(scene, model.flow), line_ends(scene)
+    supply, ambient = end.line.supply_pressure, end.line.ambient_pressure
+    steps = np.linspace(ambient, supply, 4001)
+    times = end.line.filling_time(steps, volume=0.75 * model.chamber_volume)
+    reference, _ = column.lifted(
+        0.25, lambda t: float(np.interp(t, times, steps)) - ambient, column.rest(0.25)
+    )
+    instants = np.linspace(1e-5, reference + 5e-3, 8001)
+    seen = pulse(plant_of(scene, model, LIFT, INERTIA, FILLING), 1.0, instants)
+    through = (0.25 - seen.fills) * model.chamber_volume / model.tube_area
+    found = float(np.interp((column.leg[1] - column.leg[0]) / 2, through, instants))
+    assert found == pytest.approx(reference, rel=0.01, abs=0.4e-3)

@@ -21,7 +21,7 @@ from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.calibration import calibrated_model
-from ringbalance.reduced_model.selection.estimates import INERTIA
+from ringbalance.reduced_model.selection.estimates import HELD, INERTIA
 from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
@@ -61,7 +61,7 @@ def test_injections_are_those_of_the_closed_loop(paper_scene: Scene) -> None:
         chambers=4,
         gas_pressure=scene.gas.pressure,
         integrator=quadrature,
-        dynamics=dynamics_of(scene=scene, model=model, modelled=[INERTIA]),
+        dynamics=dynamics_of(scene=scene, model=model, modelled=[INERTIA, HELD]),
     )
     state, before, expected = initial_state(disc=scene.disc), 0j, []
     k = influence(coefficient=scene.rotor.influence_coefficient, lag_angle=scene.rotor.lag_angle)

@@ -139,11 +139,11 @@ def test_saving_loses_nothing_that_matters(value: float, share: float) -> None:
 
 
 def test_a_mesh_is_found_from_another_folder(tmp_path: Path) -> None:
-    text = text_of("chamber_with_gas_tube")
-    folder = bundled_scene("chamber_with_gas_tube").parent
+    text = text_of("imported_chamber")
+    folder = bundled_scene("imported_chamber").parent
     assert found_from(text, folder=folder, to=folder) == text
     (tmp_path / "disc.toml").write_text(found_from(text, folder=folder, to=tmp_path), encoding="utf-8")
     there = load_scene(tmp_path / "disc.toml")
-    assert there.values_sha256 == load_scene(folder / "chamber_with_gas_tube.toml").values_sha256
+    assert there.values_sha256 == load_scene(folder / "imported_chamber.toml").values_sha256
     plain = text_of("six_chamber")
     assert found_from(plain, folder=folder, to=tmp_path) == plain

@@ -186,6 +186,16 @@ def test_flat_walls_miss_nothing() -> None:
     )
 
 
+def test_empty_and_full_chambers_end_at_the_walls(disc: Disc) -> None:
+    meshed = replace(disc, geometry=disc_chamber(disc, (2, 8, 1), kind="tetra10"))
+    empty, full = surface_radius(disc=meshed, fill_ratio=[0.0, 1.0])
+    for each in (liquid_area, liquid_first_moment, wall_square):
+        held, whole = (each(disc=meshed, surface_radius=a) for a in (empty, full))
+        assert abs(held) <= 1e-15 * whole
+    whole = disc.axial_width * liquid_area(disc=meshed, surface_radius=full)
+    assert whole == pytest.approx(chamber_volume(disc=meshed), rel=1e-15)
+
+
 @pytest.mark.parametrize("quantity", ["outer_radius", "inner_radius", "axial_width", "central_angle"])
 def test_a_stretched_chamber_has_the_table_of_its_mesh_moved(disc: Disc, quantity: str) -> None:
     """Stretched sectors stay sectors; the integrals over the moved nodes are made again for comparison."""

@@ -20,7 +20,7 @@ from ringbalance.scene import load_scene
 MOST_PAGES: Final = 12
 MOST_BYTES: Final = 1_500_000
 SCENES: Final = sorted((Path(__file__).resolve().parents[2] / "scenes").glob("*.toml"))
-ORIGINS: Final = {"given", "inferred", "assumed", "measured", "default"}
+ORIGINS: Final = {"given", "inferred", "assumed", "measured", "derived", "default"}
 BROWSER: Final = shutil.which("chromium") or shutil.which("google-chrome")
 
 

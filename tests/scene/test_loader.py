@@ -36,7 +36,7 @@ Load = Callable[[Mapping[str, Any]], Scene]
 BUNDLED = (
     "liquid_ring_paper",
     "liquid_ring_paper_calibrated",
-    "chamber_with_gas_tube",
+    "imported_chamber",
     "silicone_oil_100cst",
     "perfluorinated_oil",
     "six_chamber",

@@ -24,14 +24,13 @@ from ringbalance.reduced_model.chamber.imported_walls import drawing_shares
 from ringbalance.reduced_model.chamber.inputs import chamber_closed_forms
 from ringbalance.scene import liquid_ring_scene, load_scene
 from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import with_value
 from ringbalance.verification.cases.claim_18_gas_hole.case import compute as judge_hole
 from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference
 
 _FILE: Final = Path(__file__).parent / "data" / "scene.toml"
-_RADIUS, _TIP = 2.5e-3, 33.5e-3
-"""Of the tube outside, and radius of its mouth, m; as tools/example_chamber.py draws them."""
+_RADIUS, _TIP = 2e-3, 31e-3
+"""Of the tube outside, and radius of its mouth, m; as tools/example_chambers.py draws them."""
 _DEEP: Final = 0.8
 """Fill ratio at which part of the tube is under the surface."""
 
@@ -109,8 +108,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     if defect == "without_the_tube":
         own = scene
     if defect == "drawn_too_wide":
-        width = 1.001 * own.disc.axial_width
-        own = with_value(scene=own, quantity="axial_width", value=width)
+        own = replace(own, disc=replace(own.disc, axial_width=1.001 * own.disc.axial_width))
     fills = np.array(_fills(scene))
     _, moment, ratio = chamber_closed_forms(scene=own, fill_ratio=fills)
     shares = drawing_shares(own.disc, fills)

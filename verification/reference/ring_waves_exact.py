@@ -1,0 +1,71 @@
+"""Waves on a full ring of liquid between flat ends, in closed form, with the Coriolis force.
+
+With all of the flow turning as F(r) cos(k z) exp(i (m angle + s t)), lengths in outer radii and times in
+1/omega, the pressure obeys F'' + F'/r - (m^2/r^2 + q) F = 0, q = k^2 (1 - 4/s^2): Bessel functions I and K
+where s > 2, J and Y below.  The radial velocity is i (s F' + 2 m F/r)/(s^2 - 4); it vanishes on the wall, and
+at the free surface, where centrifugal gravity is a, F s (s^2 - 4) = - a (s F' + 2 m F/r).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.special import iv, ivp, jv, jvp, kv, kvp, yv, yvp
+
+from ringbalance.scene.arrays import FloatArray
+
+_SEARCH = np.linspace(3.9, 0.05, 1200)
+_TRIVIAL = 0.01
+"""Distance from |s| = 2 within which the condition is met by no flow at all."""
+
+
+def _pair(m: int, q: float, r: float) -> FloatArray:
+    """Two solutions, and their slopes, shape (2, 2)."""
+    root = float(np.sqrt(abs(q)))
+    if root == 0.0:
+        return np.array([[r**m, r**-m], [m * r ** (m - 1), -m * r ** (-m - 1)]])
+    values, slopes = ((iv, kv), (ivp, kvp)) if q > 0 else ((jv, yv), (jvp, yvp))
+    return np.array([[f(m, root * r) for f in values], [root * f(m, root * r) for f in slopes]])
+
+
+def _condition(s: float, m: int, k: float, a: float) -> float:
+    q = k**2 * (1 - 4 / s**2)
+    wall, surface = _pair(m, q, 1.0), _pair(m, q, a)
+    rows = np.array(
+        [
+            s * wall[1] + 2 * m * wall[0],
+            surface[0] * s * (s**2 - 4) + a * (s * surface[1] + 2 * m * surface[0] / a),
+        ]
+    )
+    return float(np.linalg.det(rows / np.abs(rows).max(axis=1, keepdims=True)))
+
+
+def ring_frequencies(*, surface_radius: float, width: float, around: int, along: int) -> tuple[float, ...]:
+    """The surface's two waves, s in both directions round the ring; lengths in outer radii.
+
+    Below them lie the inertial waves of the same m and k, of which none is meant here.
+    Args: `around`: m, 1 or more where `along` is 0. `along`: half waves from end to end.
+    """
+    found = []
+    for sign in (1.0, -1.0):
+        values = [_condition(sign * s, around, along * np.pi / width, surface_radius) for s in _SEARCH]
+        for high, low, first, second in zip(_SEARCH, _SEARCH[1:], values, values[1:], strict=False):
+            if first * second < 0 and not low - _TRIVIAL < 2 < high + _TRIVIAL:
+                arguments = (around, along * np.pi / width, surface_radius)
+                found.append(abs(float(brentq(_condition, sign * high, sign * low, args=arguments))))
+                break
+    return tuple(found)
+
+
+def still_frequency(*, surface_radius: float, width: float, angle: float, around: int, along: int) -> float:
+    """s of a sector without Coriolis force, s^2 = - a F'(a)/F(a), from I and K; lengths in outer radii.
+
+    Args: `around`, `along`: half waves from plate to plate and from end to end, not both 0.
+    """
+    m, k = around * np.pi / angle, along * np.pi / width
+    if along == 0:
+        return float(np.sqrt(m * np.tanh(m * np.log(1 / surface_radius))))
+    at, wall = k * surface_radius, k
+    value = iv(m, at) * kvp(m, wall) - kv(m, at) * ivp(m, wall)
+    slope = k * (ivp(m, at) * kvp(m, wall) - kvp(m, at) * ivp(m, wall))
+    return float(np.sqrt(-surface_radius * slope / value))

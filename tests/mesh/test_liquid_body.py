@@ -11,6 +11,7 @@ from ringbalance.mesh.quadratic_tetrahedra import Tetrahedra, face_nodes, lonely
 from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.chamber_file.record import CellKind
+from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.verification.reference.block_chambers import block_chamber, sector_chamber
 
 _ANGLE, _WIDTH = np.pi / 2, 1.3
@@ -58,7 +59,7 @@ def test_every_face_is_shared_or_named_and_the_normals_close(kind: CellKind) -> 
 
 @pytest.mark.parametrize("fill", [0.03, 0.25, 0.5, 0.9])
 def test_a_chamber_with_fillets_and_a_gas_tube_holds_what_exact_integrals_say(fill: float) -> None:
-    disc = load_scene(bundled_scene("imported_chamber")).disc
+    disc = liquid_ring_scene(load_scene(bundled_scene("imported_chamber"))).disc
     assert disc.geometry is not None
     radius = float(surface_radius(disc=disc, fill_ratio=fill))
     body = liquid_body(tetrahedra(disc.geometry), Level(constant=radius**2 / 2))

@@ -22,11 +22,11 @@ import numpy as np
 from ringbalance.mesh.cut.patches import halved, mirror, to_bernstein
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 
-PLAIN_POINTS: Final = 5
+PLAIN_POINTS: Final = 6
 """Gauss points along each side of a patch that no surface crosses."""
 CUT_POINTS: Final = 6
 LONGEST: Final = 1 / 3
-"""Of a patch over its distance from the shaft: 1/|r|^2 then costs 1e-11 with five points."""
+"""Of a patch over its distance from the shaft: 1/|r|^2 then costs 1e-10 with six points."""
 _STEEP: Final = 0.05
 """Least over largest slope of h along the lines on which the surface is looked for."""
 _HALVINGS: Final = 30

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from ringbalance.mesh.cut.faceting import drawing_error
-from ringbalance.mesh.cut.integrals import integrals, walls_about
+from ringbalance.mesh.cut.integrals import LONGEST, integrals, walls_about
 from ringbalance.mesh.cut.patches import split_patches, wall_patches
 from ringbalance.mesh.cut.table import SLOPE_TOLERANCE, TOLERANCE, chamber_table
 from ringbalance.mesh.geometry import (
@@ -74,7 +74,7 @@ def in_box(a: float) -> tuple[float, float, float, float]:
 def test_a_box_holds_what_quadrature_says(kind: CellKind) -> None:
     """The integrals' own limit: six Gauss points on graphs, and pieces of 1e-12 of the volume left alone."""
     radii = np.array([0.0201, 0.024, 0.0283, 0.033, 0.0449, 0.0455, 0.048])
-    walls = walls_about(*split_patches(*wall_patches(box(kind=kind)), longest=1 / 3))
+    walls = walls_about(*split_patches(*wall_patches(box(kind=kind)), longest=LONGEST))
     found = integrals(walls, radii**2)[[0, 1, 4, 5]]
     expected = np.array([in_box(a) for a in radii]).T
     size = np.abs(expected).max(axis=1, keepdims=True)
@@ -126,7 +126,9 @@ def test_turning_about_the_shaft_changes_only_the_direction_of_the_moment(
 ) -> None:
     levels = np.array([0.022, 0.0449, 0.047]) ** 2
     plain, turned = (
-        integrals(walls_about(*split_patches(*wall_patches(box(kind=kind, turned=t)), longest=1 / 3)), levels)
+        integrals(
+            walls_about(*split_patches(*wall_patches(box(kind=kind, turned=t)), longest=LONGEST)), levels
+        )
         for t in (0.0, turn)
     )
     unit = np.array([np.cos(turn), np.sin(turn)])[:, None]
@@ -228,3 +230,29 @@ def test_a_chamber_stretched_twice_comes_from_its_own_mesh(disc: Disc) -> None:
     assert twice.stretch.base is geometry
     volumes = [chamber_table(each).volume for each in (once, twice)]
     assert volumes[1] == pytest.approx(volumes[0] / 2, rel=1e-12)
+
+
+def test_a_surface_that_crosses_one_edge_of_a_wall_twice() -> None:
+    """The side y = w bulges by b (1 - (2 z/B)^2), which quadratic cells draw exactly."""
+    bulge, a = 0.004, 0.029
+
+    def place(cube: FloatArray) -> FloatArray:
+        x, z = X0 + (X1 - X0) * cube[..., 0], 2 * cube[..., 2] - 1
+        y = HALF * (2 * cube[..., 1] - 1) + bulge * cube[..., 1] * (1 - z**2)
+        return np.stack([x, y, WIDTH / 2 * z], axis=-1)
+
+    def slice_at(y: float) -> float:
+        start = max(X0, float(np.sqrt(max(a * a - y * y, 0.0))))
+        return (X1 - start) * WIDTH * float(np.sqrt(1 - max(y - HALF, 0.0) / bulge))
+
+    geometry = block_chamber((1, 1, 1), place, kind="hexahedron27")
+    patches, outer = split_patches(*wall_patches(geometry), longest=LONGEST)
+    found = integrals(walls_about(patches, outer), np.array([a**2]))[0, 0]
+    corner = float(np.sqrt(a**2 - X0**2))
+    marks = sorted([-HALF, -corner, corner, HALF, HALF + bulge])
+    expected = sum(
+        quad(slice_at, *piece, epsabs=1e-18, epsrel=1e-12)[0]
+        for piece in pairwise(marks)
+        if piece[0] >= -HALF
+    )
+    assert found == pytest.approx(expected, rel=1e-9)

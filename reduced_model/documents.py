@@ -14,11 +14,13 @@ from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.chamber.calibration import Curve
 from ringbalance.reduced_model.chamber.element_check import CHECKED, ElementCheck
 from ringbalance.reduced_model.chamber.gravity import closed_ring
+from ringbalance.reduced_model.chamber.imported_walls import share_across
 from ringbalance.reduced_model.chamber.row_status import RowStatus, row_status
 from ringbalance.reduced_model.gas_line import line_document
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Scene
 
 PRESSURE_FACTORS: Final = (0.5, 0.75, 1.0, 1.25, 1.5, 2.0)
 """Gas pressures of the law's table, over the scene's own."""
@@ -93,8 +95,17 @@ def _chamber(calibration: Calibration) -> dict[str, Any]:
         | _curve(chamber.wall_pressure, at, "wall_pressure", "Pa")
         | _curve(chamber.moment, at, "moment", "kg_m")
         | {name: _listed(values) for name, values in paper_columns(calibration, fills).items()}
+        | _across(scene, fills)
         | {"lambda_per_transferred_mass_m": _listed(calibration.lambda_over_fill(fill_ratio=fills))}
     )
+
+
+def _across(scene: Scene, fills: FloatArray) -> dict[str, Any]:
+    """Angle from the middle of an imported chamber to its moment, along the fills; with liquid only."""
+    if scene.disc.geometry is None:
+        return {}
+    shares = share_across(scene.disc, np.maximum(fills, fills[fills > 0].min()))
+    return {"moment_angle_rad": _listed(np.arctan(shares))}
 
 
 def _check(check: ElementCheck) -> dict[str, Any]:

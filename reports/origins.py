@@ -12,13 +12,16 @@ _OWNERS: Final = {"lqr": "regulator", "masses": "eccentric masses"}
 """What a table of the scene file stands for, where that is another word."""
 _ALONE: Final = ("accuracy", "environment", "run", "gas.ambient_pressure")
 """Tables, and a key, whose keys need no owner."""
+_MESH: Final = "disc.mesh"
 
 
 def resting(evidence: Record, *paths: str) -> str:
     """The inputs among some that are neither given nor measured, with their origin."""
     origins = evidence["scene"].get("origins") or {}
     by_origin: dict[str, list[str]] = {}
-    for path in paths:
+    for named in paths:
+        # What follows from the mesh of an imported chamber rests on that.
+        path = _MESH if origins.get(named) == "derived" else named
         if (origin := origins.get(path, "given")) not in _CERTAIN:
             by_origin.setdefault(origin, []).append(key_words(path))
     return "; ".join(f"{origin}: {', '.join(names)}" for origin, names in by_origin.items())

@@ -14,8 +14,8 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.models import Scene
 
-_ROUNDING: Final = 1e-9
-"""Of the integrals over the walls, relative."""
+_CUT: Final = 1e-6
+"""Relative, of totals: walls that the surface cuts are drawn again by the parts of their cells."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,10 +57,10 @@ def imported_elements(scene: Scene, geometry: ChamberGeometry, *, fill_ratio: Fl
         fill_ratio=fill_ratio,
         wall_pressure=Estimate(
             value=pressure,
-            uncertainty=np.array([float(ring.wall_pressure.uncertainty) for ring in rings]),
+            uncertainty=np.array([float(ring.wall_pressure.uncertainty) for ring in rings]) + _CUT * pressure,
         ),
         # A free surface drawn by quadratic facets takes liquid off or adds some, all of it at the surface.
-        moment=Estimate(value=moment, uncertainty=(_ROUNDING + drawn) * np.abs(moment)),
+        moment=Estimate(value=moment, uncertainty=(_CUT + 2 * drawn) * np.abs(moment)),
         volume=volume,
         cells=((len(geometry.cells),),),
         status=status,

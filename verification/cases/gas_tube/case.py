@@ -24,6 +24,7 @@ from ringbalance.reduced_model.chamber.imported_walls import drawing_shares
 from ringbalance.reduced_model.chamber.inputs import chamber_closed_forms
 from ringbalance.scene import liquid_ring_scene, load_scene
 from ringbalance.scene.models import Scene
+from ringbalance.scene.uncertain import with_value
 from ringbalance.verification.cases.claim_18_gas_hole.case import compute as judge_hole
 from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference
@@ -108,7 +109,8 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     if defect == "without_the_tube":
         own = scene
     if defect == "drawn_too_wide":
-        own = replace(own, disc=replace(own.disc, axial_width=1.001 * own.disc.axial_width))
+        width = 1.001 * own.disc.axial_width
+        own = with_value(scene=own, quantity="axial_width", value=width)
     fills = np.array(_fills(scene))
     _, moment, ratio = chamber_closed_forms(scene=own, fill_ratio=fills)
     shares = drawing_shares(own.disc, fills)

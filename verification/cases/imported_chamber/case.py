@@ -71,9 +71,7 @@ def _record(disc: Disc, cells: tuple[int, int, int], defect: str | None) -> Cham
 
 def _totals(scene: Scene, record: ChamberGeometry) -> tuple[float, float, float]:
     """Volume, moment at the largest fill, and lambda at equal fills, by integrals over the walls."""
-    outer = float(f"{np.hypot(*record.points[:, :2].T).max():.7g}")
-    disc = replace(scene.disc, geometry=record, outer_radius=outer)
-    disc = replace(disc, axial_width=float(f"{np.ptp(record.points[:, 2]):.7g}"))
+    disc = replace(scene.disc, geometry=record)
     own = replace(scene, disc=disc)
     fills = np.array([disc.max_fill_ratio, disc.max_fill_ratio / 2])
     _, moment, ratio = chamber_closed_forms(scene=own, fill_ratio=fills)

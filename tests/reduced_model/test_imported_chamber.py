@@ -1,0 +1,86 @@
+"""A disc whose chamber is imported, from the chamber's calibration to its uncertainties."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ringbalance.physics import deferred
+from ringbalance.physics.pressure.imported import ImportedRing, solved_ring
+from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.chamber.calibration import calibrate_chamber
+from ringbalance.reduced_model.chamber.imported_walls import share_across
+from ringbalance.reduced_model.chamber.terms import unmodelled_fractions
+from ringbalance.reduced_model.documents import calibration_document
+from ringbalance.reduced_model.show import _summary_rows
+from ringbalance.scene.models import Scene
+from ringbalance.verification.reference.block_chambers import imported
+
+FILLS = np.array([0.1, 0.25, 0.5])
+
+
+@pytest.fixture(scope="module")
+def scene(paper_scene: Scene) -> Scene:
+    """The paper's scene with its own chamber imported, which has no plate thickness to be uncertain."""
+    known = tuple(one for one in paper_scene.uncertainty if one.quantity != "plate_thickness")
+    return replace(paper_scene, disc=imported(paper_scene.disc), uncertainty=known)
+
+
+def turned(scene: Scene, angle: float) -> Scene:
+    """The chamber's mesh turned about the shaft, and not what is said to be its middle."""
+    geometry = scene.disc.geometry
+    assert geometry is not None
+    turn = np.array([[np.cos(angle), np.sin(angle), 0], [-np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+    record = replace(geometry, points=geometry.points @ turn, digest=f"turned by {angle}")
+    return replace(scene, disc=replace(scene.disc, geometry=record))
+
+
+def test_an_imported_chamber_is_calibrated_as_the_built_in_one(scene: Scene, paper_scene: Scene) -> None:
+    own, built_in = calibrate_chamber(scene), calibrate_chamber(paper_scene)
+    for name in ("wall_pressure", "moment"):
+        values, expected = getattr(own, name), getattr(built_in, name)
+        width = values.uncertainty + expected.uncertainty
+        # Of the table of integrals.
+        assert np.all(np.abs(values.value - expected.value) <= width + 1e-7 * expected.value.max())
+    assert float(own.moment_per_mass.value) == pytest.approx(float(built_in.moment_per_mass.value), rel=1e-5)
+    assert own.volume == pytest.approx(built_in.volume, rel=1e-6)
+    width, expected = (each.input_effects["axial_width"].volume for each in (own, built_in))
+    assert width == pytest.approx(expected, rel=1e-6)
+
+
+def test_its_check_by_finite_elements_agrees(scene: Scene) -> None:
+    check = calibrate_chamber(scene).check
+    assert check.status.ok
+    assert set(check.difference) == {"wall_pressure", "moment"}
+
+
+def test_its_check_notices_a_pressure_that_is_off(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    def spoiled(**given: Any) -> ImportedRing:
+        ring = solved_ring(**given)
+        pressure = replace(ring.wall_pressure, value=1.001 * ring.wall_pressure.value)
+        return replace(ring, wall_pressure=pressure)
+
+    monkeypatch.setattr(deferred, "solved_ring", spoiled, raising=False)
+    check = calibrate_chamber(scene).check
+    assert not check.status.ok
+    assert check.excess == pytest.approx(1e-3, rel=0.1)
+
+
+def test_a_moment_across_the_middle_counts_as_uncertain(scene: Scene) -> None:
+    """A symmetric chamber whose middle is given 2 deg beside it has tan(2 deg) of its moment across."""
+    aside = turned(scene, np.radians(2.0))
+    np.testing.assert_allclose(share_across(aside.disc, FILLS), np.tan(np.radians(2.0)), rtol=1e-6)
+    assert np.all(np.abs(share_across(scene.disc, FILLS)) < 1e-9)
+    more, less = (unmodelled_fractions(s, FILLS)["moments"] for s in (aside, scene))
+    np.testing.assert_allclose(more - less, np.tan(np.radians(2.0)), atol=1e-4)
+
+
+def test_the_angle_of_the_moment_is_reported(scene: Scene) -> None:
+    calibration = calibrate(turned(scene, np.radians(2.0)))
+    told = calibration_document(calibration)["chamber"]["moment_angle_rad"]
+    np.testing.assert_allclose(told, np.radians(2.0), rtol=1e-5)
+    rows = dict(_summary_rows(calibration))
+    assert rows["direction"].startswith("moment 2 deg from the middle")

@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
+from ringbalance.scene.chamber_file.facets import key_of, repeats
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 
 NAMELESS: Final = "other_walls"
@@ -121,9 +122,7 @@ def tetrahedra(geometry: ChamberGeometry) -> Tetrahedra:
 
 def lonely(cells: IntArray, size: int) -> BoolArray:
     """Whether each face of each cell belongs to that cell alone, shape (cells, 4)."""
-    keys = face_keys(cells[:, FACES], size)
-    _, inverse, count = np.unique(keys, return_inverse=True, return_counts=True)
-    return np.asarray((count[inverse] == 1).reshape(keys.shape))
+    return np.asarray(repeats(key_of(cells[:, FACES], size)) == 1)
 
 
 def _tetrahedron_middles(geometry: ChamberGeometry) -> FloatArray:
@@ -189,19 +188,11 @@ def _named_faces(geometry: ChamberGeometry, cells: IntArray, corners: int) -> In
         triangles += parts
         numbers += [np.full(len(part), number) for part in parts]
     size = len(geometry.points)
-    known = face_keys(np.concatenate(triangles), size)
+    known = key_of(np.concatenate(triangles), size)
     order = np.argsort(known)
-    wanted = face_keys(cells[:, FACES], size)
+    wanted = key_of(cells[:, FACES], size)
     at = np.minimum(np.searchsorted(known[order], wanted), len(known) - 1)
     return np.where(known[order][at] == wanted, np.concatenate(numbers)[order][at], -1)
-
-
-def face_keys(corners: IntArray, size: int) -> IntArray:
-    """One number for each set of three corners among `size` nodes, shape (...) from (..., 3)."""
-    low = np.sort(corners, axis=-1).astype(np.int64)
-    if size > 2_000_000:
-        raise ValueError("a chamber of more than two million nodes is too large: use a coarser mesh")
-    return np.asarray((low[..., 0] * size + low[..., 1]) * size + low[..., 2])
 
 
 def compacted(body: Tetrahedra) -> Tetrahedra:

@@ -18,6 +18,7 @@ from ringbalance.scene.chamber_file.elements import (
     GMSH_KINDS,
     GMSH_ORDER,
     between,
+    dimension,
     faces,
 )
 
@@ -58,13 +59,6 @@ class Drawing:
         group = next(number for (_, number), each in self.names.items() if each == name)
         found = self.elements.items()
         return [number for number, each in found if dimension(each.kind) == 2 and each.group == group]
-
-
-def dimension(kind: str) -> int:
-    """Of an element."""
-    if kind in FACET_KINDS.values():
-        return 2
-    return 0 if kind == "vertex" else 1 if kind.startswith("line") else 3
 
 
 def drawn(kind: str = "tetra") -> Drawing:

@@ -124,6 +124,13 @@ _CORNER_PLACES: Final = MappingProxyType(
 )
 
 
+def dimension(kind: str) -> int:
+    """Of an element of a kind: 0 for a point to 3 for a cell."""
+    if kind in FACET_KINDS.values():
+        return 2
+    return 0 if kind == "vertex" else 1 if kind.startswith("line") else 3
+
+
 def between(kind: str) -> tuple[tuple[int, ...], ...]:
     """For each node the corners in whose middle it lies on a straight cell; a corner lies at itself."""
     count = CORNERS[kind]

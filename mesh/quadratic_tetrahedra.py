@@ -67,6 +67,15 @@ def slopes(barycentric: FloatArray) -> FloatArray:
     return np.asarray(full[:, :, 1:] - full[:, :, :1])
 
 
+def derivatives(places: FloatArray, barycentric: FloatArray) -> FloatArray:
+    """dx/dX of cells or of facets at points, shape (n, points, 3, dimension).
+
+    Args: `places`: of their nodes, shape (n, functions, 3). `barycentric`: shape (points, dimension + 1).
+    """
+    local = places - places[:, :1]
+    return np.asarray(np.einsum("enx,pna->epxa", local, slopes(barycentric), optimize=True))
+
+
 def lowest_first(cells: IntArray, faces: IntArray) -> IntArray:
     """Tetrahedra of convex cells: from the corner of lowest number to all faces without it.
 

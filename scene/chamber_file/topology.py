@@ -13,7 +13,8 @@ from scipy.spatial import cKDTree
 
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.chamber_file.assembly import Body
-from ringbalance.scene.chamber_file.elements import CORNERS, faces
+from ringbalance.scene.chamber_file.elements import CORNERS
+from ringbalance.scene.chamber_file.facets import corners_of, edges_of, key_of, repeats, sides_of
 from ringbalance.scene.rules.check import Finding
 
 _SAME: Final = 1e-7
@@ -41,28 +42,18 @@ class Facets:
     """Keys in rising order that more than two cells have."""
 
 
-def key_of(corners: IntArray, nodes: int) -> IntArray:
-    """One number for the corners of each facet: its three smallest; two facets of a body share them only
-    when they are the same.
-    """
-    ordered = np.sort(corners, axis=1)
-    return np.asarray((ordered[:, 0] * nodes + ordered[:, 1]) * nodes + ordered[:, 2], dtype=np.int64)
-
-
 def facets_of(body: Body) -> Facets:
     """The sides of all cells of a body."""
-    sides = np.array(faces(body.kind))
-    corners = 3 if CORNERS[body.kind] == 4 else 4
-    nodes = body.cells[:, sides].reshape(-1, sides.shape[1])
+    nodes, corners = sides_of(body.cells, body.kind), corners_of(body.kind)
     keys = key_of(nodes[:, :corners], len(body.points))
-    _, place, counts = np.unique(keys, return_inverse=True, return_counts=True)
+    counts = repeats(keys)
     return Facets(
         nodes=nodes,
         corners=corners,
-        cells=np.repeat(np.arange(len(body.cells)), len(sides)),
+        cells=np.repeat(np.arange(len(body.cells)), len(nodes) // len(body.cells)),
         keys=keys,
-        outer=np.flatnonzero(counts[place] == 1),
-        shared=counts[place] > 2,
+        outer=np.flatnonzero(counts == 1),
+        shared=counts > 2,
     )
 
 
@@ -192,7 +183,7 @@ def _several_volumes(body: Body, facets: Facets) -> Iterator[Finding]:
 def _pinched(body: Body, facets: Facets) -> Iterator[Finding]:
     """Edges at which the outer surface meets itself."""
     outer = facets.nodes[facets.outer, : facets.corners]
-    edges = np.sort(np.stack([outer, np.roll(outer, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    edges = np.sort(edges_of(outer).reshape(-1, 2), axis=1)
     _, first, counts = np.unique(
         edges[:, 0] * len(body.points) + edges[:, 1], return_index=True, return_counts=True
     )

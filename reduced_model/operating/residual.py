@@ -23,6 +23,8 @@ _FACTORS: Final = 201
 """Nodes of a table over factors of the velocity."""
 _REFINEMENTS: Final = 2
 """Leave 2e-6 of the range, within which a straight line is good to 1e-9."""
+_NOTHING: Final = 1e-9
+"""Below this a fill ratio is not told from zero."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,7 +151,8 @@ def _residual(scene: Scene, law: FlowLaw, factors: FloatArray) -> FloatArray:
         above, below = excess[rows, cell], excess[rows, cell + 1]
         low, step = places[rows, cell], step / _PIECES
     found[inside] = low + step * np.where(above > below, above / (above - below), 0.0)
-    return found
+    # Where nothing flows, what rounding leaves over a port on the wall of a mesh is no residual.
+    return np.where(found > _NOTHING, found, 0.0)
 
 
 def _depths(scene: Scene, law: FlowLaw, fills: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -188,7 +188,8 @@ def _by_tolerance(term: Term, _: Scene, estimate: TermEstimate) -> Selection:
 
 def _plates(term: Term, scene: Scene, _: TermEstimate) -> Selection:
     strips, exact = paper.chamber_volume_paper(disc=scene.disc), chamber_volume(disc=scene.disc)
-    off = f"costs nothing; flat strips would be {percent(abs(strips / exact - 1))} off in volume"
+    simpler = "flat strips" if scene.disc.geometry is None else "a plain sector"
+    off = f"costs nothing; {simpler} would be {percent(abs(strips / exact - 1))} off in volume"
     return term.models[-1], off
 
 

@@ -84,3 +84,10 @@ def test_the_angle_of_the_moment_is_reported(scene: Scene) -> None:
     np.testing.assert_allclose(told, np.radians(2.0), rtol=1e-5)
     rows = dict(_summary_rows(calibration))
     assert rows["direction"].startswith("moment 2 deg from the middle")
+
+
+def test_a_gas_pressure_at_which_nothing_flows(scene: Scene) -> None:
+    """No gas is drawn into a port on the wall before a chamber is empty: a pair can use all its liquid."""
+    found = calibrate(replace(scene, gas=replace(scene.gas, pressure=0.1e6)))
+    assert found.residual.fill_ratio == 0
+    assert found.budgets["usable_moment"].value == pytest.approx(found.residual.pair_moment)

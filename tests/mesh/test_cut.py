@@ -104,6 +104,9 @@ def test_the_built_in_chamber_as_a_mesh_is_the_closed_form_but_for_its_drawn_arc
     volume = chamber_volume(disc=disc)
     assert chamber_volume(disc=imported) == pytest.approx(volume, rel=4 * film)
     assert np.max(np.abs(moment_across(disc=imported, surface_radius=b))) < 1e-15
+    # At the wall itself, to which a port is looked for where a column does not flow.
+    last = disc.outer_radius * (1 + np.linspace(-1e-15, 1e-15, 21))
+    assert np.min(liquid_area(disc=imported, surface_radius=last)) >= 0
 
 
 @pytest.mark.parametrize(("kind", "order"), [("tetra", 2.0), ("hexahedron", 2.0), ("tetra10", 4.0)])

@@ -13,6 +13,7 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.mesh.chamber import FREE_SURFACE
 from ringbalance.mesh.quadratic_tetrahedra import (
     EDGES,
     FACES,
@@ -27,7 +28,6 @@ from ringbalance.mesh.quadratic_tetrahedra import (
 )
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 
-FREE_SURFACE: Final = "free_surface"
 _SNAP: Final = 0.2
 """Share of the shortest edge at a corner up to which the corner is moved onto the surface."""
 _ON: Final = 1e-7

@@ -15,8 +15,9 @@ from typing import Final
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from ringbalance.mesh.chamber import FREE_SURFACE
 from ringbalance.mesh.cut.faceting import SAFETY, faceting
-from ringbalance.mesh.liquid_body import FREE_SURFACE, Level, liquid_body
+from ringbalance.mesh.liquid_body import Level, liquid_body
 from ringbalance.mesh.quadratic_tetrahedra import Tetrahedra, tetrahedra
 from ringbalance.physics.pressure.linear import LinearSolution, solve_linear
 from ringbalance.physics.pressure.solve import PressureProblem, RotatingLiquid

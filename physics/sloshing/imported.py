@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from ringbalance.mesh.chamber import FREE_SURFACE
 from ringbalance.mesh.cut.faceting import SAFETY, faceting
-from ringbalance.mesh.liquid_body import FREE_SURFACE, Level, liquid_body
+from ringbalance.mesh.liquid_body import Level, liquid_body
 from ringbalance.mesh.quadratic_tetrahedra import tetrahedra
 from ringbalance.physics import deferred
 from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace

@@ -109,7 +109,7 @@ def assembled(contents: Contents, *, scale: float) -> Body:
     )
 
 
-def helpers(contents: Contents) -> IntArray:
+def drawing_nodes(contents: Contents) -> IntArray:
     """Numbers of nodes that points and lines of the drawing have, such as centres of arcs."""
     lower = [block.nodes.ravel() for block in contents.blocks if dimension(block.kind) < 2]
     return np.concatenate([np.empty(0, dtype=np.int64), *lower])
@@ -153,7 +153,7 @@ def _wrong_nodes(contents: Contents) -> Iterator[Finding]:
         yield Finding(problem=f"coordinates are no finite numbers: {labels}", allowed="")
     elif len(numbers) and np.abs(contents.coordinates).max() > 1e9:
         node = numbers[np.abs(contents.coordinates).max(axis=1).argmax()]
-        yield Finding(problem=f"a coordinate is beyond all measure: node {node}", allowed="")
+        yield Finding(problem=f"a coordinate is above 1e9: node {node}", allowed="")
 
 
 def _lost(block: Elements, numbered: IntArray) -> Finding | None:

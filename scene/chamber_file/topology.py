@@ -57,8 +57,8 @@ def facets_of(body: Body) -> Facets:
     )
 
 
-def topology_findings(body: Body, facets: Facets, *, helpers: IntArray) -> Iterator[Finding]:
-    """What is wrong with how cells hang together. Args: `helpers`: numbers of nodes of the drawing."""
+def topology_findings(body: Body, facets: Facets, *, drawing_nodes: IntArray) -> Iterator[Finding]:
+    """What is wrong with how cells hang together. Args: `drawing_nodes`: numbers of nodes of the drawing."""
     yield from _repeated(body)
     crowded = [*_same_cells(body), *_crowded_facets(body, facets)]
     yield from crowded
@@ -69,7 +69,7 @@ def topology_findings(body: Body, facets: Facets, *, helpers: IntArray) -> Itera
     yield from parts
     if not (crowded or doubled or hanging or parts):
         yield from _pinched(body, facets)
-    yield from _unused(body, helpers)
+    yield from _unused(body, drawing_nodes)
 
 
 def _repeated(body: Body) -> Iterator[Finding]:
@@ -194,10 +194,10 @@ def _pinched(body: Body, facets: Facets) -> Iterator[Finding]:
         yield Finding(problem=problem + labels, allowed="a closed surface, two facets at each edge")
 
 
-def _unused(body: Body, helpers: IntArray) -> Iterator[Finding]:
+def _unused(body: Body, drawing_nodes: IntArray) -> Iterator[Finding]:
     used = np.zeros(len(body.points), dtype=np.bool_)
     used[body.cells] = True
-    wrong = np.flatnonzero(~used & ~np.isin(body.node_numbers, helpers))
+    wrong = np.flatnonzero(~used & ~np.isin(body.node_numbers, drawing_nodes))
     if len(wrong):
         problem = f"nodes belong to no cell ({len(wrong)}): {body.node_labels(wrong)}"
         yield Finding(problem=problem, allowed="nodes of cells only (export the named volume alone)")

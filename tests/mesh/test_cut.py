@@ -222,6 +222,25 @@ def test_a_stretched_chamber_has_the_table_of_its_mesh_moved(disc: Disc, quantit
     np.testing.assert_allclose(table.at(at)[1][:2], fresh.at(at)[1][:2], rtol=3e-5)
 
 
+@pytest.mark.parametrize("quantity", ["axial_width", "central_angle"])
+def test_a_stretched_chamber_beside_its_middle_keeps_its_moment_across(disc: Disc, quantity: str) -> None:
+    """Of a sector turned by an angle t all moments across are tan(t) times those along."""
+    plain, turn = replace(disc, plate_thickness=0.0), 0.01
+    geometry = disc_chamber(plain, (3, 16, 2), kind="hexahedron27")
+    x, y, z = geometry.points.T
+    points = np.column_stack([x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn), z])
+    dimensions = {name: getattr(plain, name) for name in STRETCHED}
+    moved = stretched(
+        replace(geometry, points=points, digest="turned"),
+        dimensions=dimensions,
+        quantity=quantity,
+        value=1.05 * dimensions[quantity],
+    )
+    columns = chamber_table(moved).columns[:, 0]
+    angle = turn * (1.05 if quantity == "central_angle" else 1.0)
+    assert columns[2] / columns[1] == pytest.approx(np.tan(angle), rel=2e-4)
+
+
 def test_a_chamber_stretched_twice_comes_from_its_own_mesh(disc: Disc) -> None:
     geometry = disc_chamber(disc, (2, 8, 1), kind="hexahedron27")
     dimensions = {name: getattr(disc, name) for name in STRETCHED}

@@ -189,3 +189,11 @@ def test_scenes_with_a_mesh_are_compared_by_its_digest(tmp_path: Path) -> None:
     assert geometry_of(other) != geometry_of(one)
     assert other.values_sha256 != one.values_sha256
     assert "disc.outer_radius" not in one.defaulted
+
+
+def test_one_file_read_in_two_ways_gives_two_chambers(tmp_path: Path) -> None:
+    """What is kept of a chamber is found by its digest, so that the way is part of it."""
+    content = msh_2(drawn())
+    found = [geometry_of(loaded(tmp_path, content, mesh_axis=axis)) for axis in ("z", "-z", "z")]
+    assert found[0] != found[1]
+    assert found[0] == found[2]

@@ -16,6 +16,7 @@ from ringbalance.scene.keys.declaration import Key, keys_of
 from ringbalance.scene.keys.eccentric_schema import ECCENTRIC_MASS
 from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.models import InputUncertainty
+from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification.catalogue import load_cases
 from ringbalance.verification.runner import DRIVEN, cases_under_way, paper_scene
 
@@ -25,7 +26,7 @@ def collect_eccentric(
     *,
     level: Level = "light",
     scene_text: str = "",
-    workers: int = 1,
+    pool: Workers | None = None,
     progress: Progress | None = None,
 ) -> Record:
     """Run the scene, balanced and with its masses locked, and judge its loops and the claims of its paper.
@@ -35,7 +36,7 @@ def collect_eccentric(
     tell = progress or (lambda _: None)
     cases = [case.id for case in load_cases() if case.paper == DRIVEN]
     with cases_under_way(
-        cases, scene=paper_scene(), level=level, mutations=level == "heavy", workers=workers
+        cases, scene=paper_scene(), level=level, mutations=level == "heavy", pool=pool
     ) as under_way:
         tell("balanced and locked run")
         study = eccentric_study(scene).document()

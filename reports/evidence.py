@@ -28,6 +28,7 @@ from ringbalance.reports.provenance import provenance
 from ringbalance.reports.section import Level, Record, Work
 from ringbalance.reports.sections import collected
 from ringbalance.scene import AnyScene, Scene, scene_table
+from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification import paper_numbers
 from ringbalance.verification.document import merge_saved, results_document
 from ringbalance.verification.result import CaseResult
@@ -50,16 +51,18 @@ def collect_evidence(
     level: Level = "light",
     scene_text: str = "",
     saved: Sequence[Mapping[str, Any]] = (),
-    workers: int = 1,
+    pool: Workers | None = None,
     progress: Progress | None = None,
+    judged: Callable[[list[Record]], None] | None = None,
 ) -> Record:
     """Run everything that a report rests on, pictures excepted, and gather it in one JSON-able document.
 
-    Args: `scene_text`: the scene file's own text, for the appendix; empty where there is none.
+    Args: `scene_text`: the scene file's own text, for the appendix; empty where there is none. `pool`: runs
+    cases beside this process. `judged`: called with all cases as soon as they are there.
     Raises: SceneError: a scene that cannot be calibrated or simulated.
     """
     tell = progress or (lambda _: None)
-    with cases_under_way(scene=scene, level=level, mutations=level == "heavy", workers=workers) as under_way:
+    with cases_under_way(scene=scene, level=level, mutations=level == "heavy", pool=pool) as under_way:
         tell("pressure field")
         pressure = _pressure(scene)
         tell("calibration")
@@ -71,6 +74,8 @@ def collect_evidence(
         sections = collected(work, last=False)
         tell("verification")
         cases = merge_saved(finished_cases(under_way, tell), saved)
+    if judged is not None:
+        judged(cases)
     sections |= collected(work, last=True)
     # What a section measured by the clock does not reproduce.
     clocked = {name: record.pop("times") for name, record in sections.items() if "times" in record}

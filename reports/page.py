@@ -6,7 +6,7 @@ import base64
 import io
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import groupby
 from types import MappingProxyType
@@ -225,22 +225,34 @@ class PageContent:
     """Every figure on the page, for files of their own."""
 
 
-def page_content(evidence: Record, *, pictures: Mapping[str, bytes] | None = None) -> PageContent:
+def case_views(cases: list[Record]) -> Record:
+    """What the page shows of the cases but the second balancer's, by id."""
+    evidence = {"verification": cases}
+    return {case["id"]: case_view(case) for case in (*summary.claims(evidence), *summary.checks(evidence))}
+
+
+def page_content(
+    evidence: Record,
+    *,
+    pictures: Mapping[str, bytes] | None = None,
+    views_of: Callable[[list[Record]], Record] = case_views,
+) -> PageContent:
     """Turn the evidence into texts, tables and figures.
 
     Args: `pictures`: PNG bytes by the file names that the evidence lists; a picture that is missing is left
-    out.
+    out. `views_of`: what `case_views` answers, perhaps made by another process meanwhile.
     Raises: KeyError: an evidence document that lacks a part.
     """
     sections = viewed(evidence)
     if evidence.get("balancer") == BALANCER:
         return PageContent(context=_frame(evidence, sections), drawings=tuple(drawings_in(sections)))
+    figures = _page_figures(evidence)
+    views = views_of(evidence["verification"])
     claims = [
-        {**case_view(case), "elsewhere": summary.elsewhere(case, evidence)}
+        {**views[case["id"]], "elsewhere": summary.elsewhere(case, evidence)}
         for case in summary.claims(evidence)
     ]
-    checks = [case_view(case) for case in summary.checks(evidence)]
-    figures = _page_figures(evidence)
+    checks = [views[case["id"]] for case in summary.checks(evidence)]
     calibration, runs = evidence["calibration"], evidence["closed_loop"]
     context = {
         **_frame(evidence, sections),

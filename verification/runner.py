@@ -6,13 +6,13 @@ import dataclasses
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from functools import lru_cache, partial
 from typing import Any
 
 from ringbalance.scene import AnyScene, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.models import Scene
-from ringbalance.scene.platform.processes import Workers
+from ringbalance.scene.platform.processes import Workers, beside
 from ringbalance.verification.assumptions import assumptions_of, overridden
 from ringbalance.verification.case import CaseDefinition, Mutation
 from ringbalance.verification.catalogue import case_code, load_case, load_cases
@@ -230,21 +230,22 @@ def cases_under_way(
     level: Level = "light",
     mutations: bool = False,
     workers: int = 1,
+    pool: Workers | None = None,
 ) -> Iterator[Iterator[CaseResult]]:
     """Start several cases as `run_cases` does, and do something else while they run.
 
     This process takes part once results are asked for. Leaving early leaves no process behind.
+    Args: `pool`: instead of `workers`, processes that are wanted for more than the cases.
     """
     scene = liquid_ring_scene(scene)
     wanted = tuple(case_ids) or tuple(definition.id for definition in load_cases())
     run = partial(_run_whole, scene=scene, level=level, mutations=mutations)
-    groups = _started_in(wanted)
-    if workers == 1:
-        yield map(run, wanted)
-        return
-    with Workers(workers - 1) as pool:
-        started = {group: pool.submit(_run_group, run, group) for group in groups}
-        yield _in_order(run, pool, started, wanted)
+    with beside(workers) if pool is None else nullcontext(pool) as crew:
+        if crew is None:
+            yield map(run, wanted)
+            return
+        started = {group: crew.submit(_run_group, run, group) for group in _started_in(wanted)}
+        yield _in_order(run, crew, started, wanted)
 
 
 def _started_in(wanted: Sequence[str]) -> list[Group]:

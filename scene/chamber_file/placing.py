@@ -192,11 +192,11 @@ def covered_findings(
         outside = float((shares * volumes).sum() / volumes.sum())
         if name == "port_radius" and outside > fill / 2:
             problem = f"at the start (fill {fill / 2:.3g}) the liquid does not cover {name}, "
-            problem += f"{written(radius, 'mm')}: {outside:.2g} of the chamber lies outside it"
+            problem += f"{written(radius, 'mm')}: {100 * outside:.2g} % of the chamber lies outside it"
             yield Finding(problem=problem, allowed="a port nearer to the outer wall, or more liquid")
         if name == "inlet_radius" and outside < fill:
             problem = f"at max_fill_ratio ({fill:.3g}) the liquid covers {name}, {written(radius, 'mm')}: "
-            problem += f"{outside:.2g} of the chamber lies outside it"
+            problem += f"{100 * outside:.2g} % of the chamber lies outside it"
             yield Finding(problem=problem, allowed="an inlet nearer to the inner wall, or less liquid")
 
 

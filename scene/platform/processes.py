@@ -8,7 +8,7 @@ import signal
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from multiprocessing import get_context, parent_process
 from threading import Thread
 from types import TracebackType
@@ -71,6 +71,11 @@ class Workers(ProcessPoolExecutor):
         for process in list((self._processes or {}).values()):
             process.kill()
         self.shutdown(cancel_futures=True)
+
+
+def beside(workers: int) -> AbstractContextManager[Workers | None]:
+    """The other ones of so many processes, this one included; None where there are none."""
+    return nullcontext() if workers == 1 else Workers(workers - 1)
 
 
 def end_with(gone: Callable[[], object]) -> None:

@@ -17,7 +17,7 @@ from keep_evidence import kept_document
 from ringbalance.reports import cli
 from ringbalance.reports import evidence as evidence_module
 from ringbalance.reports import report as report_module
-from ringbalance.reports.page import page_content
+from ringbalance.reports.page import case_views, page_content
 from ringbalance.reports.pages import consequences as consequences_module
 from ringbalance.reports.pictures.opengl import OpenGL
 from ringbalance.reports.render import render
@@ -25,6 +25,7 @@ from ringbalance.reports.report import Report, write_report
 from ringbalance.reports.saved import heavy_cases, saved_cases
 from ringbalance.reports.studies.consequences import find_consequences
 from ringbalance.scene import Scene, SceneError, bundled_scene
+from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification.runner import cases_under_way
 
 Record = dict[str, Any]
@@ -304,3 +305,11 @@ def test_a_broken_scene_writes_nothing(tmp_path: Path) -> None:
     with pytest.raises(SceneError):
         cli.report(tmp_path / "bad.toml", out=tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_a_worker_makes_the_same_views_of_the_cases(first: Report) -> None:
+    cases = first.evidence["verification"]
+    with Workers(1) as pool:
+        views = report_module._CaseViews(pool=pool)
+        views.begin(cases)
+        assert views.of([]) == case_views(cases) != {}

@@ -1,4 +1,4 @@
-"""What the models of a scene may be off by, as inputs of a fit that are held and uncertain.
+"""Errors of a scene's models, as inputs of a fit that are held and uncertain.
 
 Each cause of k's uncertainty is a random function of Re, of two parts (`with_errors`).  What clears the crest
 and the pressure of the cavity there are known within the spans of `reduced_model.tube.regime`.  The start of

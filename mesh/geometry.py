@@ -20,7 +20,7 @@ from ringbalance.scene.models import Disc
 
 
 def imported_table(disc: Disc) -> ChamberTable | None:
-    """What a chamber's mesh is integrated to; None for the sector between plates."""
+    """Integrals over a chamber's mesh; None for the sector between plates."""
     return None if disc.geometry is None else chamber_table(disc.geometry)
 
 

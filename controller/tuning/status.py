@@ -1,4 +1,4 @@
-"""What a tuning comes to, in one sentence: what keeps the runs from settling, and what to do about it."""
+"""Status of a tuning: what keeps the runs from settling, and what to do about it."""
 
 from __future__ import annotations
 
@@ -39,7 +39,8 @@ def status_of(
             f"no gain keeps the amplitude within {limit * um:.4g} um: the sensor's noise is "
             f"{scene.sensor.amplitude_noise * um:.4g} um: raise controller.limit or average the sensor"
         )
-    reached, also = settling.quantiles["p95"], f", with {best.change}" if best.change else ""
+    also = f", with {best.change}" if best.change else ""
+    reached = settling.quantiles["p95"]
     if reached is not None:
         return f"tuned{also}: 95 % of the runs settle within {reached:.3g} s"
     if max(zone, smallest / 2) > limit:
@@ -48,6 +49,11 @@ def status_of(
             f"the vibration by {smallest * um:.4g} um, and up to {zone * um:.4g} um none moves liquid: "
             f"lower controller.minimum_gas_time{_reached(found)}"
         )
+    return _unsettled(scene, settling, also=also, found=found)
+
+
+def _unsettled(scene: Scene, settling: SettlingTimes, *, also: str, found: Search | None) -> str:
+    """Of runs that settle too seldom, by what explains them. Args: `also`: a change that is recommended."""
     share = (
         f"{settling.settled.value:.1%} of the runs settle within the time limit of "
         f"{scene.run.time_limit:.4g} s{also}: 95 % is not reached"

@@ -48,7 +48,7 @@ class Faceting:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DrawingError:
-    """Half-widths (95 %) for facets and table, along the fills."""
+    """Expanded uncertainties (95 %) by facets and table, along the fills."""
 
     volume: float
     """Of the whole chamber, m^3."""
@@ -122,7 +122,7 @@ def _share(geometry: ChamberGeometry, facets: IntArray, corners: int) -> FloatAr
 
 
 def drawing_error(geometry: ChamberGeometry, *, fill_ratio: FloatArray) -> DrawingError:
-    """What facets in place of curved walls, and the table between its nodes, can change at given fills.
+    """Expanded uncertainties by facets in place of curved walls, and by the table between its nodes.
 
     At a fixed fill ratio the surface moves by what the whole chamber and by what the wet walls hold more;
     each edge counts with the sign that does most, to first order.

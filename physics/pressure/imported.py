@@ -1,4 +1,4 @@
-"""Pressure of the liquid at rest in an imported chamber, and what it does to each named boundary.
+"""Pressure of the liquid at rest in an imported chamber, and its loads on each named boundary.
 
 laplace(p) = 2 rho omega^2 in the liquid, p = p_gas on the free surface and n . grad p = rho (omega^2 r e_r +
 g) . n on walls, by quadratic tetrahedra on a mesh that follows the free surface.  The force field has the
@@ -32,7 +32,7 @@ _MOST_STEPS: Final = 20
 
 @dataclass(frozen=True, kw_only=True)
 class BoundaryLoad:
-    """What the liquid does to one boundary."""
+    """Force and moment of the liquid on one boundary."""
 
     force: Estimate
     """N, shape (3,), in the chamber's axes."""

@@ -61,7 +61,7 @@ class RingWaves:
 
 @dataclass(frozen=True, kw_only=True)
 class WaveSystem:
-    """What one surface in one chamber gives, whatever the speed."""
+    """The waves' problem of one surface in one chamber, for every speed."""
 
     reduced: ReducedWaves
     scale: float

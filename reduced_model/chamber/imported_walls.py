@@ -1,4 +1,4 @@
-"""What an imported chamber adds to the uncertainties: how well its mesh draws it, and its moment across."""
+"""Uncertainty that an imported chamber's mesh adds, and its moment across."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ringbalance.scene.models import Disc
 
 @dataclass(frozen=True, kw_only=True)
 class DrawingShares:
-    """Relative half-widths for a mesh in place of the chamber: facets for curved walls, and integration."""
+    """Relative expanded uncertainties (95 %) by facets for curved walls, and by integration."""
 
     volume: float
     wall_pressure: FloatArray

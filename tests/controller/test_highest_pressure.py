@@ -36,6 +36,15 @@ def test_there_the_smallest_correction_is_the_limit(fast: Scene) -> None:
     assert smallest(there, model) == pytest.approx(fast.controller.limit, rel=0.01)
 
 
+def test_of_a_range_of_gas_lines_the_worse_end_counts(paper_scene: Scene) -> None:
+    """The better end would reach a limit between both."""
+    model = calibration_of(paper_scene).model
+    ends = [answer.smallest_correction or 0.0 for answer in line_answers(paper_scene, model)]
+    assert max(ends) > 1.1 * min(ends) > 0
+    scene = replace(paper_scene, controller=replace(paper_scene.controller, limit=1.1 * min(ends)))
+    assert highest_pressure(scene, model) is None
+
+
 @pytest.mark.parametrize("factor", [0.5, 10.0])
 def test_none_below_the_smallest_correction_or_far_above_it(fast: Scene, factor: float) -> None:
     controller = replace(fast.controller, limit=factor * fast.controller.limit)

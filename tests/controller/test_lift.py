@@ -11,8 +11,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from ringbalance.controller.liquid_ring.compiled_column import ends
+from ringbalance.controller.liquid_ring.compiled_lift import crest_start, crest_stop, lift_rates, shown
 from ringbalance.controller.liquid_ring.interval import Passage, pass_time
-from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, Switch
+from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, Switch, packed
 from ringbalance.physics.tube.state import tube_state
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.gas_line import line_ends
@@ -233,3 +235,25 @@ def test_a_leg_rises_with_the_gas_of_a_line(
     through = (0.25 - seen.fills) * model.chamber_volume / model.tube_area
     found = float(np.interp((column.leg[1] - column.leg[0]) / 2, through, instants))
     assert found == pytest.approx(reference, rel=0.01, abs=0.4e-3)
+
+
+def test_the_front_counts_from_where_it_starts_and_has_the_slopes_that_it_states(
+    scene: Scene, plant_of: Callable[..., Dynamics]
+) -> None:
+    plant = plant_of(scene, calibrate(scene).model, INERTIA, LIFT).kept_plant(total=0.5)[0]
+    start, stop = crest_start(plant, 1), crest_stop(plant, 1)
+    for place in (0.6 * start, 0.4 * start + 0.6 * stop):
+        motion = Motion(velocity=1.0, lifted=(place, 1))
+        state = packed(np.array([plant]), fill=0.25, primed=False, motion=motion)[0]
+        assert state["lifting"]
+        assert shown(plant, state, 0.25) == 0.25
+        at, x, step = ends(plant, 0.24, 0.26, 3e5, 0.0, 1), 0.2499, 1e-6
+
+        _, by_x, by_speed, *_ = lift_rates(plant, state, at, x, 1.0)
+        changes = [
+            lift_rates(plant, state, at, x + dx, 1.0 + du)[0]
+            - lift_rates(plant, state, at, x - dx, 1.0 - du)[0]
+            for dx, du in ((step, 0.0), (0.0, step))
+        ]
+        assert changes[0] / (2 * step) == pytest.approx(by_x, rel=1e-5)
+        assert changes[1] / (2 * step) == pytest.approx(by_speed, rel=1e-3)

@@ -57,8 +57,9 @@ class Profile:
 def covariance(slopes: FloatArray) -> FloatArray:
     """(A'A)^-1 of d(residuals)/dt, with infinite variance along directions that A does not see."""
     _, s, vt = np.linalg.svd(slopes, full_matrices=False)
-    weak = s <= 1e-10 * np.max(s, initial=1e-300)
-    scaled = vt.T / np.where(weak, 1e-10 * np.max(s, initial=1e-300), s)
+    # The floor: data that tell nothing at all of any parameter leave a variance that still is a number.
+    largest = np.max(s, initial=1e-100)
+    scaled = vt.T / np.where(s <= 1e-10 * largest, 1e-10 * largest, s)
     return np.asarray(scaled @ scaled.T)
 
 

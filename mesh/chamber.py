@@ -22,6 +22,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from ringbalance.mesh.geometry import half_angle
 from ringbalance.mesh.tensor_cells import contracted, line_shapes, line_stations, stations
 from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.chamber_file.record import OUTER_WALL
 from ringbalance.scene.models import Disc
 
 Geometry = Literal["curved", "straight"]
@@ -30,10 +31,11 @@ SurfaceFunction = Callable[[FloatArray, FloatArray], FloatArray]
 HIGHEST_ORDER = 16
 """Of the polynomials in a cell; products of distances lose digits beyond."""
 
+FREE_SURFACE = "free_surface"
 SIDES: Mapping[str, tuple[int, int]] = MappingProxyType(
     {
-        "free_surface": (0, 0),
-        "outer_wall": (0, -1),
+        FREE_SURFACE: (0, 0),
+        OUTER_WALL: (0, -1),
         "plate_right": (1, 0),
         "plate_left": (1, -1),
         "end_back": (2, 0),

@@ -46,7 +46,8 @@ def liquid_area(*, disc: Disc, surface_radius: npt.ArrayLike) -> FloatArray:
     Source: integral of 2 r alpha(r); the paper's Eq. 3 is its flat-strip approximation, O(t^3) away.
     """
     if (table := imported_table(disc)) is not None:
-        return np.asarray(table.at_radius(surface_radius, 0) / disc.axial_width)
+        # Rounding at the outer wall would leave less than nothing, and a fill ratio below zero.
+        return np.maximum(table.at_radius(surface_radius, 0), 0.0) / disc.axial_width
     within = partial(swept_area, central_angle=disc.central_angle, plate_thickness=disc.plate_thickness)
     return np.asarray(within(radius=disc.outer_radius) - within(radius=surface_radius), dtype=np.float64)
 

@@ -13,21 +13,21 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.mesh.chamber import FREE_SURFACE
 from ringbalance.mesh.quadratic_tetrahedra import (
     EDGES,
     FACES,
     Tetrahedra,
     compacted,
+    derivatives,
     face_nodes,
     lonely,
     lowest_first,
     shapes,
-    slopes,
     with_middles,
 )
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 
-FREE_SURFACE: Final = "free_surface"
 _SNAP: Final = 0.2
 """Share of the shortest edge at a corner up to which the corner is moved onto the surface."""
 _ON: Final = 1e-7
@@ -97,11 +97,10 @@ def _tangents(body: Tetrahedra) -> FloatArray:
     """Projectors onto the directions in which each node stays on the planes of its walls, (nodes, 3, 3)."""
     spread = np.zeros((len(body.nodes), 3, 3))
     at = np.concatenate([np.eye(3), (np.eye(3) + np.roll(np.eye(3), 1, axis=1)) / 2])
-    gradients = slopes(at)
     for face in range(4):
         here = body.faces[:, face] >= 0
         nodes = face_nodes(body.cells[here], face)
-        tangent = np.einsum("enx,pna->epxa", body.nodes[nodes], gradients)
+        tangent = derivatives(body.nodes[nodes], at)
         normal = np.cross(tangent[..., 0], tangent[..., 1])
         normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
         np.add.at(spread, nodes, normal[..., :, None] * normal[..., None, :])
@@ -151,9 +150,7 @@ def _shifted(body: Tetrahedra, shift: FloatArray) -> Tetrahedra:
 
 def jacobians(body: Tetrahedra) -> FloatArray:
     """Determinants of dx/dX at the four corners and in the middle of each cell, shape (cells, 5)."""
-    gradients = slopes(np.vstack([np.eye(4), np.full(4, 0.25)]))
-    places = body.nodes[body.cells]
-    matrix = np.einsum("enx,pna->epxa", places - places[:, :1], gradients, optimize=True)
+    matrix = derivatives(body.nodes[body.cells], np.vstack([np.eye(4), np.full(4, 0.25)]))
     return np.asarray(np.einsum("epi,epi->ep", matrix[..., 0], np.cross(matrix[..., 1], matrix[..., 2])))
 
 

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.scene.chamber_file.facets import boundary_facets, corners_of
+from ringbalance.scene.chamber_file.facets import boundary_facets, corners_of, edges_of
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 
 _OFF_NODES: Final = 1e-7
@@ -51,7 +51,7 @@ def outlines(geometry: ChamberGeometry, *, axis: int, place: float = 0.0) -> tup
 
 def _crossed(pieces: IntArray, height: FloatArray) -> IntArray:
     """Edges from one side of the plane to the other, piece by piece, their nodes in rising order."""
-    ends = np.stack([pieces, np.roll(pieces, -1, axis=1)], axis=-1)
+    ends = edges_of(pieces)
     piece, edge = np.nonzero(height[ends[..., 0]] * height[ends[..., 1]] < 0)
     return np.sort(ends[piece, edge], axis=1)
 

@@ -13,23 +13,18 @@ from typing import Final
 import numpy as np
 
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
+from ringbalance.scene.chamber_file.elements import CORNERS, between, faces, reference_nodes, shape_values
+from ringbalance.scene.chamber_file.facets import key_of, repeats
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 
 NAMELESS: Final = "other_walls"
 """Boundary of all faces to which the file gives no name."""
-EDGES: Final = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])
+EDGES: Final = np.array(between("tetra10")[4:])
 """Corners of the edges on which nodes 4 to 9 lie: meshio's order."""
-FACES: Final = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+_SIDES: Final = np.array(sorted(faces("tetra10"), key=lambda side: -sum(side[:3])))
+FACES: Final = _SIDES[:, :3]
 """Corners of the face opposite each corner, seen from outside in the order of a positive cell."""
-_HEXAHEDRON_FACES: Final = np.array(
-    [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
-)
-_HEXAHEDRON_CORNERS: Final = np.array(
-    [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]]
-)
-_HEXAHEDRON_EDGES: Final = np.array(
-    [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]]
-)
+_HEXAHEDRON_FACES: Final = np.array(faces("hexahedron"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,13 +43,7 @@ class Tetrahedra:
 
 def face_nodes(cells: IntArray, face: int) -> IntArray:
     """The six nodes of one face of every cell, corners first, then the middles of its sides in turn."""
-    corners = FACES[face]
-    sides = [_edge(int(corners[k]), int(corners[(k + 1) % 3])) for k in range(3)]
-    return np.asarray(cells[:, [*corners, *(4 + side for side in sides)]])
-
-
-def _edge(first: int, second: int) -> int:
-    return int(np.flatnonzero((np.sort(EDGES, axis=1) == sorted((first, second))).all(axis=1))[0])
+    return np.asarray(cells[:, _SIDES[face]])
 
 
 def shapes(barycentric: FloatArray) -> FloatArray:
@@ -76,6 +65,15 @@ def slopes(barycentric: FloatArray) -> FloatArray:
     for row, (i, j) in enumerate(edges, start=corners):
         full[:, row, i], full[:, row, j] = 4 * barycentric[:, j], 4 * barycentric[:, i]
     return np.asarray(full[:, :, 1:] - full[:, :, :1])
+
+
+def derivatives(places: FloatArray, barycentric: FloatArray) -> FloatArray:
+    """dx/dX of cells or of facets at points, shape (n, points, 3, dimension).
+
+    Args: `places`: of their nodes, shape (n, functions, 3). `barycentric`: shape (points, dimension + 1).
+    """
+    local = places - places[:, :1]
+    return np.asarray(np.einsum("enx,pna->epxa", local, slopes(barycentric), optimize=True))
 
 
 def lowest_first(cells: IntArray, faces: IntArray) -> IntArray:
@@ -102,7 +100,7 @@ def lowest_first(cells: IntArray, faces: IntArray) -> IntArray:
 
 def tetrahedra(geometry: ChamberGeometry) -> Tetrahedra:
     """The cells of a chamber as quadratic tetrahedra; straight edges get a node in their middle."""
-    corners = 4 if geometry.kind.startswith("tetra") else 8
+    corners = CORNERS[geometry.kind]
     if corners == 4:
         cells, middles = geometry.cells[:, :4], _tetrahedron_middles(geometry)
     else:
@@ -121,9 +119,7 @@ def tetrahedra(geometry: ChamberGeometry) -> Tetrahedra:
 
 def lonely(cells: IntArray, size: int) -> BoolArray:
     """Whether each face of each cell belongs to that cell alone, shape (cells, 4)."""
-    keys = face_keys(cells[:, FACES], size)
-    _, inverse, count = np.unique(keys, return_inverse=True, return_counts=True)
-    return np.asarray((count[inverse] == 1).reshape(keys.shape))
+    return np.asarray(repeats(key_of(cells[:, FACES], size)) == 1)
 
 
 def _tetrahedron_middles(geometry: ChamberGeometry) -> FloatArray:
@@ -134,36 +130,16 @@ def _tetrahedron_middles(geometry: ChamberGeometry) -> FloatArray:
 
 
 def _hexahedron_middles(geometry: ChamberGeometry, parents: IntArray, local: IntArray) -> FloatArray:
-    points, cells = geometry.points, geometry.cells
-    middle = _HEXAHEDRON_CORNERS[local][:, EDGES].mean(axis=2)
-    result = np.empty((len(local), 6, 3))
+    middle = reference_nodes("hexahedron")[local][:, EDGES].mean(axis=2)
+    result = np.empty(middle.shape)
     # 27 places at most: corners' means on edges, faces and in the middle of the reference cell.
-    codes = ((middle + 1) @ np.array([9, 3, 1])).astype(np.int64)
-    for code in np.unique(codes):
-        place = np.array([code // 9, code // 3 % 3, code % 3]) - 1.0
-        values = _hexahedron_shapes(place, cells.shape[1])
+    codes = (2 * middle @ np.array([9, 3, 1])).astype(np.int64)
+    for code, first in zip(*np.unique(codes, return_index=True), strict=True):
         here = codes == code
-        result[here] = np.einsum("k,ekx->ex", values, points[cells[parents[np.nonzero(here)[0]]]])
+        values = shape_values(geometry.kind, middle.reshape(-1, 3)[first])
+        nodes = geometry.cells[parents[np.nonzero(here)[0]]]
+        result[here] = np.einsum("k,ekx->ex", values, geometry.points[nodes])
     return result
-
-
-def _hexahedron_shapes(place: FloatArray, functions: int) -> FloatArray:
-    """Shape functions of a hexahedron of 8, 20 or 27 nodes at one place, in meshio's order of nodes."""
-    corners = np.prod(1 + place * _HEXAHEDRON_CORNERS, axis=1) / 8
-    if functions == 8:
-        return np.asarray(corners)
-    ends = _HEXAHEDRON_CORNERS[_HEXAHEDRON_EDGES].mean(axis=1)
-    if functions == 20:
-        along = np.where(ends == 0, 1 - place**2, (1 + place * ends) / 2)
-        edges = np.prod(along, axis=1)
-        corrected = corners.copy()
-        for edge, value in zip(_HEXAHEDRON_EDGES, edges, strict=True):
-            corrected[edge] -= value / 2
-        return np.concatenate([corrected, edges])
-    sides = np.array([[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1], [0, 0, 0]])
-    at = np.concatenate([_HEXAHEDRON_CORNERS, ends, sides])
-    lines = np.where(at == 0, 1 - place**2, place * (place + at) / 2)
-    return np.asarray(np.prod(lines, axis=1))
 
 
 def with_middles(points: FloatArray, cells: IntArray, middles: FloatArray) -> tuple[FloatArray, IntArray]:
@@ -189,19 +165,11 @@ def _named_faces(geometry: ChamberGeometry, cells: IntArray, corners: int) -> In
         triangles += parts
         numbers += [np.full(len(part), number) for part in parts]
     size = len(geometry.points)
-    known = face_keys(np.concatenate(triangles), size)
+    known = key_of(np.concatenate(triangles), size)
     order = np.argsort(known)
-    wanted = face_keys(cells[:, FACES], size)
+    wanted = key_of(cells[:, FACES], size)
     at = np.minimum(np.searchsorted(known[order], wanted), len(known) - 1)
     return np.where(known[order][at] == wanted, np.concatenate(numbers)[order][at], -1)
-
-
-def face_keys(corners: IntArray, size: int) -> IntArray:
-    """One number for each set of three corners among `size` nodes, shape (...) from (..., 3)."""
-    low = np.sort(corners, axis=-1).astype(np.int64)
-    if size > 2_000_000:
-        raise ValueError("a chamber of more than two million nodes is too large: use a coarser mesh")
-    return np.asarray((low[..., 0] * size + low[..., 1]) * size + low[..., 2])
 
 
 def compacted(body: Tetrahedra) -> Tetrahedra:

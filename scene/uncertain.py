@@ -32,7 +32,12 @@ SHAPE: Final = (*STRETCHED, "plate_thickness")
 
 
 def nominal_value(*, scene: Scene, quantity: str) -> float | None:
-    """SI value of a key of `UNCERTAIN_QUANTITIES`; None when the scene does not ask for the term."""
+    """SI value of a key of `UNCERTAIN_QUANTITIES`; None when the scene does not ask for the term.
+
+    None too for what the mesh of a chamber cannot be stretched by.
+    """
+    if quantity in SHAPE and quantity not in STRETCHED and scene.disc.geometry is not None:
+        return None
     value: float | None = getattr(getattr(scene, _table_of(quantity)), quantity)
     return value
 

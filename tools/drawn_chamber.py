@@ -3,30 +3,27 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from itertools import product
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
 from ringbalance.scene import AnyScene, bundled_scene, load_scene
-from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.chamber_file.elements import (
-    CORNERS,
     FACET_KINDS,
     GMSH_KINDS,
     GMSH_ORDER,
-    between,
-    faces,
+    dimension,
 )
+from ringbalance.scene.chamber_file.record import CellKind
+from ringbalance.verification.reference.block_chambers import sector_chamber
 
 GMSH_NUMBERS = {name: number for number, name in GMSH_KINDS.items()}
 DIVISIONS = (2, 3, 2)
 """Cells in the directions of radius, angle and shaft."""
 CHAMBER, NAMES = 7, ("inner_wall", "outer_wall", "plate_right", "plate_left", "end_back", "end_front")
 """Physical number of the volume, and names of the sides, whose physical numbers count from 1."""
-_SIX_TETRAHEDRA = ((0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6))
 
 
 @dataclass
@@ -60,77 +57,26 @@ class Drawing:
         return [number for number, each in found if dimension(each.kind) == 2 and each.group == group]
 
 
-def dimension(kind: str) -> int:
-    """Of an element."""
-    if kind in FACET_KINDS.values():
-        return 2
-    return 0 if kind == "vertex" else 1 if kind.startswith("line") else 3
-
-
 def drawn(kind: str = "tetra") -> Drawing:
     """A sector of 80 deg about the x axis, radii 20 mm and 40 mm, 30 mm long, of cells of a kind."""
-    places, cells = _lattice(kind)
-    cells, places = _second_order(kind, cells, places)
-    points = {number + 1: tuple(_bent(place)) for number, place in enumerate(places)}
-    drawing = Drawing(points=points, elements={}, names={(3, CHAMBER): "chamber"})  # type: ignore[arg-type]
-    for count, name in enumerate(NAMES):
-        drawing.names[2, count + 1] = name
-    for side, nodes in _sides(kind, cells, places):
-        _add(drawing, FACET_KINDS[len(nodes)], nodes, side + 1)
-    for cell in cells:
-        _add(drawing, kind, cell.tolist(), CHAMBER)
+    radii, angle = (20.0, 40.0), float(np.radians(80))
+    chamber = sector_chamber(DIVISIONS, radii=radii, angle=angle, width=30.0, kind=cast(CellKind, kind))
+    used = np.unique(chamber.cells).tolist()
+    numbers = {node: count + 1 for count, node in enumerate(used)}
+    x, y, z = chamber.points[used].T.tolist()
+    points = dict(zip(numbers.values(), zip(x, y, z, strict=True), strict=True))
+    drawing = Drawing(points=points, elements={}, names={(3, CHAMBER): "chamber"})
+    for group, name in enumerate(NAMES, start=1):
+        drawing.names[2, group] = name
+        for facet in chamber.boundaries[name].tolist():
+            _add(drawing, FACET_KINDS[len(facet)], [numbers[node] for node in facet], group)
+    for cell in chamber.cells.tolist():
+        _add(drawing, kind, [numbers[node] for node in cell], CHAMBER)
     return drawing
 
 
-def _add(drawing: Drawing, kind: str, nodes: Sequence[int], group: int) -> None:
-    drawing.elements[len(drawing.elements) + 101] = Element(kind, [node + 1 for node in nodes], group)
-
-
-def _lattice(kind: str) -> tuple[FloatArray, IntArray]:
-    """Corners in the unit cube, and cells."""
-    steps = [np.linspace(0, 1, count + 1) for count in DIVISIONS]
-    places = np.array(list(product(*steps)))
-    shape = tuple(count + 1 for count in DIVISIONS)
-    cube = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)])
-    hexahedra = [
-        [int(np.ravel_multi_index(tuple(first + corner), shape)) for corner in cube]
-        for first in product(*(range(count) for count in DIVISIONS))
-    ]
-    if CORNERS[kind] == 8:
-        return places, np.array(hexahedra)
-    return places, np.array([[cell[c] for c in four] for cell in hexahedra for four in _SIX_TETRAHEDRA])
-
-
-def _second_order(kind: str, cells: IntArray, places: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Nodes in the middles of corners, one for all cells that share them."""
-    rows, every, numbers = [], list(map(tuple, places.tolist())), dict[frozenset[int], int]()
-    for cell in cells:
-        row = cell.tolist()
-        for corners in between(kind)[CORNERS[kind] :]:
-            key = frozenset(row[corner] for corner in corners)
-            if key not in numbers:
-                numbers[key] = len(every)
-                every.append(tuple(places[sorted(key)].mean(axis=0).tolist()))
-            row = [*row, numbers[key]]
-        rows.append(row)
-    return np.array(rows), np.array(every)
-
-
-def _bent(place: FloatArray) -> list[float]:
-    radius, angle, along = 20 + 20 * place[0], np.radians(-40 + 80 * place[1]), -15 + 30 * place[2]
-    return [float(radius * np.cos(angle)), float(radius * np.sin(angle)), float(along)]
-
-
-def _sides(kind: str, cells: IntArray, places: FloatArray) -> list[tuple[int, list[int]]]:
-    """Facets on the six sides of the cube, in the order of `NAMES`."""
-    found = []
-    for side, (axis, value) in enumerate(product(range(3), (0.0, 1.0))):
-        for cell in cells:
-            for face in faces(kind):
-                nodes = [int(cell[place]) for place in face]
-                if (np.abs(places[nodes, axis] - value) < 1e-9).all():
-                    found.append((side, nodes))
-    return found
+def _add(drawing: Drawing, kind: str, nodes: list[int], group: int) -> None:
+    drawing.elements[len(drawing.elements) + 101] = Element(kind, nodes, group)
 
 
 def msh_2(drawing: Drawing) -> bytes:

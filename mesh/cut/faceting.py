@@ -17,7 +17,7 @@ from ringbalance.mesh.cut.integrals import gauss
 from ringbalance.mesh.cut.patches import wall_patches
 from ringbalance.mesh.cut.table import SLOPE_TOLERANCE, TOLERANCE, chamber_table
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.scene.chamber_file.facets import boundary_facets, corners_of
+from ringbalance.scene.chamber_file.facets import boundary_facets, corners_of, edges_of
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 
 SMOOTH: Final = np.pi / 6
@@ -104,8 +104,7 @@ def _normals(patches: FloatArray, u: FloatArray, v: FloatArray) -> FloatArray:
 
 def _shared_edges(corners: IntArray) -> tuple[IntArray, IntArray, IntArray]:
     """Each edge of two facets: its place among the edges of both, facet by facet, and its ends."""
-    ends = np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1).reshape(-1, 2)
-    ends = np.sort(ends, axis=1)
+    ends = np.sort(edges_of(corners).reshape(-1, 2), axis=1)
     order = np.lexsort(ends.T)
     pair = np.flatnonzero(np.all(ends[order][1:] == ends[order][:-1], axis=1))
     return order[pair], order[pair + 1], ends[order[pair]]

@@ -13,8 +13,8 @@ from typing import Final
 import numpy as np
 
 from ringbalance.scene.arrays import BoolArray, FloatArray
-from ringbalance.scene.chamber_file.facets import boundary_facets
-from ringbalance.scene.chamber_file.record import ChamberGeometry
+from ringbalance.scene.chamber_file.facets import boundary_facets, corners_of, key_of
+from ringbalance.scene.chamber_file.record import OUTER_WALL, ChamberGeometry
 
 Powers = tuple[tuple[int, int], ...]
 _QUAD: Final[Powers] = ((0, 0), (1, 0), (1, 1), (0, 1))
@@ -56,11 +56,9 @@ def wall_patches(geometry: ChamberGeometry) -> tuple[FloatArray, BoolArray]:
     """
     facets = boundary_facets(geometry)
     patches = _coefficients(facets.shape[1]) @ geometry.points[facets]
-    outer = np.sort(geometry.boundaries["outer_wall"], axis=1)
-    rows = np.ascontiguousarray(np.concatenate([np.sort(facets, axis=1), outer]))
-    _, number = np.unique(rows, axis=0, return_inverse=True)
-    named = np.isin(number[: len(facets)], number[len(facets) :])
-    return patches.reshape(-1, 3, 3, 3), named
+    corners, nodes = corners_of(geometry.kind), len(geometry.points)
+    outer = key_of(geometry.boundaries[OUTER_WALL][:, :corners], nodes)
+    return patches.reshape(-1, 3, 3, 3), np.isin(key_of(facets[:, :corners], nodes), outer)
 
 
 @cache

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.mesh.cut.integrals import COLUMNS, LONGEST, Walls, gauss, integrals, walls_about
+from ringbalance.mesh.cut.integrals import COLUMNS, LONGEST, gauss, integrals, walls_about
 from ringbalance.mesh.cut.patches import split_patches, wall_patches
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.chamber_file.record import ChamberGeometry, Stretch
@@ -134,7 +134,7 @@ def chamber_table(geometry: ChamberGeometry) -> ChamberTable:
         return _stretched(geometry, geometry.stretch)
     patches, outer = split_patches(*wall_patches(geometry), longest=LONGEST)
     walls = walls_about(patches, outer)
-    inner, outermost = _bounds(walls)
+    inner, outermost = _bounds(walls.level)
     wall_area = float(walls.samples[5].sum())
     scale = np.array([1, 1, 1, 1 / wall_area] * 2)[:, None]
 
@@ -149,15 +149,18 @@ def chamber_table(geometry: ChamberGeometry) -> ChamberTable:
         nodes=nodes,
         columns=columns,
         wall_area=wall_area,
-        wall_start=float(walls.lowest[walls.outer].min()),
+        wall_start=_bounds(walls.level[walls.outer])[0],
         error=error,
     )
 
 
-def _bounds(walls: Walls) -> tuple[float, float]:
-    """Least and largest r^2, at nine places along each side of a patch, which hold all nodes of the mesh."""
+def _bounds(level: FloatArray) -> tuple[float, float]:
+    """Least and largest r^2, at nine places along each side of a patch, which hold all nodes of the mesh.
+
+    Args: `level`: r^2 on the patches, as in `Walls`.
+    """
     powers = np.linspace(0, 1, 9)[:, None] ** np.arange(5)
-    squares = powers @ walls.level @ powers.T
+    squares = powers @ level @ powers.T
     return float(squares.min()), float(squares.max())
 
 

@@ -15,17 +15,17 @@ from typing import Final
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from ringbalance.mesh.chamber import FREE_SURFACE
 from ringbalance.mesh.cut.faceting import SAFETY, faceting
-from ringbalance.mesh.liquid_body import FREE_SURFACE, Level, liquid_body
+from ringbalance.mesh.liquid_body import Level, liquid_body
 from ringbalance.mesh.quadratic_tetrahedra import Tetrahedra, tetrahedra
 from ringbalance.physics.pressure.linear import LinearSolution, solve_linear
 from ringbalance.physics.pressure.solve import PressureProblem, RotatingLiquid
 from ringbalance.physics.pressure.tetrahedra import Facets, TetrahedronSpace
 from ringbalance.physics.results import Estimate, Statistics, Status, StatusCode
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.scene.chamber_file.record import ChamberGeometry
+from ringbalance.scene.chamber_file.record import OUTER_WALL, ChamberGeometry
 
-WALL: Final = "outer_wall"
 _VOLUME_TOLERANCE: Final = 1e-10
 _MOST_STEPS: Final = 20
 
@@ -177,7 +177,7 @@ def _ring(
     # What the facets of the outer wall leave of r^2 there stands for the other walls, too.
     doubt = density * angular_velocity**2 / 2 * SAFETY * faceting(geometry).wall
     loads = {name: _load(facets, linear.values, exact, doubt) for name, facets in walls.items()}
-    wall = walls[WALL]
+    wall = walls[OUTER_WALL]
     mean, still = (_mean(wall, values) for values in (linear.values, exact))
     weights = space.weights
     return ImportedRing(

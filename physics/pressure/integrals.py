@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ringbalance.mesh.chamber import FREE_SURFACE
 from ringbalance.physics.pressure.assembly import facet_points, volume_points
-from ringbalance.physics.pressure.solve import FREE_SURFACE, PressureSolution
+from ringbalance.physics.pressure.solve import PressureSolution
 from ringbalance.scene.arrays import FloatArray
 
 

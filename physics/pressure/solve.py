@@ -18,14 +18,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ringbalance.mesh.chamber import ChamberMesh
+from ringbalance.mesh.chamber import FREE_SURFACE, ChamberMesh
 from ringbalance.physics.pressure.assembly import Stiffness, facet_points, gauss_line, volume_points
 from ringbalance.physics.pressure.linear import Form, LinearSolution, solve_form
 from ringbalance.physics.pressure.separable import mass_inverse, stiffness_inverse
 from ringbalance.physics.results import Statistics, Status
 from ringbalance.scene.arrays import FloatArray
-
-FREE_SURFACE = "free_surface"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,11 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ringbalance.mesh.chamber import ChamberMesh, chamber_mesh
+from ringbalance.mesh.chamber import FREE_SURFACE, ChamberMesh, chamber_mesh
 from ringbalance.mesh.geometry import half_angle, liquid_area, surface_radius
 from ringbalance.physics.pressure.assembly import facet_points, volume_points
 from ringbalance.physics.pressure.solve import (
-    FREE_SURFACE,
     PressureSolution,
     RotatingLiquid,
     solve_pressure,

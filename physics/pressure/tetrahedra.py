@@ -13,7 +13,15 @@ from typing import Final
 import numpy as np
 from scipy.sparse import csr_matrix, diags_array, vstack
 
-from ringbalance.mesh.quadratic_tetrahedra import EDGES, FACES, Tetrahedra, face_nodes, shapes, slopes
+from ringbalance.mesh.quadratic_tetrahedra import (
+    EDGES,
+    FACES,
+    Tetrahedra,
+    derivatives,
+    face_nodes,
+    shapes,
+    slopes,
+)
 from ringbalance.scene.arrays import FloatArray, IntArray
 
 
@@ -24,18 +32,16 @@ def _permutations(first: float, corners: int) -> FloatArray:
 
 _ROOTS: Final = [(8 - np.sqrt(10) + sign * np.sqrt(38 - 44 * np.sqrt(0.4))) / 18 for sign in (1, -1)]
 """Of the two orbits of the triangle's six points."""
-_CELL_POINTS: Final = _permutations((5 + 3 * np.sqrt(5)) / 20, 4)
-_CELL_WEIGHTS: Final = np.full(4, 1 / 24)
+CELL_POINTS: Final = _permutations((5 + 3 * np.sqrt(5)) / 20, 4)
+"""Barycentric, one nearest to each corner, shape (4, 4)."""
+_CELL_WEIGHT: Final = 1 / 24
 _FACET_POINTS: Final = np.vstack([_permutations(1 - 2 * root, 3) for root in _ROOTS])
 
 
 def _facet_weights() -> FloatArray:
     """Weights that integrate 1 and the square of one coordinate, 1/2 and 1/12."""
-    ones, squares = (
-        np.full(2, 3.0),
-        np.array([(orbit[:, 0] ** 2).sum() for orbit in np.split(_FACET_POINTS, 2)]),
-    )
-    pair = np.linalg.solve(np.stack([ones, squares]), [0.5, 1 / 12])
+    squares = [(orbit[:, 0] ** 2).sum() for orbit in np.split(_FACET_POINTS, 2)]
+    pair = np.linalg.solve([[3.0, 3.0], squares], [0.5, 1 / 12])
     return np.repeat(pair, 3)
 
 
@@ -96,38 +102,30 @@ class TetrahedronSpace:
         return tuple(self.body.names[number] for number in present[present >= 0])
 
     @cached_property
-    def _jacobian(self) -> FloatArray:
-        """dx/dX at the quadrature points, shape (cells, points, 3, 3)."""
-        places = self.body.nodes[self.body.cells]
-        local = places - places[:, :1]
-        return np.asarray(np.einsum("enx,pna->epxa", local, slopes(_CELL_POINTS), optimize=True))
-
-    @cached_property
     def weights(self) -> FloatArray:
         """m^3, shape (cells * points,)."""
-        return np.asarray((np.linalg.det(self._jacobian) * _CELL_WEIGHTS).ravel())
+        jacobian = derivatives(self.body.nodes[self.body.cells], CELL_POINTS)
+        return np.asarray((np.linalg.det(jacobian) * _CELL_WEIGHT).ravel())
 
     @cached_property
     def points(self) -> FloatArray:
         """Quadrature points, m, shape (cells * points, 3)."""
         return np.asarray(
-            np.einsum("pn,enx->epx", shapes(_CELL_POINTS), self.body.nodes[self.body.cells])
+            np.einsum("pn,enx->epx", shapes(CELL_POINTS), self.body.nodes[self.body.cells])
         ).reshape(-1, 3)
 
     def at_points(self, nodal: FloatArray) -> FloatArray:
         """Values at the quadrature points of a field given at the nodes."""
-        return np.asarray(nodal[self.body.cells] @ shapes(_CELL_POINTS).T).ravel()
+        return np.asarray(nodal[self.body.cells] @ shapes(CELL_POINTS).T).ravel()
 
     @cached_property
     def gradient(self) -> csr_matrix:
         """Matrix that takes nodal values to gradients at the quadrature points, three rows a point."""
-        return self._gradient(self.body.cells, _CELL_POINTS)
+        return self._gradient(self.body.cells, CELL_POINTS)
 
     def _gradient(self, cells: IntArray, points: FloatArray) -> csr_matrix:
-        local_slopes = slopes(points)
-        places = self.body.nodes[cells]
-        jacobian = np.einsum("enx,pna->epxa", places - places[:, :1], local_slopes, optimize=True)
-        local = np.einsum("epax,pna->epxn", np.linalg.inv(jacobian), local_slopes, optimize=True)
+        inverse = np.linalg.inv(derivatives(self.body.nodes[cells], points))
+        local = np.einsum("epax,pna->epxn", inverse, slopes(points), optimize=True)
         rows, functions = 3 * len(cells) * len(points), cells.shape[1]
         columns = np.repeat(cells, 3 * len(points), axis=0)
         starts = np.arange(0, (rows + 1) * functions, functions)
@@ -151,7 +149,7 @@ class TetrahedronSpace:
     def load(self, density: FloatArray) -> FloatArray:
         """Integrals of f N_i, f given at the quadrature points."""
         cells = self.body.cells
-        local = (density * self.weights).reshape(len(cells), -1) @ shapes(_CELL_POINTS)
+        local = (density * self.weights).reshape(len(cells), -1) @ shapes(CELL_POINTS)
         return np.bincount(cells.ravel(), weights=local.ravel(), minlength=self.unknowns).astype(np.float64)
 
     def facets(self, name: str) -> Facets:
@@ -160,9 +158,8 @@ class TetrahedronSpace:
         nodes = np.concatenate(
             [face_nodes(self.body.cells[self.body.faces[:, k] == number], k) for k in range(len(FACES))]
         )
-        values, gradients = shapes(_FACET_POINTS), slopes(_FACET_POINTS)
-        places = self.body.nodes[nodes]
-        tangent = np.einsum("enx,pna->epxa", places - places[:, :1], gradients)
+        values, places = shapes(_FACET_POINTS), self.body.nodes[nodes]
+        tangent = derivatives(places, _FACET_POINTS)
         area = np.cross(tangent[..., 0], tangent[..., 1]) * _FACET_WEIGHTS[:, None]
         return Facets(
             nodes=nodes,

@@ -37,7 +37,7 @@ from scipy.sparse import csr_matrix, diags_array
 from scipy.sparse.linalg import lobpcg, splu
 
 from ringbalance.mesh.liquid_body import Level
-from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
+from ringbalance.physics.pressure.tetrahedra import CELL_POINTS, TetrahedronSpace
 from ringbalance.physics.sloshing.projection import Fields, Multigrid, turn
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 
@@ -219,16 +219,14 @@ def _squared_errors(space: TetrahedronSpace, gradients: FloatArray) -> FloatArra
     cells, count = space.body.cells[:, :4], gradients.shape[1]
     points = gradients.reshape(len(cells), 4, 3 * count)
     # Linear in the cell: from its four points to its corners.
-    near, far = (5 + 3 * np.sqrt(5)) / 20, (5 - np.sqrt(5)) / 20
-    out = np.linalg.inv(np.full((4, 4), far) + (near - far) * np.eye(4))
-    corners = np.einsum("cp,epk->eck", out, points)
+    corners = np.einsum("cp,epk->eck", np.linalg.inv(CELL_POINTS), points)
     size = space.weights.reshape(len(cells), 4).sum(axis=1)
     gather = csr_matrix(
         (np.repeat(size, 4), (cells.ravel(), np.arange(cells.size))), shape=(space.unknowns, cells.size)
     )
     total = np.maximum(gather @ np.ones(cells.size), np.finfo(np.float64).tiny)
     smooth = (diags_array(1 / total) @ (gather @ corners.reshape(cells.size, -1)))[cells]
-    back = np.einsum("pc,eck->epk", np.linalg.inv(out), smooth - corners)
+    back = np.einsum("pc,eck->epk", CELL_POINTS, smooth - corners)
     weights = space.weights.reshape(len(cells), 4)
     squared = np.einsum("ep,epk->k", weights, back**2).reshape(3, count).sum(axis=0)
     whole = np.einsum("ep,epk->k", weights, points**2).reshape(3, count).sum(axis=0)

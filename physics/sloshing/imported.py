@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from ringbalance.mesh.chamber import FREE_SURFACE
 from ringbalance.mesh.cut.faceting import SAFETY, faceting
-from ringbalance.mesh.liquid_body import FREE_SURFACE, Level, liquid_body
+from ringbalance.mesh.liquid_body import Level, liquid_body
 from ringbalance.mesh.quadratic_tetrahedra import tetrahedra
 from ringbalance.physics import deferred
 from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
 from ringbalance.physics.results import Estimate, Statistics, Status, StatusCode
 from ringbalance.physics.sloshing.range import SMALL
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.chamber_file.record import ChamberGeometry
+from ringbalance.scene.chamber_file.record import OUTER_WALL, ChamberGeometry
 
 if TYPE_CHECKING:
     from ringbalance.physics.sloshing.body import ReducedWaves
 
-WALL: Final = "outer_wall"
 LEVELS: Final = 2
 """Of the Coriolis force: more bring in scales that a mesh does not resolve."""
 _SAFETY: Final = 1.25
@@ -146,7 +146,7 @@ def wave_system(geometry: ChamberGeometry, radius: float, tilt: float, modes: in
     space = TetrahedronSpace(body=replace(body, nodes=body.nodes / scale))
     level = Level(constant=radius**2 / 2 / scale**2, tilt=(0.0, 0.0, tilt / scale))
     reduced = deferred.reduced_waves(
-        space=space, level=level, wall=WALL, potentials=modes + _SPARE, levels=levels
+        space=space, level=level, wall=OUTER_WALL, potentials=modes + _SPARE, levels=levels
     )
     surface = space.facets(FREE_SURFACE)
     missed = np.abs(level.value(surface.points)) / (radius / scale)

@@ -15,7 +15,8 @@ from pyamg.relaxation.relaxation import gauss_seidel
 from scipy.sparse import csr_matrix, diags_array, vstack
 from scipy.sparse.linalg import LinearOperator, cg
 
-from ringbalance.mesh.liquid_body import FREE_SURFACE, Level
+from ringbalance.mesh.chamber import FREE_SURFACE
+from ringbalance.mesh.liquid_body import Level
 from ringbalance.physics.pressure.multigrid import hierarchy_of
 from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
 from ringbalance.scene.arrays import FloatArray, IntArray

@@ -231,7 +231,8 @@ def _along(panel: Axes, found: Record, size: dict[str, float]) -> None:
     _arrow(panel, (-half - 0.35 * outer, level), (-half, level), "-|>", color=style.THIRD, linewidth=1.4)
     panel.text(half + 2 * wall, 0.72 * outer, "tube", color=style.PAPER, va="center")
     panel.text(0, (surface + outer) / 2, "liquid", ha="center", va="center")
-    panel.text(0, (surface + inner) / 2, "gas", ha="center", va="center")
+    # Beside the middle, where a gas tube may stand.
+    panel.text(-half / 2, (surface + inner) / 2, "gas", ha="center", va="center")
     panel.text(1.5 * half, 0.04 * outer, "shaft", ha="right", va="bottom", color=style.MUTED)
 
 

@@ -10,13 +10,13 @@ import numpy as np
 
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.chamber_file.contents import Contents, Elements, MeshFileError, shown, unreadable
-from ringbalance.scene.chamber_file.elements import CELL_KINDS, CORNERS, FACET_KINDS
+from ringbalance.scene.chamber_file.elements import CELL_KINDS, CORNERS, dimension
+from ringbalance.scene.chamber_file.facets import MOST_NODES
 from ringbalance.scene.chamber_file.record import CellKind
 from ringbalance.scene.rules.check import Finding
 
-_MOST: Final = 2_000_000
-"""Nodes, and cells; three numbers of nodes then make one of 64 bits, and the checks of
-as many tetrahedra take 15 s and 1.5 GB."""
+_MOST: Final = MOST_NODES
+"""Nodes, and cells: the checks of as many tetrahedra take 15 s and 1.5 GB."""
 _KINDS: Final = f"cells of one kind: {', '.join(CELL_KINDS)}"
 
 
@@ -81,7 +81,7 @@ def assembled(contents: Contents, *, scale: float) -> Body:
     Args: `scale`: metres in the file's unit.
     Raises: MeshFileError: its cells or nodes are such that nothing further can be looked at.
     """
-    cells = [block for block in contents.blocks if _dimension(block.kind) == 3]
+    cells = [block for block in contents.blocks if dimension(block.kind) == 3]
     found = [*_wrong_kinds(contents, cells), *_wrong_nodes(contents)]
     if found:
         raise MeshFileError(found)
@@ -94,8 +94,8 @@ def assembled(contents: Contents, *, scale: float) -> Body:
     def placed(block: Elements) -> Elements:
         return replace(block, nodes=order[np.searchsorted(numbered, block.nodes)])
 
-    facets = (placed(b) for b in contents.blocks if b.names and b.kind in FACET_KINDS.values())
-    lower = [b for b in contents.blocks if _dimension(b.kind) < 2]
+    facets = (placed(b) for b in contents.blocks if b.names and dimension(b.kind) == 2)
+    lower = [b for b in contents.blocks if dimension(b.kind) < 2]
     return Body(
         kind=next(kind for kind in CELL_KINDS if kind == cells[0].kind),
         node_numbers=contents.node_numbers,
@@ -109,16 +109,10 @@ def assembled(contents: Contents, *, scale: float) -> Body:
     )
 
 
-def helpers(contents: Contents) -> IntArray:
+def drawing_nodes(contents: Contents) -> IntArray:
     """Numbers of nodes that points and lines of the drawing have, such as centres of arcs."""
-    lower = [block.nodes.ravel() for block in contents.blocks if _dimension(block.kind) < 2]
+    lower = [block.nodes.ravel() for block in contents.blocks if dimension(block.kind) < 2]
     return np.concatenate([np.empty(0, dtype=np.int64), *lower])
-
-
-def _dimension(kind: str) -> int:
-    if kind in FACET_KINDS.values():
-        return 2
-    return 0 if kind == "vertex" else 1 if kind.startswith("line") else 3
 
 
 def _wrong_kinds(contents: Contents, cells: Sequence[Elements]) -> Iterator[Finding]:
@@ -159,7 +153,7 @@ def _wrong_nodes(contents: Contents) -> Iterator[Finding]:
         yield Finding(problem=f"coordinates are no finite numbers: {labels}", allowed="")
     elif len(numbers) and np.abs(contents.coordinates).max() > 1e9:
         node = numbers[np.abs(contents.coordinates).max(axis=1).argmax()]
-        yield Finding(problem=f"a coordinate is beyond all measure: node {node}", allowed="")
+        yield Finding(problem=f"a coordinate is above 1e9: node {node}", allowed="")
 
 
 def _lost(block: Elements, numbered: IntArray) -> Finding | None:

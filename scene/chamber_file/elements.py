@@ -124,6 +124,13 @@ _CORNER_PLACES: Final = MappingProxyType(
 )
 
 
+def dimension(kind: str) -> int:
+    """Of an element of a kind: 0 for a point to 3 for a cell."""
+    if kind in FACET_KINDS.values():
+        return 2
+    return 0 if kind == "vertex" else 1 if kind.startswith("line") else 3
+
+
 def between(kind: str) -> tuple[tuple[int, ...], ...]:
     """For each node the corners in whose middle it lies on a straight cell; a corner lies at itself."""
     count = CORNERS[kind]
@@ -165,8 +172,7 @@ def shape_gradients(kind: str) -> FloatArray:
     tetra10 and up to 2 (5) in each coordinate of a hexahedron of first (second) order, and is looked at on a
     lattice with as many places in each direction as it has coefficients, or more.
     """
-    powers = np.array(_powers(kind), dtype=np.float64)
-    coefficients = np.linalg.inv(np.prod(reference_nodes(kind)[:, None, :] ** powers, axis=2))
+    powers, coefficients = _polynomials(kind)
     at = _lattice(kind)
     found = np.empty((len(at), NODES[kind], 3))
     for axis in range(3):
@@ -175,6 +181,19 @@ def shape_gradients(kind: str) -> FloatArray:
         slopes = powers[:, axis] * np.prod(at[:, None, :] ** lower, axis=2)
         found[:, :, axis] = slopes @ coefficients
     return found
+
+
+def shape_values(kind: str, place: FloatArray) -> FloatArray:
+    """Shape functions of a cell at one place in reference coordinates, shape (nodes,)."""
+    powers, coefficients = _polynomials(kind)
+    return np.asarray(np.prod(place**powers, axis=1) @ coefficients)
+
+
+@cache
+def _polynomials(kind: str) -> tuple[FloatArray, FloatArray]:
+    """Exponents of the monomials, shape (n, 3), and coefficients of the shape functions, shape (n, nodes)."""
+    powers = np.array(_powers(kind), dtype=np.float64)
+    return powers, np.linalg.inv(np.prod(reference_nodes(kind)[:, None, :] ** powers, axis=2))
 
 
 def _powers(kind: str) -> list[tuple[int, ...]]:

@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.scene.arrays import IntArray
-from ringbalance.scene.chamber_file.assembly import Body, assembled, helpers
+from ringbalance.scene.chamber_file.assembly import Body, assembled, drawing_nodes
 from ringbalance.scene.chamber_file.contents import MeshFileError
 from ringbalance.scene.chamber_file.keys import MeshKeys
 from ringbalance.scene.chamber_file.names import boundaries_of
@@ -110,7 +110,7 @@ def _chamber(reading: Reading) -> tuple[ChamberGeometry, Placed]:
     axis, middle = reading.values["disc.mesh_axis"], reading.values.get("disc.mesh_middle")
     found, misplaced = placed(body, boundaries, facets.nodes[facets.outer], axis=axis, middle=middle)
     everything = [
-        *topology_findings(body, facets, helpers=helpers(contents)),
+        *topology_findings(body, facets, drawing_nodes=drawing_nodes(contents)),
         *misshapen,
         *misnamed,
         *misplaced,

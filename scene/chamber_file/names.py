@@ -12,11 +12,12 @@ from ringbalance.scene.arrays import BoolArray, IntArray
 from ringbalance.scene.chamber_file.assembly import Body
 from ringbalance.scene.chamber_file.contents import Elements
 from ringbalance.scene.chamber_file.elements import CORNERS
-from ringbalance.scene.chamber_file.topology import Facets, key_of
+from ringbalance.scene.chamber_file.facets import key_of
+from ringbalance.scene.chamber_file.record import OUTER_WALL
+from ringbalance.scene.chamber_file.topology import Facets
 from ringbalance.scene.faults import closest, did_you_mean, toml_text
 from ringbalance.scene.rules.check import Finding
 
-OUTER_WALL: Final = "outer_wall"
 PORT: Final = "port"
 WALLS: Final = "walls"
 VOLUME: Final = "chamber"

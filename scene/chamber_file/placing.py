@@ -12,8 +12,10 @@ import numpy as np
 
 from ringbalance.scene.arrays import FloatArray, IntArray, clipped
 from ringbalance.scene.chamber_file.assembly import Body
+from ringbalance.scene.chamber_file.facets import corners_of, edges_of
 from ringbalance.scene.chamber_file.keys import Axis
-from ringbalance.scene.chamber_file.names import OUTER_WALL, PORT
+from ringbalance.scene.chamber_file.names import PORT
+from ringbalance.scene.chamber_file.record import OUTER_WALL
 from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.rules.check import Finding, written
 
@@ -56,7 +58,7 @@ def placed(
     start, extent = _taken(angle[np.unique(body.cells)])
     centre = start + extent / 2 if middle is None else middle
     points = _rotated(turned, -centre)
-    inner, where = _nearest(points, surface)
+    inner, where = _nearest(points, surface, corners_of(body.kind))
     low, high = float(points[:, 2].min()), float(points[:, 2].max())
     points[:, 2] -= (low + high) / 2
     outer = float(np.hypot(points[:, 0], points[:, 1]).max())
@@ -99,10 +101,9 @@ def _taken(angles: FloatArray) -> tuple[float, float]:
     return start, 2 * math.pi - float(gaps[widest])
 
 
-def _nearest(points: FloatArray, surface: IntArray) -> tuple[float, int]:
+def _nearest(points: FloatArray, surface: IntArray, corners: int) -> tuple[float, int]:
     """Smallest distance from the axis, m, of the edges of the surface, and a node of that edge."""
-    corners = 3 if surface.shape[1] in (3, 6) else 4
-    ends = np.stack([surface[:, :corners], np.roll(surface[:, :corners], -1, axis=1)], axis=2).reshape(-1, 2)
+    ends = edges_of(surface[:, :corners]).reshape(-1, 2)
     first, last = points[ends[:, 0], :2], points[ends[:, 1], :2]
     if surface.shape[1] == corners:
         distance = _from_origin(first, last)
@@ -191,11 +192,11 @@ def covered_findings(
         outside = float((shares * volumes).sum() / volumes.sum())
         if name == "port_radius" and outside > fill / 2:
             problem = f"at the start (fill {fill / 2:.3g}) the liquid does not cover {name}, "
-            problem += f"{written(radius, 'mm')}: {outside:.2g} of the chamber lies outside it"
+            problem += f"{written(radius, 'mm')}: {100 * outside:.2g} % of the chamber lies outside it"
             yield Finding(problem=problem, allowed="a port nearer to the outer wall, or more liquid")
         if name == "inlet_radius" and outside < fill:
             problem = f"at max_fill_ratio ({fill:.3g}) the liquid covers {name}, {written(radius, 'mm')}: "
-            problem += f"{outside:.2g} of the chamber lies outside it"
+            problem += f"{100 * outside:.2g} % of the chamber lies outside it"
             yield Finding(problem=problem, allowed="an inlet nearer to the inner wall, or less liquid")
 
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Final, Literal
 
 from ringbalance.scene.arrays import FloatArray, IntArray
 
 CellKind = Literal["tetra", "tetra10", "hexahedron", "hexahedron20", "hexahedron27"]
 """One kind in a mesh; names and orders of nodes are meshio's."""
+OUTER_WALL: Final = "outer_wall"
+"""The boundary that every chamber has."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,8 @@ from scipy.spatial import cKDTree
 
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.chamber_file.assembly import Body
-from ringbalance.scene.chamber_file.elements import CORNERS, faces
+from ringbalance.scene.chamber_file.elements import CORNERS
+from ringbalance.scene.chamber_file.facets import corners_of, edges_of, key_of, repeats, sides_of
 from ringbalance.scene.rules.check import Finding
 
 _SAME: Final = 1e-7
@@ -41,33 +42,23 @@ class Facets:
     """Keys in rising order that more than two cells have."""
 
 
-def key_of(corners: IntArray, nodes: int) -> IntArray:
-    """One number for the corners of each facet: its three smallest; two facets of a body share them only
-    when they are the same.
-    """
-    ordered = np.sort(corners, axis=1)
-    return np.asarray((ordered[:, 0] * nodes + ordered[:, 1]) * nodes + ordered[:, 2], dtype=np.int64)
-
-
 def facets_of(body: Body) -> Facets:
     """The sides of all cells of a body."""
-    sides = np.array(faces(body.kind))
-    corners = 3 if CORNERS[body.kind] == 4 else 4
-    nodes = body.cells[:, sides].reshape(-1, sides.shape[1])
+    nodes, corners = sides_of(body.cells, body.kind), corners_of(body.kind)
     keys = key_of(nodes[:, :corners], len(body.points))
-    _, place, counts = np.unique(keys, return_inverse=True, return_counts=True)
+    counts = repeats(keys)
     return Facets(
         nodes=nodes,
         corners=corners,
-        cells=np.repeat(np.arange(len(body.cells)), len(sides)),
+        cells=np.repeat(np.arange(len(body.cells)), len(nodes) // len(body.cells)),
         keys=keys,
-        outer=np.flatnonzero(counts[place] == 1),
-        shared=counts[place] > 2,
+        outer=np.flatnonzero(counts == 1),
+        shared=counts > 2,
     )
 
 
-def topology_findings(body: Body, facets: Facets, *, helpers: IntArray) -> Iterator[Finding]:
-    """What is wrong with how cells hang together. Args: `helpers`: numbers of nodes of the drawing."""
+def topology_findings(body: Body, facets: Facets, *, drawing_nodes: IntArray) -> Iterator[Finding]:
+    """What is wrong with how cells hang together. Args: `drawing_nodes`: numbers of nodes of the drawing."""
     yield from _repeated(body)
     crowded = [*_same_cells(body), *_crowded_facets(body, facets)]
     yield from crowded
@@ -78,7 +69,7 @@ def topology_findings(body: Body, facets: Facets, *, helpers: IntArray) -> Itera
     yield from parts
     if not (crowded or doubled or hanging or parts):
         yield from _pinched(body, facets)
-    yield from _unused(body, helpers)
+    yield from _unused(body, drawing_nodes)
 
 
 def _repeated(body: Body) -> Iterator[Finding]:
@@ -192,7 +183,7 @@ def _several_volumes(body: Body, facets: Facets) -> Iterator[Finding]:
 def _pinched(body: Body, facets: Facets) -> Iterator[Finding]:
     """Edges at which the outer surface meets itself."""
     outer = facets.nodes[facets.outer, : facets.corners]
-    edges = np.sort(np.stack([outer, np.roll(outer, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    edges = np.sort(edges_of(outer).reshape(-1, 2), axis=1)
     _, first, counts = np.unique(
         edges[:, 0] * len(body.points) + edges[:, 1], return_index=True, return_counts=True
     )
@@ -203,10 +194,10 @@ def _pinched(body: Body, facets: Facets) -> Iterator[Finding]:
         yield Finding(problem=problem + labels, allowed="a closed surface, two facets at each edge")
 
 
-def _unused(body: Body, helpers: IntArray) -> Iterator[Finding]:
+def _unused(body: Body, drawing_nodes: IntArray) -> Iterator[Finding]:
     used = np.zeros(len(body.points), dtype=np.bool_)
     used[body.cells] = True
-    wrong = np.flatnonzero(~used & ~np.isin(body.node_numbers, helpers))
+    wrong = np.flatnonzero(~used & ~np.isin(body.node_numbers, drawing_nodes))
     if len(wrong):
         problem = f"nodes belong to no cell ({len(wrong)}): {body.node_labels(wrong)}"
         yield Finding(problem=problem, allowed="nodes of cells only (export the named volume alone)")

@@ -343,3 +343,20 @@ def test_a_fit_that_fails_says_so(run: Run, tmp_path: Path) -> None:
     worst = document["criticism"]["findings"][0]
     assert worst["fails"]
     assert document["criticism"]["text"].startswith("the fit does not describe the data")
+
+
+def test_a_disc_with_imported_chambers(run: Run) -> None:
+    """Injections of the paper's disc; a mesh has no plates that could be uncertain."""
+    _, out, _ = run(bundled_scene("imported_chamber"), EXAMPLES["transfer"])
+    exact = " ".join(out.split()).split("taken as exact: ")[1].split(".")[0].split(", ")
+    assert "plate_thickness" not in exact
+    assert "inner_radius" in exact
+
+
+def test_data_that_tell_nothing_of_a_parameter(run: Run) -> None:
+    """What an injection moves does not depend on lambda."""
+    _, out, _ = run(PAPER, EXAMPLES["transfer"], "--parameters", "lambda_factor", "--json")
+    (found,) = json.loads(out)["parameters"]
+    low, high = found["interval"]
+    assert high > 100 * low
+    assert found["verdict"] == "structurally not identified"

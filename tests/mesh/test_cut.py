@@ -104,6 +104,9 @@ def test_the_built_in_chamber_as_a_mesh_is_the_closed_form_but_for_its_drawn_arc
     volume = chamber_volume(disc=disc)
     assert chamber_volume(disc=imported) == pytest.approx(volume, rel=4 * film)
     assert np.max(np.abs(moment_across(disc=imported, surface_radius=b))) < 1e-15
+    # At the wall itself, to which a port is looked for where a column does not flow.
+    last = disc.outer_radius * (1 + np.linspace(-1e-15, 1e-15, 21))
+    assert np.min(liquid_area(disc=imported, surface_radius=last)) >= 0
 
 
 @pytest.mark.parametrize(("kind", "order"), [("tetra", 2.0), ("hexahedron", 2.0), ("tetra10", 4.0)])
@@ -217,6 +220,25 @@ def test_a_stretched_chamber_has_the_table_of_its_mesh_moved(disc: Disc, quantit
     at = fresh.level_of(volumes)
     np.testing.assert_allclose(table.at(at)[0][[0, 1, 3]], fresh.at(at)[0][[0, 1, 3]], rtol=3e-6)
     np.testing.assert_allclose(table.at(at)[1][:2], fresh.at(at)[1][:2], rtol=3e-5)
+
+
+@pytest.mark.parametrize("quantity", ["axial_width", "central_angle"])
+def test_a_stretched_chamber_beside_its_middle_keeps_its_moment_across(disc: Disc, quantity: str) -> None:
+    """Of a sector turned by an angle t all moments across are tan(t) times those along."""
+    plain, turn = replace(disc, plate_thickness=0.0), 0.01
+    geometry = disc_chamber(plain, (3, 16, 2), kind="hexahedron27")
+    x, y, z = geometry.points.T
+    points = np.column_stack([x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn), z])
+    dimensions = {name: getattr(plain, name) for name in STRETCHED}
+    moved = stretched(
+        replace(geometry, points=points, digest="turned"),
+        dimensions=dimensions,
+        quantity=quantity,
+        value=1.05 * dimensions[quantity],
+    )
+    columns = chamber_table(moved).columns[:, 0]
+    angle = turn * (1.05 if quantity == "central_angle" else 1.0)
+    assert columns[2] / columns[1] == pytest.approx(np.tan(angle), rel=2e-4)
 
 
 def test_a_chamber_stretched_twice_comes_from_its_own_mesh(disc: Disc) -> None:

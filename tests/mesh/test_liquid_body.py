@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ringbalance.mesh.chamber import FREE_SURFACE
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
-from ringbalance.mesh.liquid_body import FREE_SURFACE, Level, jacobians, liquid_body
+from ringbalance.mesh.liquid_body import Level, jacobians, liquid_body
 from ringbalance.mesh.quadratic_tetrahedra import Tetrahedra, face_nodes, lonely, tetrahedra
 from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
 from ringbalance.scene import bundled_scene, load_scene

@@ -96,3 +96,14 @@ def test_a_flat_wall_that_is_dry_in_its_middle_holds_a_closed_ring() -> None:
     assert np.all(found.closed)
     deep = tilted_liquid(table(), length=5e-3, vertical=False, turn=4, fills=(0.001, 0.8))
     assert not np.any(deep.closed[0])
+
+
+def test_a_flat_wall_that_gravity_dries_in_its_middle_holds_no_closed_ring() -> None:
+    """The concentric surface leaves 0.05 mm there, less than gravity takes unless it points to the wall."""
+    a, length = X1 - 5e-5, 3e-3
+    fill = float(table().at_radius(a, 0)) / table().volume
+    found = tilted_liquid(table(), length=length, vertical=False, turn=4, fills=(fill,))
+    # Along the wall, G phi less x1 phi^2/2 at an angle phi; away from it, G less its mean over the angle.
+    half = np.arctan(HALF / X1)
+    assert min(length**2 / (2 * X1), length * (1 - np.sin(half) / half)) > 5e-5
+    assert found.closed[0].tolist() == [True, False, False, False]

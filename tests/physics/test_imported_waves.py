@@ -14,6 +14,7 @@ from ringbalance.physics.sloshing.modes import sloshing_modes
 from ringbalance.physics.sloshing.response import sloshing_response
 from ringbalance.scene.models import Disc
 from ringbalance.verification.reference.block_chambers import block_chamber, disc_chamber, sector_chamber
+from ringbalance.verification.reference.sloshing_exact import cosine_waves
 
 _FILL, _NU, _OMEGA = 0.25, 1e-6, 1000.0
 
@@ -91,6 +92,14 @@ def test_without_rotation_a_box_has_the_frequencies_of_its_closed_form() -> None
     # s is large (s^2 about far), so what the Coriolis force does is of order 1 / s.
     assert waves.frequency_ratio.value == pytest.approx(np.sqrt(far * k * np.tanh(k * depth)), rel=2e-3)
     assert waves.vortical_share.max() < 0.01
+
+
+@pytest.mark.parametrize("cells", [(4, 4, 2), (6, 6, 2)])
+def test_straight_cells_on_a_round_wall_are_in_the_uncertainty(cells: tuple[int, int, int]) -> None:
+    geometry = sector_chamber(cells, radii=(0.5, 1.0), angle=np.pi / 2, width=0.3, kind="hexahedron")
+    lowest = ring_waves(geometry=geometry, surface_radius=0.8, modes=4).frequency_ratio
+    exact = cosine_waves(central_angle=np.pi / 2, depth=float(np.log(1 / 0.8))).frequencies(modes=1)[0]
+    assert abs(lowest.value[0] - exact) <= lowest.uncertainty[0] <= 0.05 * exact
 
 
 def test_a_vertical_shaft_tilts_the_surface_and_slows_nothing_at_high_speed() -> None:

@@ -30,6 +30,7 @@ def waves(*, resonant: list[Record], top: float, code: str = "ok", text: str = "
         "surface_amplitude_m": [1e-6, 1e-6, 2e-6],
         "depth_m": [1e-3, 3e-3, 5e-3],
         "resonant": resonant,
+        "imported": False,
         "equal": {
             "fill_ratio": 0.25,
             "amplification": 0.8,

@@ -354,6 +354,9 @@ def test_one_quantity_changed() -> None:
         assert with_value(scene=changed, quantity=quantity, value=back) == scene
     with pytest.raises(ValueError, match="'colour' is none of"):
         nominal_value(scene=scene, quantity="colour")
+    imported = liquid_ring_scene(load_scene(bundled_scene("imported_chamber")))
+    absent = [each for each in UNCERTAIN_QUANTITIES if nominal_value(scene=imported, quantity=each) is None]
+    assert {"plate_thickness", "hump_radius"} & set(absent) == {"plate_thickness"}
 
 
 @pytest.mark.parametrize("where", ["at the top", "in a table", "as tables"])

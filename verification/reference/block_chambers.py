@@ -11,18 +11,13 @@ import numpy as np
 
 from ringbalance.mesh.geometry import half_angle
 from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.chamber_file.elements import CORNERS, NODES, between, reference_nodes
 from ringbalance.scene.chamber_file.facets import boundary_facets
 from ringbalance.scene.chamber_file.record import CellKind, ChamberGeometry
 from ringbalance.scene.models import Disc
 
-_CORNERS: Final = np.array(
-    [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [0, 0, 2], [2, 0, 2], [2, 2, 2], [0, 2, 2]]
-)
-_EDGES: Final = np.array(
-    [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]]
-)
-_SIDES: Final = np.array([[0, 1, 1], [2, 1, 1], [1, 0, 1], [1, 2, 1], [1, 1, 0], [1, 1, 2], [1, 1, 1]])
-_PLACES: Final = np.concatenate([_CORNERS, _CORNERS[_EDGES].sum(axis=1) // 2, _SIDES])
+_PLACES: Final = (2 * reference_nodes("hexahedron27")).astype(np.int64)
+"""Of the nodes of a cube, in halves."""
 _BOUNDARIES: Final = {
     "inner_wall": (0, 0),
     "outer_wall": (0, 1),
@@ -31,10 +26,8 @@ _BOUNDARIES: Final = {
     "end_back": (2, 0),
     "end_front": (2, 1),
 }
-_KINDS: Final[dict[CellKind, int]] = {"hexahedron": 8, "hexahedron20": 20, "hexahedron27": 27}
-_KUHN: Final = ((0, 1, 2, 6), (0, 5, 1, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 4, 5, 6), (0, 7, 4, 6))
+_KUHN: Final = ((0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6))
 """Corners of tetrahedra that fill a cube and fit together from cube to cube."""
-_TETRA_EDGES: Final = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
 
 
 def block_chamber(
@@ -79,11 +72,10 @@ def block_chamber(
 
 def _local(kind: CellKind) -> IntArray:
     """Places of the nodes of each cell in a cube, in halves, shape (cells, nodes, 3)."""
-    if not kind.startswith("tetra"):
-        return _PLACES[None, : _KINDS[kind]]
-    corners = _CORNERS[np.array(_KUHN)]
-    middles = [corners[:, list(pair)].sum(axis=1) // 2 for pair in _TETRA_EDGES]
-    return np.concatenate([corners, np.stack(middles, axis=1)], axis=1)[:, : 4 if kind == "tetra" else 10]
+    if CORNERS[kind] == 8:
+        return _PLACES[None, : NODES[kind]]
+    corners = _PLACES[np.array(_KUHN)]
+    return np.stack([corners[:, list(each)].sum(axis=1) // len(each) for each in between(kind)], axis=1)
 
 
 def sector_chamber(

@@ -11,9 +11,10 @@ import meshio
 import numpy as np
 import pytest
 from drawn_chamber import NAMES, Drawing, drawn, inp, loaded, msh_2, msh_4
+from vtkmodules import vtkCommonDataModel
 
 from ringbalance.scene import Scene
-from ringbalance.scene.chamber_file.elements import CELL_KINDS, faces, reference_nodes, shape_gradients
+from ringbalance.scene.chamber_file.elements import CELL_KINDS, NODES, faces, reference_nodes, shape_gradients
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 
 Writer = Callable[[Drawing], bytes]
@@ -73,6 +74,22 @@ def test_cells_are_positive_and_facets_point_as_their_cells(kind: str) -> None:
     for face in faces(kind):
         one, two, three = nodes[list(face[:3])]
         assert np.cross(two - one, three - one) @ (one - middle) > 0
+
+
+_IN_VTK = {
+    "tetra": vtkCommonDataModel.vtkTetra,
+    "tetra10": vtkCommonDataModel.vtkQuadraticTetra,
+    "hexahedron": vtkCommonDataModel.vtkHexahedron,
+    "hexahedron20": vtkCommonDataModel.vtkQuadraticHexahedron,
+    "hexahedron27": vtkCommonDataModel.vtkTriQuadraticHexahedron,
+}
+
+
+@pytest.mark.parametrize("kind", CELL_KINDS)
+def test_nodes_are_in_the_order_of_vtk(kind: str) -> None:
+    """Also those in the middle of faces, which every other test takes from the same table."""
+    there = np.reshape(_IN_VTK[kind]().GetParametricCoords(), (-1, 3))
+    assert reference_nodes(kind).tolist() == there[: NODES[kind]].tolist()
 
 
 @pytest.mark.parametrize("binary", [False, True])
@@ -172,3 +189,11 @@ def test_scenes_with_a_mesh_are_compared_by_its_digest(tmp_path: Path) -> None:
     assert geometry_of(other) != geometry_of(one)
     assert other.values_sha256 != one.values_sha256
     assert "disc.outer_radius" not in one.defaulted
+
+
+def test_one_file_read_in_two_ways_gives_two_chambers(tmp_path: Path) -> None:
+    """What is kept of a chamber is found by its digest, so that the way is part of it."""
+    content = msh_2(drawn())
+    found = [geometry_of(loaded(tmp_path, content, mesh_axis=axis)) for axis in ("z", "-z", "z")]
+    assert found[0] != found[1]
+    assert found[0] == found[2]

@@ -49,6 +49,21 @@ def test_a_changed_dimension_stretches_the_mesh(quantity: str, tmp_path: Path) -
     assert again.disc.geometry == changed.disc.geometry
 
 
+@pytest.mark.parametrize(("inlet", "covered"), [(24, False), (39, True)])
+def test_the_liquid_must_not_cover_a_gas_inlet(inlet: int, covered: bool, tmp_path: Path) -> None:
+    """At half a chamber the surface lies at 31.6 mm."""
+    scene_of(tmp_path)
+    text = scene_text("chamber.msh", mesh_unit="mm").replace(
+        "[gas]", f'[gas]\ninlet_radius = "{inlet} mm"', 1
+    )
+    (tmp_path / "my_disc.toml").write_text(text, encoding="utf-8")
+    if not covered:
+        assert isinstance(load_scene(tmp_path / "my_disc.toml"), Scene)
+        return
+    with pytest.raises(SceneError, match="the liquid covers inlet_radius, 39 mm"):
+        load_scene(tmp_path / "my_disc.toml")
+
+
 def test_plates_of_a_mesh_have_no_thickness(tmp_path: Path) -> None:
     scene = scene_of(tmp_path)
     with pytest.raises(ValueError, match="no plate_thickness of its own"):

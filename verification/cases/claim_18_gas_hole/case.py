@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from ringbalance.mesh.cut.integrals import gauss
 from ringbalance.mesh.geometry import half_angle, surface_radius
-from ringbalance.mesh.quadratic_tetrahedra import shapes, slopes, tetrahedra
+from ringbalance.mesh.quadratic_tetrahedra import derivatives, shapes, tetrahedra
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.models import Disc, Scene
@@ -157,15 +158,14 @@ def _imported_cells(geometry: ChamberGeometry, radial: int, angular: int, points
 def _columns(geometry: ChamberGeometry, points: int) -> tuple[ComplexArray, FloatArray]:
     """Gauss points of all cells across the shaft, m, and the volume at each, m^3."""
     body = tetrahedra(geometry)
-    one, weights = np.polynomial.legendre.leggauss(points)
-    u, v, w = (grid.ravel() for grid in np.meshgrid(*3 * [(1 + one) / 2], indexing="ij"))
-    weight = np.prod([grid.ravel() for grid in np.meshgrid(*3 * [weights / 2], indexing="ij")], axis=0)
+    line, weights = gauss(points)
+    u, v, w = (grid.ravel() for grid in np.meshgrid(*3 * [line], indexing="ij"))
+    weight = np.prod([grid.ravel() for grid in np.meshgrid(*3 * [weights], indexing="ij")], axis=0)
     # A cube drawn to a corner: its Jacobian is (1 - v)(1 - w)^2.
     second, third, fourth = u * (1 - v) * (1 - w), v * (1 - w), w
     local = np.stack([1 - second - third - fourth, second, third, fourth], axis=1)
     corners = body.nodes[body.cells]
-    jacobian = np.einsum("enx,pna->epxa", corners, slopes(local), optimize=True)
-    volume = np.linalg.det(jacobian) * weight * (1 - v) * (1 - w) ** 2
+    volume = np.linalg.det(derivatives(corners, local)) * weight * (1 - v) * (1 - w) ** 2
     places = np.einsum("pn,enx->epx", shapes(local), corners[..., :2], optimize=True)
     return np.asarray(places[..., 0] + 1j * places[..., 1]), np.asarray(volume)
 

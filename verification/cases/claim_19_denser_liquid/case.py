@@ -66,6 +66,8 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "usable_light": usable[0],
             "gain_usable": _ability(scene, 2 * light, usable[1]) / _ability(scene, light, usable[0]),
             "gain_full": _gain(scene, laws, full=True),
+            "gain_vapour": _gain(scene, [laws[0], _law(scene, 2 * light, degassed=True)], full=True),
+            "push": scene.gas.ambient_pressure - scene.liquid.vapour_pressure,
             "prime_light": _priming(scene, light),
             "prime_dense": _priming(scene, felt),
         },
@@ -92,8 +94,11 @@ def _stall_by_elements(scene: Scene, density: float) -> Found:
     return found_of(ring_of(scene, (scene.disc.max_fill_ratio,), density=density), "wall_pressure", 0)
 
 
-def _law(scene: Scene, density: float) -> FlowLaw:
+def _law(scene: Scene, density: float, *, degassed: bool = False) -> FlowLaw:
+    """Args: `degassed`: whether the liquid holds no gas, so that its cavity is at vapour pressure."""
     liquid = dataclasses.replace(scene.liquid, density=density)
+    if degassed:
+        liquid = dataclasses.replace(liquid, dissolved_gas="none")
     return flow_law_of(dataclasses.replace(scene, liquid=liquid))
 
 

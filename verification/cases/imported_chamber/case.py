@@ -8,11 +8,11 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.mesh.chamber import FREE_SURFACE
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.mesh.quadratic_tetrahedra import tetrahedra
 from ringbalance.physics.convergence.grid import gci
 from ringbalance.physics.pressure.imported import solve_on, solved_ring
-from ringbalance.physics.pressure.solve import FREE_SURFACE
 from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
 from ringbalance.reduced_model.chamber.inputs import chamber_closed_forms
 from ringbalance.scene.chamber_file.record import ChamberGeometry

@@ -150,6 +150,8 @@ class _Run:
     rises: int = 0
     idle: int = 0
     drift: float = 0.0
+    seen: tuple[tuple[float, ...], complex] | None = None
+    """The fills last looked at, and their vibration: most waits change nothing."""
     since: float = math.inf
     """s, from which on the true amplitude has not been above the limit; infinite while it is."""
     held_since: float = math.inf
@@ -196,8 +198,11 @@ class _Run:
         return None if seen is None else replace(seen, at_residual=without)
 
     def _vibration(self) -> complex:
-        moment = disc_unbalance(moment=self.plant.model.moment, fill_ratio=self.state.fills())
-        return complex(vibration(rotor=self.scene.rotor, moment=moment))
+        fills = self.state.fills()
+        if self.seen is None or self.seen[0] != fills:
+            moment = disc_unbalance(moment=self.plant.model.moment, fill_ratio=fills)
+            self.seen = fills, complex(vibration(rotor=self.scene.rotor, moment=moment))
+        return self.seen[1]
 
     @property
     def _held(self) -> bool:

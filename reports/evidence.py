@@ -18,7 +18,7 @@ import numpy as np
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.line_runs import line_runs, line_runs_document
 from ringbalance.controller.loop import simulate
-from ringbalance.reduced_model.calibration import Calibration, calibrate
+from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
 from ringbalance.reduced_model.law.paper_law import paper_model
@@ -31,6 +31,7 @@ from ringbalance.scene import AnyScene, Scene, scene_table
 from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification import paper_numbers
 from ringbalance.verification.document import merge_saved, results_document
+from ringbalance.verification.loops import calibration_of
 from ringbalance.verification.result import CaseResult
 from ringbalance.verification.runner import cases_under_way
 
@@ -66,7 +67,7 @@ def collect_evidence(
         tell("pressure field")
         pressure = _pressure(scene)
         tell("calibration")
-        calibration = calibrate(scene)
+        calibration = calibration_of(scene)
         tell("closed loop")
         runs = _closed_loop(scene, calibration)
         tell("sections")

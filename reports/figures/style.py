@@ -274,12 +274,14 @@ def _to_page(text: str, name: str, alt: str) -> str:
         body = body.replace(sentinel, f"var({variable})")
     body = body.replace("<svg ", f'<svg role="img" aria-label="{escape(alt, quote=True)}" ', 1)
     # A tenth of a point is finer than the eye; what is small, as a marker, keeps another digit.
-    body = re.sub(r' (?:d|x|y|transform)="[^"]*"', lambda m: _rounded(m[0]), body)
+    parts = re.split(r'( (?:d|x|y|transform)="[^"]*")', body)
+    parts[1::2] = _rounded("\0".join(parts[1::2])).split("\0")
+    body = "".join(parts)
     return "\n".join(text.rstrip() for text in body.splitlines())
 
 
-def _rounded(attribute: str) -> str:
-    short = re.sub(r"(\d\d\.\d)\d+", r"\1", re.sub(r"(\.\d\d)\d+", r"\1", attribute))
+def _rounded(attributes: str) -> str:
+    short = re.sub(r"(\d\d\.\d)\d+", r"\1", re.sub(r"(\.\d\d)\d+", r"\1", attributes))
     return re.sub(r"\.(?!\d)", "", re.sub(r"(\.\d*?)0+(?!\d)", r"\1", short))
 
 

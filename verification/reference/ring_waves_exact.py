@@ -8,6 +8,8 @@ at the free surface, where centrifugal gravity is a, F s (s^2 - 4) = - a (s F' +
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from scipy.optimize import brentq
 from scipy.special import iv, ivp, jv, jvp, kv, kvp, yv, yvp
@@ -46,12 +48,13 @@ def ring_frequencies(*, surface_radius: float, width: float, around: int, along:
     Below them lie the inertial waves of the same m and k, of which none is meant here.
     Args: `around`: m, 1 or more where `along` is 0. `along`: half waves from end to end.
     """
+    arguments = (around, along * np.pi / width, surface_radius)
     found = []
     for sign in (1.0, -1.0):
-        values = [_condition(sign * s, around, along * np.pi / width, surface_radius) for s in _SEARCH]
-        for high, low, first, second in zip(_SEARCH, _SEARCH[1:], values, values[1:], strict=False):
+        # From the fastest on, and no further than the first change of sign.
+        values = ((s, _condition(sign * s, *arguments)) for s in _SEARCH)
+        for (high, first), (low, second) in pairwise(values):
             if first * second < 0 and not low - _TRIVIAL < 2 < high + _TRIVIAL:
-                arguments = (around, along * np.pi / width, surface_radius)
                 found.append(abs(float(brentq(_condition, sign * high, sign * low, args=arguments))))
                 break
     return tuple(found)

@@ -101,9 +101,9 @@ def _chamber(calibration: Calibration) -> dict[str, Any]:
 
 
 def _across(scene: Scene, fills: FloatArray) -> dict[str, Any]:
-    """Angle from the middle of an imported chamber to its moment, along the fills; with liquid only."""
+    """Angle from the middle of a chamber to its moment, along the fills; zero for a sector."""
     if scene.disc.geometry is None:
-        return {}
+        return {"moment_angle_rad": [0.0] * fills.size}
     shares = share_across(scene.disc, np.maximum(fills, fills[fills > 0].min()))
     return {"moment_angle_rad": _listed(np.arctan(shares))}
 

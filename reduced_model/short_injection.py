@@ -294,7 +294,7 @@ class ShortInjection:
         if self.mass:
             _, velocities, frictions = self._losses
             friction = float(np.interp(max(before.velocity, steady), velocities, frictions))
-            velocity, metres = _ridden(velocity=before.velocity, push=push, friction=friction, time=time)
+            velocity, metres = ridden(velocity=before.velocity, push=push, friction=friction, time=time)
         return replace(before, metres=before.metres + metres, time=before.time + time, velocity=velocity)
 
     def _braked(self, before: Moved) -> Moved:
@@ -303,7 +303,7 @@ class ShortInjection:
         return self._moved(before, 0.0, push, math.inf) if push and before.velocity else before
 
 
-def _ridden(*, velocity: float, push: float, friction: float, time: float) -> tuple[float, float]:
+def ridden(*, velocity: float, push: float, friction: float, time: float) -> tuple[float, float]:
     """Velocity, m/s, and way, m, after a time under du/dt = B - c u^2, until it rests.
 
     With q = sqrt(B c), w = sqrt(B/c) and v = u/w, u becomes w (v + tanh qt)/(1 + v tanh qt) on a way
@@ -312,12 +312,13 @@ def _ridden(*, velocity: float, push: float, friction: float, time: float) -> tu
     if time == 0:
         return velocity, 0.0
     rate, speed = math.sqrt(abs(push) * friction), math.sqrt(abs(push) / friction)
-    if push > 0:
+    if push > 0 and speed > 0:
         share, turned = velocity / speed, time * rate
         grown = math.tanh(turned)
         way = turned + math.log((1 + share + (1 - share) * math.exp(-2 * turned)) / 2)
         return speed * (share + grown) / (1 + share * grown), way / friction
-    if push == 0:
+    # A push below what numbers hold, over the friction, is none.
+    if push == 0 or speed == 0:
         return velocity / (1 + friction * velocity * time), math.log1p(friction * velocity * time) / friction
     angle = math.atan(velocity / speed)
     left = max(angle - rate * time, 0.0)

@@ -111,7 +111,7 @@ def _nearest(points: FloatArray, surface: IntArray, corners: int) -> tuple[float
         middle = points[surface[:, corners : 2 * corners].ravel(), :2]
         bulge = middle - (first + last) / 2
         along = [first + share * (last - first) + 4 * share * (1 - share) * bulge for share in _SHARES]
-        distance = np.min([_from_origin(*pair) for pair in pairwise(along)], axis=0)
+        distance = np.minimum.reduce([_from_origin(*pair) for pair in pairwise(along)])
     return float(distance.min()), int(ends[distance.argmin(), 0])
 
 

@@ -137,7 +137,8 @@ def _cells(disc: Disc, radial: int, angular: int, points: int) -> _Cells:
 
 def _imported_cells(geometry: ChamberGeometry, radial: int, angular: int, points: int) -> _Cells:
     """What lies in each column along the shaft, at the middle of it."""
-    place, volume = (values.ravel() for values in _columns(geometry, points))
+    places, volumes = _columns(geometry, points)
+    place, volume = places.ravel(), volumes.ravel()
     parts = []
     for value, count in ((np.abs(place), radial), (np.angle(place), angular)):
         step = np.ptp(value) / count
@@ -145,9 +146,9 @@ def _imported_cells(geometry: ChamberGeometry, radial: int, angular: int, points
     (ring, depth), (ray, angle) = parts
     cell, size = ring * angular + ray, radial * angular
     share = np.bincount(cell, volume, size)
-    middle = np.bincount(cell, volume * place.real, size) + 1j * np.bincount(cell, volume * place.imag, size)
+    sums = np.bincount(cell, volume * place.real, size) + 1j * np.bincount(cell, volume * place.imag, size)
     filled = share > 0
-    middle = np.asarray(middle[filled] / share[filled], dtype=np.complex128)
+    middle = np.asarray(sums[filled] / share[filled], dtype=np.complex128)
     return _Cells(
         place=middle,
         share=share[filled] / share.sum(),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Final
 
 from scipy.optimize import brentq
@@ -23,6 +24,7 @@ def highest_pressure(scene: Scene, model: BalancerModel) -> float | None:
         it at twice that pressure.
     """
 
+    @cache
     def above(pressure: float) -> float:
         answers = line_answers(with_value(scene=scene, quantity="pressure", value=pressure), model)
         return max((a.smallest_correction or 0.0) / a.limit for a in answers) - 1

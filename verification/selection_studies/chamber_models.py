@@ -148,35 +148,45 @@ def _kinds(scene: Scene) -> tuple[_Kind, ...]:
         _kind("closed form", "exact", "left out", pull, by_closed_form, formula=30),
     )
     if scene.disc.geometry is not None:
-        return _imported_kinds(scene, plain)
+        return _imported_kinds(scene, plain, len(scene.disc.geometry.cells))
     meshes = tuple(_mesh_kind(scene, cells, heavy=False) for cells in _meshes(scene, 2))
     solid = _mesh_kind(scene, _meshes(scene, 3)[0], heavy=False)
     if scene.environment.gravity == 0:
         return (*plain, *meshes[:1], solid, meshes[1])
-    turns = _turns(scene)
-    swing = () if scene.environment.shaft == "vertical" else (SLOSHING,)
-    gravity = (
-        _kind(
-            "quadrature, gravity to all orders",
-            "exact",
-            "all orders",
-            swing,
-            by_quadrature,
-            quadrature=turns * POINTS * RADIAL_POINTS,
-            formula=60,
-        ),
-    )
+    gravity = _to_all_orders(scene, "quadrature")
     dimension = 3 if scene.environment.shaft == "vertical" else 2
     tilted = tuple(_mesh_kind(scene, cells, heavy=True) for cells in _meshes(scene, dimension))
-    quasi_static = (*plain, *gravity, *meshes, solid, *tilted)
-    if not swing:
+    quasi_static = (*plain, gravity, *meshes, solid, *tilted)
+    if not _swing(scene):
         return quasi_static
-    return (*quasi_static, _swinging(scene, gravity[-1]), _swinging(scene, tilted[-1]))
+    return (*quasi_static, _swinging(scene, gravity), _swinging(scene, tilted[-1]))
 
 
-def _imported_kinds(scene: Scene, plain: tuple[_Kind, ...]) -> tuple[_Kind, ...]:
-    """Of an imported chamber, which has one mesh; the closed form stands for integrals over its walls."""
-    shaft, gravity = scene.environment.shaft, scene.environment.gravity
+def _swing(scene: Scene) -> tuple[str, ...]:
+    """What a free surface that follows gravity at once leaves out."""
+    still = scene.environment.shaft == "vertical" or scene.environment.gravity == 0
+    return () if still else (SLOSHING,)
+
+
+def _to_all_orders(scene: Scene, name: str) -> _Kind:
+    """Integrals over the tilted liquid at every angle of the turn."""
+    return _kind(
+        f"{name}, gravity to all orders",
+        "exact",
+        "all orders",
+        _swing(scene),
+        by_quadrature,
+        quadrature=_turns(scene) * POINTS * RADIAL_POINTS,
+        formula=60,
+    )
+
+
+def _imported_kinds(scene: Scene, plain: tuple[_Kind, ...], cells: int) -> tuple[_Kind, ...]:
+    """Of an imported chamber, which has one mesh; the closed form stands for integrals over its walls.
+
+    Args: `cells`: how many its mesh has.
+    """
+    gravity = scene.environment.gravity
     pull = () if gravity == 0 else (RIPPLE, MEAN, SLOSHING)
     paper, exact = plain
     walls = replace(exact, name="integrals over the walls", models={**exact.models, "solution": "walls"})
@@ -187,23 +197,13 @@ def _imported_kinds(scene: Scene, plain: tuple[_Kind, ...]) -> tuple[_Kind, ...]
         (FINE_MESH, *pull),
         by_imported_elements,
         solve=9.0,
-        unknown_3d=30.0 * len(scene.disc.geometry.cells) if scene.disc.geometry else 0.0,
+        unknown_3d=30.0 * cells,
     )
     if gravity == 0:
         return paper, walls, elements
-    swing = () if shaft == "vertical" else (SLOSHING,)
-    turns = _turns(scene)
-    tilted = _kind(
-        "integrals over the walls, gravity to all orders",
-        "exact",
-        "all orders",
-        swing,
-        by_quadrature,
-        quadrature=turns * POINTS * RADIAL_POINTS,
-        formula=60,
-    )
+    tilted = _to_all_orders(scene, "integrals over the walls")
     still = (paper, walls, elements, tilted)
-    return (*still, _swinging(scene, tilted)) if swing else still
+    return (*still, _swinging(scene, tilted)) if _swing(scene) else still
 
 
 def _swinging(scene: Scene, still: _Kind) -> _Kind:
@@ -246,8 +246,7 @@ def _meshes(scene: Scene, dimension: int) -> tuple[tuple[int, ...], tuple[int, .
 def _mesh_kind(scene: Scene, cells: tuple[int, ...], *, heavy: bool) -> _Kind:
     """Finite elements on a mesh and two coarser ones; with gravity when `heavy`."""
     fine = cells == default_cells(disc=scene.disc, dimension=len(cells))
-    swing = () if scene.environment.shaft == "vertical" or scene.environment.gravity == 0 else (SLOSHING,)
-    lacks = (FINE_MESH if fine else COARSE_MESH, *swing, *(() if heavy else (RIPPLE, MEAN)))
+    lacks = (FINE_MESH if fine else COARSE_MESH, *_swing(scene), *(() if heavy else (RIPPLE, MEAN)))
     solves = _mesh_turns(scene) * GRAVITY_SWEEPS if heavy else 1
     unknowns = sum(float(np.prod([2 * (n // k) + 1 for n in cells])) for k in (1, 2, 4))
     named = " x ".join(str(n) for n in cells)

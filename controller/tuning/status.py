@@ -60,7 +60,7 @@ def _unsettled(scene: Scene, settling: SettlingTimes, *, also: str, found: Searc
     )
     if settling.explained_by(settling.beyond_capacity):
         return (
-            f"{share}; {settling.beyond_capacity:.1%} of them would need more moment than the disc can form "
+            f"{share}; {settling.beyond_capacity:.1%} of the runs would need more moment than the disc can form "
             f"above its residual fill: {BEYOND_CAPACITY}"
         )
     if found is not None and found.needs is not None and found.needs > scene.run.time_limit:

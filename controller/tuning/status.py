@@ -60,8 +60,8 @@ def _unsettled(scene: Scene, settling: SettlingTimes, *, also: str, found: Searc
     )
     if settling.explained_by(settling.beyond_capacity):
         return (
-            f"{share}; {settling.beyond_capacity:.1%} of the runs would need more moment than the disc can form "
-            f"above its residual fill: {BEYOND_CAPACITY}"
+            f"{share}; {settling.beyond_capacity:.1%} of the runs would need more moment than the disc "
+            f"can form above its residual fill: {BEYOND_CAPACITY}"
         )
     if found is not None and found.needs is not None and found.needs > scene.run.time_limit:
         return f"{share}; they need some {found.needs:.2g} s: raise run.time_limit"

@@ -1,4 +1,4 @@
-"""The closed loop with a moment across the chambers' middles, which turns those of all pairs."""
+"""The closed loop on imported chambers: moments across their middles, less space than their sector."""
 
 from __future__ import annotations
 
@@ -12,10 +12,13 @@ import pytest
 from ringbalance.controller.ensemble.monte_carlo import simulate_members
 from ringbalance.controller.ensemble.samples import members_alike
 from ringbalance.controller.loop import simulate
+from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.reduced_model.law.building import nominal_law
 from ringbalance.reduced_model.law.model import BalancerModel, MomentCurve, balancer_model
+from ringbalance.reduced_model.law.paper_law import paper_model
+from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
-from ringbalance.verification.reference.block_chambers import imported, turned
+from ringbalance.verification.reference.block_chambers import disc_chamber, imported, turned
 
 ANGLE = 0.35
 
@@ -63,3 +66,14 @@ def test_a_member_of_an_ensemble_is_the_run(exact: Scene, model: BalancerModel, 
     assert abs(run.amplitude[-1] - plain.amplitude[-1]) > 1e-8
     assert found.final_amplitude[0] == pytest.approx(run.amplitude[-1], abs=1e-13)
     assert found.samples[0] == len(run.samples)
+
+
+def test_the_papers_law_takes_a_chamber_with_much_less_space_than_its_sector(exact: Scene) -> None:
+    """Ribs that take a tenth of a sector are not in Eq. 4, and the disc is the same; a longer one is not."""
+    ribbed = disc_chamber(replace(exact.disc, plate_thickness=4e-3), (4, 16, 2))
+    disc = replace(exact.disc, plate_thickness=0.0, geometry=ribbed)
+    run = simulate(replace(exact, disc=disc), paper_model(replace(exact, disc=disc)))
+    assert run.model.chamber_volume > 1.1 * chamber_volume(disc=disc)
+    longer = replace(exact, disc=replace(disc, axial_width=1.1 * disc.axial_width))
+    with pytest.raises(SceneError, match="made for another disc"):
+        simulate(longer, paper_model(replace(exact, disc=disc)))

@@ -63,8 +63,7 @@ class LineAnswer:
     venting_time: float
     """Back to ambient, s."""
     shortest_opening: float | None
-    """Shortest valve-open time whose effect can be relied upon, s: it primes the tube; None: the gas starts no
-    flow."""
+    """Shortest valve-open time whose effect can be relied upon, s: it primes the tube; None: no flow starts."""
     smallest_correction: float | None
     """Change of the vibration by the shortest opening, m."""
     limit: float
@@ -239,8 +238,8 @@ def _standing_warning(answer: LineAnswer) -> str:
     if answer.end != "given" or still <= answer.limit:
         return ""
     return (
-        f"up to {1e6 * still:.2g} um an injection by the controller's gain alone transfers no liquid, it only "
-        f"fills gas or lifts liquid to the crest, for {1e3 * (answer.dead_time or 0.0):.3g} ms: "
+        f"up to {1e6 * still:.2g} um an injection by the controller's gain alone transfers no liquid, it "
+        f"only fills gas or lifts liquid to the crest, for {1e3 * (answer.dead_time or 0.0):.3g} ms: "
         "`ringbalance tune` recommends controller.gas_time_offset"
     )
 

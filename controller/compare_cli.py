@@ -14,6 +14,7 @@ from ringbalance.controller.compare import Comparison, Side
 from ringbalance.controller.compare import compare as compare_scenes
 from ringbalance.reduced_model.law_by_name import law_by_name
 from ringbalance.scene.accuracy import Models, with_tolerance
+from ringbalance.scene.describe import in_usual_unit, usual_unit
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.platform.progress import activity
 from ringbalance.scene.platform.terminal import results_console
@@ -67,7 +68,8 @@ def _show(comparison: Comparison, console: Console) -> None:
         f"over {comparison.span:.4g} s, medians (smallest to largest)",
         highlight=False,
     )
-    table = Table("", *(side.scene.name for side in comparison.sides))
+    names = [side.scene.name for side in comparison.sides]
+    table = Table("", *(names if len(set(names)) > 1 else [side.scene.source for side in comparison.sides]))
     rows = {
         "balancer": [side.scene.balancer.replace("_", " ") for side in comparison.sides],
         "tuned": [_tuned(side) for side in comparison.sides],
@@ -101,4 +103,11 @@ def _settled(side: Side) -> str:
 
 
 def _tuned(side: Side) -> str:
-    return ", ".join(f"{key} = {value:.4g} (SI)" for key, value in side.tuned.items()) or "as it is"
+    """Settings that tuning has changed, in their usual units."""
+
+    def line(path: str, value: float) -> str:
+        table, key, *chamber = path.split(".")
+        unit = usual_unit(f"{table}.{key}")
+        return f"{' '.join([key, *chamber])} = {in_usual_unit(f'{table}.{key}', value):.4g} {unit}".rstrip()
+
+    return "\n".join(line(path, value) for path, value in side.tuned.items()) or "as it is"

@@ -6,7 +6,7 @@ import numpy as np
 
 from ringbalance.reduced_model.paper.formulas import PAPER_DRAG_COEFFICIENT, stall_pressure, velocity_paper
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Curve, Evidence, Found, Level, NotRunError, Series, figure
+from ringbalance.verification.evidence import Curve, Evidence, Level, NotRunError, Series, as_found, figure
 from ringbalance.verification.paper_numbers import DENSITY, HIGHEST_PRESSURE, LOWEST_PRESSURE
 from ringbalance.verification.reference.exact_chamber import wall_pressure_of
 
@@ -18,10 +18,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     if scene.tube.hump_radius is None:
         raise NotRunError("the scene's tube has no siphon crest to prime over")
     return Evidence(
-        found={
-            "by_eq_19": Found(value=_stall(scene)),
-            "by_priming": Found(value=_priming(scene, scene.tube.hump_radius)),
-        },
+        found=as_found(by_eq_19=_stall(scene), by_priming=_priming(scene, scene.tube.hump_radius)),
         numbers={
             "by_ring": float(wall_pressure_of(scene, scene.disc.max_fill_ratio, density=DENSITY)),
             "scene_hump": scene.tube.hump_radius,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
 from ringbalance.reduced_model.paper.formulas import PAPER_DRAG_COEFFICIENT, stall_pressure, velocity_paper
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Level, NotRunError, Series, as_found, figure
@@ -29,13 +30,13 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 
 
 def _stall(scene: Scene) -> float:
-    return float(stall_pressure(disc=scene.disc, density=DENSITY, angular_velocity=scene.rotor.speed))
+    return stall_pressure(disc=scene.disc, density=DENSITY, angular_velocity=scene.rotor.speed)
 
 
 def _priming(scene: Scene, hump_radius: float) -> float:
     """Gas pressure that lifts an almost empty chamber's liquid over the crest, the other side vented."""
-    lift = (scene.disc.outer_radius - hump_radius) * (scene.disc.outer_radius + hump_radius) / 2
-    return DENSITY * scene.rotor.speed**2 * lift
+    omega, outer = scene.rotor.speed, scene.disc.outer_radius
+    return hydrostatic_pressure(density=DENSITY, angular_velocity=omega, inner=hump_radius, outer=outer)
 
 
 def _velocity(scene: Scene, pressure: float) -> float:

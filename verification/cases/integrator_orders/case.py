@@ -43,9 +43,8 @@ def _kinked(fill_ratio: FloatArray, largest: float) -> FloatArray:
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     law = paper_law(scene)
-    empties = float(
-        stall_pressure(disc=scene.disc, density=scene.liquid.density, angular_velocity=scene.rotor.speed)
-    )
+    omega = scene.rotor.speed
+    empties = stall_pressure(disc=scene.disc, density=scene.liquid.density, angular_velocity=omega)
     full = law.max_fill_ratio
     long, low = (
         paper_drive(law, gas_pressure=above * empties, fill=full, total=full)

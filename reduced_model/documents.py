@@ -101,11 +101,8 @@ def _chamber(calibration: Calibration) -> dict[str, Any]:
 
 
 def _across(scene: Scene, fills: FloatArray) -> dict[str, Any]:
-    """Angle from the middle of a chamber to its moment, along the fills; zero for a sector."""
-    if scene.disc.geometry is None:
-        return {"moment_angle_rad": [0.0] * fills.size}
-    shares = share_across(scene.disc, np.maximum(fills, fills[fills > 0].min()))
-    return {"moment_angle_rad": _listed(np.arctan(shares))}
+    """Angle from the middle of a chamber to the moment of liquid moved at the fills; zero for a sector."""
+    return {"moment_angle_rad": _listed(np.arctan(share_across(scene.disc, fills)))}
 
 
 def _check(check: ElementCheck) -> dict[str, Any]:
@@ -138,6 +135,7 @@ def paper_columns(calibration: Calibration, fill_ratio: FloatArray) -> Mapping[s
     scene = calibration.scene
     volume = fill_ratio * paper.chamber_volume_paper(disc=scene.disc)
     radius = paper.surface_radius_paper(disc=scene.disc, liquid_volume=volume)
+    moment = paper.moment_paper(disc=scene.disc, density=scene.liquid.density, surface_radius=radius)
     return {
         "wall_pressure_paper_Pa": paper.wall_pressure_paper(
             disc=scene.disc,
@@ -145,9 +143,8 @@ def paper_columns(calibration: Calibration, fill_ratio: FloatArray) -> Mapping[s
             angular_velocity=scene.rotor.speed,
             liquid_volume=volume,
         ),
-        "moment_paper_kg_m": paper.moment_paper(
-            disc=scene.disc, density=scene.liquid.density, surface_radius=radius
-        ),
+        # A root and its square differ by rounding, of which an empty chamber shall have nothing.
+        "moment_paper_kg_m": np.where(fill_ratio > 0, moment, 0.0),
     }
 
 

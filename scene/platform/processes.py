@@ -15,6 +15,8 @@ from threading import Thread
 from types import TracebackType
 from typing import Final, ParamSpec, TypeVar
 
+from ringbalance.scene.faults import option_error
+
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
@@ -75,6 +77,16 @@ class Workers(ProcessPoolExecutor):
         for process in list((self._processes or {}).values()):
             process.kill()
         self.shutdown(cancel_futures=True)
+
+
+def checked_workers(workers: int) -> int:
+    """The number of processes that the option `--workers` asks for. Raises: SceneError: below one."""
+    if workers < 1:
+        problem = "there is no process to work"
+        raise option_error(
+            option="--workers", value=workers, problem=problem, allowed="a whole number of at least 1"
+        )
+    return workers
 
 
 def beside(workers: int) -> AbstractContextManager[Workers | None]:

@@ -24,7 +24,7 @@ from ringbalance.verification.reference.block_chambers import imported
 from ringbalance.verification.selection_studies import study as trade_module
 from ringbalance.verification.selection_studies.chamber_elements import forget_solves
 from ringbalance.verification.selection_studies.choice import Values, choose
-from ringbalance.verification.selection_studies.choices import judge
+from ringbalance.verification.selection_studies.choices import judge, random_scene
 from ringbalance.verification.selection_studies.cost import CostModel, committed_costs
 from ringbalance.verification.selection_studies.hierarchy import ModelHierarchy
 from ringbalance.verification.selection_studies.law_models import CLOSED, REGIMES, LawModels, base_law
@@ -35,7 +35,6 @@ from ringbalance.verification.selection_studies.operation import (
     settling_hierarchy,
     time_models,
 )
-from ringbalance.verification.selection_studies.scenes import random_scene
 from ringbalance.verification.selection_studies.study import (
     held_tolerance,
     thinned,

@@ -12,7 +12,6 @@ import numpy as np
 
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, Curve
 from ringbalance.reduced_model.chamber.imported_walls import drawing_shares
-from ringbalance.reduced_model.chamber.inputs import half_widths, shifted
 from ringbalance.reduced_model.device import HEAD_INPUTS, Device, device_of
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.operating.crest_margin import directed_state
@@ -21,7 +20,7 @@ from ringbalance.reduced_model.operating.residual import ResidualLiquid, usable_
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
 from ringbalance.reduced_model.tube.heads import without_inputs
 from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
+from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, half_widths, shifted
 
 UNITS: Final = {
     "chamber_volume": "m^3",

@@ -120,7 +120,7 @@ def calibrate(scene: AnyScene) -> Calibration:
     return Calibration(
         scene=scene,
         chamber=chamber,
-        tube=_tube(scene, np.geomspace(*VELOCITIES, VELOCITY_POINTS)),
+        tube=tube_loss(scene, np.geomspace(*VELOCITIES, VELOCITY_POINTS)),
         flow_law=law,
         paper_law=paper_law(scene),
         operating_point=point,
@@ -155,13 +155,3 @@ def _chamber_and_law(scene: Scene) -> tuple[ChamberCalibration, CalibratedLaw]:
     check_ring(scene)
     chamber = calibrate_chamber(scene)
     return chamber, calibrated_law(scene=scene, chamber=chamber, heads=tube_heads(scene))
-
-
-def _tube(scene: Scene, velocity: FloatArray) -> TubeLoss:
-    return tube_loss(
-        tube=scene.tube,
-        liquid=scene.liquid,
-        angular_velocity=scene.rotor.speed,
-        velocity=velocity,
-        inputs=scene.uncertainty,
-    )

@@ -48,5 +48,6 @@ def _flow_rate(device: Device, observations: Observations) -> FloatArray:
 def _loss(scene: Scene, velocity: FloatArray) -> FloatArray:
     """k of the tube at rest, by the finest models: the scene's are chosen for its own velocities."""
     tube = replace(scene.tube, models=replace(FINEST_MODELS, errors=scene.tube.models.errors))
-    state = tube_state(tube=tube, liquid=scene.liquid, angular_velocity=0.0, velocity=velocity)
+    still = replace(scene, rotor=replace(scene.rotor, speed=0.0))
+    state = tube_state(still, velocity, tube=tube)
     return with_errors(tube=tube, state=state).k

@@ -11,7 +11,6 @@ from ringbalance.mesh.geometry import chamber_volume, wall_radius
 from ringbalance.physics.gas.column import pressure_factor
 from ringbalance.physics.pressure.hydrostatics import Radius, hydrostatic_pressure
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes
-from ringbalance.reduced_model.chamber.inputs import half_widths
 from ringbalance.reduced_model.chamber.moment import CalibratedMoment
 from ringbalance.reduced_model.chamber.ring_values import ring_values
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
@@ -22,7 +21,7 @@ from ringbalance.reduced_model.tube.heads import TubeHeads, nominal_heads
 from ringbalance.reduced_model.tube.regime import CLEARING_UNCERTAINTY, RELEASED, TubePath
 from ringbalance.scene.models import Scene
 from ringbalance.scene.tube_models import CAVITY_ERROR, CLEARING_ERROR
-from ringbalance.scene.uncertain import NORMAL_95
+from ringbalance.scene.uncertain import NORMAL_95, half_widths
 
 # Density and speed act on both wall pressures and on the tube at once, so the law handles them separately.
 _SHARED: Final = ("density", "speed")

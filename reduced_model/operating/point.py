@@ -68,15 +68,7 @@ def operating_point(*, scene: Scene, law: CalibratedLaw) -> OperatingPoint:
     flow = law.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=pressure)
     full = law.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=pressure, primed=True)
     u = abs(float(flow.velocity)) or abs(float(full.velocity))
-    loss = None
-    if u > 0:
-        loss = tube_loss(
-            tube=scene.tube,
-            liquid=scene.liquid,
-            angular_velocity=scene.rotor.speed,
-            velocity=u,
-            inputs=scene.uncertainty,
-        )
+    loss = tube_loss(scene, u) if u > 0 else None
     hump = hump_profile(scene=scene, law=law, fill_ratio=x, opposite_fill_ratio=x, points=2)
     vented = priming_pressure(law=law, fill_ratio=0.0, hump_gas="vented")
     trapped = priming_pressure(law=law, fill_ratio=x, opposite_fill_ratio=x, hump_gas="trapped")

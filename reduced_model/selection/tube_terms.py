@@ -82,7 +82,7 @@ def loss_effect(scene: Scene, models: TubeModels) -> _LossEffect:
 def _heads(scene: Scene, models: TubeModels) -> tuple[FloatArray, ...]:
     """k, and the heads of the full tube and, where it has a crest, up to there."""
     tube, u = replace(scene.tube, models=models), range_velocities(scene)
-    state = tube_state(tube=tube, liquid=scene.liquid, angular_velocity=scene.rotor.speed, velocity=u)
+    state = tube_state(scene, u, tube=tube)
     full = state.k, (state.k + 1) * u**2 / 2
     if tube.hump_radius is None:
         return full

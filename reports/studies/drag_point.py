@@ -20,10 +20,10 @@ from ringbalance.physics.tube.uncertainty import input_parts, model_parts
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.heads import TABLE_VELOCITIES
-from ringbalance.reduced_model.tube.path import head_behind_crest, loss_along, to_crest_end
+from ringbalance.reduced_model.tube.path import crest_span, head_behind_crest
 from ringbalance.reduced_model.tube.regime import SiphonCrest, TubeEnds, can_flow
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
-from ringbalance.scene.models import InputUncertainty, Liquid, Scene, Tube
+from ringbalance.scene.models import InputUncertainty, Scene, Tube
 
 _STEP: Final = 1e-5
 """Of ln u, for slopes."""
@@ -213,8 +213,8 @@ def _siphon_factor(_tube: Tube, state: TubeState) -> FloatArray:
 def _separation_factor(tube: Tube, state: TubeState) -> FloatArray:
     """As the head up to the lowest pressure, over u^2/2; R_Om/Re d is omega/u."""
     turns = (state.rotation_reynolds / state.reynolds / tube.bore) ** 2
-    behind = head_behind_crest(tube=tube, along=loss_along(state.terms), square=2 * turns)
-    up = state.upstream_loss(tube=to_crest_end(tube))
+    behind = head_behind_crest(tube=tube, along=state.along, square=2 * turns)
+    up = state.upstream_loss(crest_span(tube)[1])
     return np.asarray(state.kinetic_factor + up + behind, dtype=np.float64)
 
 
@@ -266,17 +266,8 @@ def _parts(
 
     nu = batch.kinematic_viscosity
 
-    def by_input(t: Tube, _liquid: Liquid, speed: float) -> FloatArray:
-        return k_of(t, nu, speed)
-
-    parts |= input_parts(
-        tube=tube,
-        liquid=scene.liquid,
-        angular_velocity=scene.rotor.speed,
-        inputs=(*stated, _EXACT_VISCOSITY),
-        k_of=by_input,
-        k=state.k,
-    )
+    at_hand = replace(scene, tube=tube, uncertainty=(*stated, _EXACT_VISCOSITY))
+    parts |= input_parts(at_hand, k_of=lambda moved: k_of(moved.tube, nu, moved.rotor.speed), k=state.k)
     if np.any(batch.relative_viscosity > 0):
         sides = [
             k_of(tube, nu * factor, scene.rotor.speed) for factor in _either_way(batch.relative_viscosity)
@@ -314,7 +305,7 @@ def _half_widths(
     ahead = np.where(separated, slope(_separation_factor), siphon)
     up = np.where(
         state.k > 0,
-        state.upstream_loss(tube=to_crest_end(tube)) / np.where(state.k > 0, state.k, 1.0),
+        state.upstream_loss(crest_span(tube)[1]) / np.where(state.k > 0, state.k, 1.0),
         1.0,
     )
     of_head = width * np.where(separated, up / _separation_factor(tube, state), 1 / (state.k + 1))

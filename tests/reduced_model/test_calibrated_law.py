@@ -59,12 +59,7 @@ def test_siphon_obeys_the_energy_balance(law: CalibratedLaw, point_scene: Scene)
     x, p = np.array([0.1, 0.2, 0.3]), 1.2e6
     flow = law.evaluate(fill_ratio=x, gas_pressure=p)
     assert np.all(flow.regime == Regime.SIPHON)
-    loss = tube_loss(
-        tube=point_scene.tube,
-        liquid=point_scene.liquid,
-        angular_velocity=point_scene.rotor.speed,
-        velocity=flow.velocity,
-    )
+    loss = tube_loss(point_scene, flow.velocity)
     surplus = p + law.wall_pressure(x) - law.wall_pressure(0.5 - x)
     np.testing.assert_allclose((loss.k.value + 1) * 1000 * flow.velocity**2 / 2, surplus, rtol=1e-8)
 
@@ -75,15 +70,10 @@ def test_separated_flow_obeys_the_humps_balance_and_forgets_the_receiving_chambe
     flow = law.evaluate(fill_ratio=0.4, opposite_fill_ratio=[0.05, 0.1, 0.12], gas_pressure=0.6e6)
     assert np.all(flow.regime == Regime.SEPARATED)
     assert np.ptp(flow.velocity) == 0.0
-    loss = tube_loss(
-        tube=point_scene.tube,
-        liquid=point_scene.liquid,
-        angular_velocity=point_scene.rotor.speed,
-        velocity=flow.velocity,
-    )
+    loss = tube_loss(point_scene, flow.velocity)
     hump = column_pressure(scene=point_scene, radius=31.5e-3)
     margin = 0.6e6 + AMBIENT - 2339.0 + law.wall_pressure(0.4) - hump
-    head = (loss.kinetic_factor + loss.upstream_k) * 1000 * flow.velocity**2 / 2
+    head = (loss.state.kinetic_factor + loss.state.upstream_loss(0.5)) * 1000 * flow.velocity**2 / 2
     np.testing.assert_allclose(head, margin, rtol=1e-8)
 
 
@@ -237,12 +227,7 @@ def test_uncertainty_of_a_turbulent_siphon_is_half_that_of_k_plus_1(
     law: CalibratedLaw, point_scene: Scene
 ) -> None:
     flow = law.evaluate(fill_ratio=0.25, gas_pressure=1.5e6)
-    loss = tube_loss(
-        tube=point_scene.tube,
-        liquid=point_scene.liquid,
-        angular_velocity=point_scene.rotor.speed,
-        velocity=flow.velocity,
-    )
+    loss = tube_loss(point_scene, flow.velocity)
     expected = 0.5 * float(loss.k.uncertainty / (loss.k.value + 1)) * float(flow.velocity)
     assert float(flow.uncertainty) == pytest.approx(expected, rel=0.1)
 
@@ -280,7 +265,7 @@ def test_spread_of_the_heads_never_falls_below_that_of_k(
     )
     heads = tube_heads(scene)
     u = np.geomspace(2e-5, 5e2, 20001)
-    loss = tube_loss(tube=scene.tube, liquid=scene.liquid, angular_velocity=speed, velocity=u)
+    loss = tube_loss(scene, u)
     exact = loss.k.uncertainty / (loss.k.value + 1)
     tabulated = heads.uncertainty(np.log(u))
     # Within one interval of the table, 3.7 % of the velocity: 43 places.

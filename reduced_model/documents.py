@@ -88,9 +88,7 @@ def _chamber(calibration: Calibration) -> dict[str, Any]:
             "max_liquid_volume_m3": scene.disc.max_fill_ratio * chamber.volume,
             "fill_ratio": _listed(fills),
             "free_surface_radius_m": _listed(chamber.ring.surface_radius[at]),
-            "row_status": [
-                str(status) for status in row_status(scene, fill_ratio=fills, closed=chamber.ring.closed[at])
-            ],
+            "row_status": [str(status) for status in chamber_status(calibration)],
         }
         | _curve(chamber.wall_pressure, at, "wall_pressure", "Pa")
         | _curve(chamber.moment, at, "moment", "kg_m")
@@ -207,6 +205,13 @@ def _budget(budget: Budget) -> dict[str, Any]:
         "total": budget.total,
         "inputs": dict(budget.inputs),
     }
+
+
+def chamber_status(calibration: Calibration) -> tuple[RowStatus, ...]:
+    """What limits a chamber at the reported fill ratios."""
+    scene, chamber = calibration.scene, calibration.chamber
+    fills, computed = chamber.reported_fill_ratio, chamber.ring.closed[list(chamber.reported)]
+    return row_status(scene, fill_ratio=fills, closed=computed & closed_ring(scene, fills))
 
 
 def velocity_status(calibration: Calibration, fill_ratio: FloatArray) -> tuple[RowStatus, ...]:

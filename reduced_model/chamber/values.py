@@ -76,14 +76,7 @@ def by_quadrature(scene: Scene, fill: float) -> ChamberValues:
     Returns: ChamberValues, exact for liquid at rest in the rotating frame at every instant.
     Source: `tilted_ring`.
     """
-    found = tilted_ring(
-        disc=scene.disc,
-        density=scene.liquid.density,
-        angular_velocity=scene.rotor.speed,
-        gravity=scene.environment.gravity,
-        shaft=scene.environment.shaft,
-        fill_ratio=np.array([fill]),
-    )
+    found = tilted_ring(scene, np.array([fill]))
     return ChamberValues(
         wall_pressure=float(found.wall_pressure[0]),
         wall_pressure_ripple=float(found.wall_pressure_ripple[0]),

@@ -144,7 +144,7 @@ def flow_contributions(scene: Scene) -> Mapping[str, Contribution]:
         for term, models, formula in _LACKING
     }
     fills = scene.disc.max_fill_ratio * np.array(SHARES)
-    chamber = chamber_contributions(scene, _closed(scene, fills))["pressures"]
+    chamber = chamber_contributions(scene, fills[closed_ring(scene, fills)])["pressures"]
     lever = _lever(scene)
     levels = {
         name: Contribution(
@@ -164,11 +164,6 @@ def _contribution(term: str, value: float, formula: str) -> Contribution:
     return Contribution(
         term=term, value=value, formula=formula, source="over the range of velocities", rough=True
     )
-
-
-def _closed(scene: Scene, fills: np.ndarray) -> np.ndarray:
-    closed = closed_ring(scene, fills)
-    return np.asarray(fills[closed])
 
 
 def _lever(scene: Scene) -> float:

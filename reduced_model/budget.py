@@ -14,7 +14,7 @@ from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, Cu
 from ringbalance.reduced_model.chamber.imported_walls import drawing_shares
 from ringbalance.reduced_model.device import HEAD_INPUTS, Device, device_of
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.operating.crest_margin import directed_state
+from ringbalance.reduced_model.operating.crest_margin import DirectedState, directed_state
 from ringbalance.reduced_model.operating.point import OperatingPoint
 from ringbalance.reduced_model.operating.residual import ResidualLiquid, usable_moment_uncertainty
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
@@ -185,7 +185,7 @@ def _flow_parts(scene: Scene, calibration: Calibrated) -> dict[str, _Parts]:
     margin = state.margin(law=law)[1] or 0.0
     rounding = error * abs(point.gas_pressure)
     return found | {
-        "crest_pressure": (point.hump_pressure, rounding, _crest_part(law, point, margin)),
+        "crest_pressure": (point.hump_pressure, rounding, _crest_part(law, point, state, margin)),
         "cavitation_margin": (point.cavitation_margin, rounding, margin),
     }
 
@@ -203,10 +203,8 @@ def _level_parts(calibration: Calibrated) -> dict[str, _Parts]:
     return {name: (value, width, math.sqrt(2) * model) for name, value in values.items() if value is not None}
 
 
-def _crest_part(law: CalibratedLaw, point: OperatingPoint, margin: float) -> float:
+def _crest_part(law: CalibratedLaw, point: OperatingPoint, state: DirectedState, margin: float) -> float:
     """Model part of the crest's pressure, the larger of a cavity's, which has bounds, and a full siphon's."""
-    fills = (point.fill_ratio, point.fill_ratio)
-    state = directed_state(law=law, fills=fills, gas_pressure=point.gas_pressure, reverse=point.velocity < 0)
     crest = law.path.crest
     if crest is None or point.cavitation_margin is None or point.cavity_pressure is None:
         return 0.0

@@ -16,6 +16,7 @@ from ringbalance.reduced_model.chamber.element_check import CHECKED, ElementChec
 from ringbalance.reduced_model.chamber.gravity import closed_ring
 from ringbalance.reduced_model.chamber.imported_walls import share_across
 from ringbalance.reduced_model.chamber.row_status import RowStatus, row_status
+from ringbalance.reduced_model.chamber.values import paper_closed_forms
 from ringbalance.reduced_model.gas_line import line_document
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.paper import formulas as paper
@@ -131,22 +132,9 @@ def paper_columns(calibration: Calibration, fill_ratio: FloatArray) -> Mapping[s
     """What the liquid-ring paper gives for wall pressure and moment at fill ratios.
 
     Returns: "wall_pressure_paper_Pa" and "moment_paper_kg_m", shape (n,), by the paper's own volume.
-    Source: Eqs. 3, 4, 7 and 12.
     """
-    scene = calibration.scene
-    volume = fill_ratio * paper.chamber_volume_paper(disc=scene.disc)
-    radius = paper.surface_radius_paper(disc=scene.disc, liquid_volume=volume)
-    return {
-        "wall_pressure_paper_Pa": paper.wall_pressure_paper(
-            disc=scene.disc,
-            density=scene.liquid.density,
-            angular_velocity=scene.rotor.speed,
-            liquid_volume=volume,
-        ),
-        "moment_paper_kg_m": paper.moment_paper(
-            disc=scene.disc, density=scene.liquid.density, surface_radius=radius
-        ),
-    }
+    pressure, moment = paper_closed_forms(calibration.scene, fill_ratio)
+    return {"wall_pressure_paper_Pa": pressure, "moment_paper_kg_m": moment}
 
 
 def _lambda(calibration: Calibration) -> dict[str, Any]:

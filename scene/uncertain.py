@@ -18,7 +18,7 @@ NORMAL_95: Final = 1.959963984540054
 """Expanded uncertainty (95 %) of a normal distribution in standard deviations."""
 ASSUMED_ROUGHNESS_UNCERTAINTY: Final = 0.5
 """Relative expanded uncertainty (95 %) of a roughness for which the scene states none."""
-_MAY_VANISH: Final = frozenset({"roughness", "extra_loss", "drag_coefficient"})
+_MAY_VANISH: Final = frozenset({"roughness", "extra_loss"})
 """Quantities of the tube that may be zero; where others would reach it, a tenth of the value counts."""
 _PATH: Final = re.compile(r"(\w+)\.(\w+)(?:\[([01])\])?")
 UNCERTAIN_QUANTITIES: Mapping[str, str] = MappingProxyType(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import Final
 
@@ -42,7 +41,7 @@ def _flow_rate(device: Device, observations: Observations) -> FloatArray:
         log_u = log_u + np.clip(change, -1.0, 1.0)
         if np.max(np.abs(change)) < _DONE:
             break
-    return np.asarray(math.pi / 4 * scene.tube.bore**2 * np.exp(log_u))
+    return np.asarray(scene.tube.area * np.exp(log_u))
 
 
 def _loss(scene: Scene, velocity: FloatArray) -> FloatArray:

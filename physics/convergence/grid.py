@@ -115,17 +115,16 @@ def _is_noise(phi: FloatArray, h: FloatArray, formal_order: float, noise: float)
     return bool(first <= noise and foretold <= 10 * noise)
 
 
-def celik_order(*, first_change: float, second_change: float, r21: float, r32: float) -> float:
+def _celik_order(e21: float, e32: float, r21: float, r32: float) -> float:
     """Observed order from two changes, by fixed-point iteration; negative when the changes grow.
 
-    Args: `first_change`: e21 = phi2 - phi1, finest mesh 1; zero counts as the highest order. `second_change`:
-        e32 = phi3 - phi2; not zero. `r21`: h2/h1, above 1. `r32`: h3/h2, above 1.
+    Args: `e21`: zero counts as the highest order. `e32`: not zero.
     Returns: p with the sign that Celik's absolute value drops; limited to +-50.
     Source: Celik et al. (2008), Eqs. 5a to 5c, doi:10.1115/1.2960953.
     """
-    if first_change == 0:
+    if e21 == 0:
         return _HIGHEST_ORDER
-    ratio = second_change / first_change
+    ratio = e32 / e21
     s, logarithm = np.sign(ratio), np.log(abs(ratio))
     p = float(logarithm / np.log(r21))
     if abs(r21 - r32) <= 1e-12 * r21:
@@ -146,7 +145,7 @@ def _from_three(
     r21, r32 = float(h[1] / h[0]), float(h[2] / h[1])
     if abs(e32) <= noise:
         return _record(Verdict.DIVERGING, phi, 0.0, 0.0, phi[0], 0.0, 3 * abs(e21) + noise)
-    observed = celik_order(first_change=e21, second_change=e32, r21=r21, r32=r32)
+    observed = _celik_order(e21, e32, r21, r32)
     verdict = _verdict(observed, e21 * e32 < 0, formal_order)
     if observed <= 0:
         return _record(verdict, phi, observed, 0.0, phi[0], 0.0, 3 * max(abs(e21), abs(e32)) + noise)

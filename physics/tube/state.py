@@ -27,10 +27,9 @@ from ringbalance.physics.tube.numbers import reynolds_number, rotation_reynolds_
 from ringbalance.physics.tube.rotation import (
     STRAIGHT_CRITICAL_REYNOLDS,
     critical_reynolds,
-    laminar_ratio,
     turbulent_friction_ratio,
 )
-from ringbalance.physics.tube.rotation_table import ito_nanbu_laminar
+from ringbalance.physics.tube.rotation_table import ito_nanbu_laminar, laminar_ratio
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Bend, Scene, Tube
 from ringbalance.scene.tube_models import CORRELATION, FINEST_MODELS, LEFT_OUT, Fidelity

@@ -12,7 +12,8 @@ from ringbalance.physics.tube.bends import straight_length
 from ringbalance.physics.tube.development import developing_length, development_uncertainty
 from ringbalance.physics.tube.ends import entrance_loss, exit_loss
 from ringbalance.physics.tube.friction import friction_factor, friction_uncertainty, turbulent_share
-from ringbalance.physics.tube.rotation import rotating_friction_ratio, turbulent_friction_ratio
+from ringbalance.physics.tube.rotation import turbulent_friction_ratio
+from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.physics.tube.state import TubeState, finest_state, tube_state
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene, Tube

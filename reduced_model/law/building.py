@@ -87,7 +87,7 @@ def _put_together(
         max_fill_ratio=scene.disc.max_fill_ratio,
         ambient_pressure=scene.gas.ambient_pressure,
         chamber_volume=chamber_volume(disc=scene.disc),
-        tube_area=math.pi / 4 * scene.tube.bore**2,
+        tube_area=scene.tube.area,
         wall_pressure=wall_pressure,
         wall_pressure_uncertainty=wall_pressure_uncertainty,
         path=tube_path(scene),

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
 from ringbalance.reduced_model.calibration import Calibration
-from ringbalance.reduced_model.operating.thresholds import priming_pressure
+from ringbalance.reduced_model.operating.point import priming_pressure
 from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.reports.studies.drag_point import DragPoint, LiquidBatch, drag_point
 from ringbalance.scene.arrays import BoolArray, FloatArray

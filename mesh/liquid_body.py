@@ -129,11 +129,10 @@ def _snapped(body: Tetrahedra, level: Level) -> tuple[Tetrahedra, BoolArray]:
     shift = moved - body.nodes
     near = np.abs(level.value(moved)) < _ON * np.linalg.norm(level.gradient(moved), axis=1) * room
     taken = corner & near & (np.linalg.norm(shift, axis=1) < _SNAP * np.where(corner, room, 0.0))
-    before = jacobians(body)
     for _ in range(10):
         result = _shifted(body, np.where(taken[:, None], shift, 0.0))
-        folded = jacobians(result).min(axis=1) < _FOLDED * before.min(axis=1)
-        if not (folded & taken[body.cells[:, :4]].any(axis=1)).any():
+        folded = _folded(body, result)
+        if not taken[body.cells[folded, :4]].any():
             break
         taken[body.cells[folded, :4]] = False
     reach = np.linalg.norm(level.gradient(result.nodes), axis=1) * np.where(corner, room, 0.0)
@@ -146,6 +145,14 @@ def _shifted(body: Tetrahedra, shift: FloatArray) -> Tetrahedra:
     middle = body.cells[:, 4:].ravel()
     nodes[middle] = body.nodes[middle] + shift[body.cells[:, EDGES]].mean(axis=2).reshape(-1, 3)
     return replace(body, nodes=nodes)
+
+
+def _folded(body: Tetrahedra, after: Tetrahedra) -> IntArray:
+    """Cells that moves of their nodes turn inside out, or nearly so."""
+    moved = (after.nodes != body.nodes).any(axis=1)
+    near = np.flatnonzero(moved[body.cells].any(axis=1))
+    was, least = (jacobians(replace(b, cells=b.cells[near])).min(axis=1) for b in (body, after))
+    return np.asarray(near[least < _FOLDED * was])
 
 
 def jacobians(body: Tetrahedra) -> FloatArray:
@@ -304,11 +311,10 @@ def _on_surface(body: Tetrahedra, level: Level) -> Tetrahedra:
     tangents, moved = _tangents(walls)[surface], body.nodes.copy()
     for _ in range(3):
         moved[surface] += _move(level, moved[surface], tangents)
-    before = jacobians(body)
     for attempt in range(10):
         result = replace(body, nodes=moved)
-        folded = jacobians(result).min(axis=1) < _FOLDED * before.min(axis=1)
-        if not folded.any():
+        folded = _folded(body, result)
+        if folded.size == 0:
             break
         back = np.unique(body.cells[folded])
         moved[back] = body.nodes[back] + (0.5 if attempt < _HALVINGS else 0.0) * (

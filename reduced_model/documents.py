@@ -100,11 +100,8 @@ def _chamber(calibration: Calibration) -> dict[str, Any]:
 
 
 def _across(scene: Scene, fills: FloatArray) -> dict[str, Any]:
-    """Angle from the middle of a chamber to its moment, along the fills; zero for a sector."""
-    if scene.disc.geometry is None:
-        return {"moment_angle_rad": [0.0] * fills.size}
-    shares = share_across(scene.disc, np.maximum(fills, fills[fills > 0].min()))
-    return {"moment_angle_rad": _listed(np.arctan(shares))}
+    """Angle from the middle of a chamber to the moment of liquid moved at the fills; zero for a sector."""
+    return {"moment_angle_rad": _listed(np.arctan(share_across(scene.disc, fills)))}
 
 
 def _check(check: ElementCheck) -> dict[str, Any]:

@@ -63,7 +63,7 @@ class LineAnswer:
     venting_time: float
     """Back to ambient, s."""
     shortest_opening: float | None
-    """Valve-open time below which nothing moves, s; None: the gas starts no flow."""
+    """Shortest valve-open time whose effect can be relied upon, s: it primes the tube; None: no flow."""
     smallest_correction: float | None
     """Change of the vibration by the shortest opening, m."""
     limit: float
@@ -71,7 +71,7 @@ class LineAnswer:
     dead_time: float | None = None
     """Valve-open time that an injection of the size of the limit loses against the steady velocity, s."""
     standing_amplitude: float | None = None
-    """Amplitude up to which every injection by the scene's gain and offsets only fills gas, m."""
+    """Amplitude up to which no injection by the scene's gain and offsets transfers liquid, m."""
 
     @property
     def above_limit(self) -> bool:
@@ -238,8 +238,9 @@ def _standing_warning(answer: LineAnswer) -> str:
     if answer.end != "given" or still <= answer.limit:
         return ""
     return (
-        f"up to {1e6 * still:.2g} um an injection by the controller's gain alone only fills gas, for "
-        f"{1e3 * (answer.dead_time or 0.0):.3g} ms: `ringbalance tune` recommends controller.gas_time_offset"
+        f"up to {1e6 * still:.2g} um an injection by the controller's gain alone transfers no liquid, it "
+        f"only fills gas or lifts liquid to the crest, for {1e3 * (answer.dead_time or 0.0):.3g} ms: "
+        "`ringbalance tune` recommends controller.gas_time_offset"
     )
 
 

@@ -126,12 +126,12 @@ def _summary_rows(calibration: Calibration) -> Iterator[tuple[str, str]]:
 
 def _direction(disc: Disc) -> Iterator[tuple[str, str]]:
     """Where an imported chamber is not symmetric, the angle of its moment to its middle."""
-    angles = np.degrees(np.arctan(share_across(disc, disc.max_fill_ratio * np.array([0.5, 0.1, 1.0]))))
+    angles = np.degrees(np.arctan(share_across(disc, disc.max_fill_ratio * np.linspace(0.05, 1.0, 20))))
     if np.max(np.abs(angles)) >= _ASIDE:
-        equal, *ends = angles
         text = (
-            f"moment {equal:.2g} deg from the middle of the chamber at equal fills, {ends[0]:.2g} to "
-            f"{ends[1]:.2g} deg over the range; counts as uncertainty"
+            f"liquid moves the moment {angles[9]:.2g} deg from the middle of the chamber at equal fills, "
+            f"{angles.min():.2g} to {angles.max():.2g} deg over the range; the closed loop follows that, "
+            "moments and lambda are those along the middle"
         )
         yield "direction", text
 

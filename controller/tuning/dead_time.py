@@ -124,7 +124,7 @@ def standing_remedy(scene: Scene, model: BalancerModel) -> str:
     still = dead_zone(scene, model, mended)
     by = "law" if scene.controller.kind == "law_based" else "gain alone"
     return (
-        f"a command by the {by} moves no liquid up to {1e6 * still:.3g} um, it only fills gas or lifts "
+        f"a command by the {by} transfers no liquid up to {1e6 * still:.3g} um, it only fills gas or lifts "
         "liquid to the crest: set "
         f"{offset_text(mended)}"
     )

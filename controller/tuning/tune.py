@@ -66,7 +66,7 @@ class Tuning:
     dead_times: tuple[float, ...]
     """s, of every chamber; empty where runs do not model the filling of gas."""
     dead_zone: float
-    """Largest amplitude at which no valve may open any more, or gas only fills chambers, m."""
+    """Largest amplitude at which no valve may open any more, or none transfers liquid, m."""
     change: str
     """Keys and values that are recommended beside the gain; empty: none."""
     search: Search | None

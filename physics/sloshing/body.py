@@ -38,7 +38,7 @@ from scipy.sparse.linalg import lobpcg, splu
 
 from ringbalance.mesh.liquid_body import Level
 from ringbalance.physics.pressure.tetrahedra import CELL_POINTS, TetrahedronSpace
-from ringbalance.physics.sloshing.projection import Fields, Multigrid, turn
+from ringbalance.physics.sloshing.projection import TOLERANCE, Fields, RepeatedSolves
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 
 _NOISE: Final = 0.05
@@ -92,7 +92,9 @@ class ReducedWaves:
     """Integrals of (1, x, y) n . xi of a surface that follows G = x + i y at once, shape (3,)."""
     wall: WallMean
     residual: float
-    """Largest relative residual of the projections."""
+    """Largest relative one of the linear solves."""
+    excess: float
+    """Largest residual over the one asked for."""
 
 
 def reduced_waves(
@@ -135,7 +137,7 @@ def _potentials(fields: Fields, count: int) -> FloatArray:
     """Columns phi of the slowest waves without rotation, K phi = s^2 M phi, (grad phi)^2 = 1."""
     space, mass = fields.space, fields.surface_mass
     matrix = csr_matrix(space.stiffness + _SHIFT * mass)
-    multigrid = Multigrid(matrix, space.prolongation(np.arange(space.unknowns)))
+    near = RepeatedSolves(matrix, space.prolongation(np.arange(space.unknowns)))
     x, y, z = space.body.nodes.T
     powers = sorted((p for p in product(range(4), repeat=3) if sum(p) < 4), key=sum)[: count + 1]
     start = np.stack([x**i * y**j * z**k for i, j, k in powers], axis=1)
@@ -143,7 +145,7 @@ def _potentials(fields: Fields, count: int) -> FloatArray:
         # It warns that its last fields are rough ones; they need not be better.
         warnings.simplefilter("ignore", UserWarning)
         values, shapes = lobpcg(
-            mass, start, B=matrix, M=multigrid.cycle, largest=True, tol=1e-14, maxiter=_ITERATIONS
+            mass, start, B=matrix, M=near.cycle, largest=True, tol=1e-14, maxiter=_ITERATIONS
         )
     # The largest belongs to the constant.
     slow = np.argsort(-values)[1:]
@@ -157,11 +159,10 @@ def _potentials(fields: Fields, count: int) -> FloatArray:
 def _assembled(
     fields: Fields, wall: str, blocks: list[FloatArray], errors: FloatArray, left_out: float
 ) -> ReducedWaves:
-    surface, rows = fields.surface, fields.body_rows
-    coriolis = np.block([[fields.products(left, turn(right)) for right in blocks] for left in blocks])
-    sides = np.concatenate([block[rows:] for block in blocks], axis=1)
-    onto_surface = fields.gradient[:rows][:, surface].T
-    flux = np.concatenate([onto_surface @ block[:rows] for block in blocks], axis=1)
+    surface = fields.surface
+    coriolis = np.block([[fields.turned_products(left, right) for right in blocks] for left in blocks])
+    sides = np.concatenate([block[fields.body_rows :] for block in blocks], axis=1)
+    flux = np.concatenate([fields.along_gradients(block)[surface] for block in blocks], axis=1)
     over = splu(fields.surface_mass[surface][:, surface].tocsc()).solve(flux)  # g n . xi
     stiffness = flux.T @ over
     places = fields.space.body.nodes[surface]
@@ -178,6 +179,7 @@ def _assembled(
         quasi_static=_quasi_static(fields),
         wall=_wall_mean(fields, wall, blocks, over),
         residual=fields.pinned.residual,
+        excess=fields.pinned.excess,
     )
 
 
@@ -200,9 +202,9 @@ def _wall_mean(fields: Fields, wall: str, blocks: list[FloatArray], over: FloatA
     facets = space.facets(wall)
     mean = facets.load(facets.weights, unknowns=space.unknowns) / facets.weights.sum()
     adjoint = np.zeros((space.unknowns, 1))
-    adjoint[fields.inner] = fields.pinned.solve(mean[fields.inner][:, None])
+    adjoint[fields.inner] = fields.pinned.solve(mean[fields.inner][:, None], adjoint[fields.inner], TOLERANCE)
     drawn = fields.gradient @ adjoint
-    chi = np.concatenate([fields.products(drawn, turn(block)) for block in blocks], axis=1)
+    chi = np.concatenate([fields.turned_products(drawn, block) for block in blocks], axis=1)
     onto = mean[surface] - (space.stiffness @ adjoint)[surface, 0]
     places = space.body.nodes[:, 0] + 1j * space.body.nodes[:, 1]
     over_surface = np.asarray(fields.surface_mass @ np.ones(space.unknowns))

@@ -11,54 +11,45 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-from pyamg.relaxation.relaxation import gauss_seidel
 from scipy.sparse import csr_matrix, diags_array, vstack
 from scipy.sparse.linalg import LinearOperator, cg
 
 from ringbalance.mesh.chamber import FREE_SURFACE
 from ringbalance.mesh.liquid_body import Level
-from ringbalance.physics.pressure.multigrid import hierarchy_of
+from ringbalance.physics.pressure.multigrid import multigrid
 from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
 from ringbalance.scene.arrays import FloatArray, IntArray
 
-_TOLERANCE: Final = 1e-7
-"""Relative residual of a projection: far below what the mesh leaves of a field."""
+TOLERANCE: Final = 1e-7
+"""Relative residual of a harmonic potential, whose gradient is small beside it."""
+_TURNED_TOLERANCE: Final = 1e-5
+"""Relative residual of what is taken from a turned field: far below what the mesh leaves of the field."""
 
 
-class Multigrid:
+class RepeatedSolves:
     """Repeated solves with one positive definite matrix of quadratic elements."""
 
     def __init__(self, matrix: csr_matrix, prolongation: csr_matrix) -> None:
-        self._matrix, self._up = csr_matrix(matrix), prolongation
-        self._matrix.sort_indices()
-        self._down = csr_matrix(prolongation.T)
-        coarse = csr_matrix(self._down @ self._matrix @ prolongation)
-        self._coarse = hierarchy_of(coarse, None).aspreconditioner(cycle="V")
-        self.cycle = LinearOperator(self._matrix.shape, matvec=self._cycle, dtype=np.float64)
+        self._matrix = matrix
+        self.cycle = LinearOperator(matrix.shape, matvec=multigrid(matrix, prolongation), dtype=np.float64)
         self.residual = 0.0
         """Largest relative one of all solves."""
+        self.excess = 0.0
+        """Largest residual over the one asked for."""
 
-    def _cycle(self, right: FloatArray) -> FloatArray:
-        right = np.ascontiguousarray(right.ravel())
-        result = np.zeros_like(right)
-        gauss_seidel(self._matrix, result, right, sweep="forward")
-        result += self._up @ (self._coarse @ (self._down @ (right - self._matrix @ result)))
-        gauss_seidel(self._matrix, result, right, sweep="backward")
-        return result
-
-    def solve(self, right: FloatArray, start: FloatArray | None = None) -> FloatArray:
-        """Columns of u for columns of b, to `_TOLERANCE` of b."""
-        result = np.zeros_like(right) if start is None else start.copy()
+    def solve(self, right: FloatArray, start: FloatArray, tolerance: float) -> FloatArray:
+        """Columns of u for columns of b, to a residual relative to b."""
+        result = start.copy()
         for column, b in enumerate(right.T):
             size = float(np.linalg.norm(b))
             if size == 0.0:
                 continue
             found, _ = cg(
-                self._matrix, b, x0=result[:, column], rtol=_TOLERANCE, atol=0.0, maxiter=500, M=self.cycle
+                self._matrix, b, x0=result[:, column], rtol=tolerance, atol=0.0, maxiter=500, M=self.cycle
             )
             result[:, column] = found
             left = float(np.linalg.norm(b - self._matrix @ found)) / size
-            self.residual = max(self.residual, left)
+            self.residual, self.excess = max(self.residual, left), max(self.excess, left / tolerance)
         return result
 
 
@@ -100,33 +91,47 @@ class Fields:
         return csr_matrix(diags_array(np.repeat(np.sqrt(np.concatenate(weights)), 3)) @ vstack(parts))
 
     @cached_property
-    def inner_gradient(self) -> csr_matrix:
-        """Fields of potentials that vanish on the free surface, given at the other nodes."""
-        return csr_matrix(self.gradient[:, self.inner])
+    def _body_gradient(self) -> csr_matrix:
+        """The body's rows of `gradient`, not copied."""
+        whole, rows = self.gradient, self.body_rows
+        end = whole.indptr[rows]
+        parts = (whole.data[:end], whole.indices[:end], whole.indptr[: rows + 1])
+        return csr_matrix(parts, shape=(rows, self.space.unknowns))
 
     @cached_property
-    def pinned(self) -> Multigrid:
+    def pinned(self) -> RepeatedSolves:
         """The stiffness of the nodes that are not on the surface."""
         inside = self.space.stiffness[self.inner][:, self.inner]
-        return Multigrid(inside, self.space.prolongation(self.inner))
+        return RepeatedSolves(inside, self.space.prolongation(self.inner))
 
     def harmonic(self, values: FloatArray) -> FloatArray:
         """Columns of nodal values, those inside replaced by the harmonic ones with walls without flux."""
         right = -(self.space.stiffness[self.inner][:, self.surface] @ values[self.surface])
         result = values.copy()
-        result[self.inner] = self.pinned.solve(right, values[self.inner])
+        result[self.inner] = self.pinned.solve(right, values[self.inner], TOLERANCE)
         return result
 
     def products(self, first: FloatArray, second: FloatArray) -> FloatArray:
         """Integrals over the body of the products of columns."""
         return np.asarray(first[: self.body_rows].T @ second[: self.body_rows])
 
+    def turned_products(self, first: FloatArray, second: FloatArray) -> FloatArray:
+        """Integrals over the body of first . e_z x second."""
+        (x, y), (u, v) = ([f[k : self.body_rows : 3] for k in (0, 1)] for f in (first, second))
+        return np.asarray(y.T @ u - x.T @ v)
+
+    def along_gradients(self, fields: FloatArray) -> FloatArray:
+        """Integrals over the body of grad N_i . u for columns u."""
+        return np.asarray(self._body_gradient.T @ fields[: self.body_rows])
+
     def coriolis_part(self, fields: FloatArray) -> FloatArray:
         """The part of e_z x u that keeps volume and walls."""
-        turned = turn(fields)
-        rows = self.inner_gradient[: self.body_rows]
-        potential = self.pinned.solve(np.asarray(rows.T @ turned[: self.body_rows]))
-        turned -= self.inner_gradient @ potential
+        turned = np.zeros_like(fields)
+        turned[0::3], turned[1::3] = -fields[1::3], fields[0::3]
+        potential = np.zeros((self.space.unknowns, fields.shape[1]))
+        right = self.along_gradients(turned)[self.inner]
+        potential[self.inner] = self.pinned.solve(right, potential[self.inner], _TURNED_TOLERANCE)
+        turned -= self.gradient @ potential
         return turned
 
     def new_directions(
@@ -134,19 +139,13 @@ class Fields:
     ) -> tuple[FloatArray, float]:
         """Orthonormal columns of what is new in fields of norm 1, without what is smaller than `least`.
 
+        Args: `fields`: changed, memory being short.
         Returns: The columns, and the largest squared norm of what was left out.
         """
         for _ in range(2):
             for block in before:
-                fields = fields - block @ self.products(block, fields)
+                fields -= block @ self.products(block, fields)
         squares, axes = np.linalg.eigh(self.products(fields, fields))
         kept = squares > least**2
         left_out = float(squares[~kept].max(initial=0.0))
         return np.asarray(fields @ (axes[:, kept] / np.sqrt(squares[kept]))), left_out
-
-
-def turn(fields: FloatArray) -> FloatArray:
-    """e_z x u."""
-    result = np.zeros_like(fields)
-    result[0::3], result[1::3] = -fields[1::3], fields[0::3]
-    return result

@@ -11,6 +11,7 @@ from ringbalance.mesh.geometry import chamber_volume, wall_radius
 from ringbalance.physics.gas.column import pressure_factor
 from ringbalance.physics.pressure.hydrostatics import Radius, hydrostatic_pressure
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes
+from ringbalance.reduced_model.chamber.imported_walls import across_table
 from ringbalance.reduced_model.chamber.moment import CalibratedMoment
 from ringbalance.reduced_model.chamber.ring_values import ring_values
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
@@ -42,7 +43,9 @@ def calibrated_law(*, scene: Scene, chamber: ChamberCalibration, heads: TubeHead
         wall_pressure_uncertainty=chamber.wall_pressure.uncertainty_table(inputs=inputs),
         inputs=_drive_uncertainty(scene),
         moment=CalibratedMoment(
-            chamber_moment=chamber.moment.table, half_width=chamber.moment.uncertainty_table(inputs=no_inputs)
+            chamber_moment=chamber.moment.table,
+            half_width=chamber.moment.uncertainty_table(inputs=no_inputs),
+            across=across_table(scene, chamber.moment.table.nodes),
         ),
     )
 
@@ -69,6 +72,7 @@ def nominal_law(scene: Scene, *, gravity: bool) -> CalibratedLaw:
         moment=CalibratedMoment(
             chamber_moment=table_from_samples(value=scene.disc.moment_factor * ring.moment.value, **ends),
             half_width=exact,
+            across=across_table(scene, fills),
         ),
     )
 

@@ -268,7 +268,7 @@ def _actions(evidence: Record, rows: Sequence[Requirement]) -> list[str]:
     if verdicts.get(STANDING) in {MISSED, OPEN} and not change:
         told.append(
             "With the valve in the scene, run tune: it recommends the times to add to the valve-open times, "
-            "without which small corrections only fill gas."
+            "without which small corrections transfer no liquid."
         )
     if verdicts.get("Correction capacity of one pair") in {MISSED, OPEN}:
         told.append("Balance the rotor better by hand, or take a larger disc: the capacity has no reserve.")

@@ -17,7 +17,7 @@ from ringbalance.reports.summary import MET, MISSED, OPEN, UNASKED, above, below
 from ringbalance.reports.traces import evidence_at, read, traced, untraced
 from ringbalance.scene import Scene
 
-STANDING: Final = "Vibration up to which the scene’s valve-open times only fill gas"
+STANDING: Final = "Vibration up to which the scene’s valve-open times transfer no liquid"
 _NONE: Final = "the scene asks for none"
 _LIKELY: Final = 0.95
 """Fraction of runs that must settle in time, the confidence of every interval in the report."""
@@ -322,7 +322,7 @@ def _smallest(evidence: Record) -> Requirement | None:
 
 
 def _standing(evidence: Record) -> Requirement | None:
-    """With the scene's own gain and offsets, by the dead time in which gas only fills a chamber."""
+    """With the scene's own gain and offsets, by the dead time: gas fills, and liquid rises to the crest."""
     return _of_line(evidence, "standing_amplitude_m", STANDING)
 
 

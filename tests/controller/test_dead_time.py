@@ -58,13 +58,18 @@ def test_the_largest_vector_that_stands_still() -> None:
 
 
 def test_an_amplitude_stands_as_far_as_the_dead_time_says(slow: Scene, calibrated: BalancerModel) -> None:
-    """A run that starts within the zone does not move; one that starts beyond what is lifted, too, does."""
+    """A run that starts within the zone does not move; one whose valve primes the tube does.
+
+    Between the two it depends on every millisecond how far an injection gets on the crest.
+    """
     start = slow.rotor.initial_phase + slow.rotor.lag_angle
     zone = (
         min(dead_times(replace(slow, rotor=_start(slow, 0.5e-6)), calibrated)) / slow.controller.proportional
     )
     along = replace(slow.rotor, initial_phase=start - slow.rotor.lag_angle - start)
-    for part, moves in ((0.9, False), (2.0, True)):
+    primes = line_answers(slow, calibrated)[0].shortest_opening
+    assert primes is not None
+    for part, moves in ((0.9, False), (primes / slow.controller.proportional / zone, True)):
         begun = replace(slow, rotor=replace(along, initial_amplitude=part * zone))
         exact = replace(begun, sensor=replace(slow.sensor, amplitude_noise=0.0, phase_noise=0.0))
         run = simulate(replace(exact, run=replace(slow.run, time_limit=2.0)), calibrated)
@@ -109,7 +114,7 @@ def test_the_offset_brings_every_run_to_the_limit(
     stuck = simulate(slow, calibrated)
     assert not stuck.settled
     assert offset_text(dead) in stuck.status
-    assert "only fills gas" in line_warning(stuck.gas_line)
+    assert "transfers no liquid" in line_warning(stuck.gas_line)
     assert line_warning(line_answers(offset, calibrated)) == ""
     for seed in range(3):
         assert simulate(replace(offset, run=replace(offset.run, seed=seed)), calibrated).settled

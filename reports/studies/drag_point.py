@@ -52,21 +52,21 @@ class LiquidBatch:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DragPoint:
-    """The tube's operating point, an empty tube beforehand; arrays of one shape.
+    """The operating point of a primed tube; arrays of one shape.
 
-    Where nothing flows, not even in a primed tube, every number is zero and `runs` is False.
+    Where nothing flows every number is zero and `runs` is False.
     """
 
     regime: IntArray
-    """Values of `Regime`: blocked, siphon or separated."""
+    """Values of `Regime`: siphon or separated, and blocked where the gas starts no flow in an empty tube."""
     runs: BoolArray
     """Whether a primed tube flows: only there have the numbers a meaning."""
     separated: BoolArray
-    """Whether that flow is separated; where `regime` is blocked, of the primed tube."""
+    """Whether that flow is separated."""
     separation_excess: FloatArray
     """ln of siphon velocity over separation velocity: positive where separated; without a crest -1."""
     velocity: FloatArray
-    """u, m/s; where blocked, that of a primed tube."""
+    """u, m/s."""
     velocity_uncertainty: FloatArray
     """Expanded uncertainty (95 %), m/s."""
     k: FloatArray

@@ -57,7 +57,7 @@ class LineAnswer:
     venting_time: float
     """Back to ambient, s."""
     shortest_opening: float | None
-    """Shortest valve-open time whose effect can be relied upon, s: it primes the tube; None: no flow."""
+    """Shortest valve-open time whose effect is sure, s: it primes the tube; None: the gas starts no flow."""
     smallest_correction: float | None
     """Change of the vibration by the shortest opening, m."""
     limit: float

@@ -38,8 +38,12 @@ def kinetic_factor(
         inertia, our interpolation between; 1/7-power profile.
     """
     turned = turbulent_share(reynolds=reynolds, critical_ratio=critical_ratio)
-    laminar = 1.2 + 0.8 * np.asarray(friction_ratio, dtype=np.float64) ** -1.5
+    laminar = _laminar_kinetic_factor(np.asarray(friction_ratio, dtype=np.float64))
     return np.asarray((1 - turned) * laminar + TURBULENT_KINETIC_FACTOR * turned, dtype=np.float64)
+
+
+def _laminar_kinetic_factor(friction_ratio: FloatArray) -> FloatArray:
+    return np.asarray(1.2 + 0.8 * friction_ratio**-1.5)
 
 
 def turbulent_entrance_loss(*, tube: Tube) -> tuple[float, float]:
@@ -106,5 +110,5 @@ def exit_loss(
     blunted = ROTATING_PROFILE_UNCERTAINTY * np.minimum(1.0, (ratio - 1) / 0.1)
     uncertainty_95 = (1 - turned) * (table.uncertainty + 0.3 * undeveloped + blunted) + 0.06 * turned
     gap = 2 * turned * (1 - turned)
-    carried = 0.2 + 0.8 * ratio**-1.5
+    carried = _laminar_kinetic_factor(ratio) - 1
     return (1 - turned) * (carried + table.value), np.hypot(uncertainty_95, gap)

@@ -42,6 +42,14 @@ def pressure_factor(scene: Scene) -> float:
     return math.exp((scene.rotor.speed * surface) ** 2 / (2 * AIR_CONSTANT * scene.gas.temperature))
 
 
+def vented_pressure(scene: Scene) -> float:
+    """Absolute pressure of the gas on the liquid of a vented chamber, from which gauge pressures there count.
+
+    The surroundings', times `pressure_factor` where the scene's pressures hold on the shaft.
+    """
+    return scene.gas.ambient_pressure * pressure_factor(scene)
+
+
 def normal_volume(*, pressure_volume: float, temperature: float) -> float:
     """Normal volume (m^3, at 0 degC and 101.325 kPa) of the gas with a given p V (J) at a temperature."""
     return pressure_volume / NORMAL_PRESSURE * NORMAL_TEMPERATURE / temperature

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, wall_radius
-from ringbalance.physics.gas.column import pressure_factor
+from ringbalance.physics.gas.column import pressure_factor, vented_pressure
 from ringbalance.physics.pressure.hydrostatics import Radius, hydrostatic_pressure
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes
 from ringbalance.reduced_model.chamber.imported_walls import across_table
@@ -116,7 +116,7 @@ def tube_path(scene: Scene) -> TubePath:
         port_pressure=column_pressure(scene=scene, radius=scene.tube.port_radius),
         hump_pressure=None if hump is None else column_pressure(scene=scene, radius=hump),
         trapped=scene.tube.hump_gas == "trapped",
-        vapour_pressure=scene.liquid.vapour_pressure - scene.gas.ambient_pressure,
+        vapour_pressure=scene.liquid.vapour_pressure - vented_pressure(scene),
         released=released if scene.liquid.dissolved_gas == "saturated" else 0.0,
         froude_velocity=froude * abs(scene.rotor.speed) * math.sqrt((hump or 0.0) * scene.tube.bore),
     )

@@ -176,7 +176,10 @@ def _drive(law: CalibratedLaw, batch: LiquidBatch) -> _Drive:
 
 
 def _ends(law: CalibratedLaw, batch: LiquidBatch, ratio: FloatArray) -> TubeEnds[FloatArray]:
-    gas, hydrostatic = batch.gas_pressure, ratio * float(law.wall_pressure(law.max_fill_ratio / 2))
+    gas, hydrostatic = (
+        law.gas_factor * batch.gas_pressure,
+        ratio * float(law.wall_pressure(law.max_fill_ratio / 2)),
+    )
     return TubeEnds(
         upstream_gas=gas,
         downstream_gas=np.zeros_like(gas),

@@ -9,15 +9,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ringbalance.physics.gas.column import pressure_factor
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.chamber.calibration import calibrate_chamber
-from ringbalance.reduced_model.law.building import calibrated_law, column_pressure
+from ringbalance.reduced_model.law.building import calibrated_law, column_pressure, nominal_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.operating.point import priming_pressure
+from ringbalance.reduced_model.operating.pressure_profile import hump_profile
+from ringbalance.reduced_model.selection.range_flow import range_flow
 from ringbalance.reduced_model.tube.heads import tube_heads
-from ringbalance.scene.models import Scene
+from ringbalance.scene.models import HumpGas, Scene
 
 AMBIENT = 101325.0
 
@@ -221,6 +224,39 @@ def test_never_nan_and_always_consistent(request: pytest.FixtureRequest, name: s
 def test_more_gas_never_means_less_flow(law: CalibratedLaw, x: float, p: float, step: float) -> None:
     flow = law.evaluate(fill_ratio=x, gas_pressure=[p, p + step])
     assert flow.velocity[1] >= flow.velocity[0]
+
+
+@pytest.mark.parametrize("crest_gas", ["vented", "trapped"])
+def test_pressures_on_the_shaft_are_those_on_the_liquid_times_the_columns_ratio(
+    point_scene: Scene, crest_gas: HumpGas
+) -> None:
+    """Supply and surroundings alike: the same disc with both pressures as they are on the liquid flows alike,
+    separated over vapour as well, and holds alike at rest."""
+    tube = dataclasses.replace(point_scene.tube, hump_gas=crest_gas)
+    scene = dataclasses.replace(point_scene, tube=tube)
+    on_shaft = dataclasses.replace(scene, gas=dataclasses.replace(scene.gas, measured_at="shaft"))
+    ratio = pressure_factor(on_shaft)
+    gas = dataclasses.replace(
+        scene.gas,
+        pressure=ratio * scene.gas.pressure,
+        ambient_pressure=ratio * scene.gas.ambient_pressure,
+    )
+    on_liquid = dataclasses.replace(scene, gas=gas)
+    laws = [nominal_law(each, gravity=False) for each in (on_shaft, on_liquid)]
+    for p in (0.0, 0.56e6, 0.7e6, 1.5e6):
+        one, other = (
+            each.evaluate(fill_ratio=[0.1, 0.25, 0.4], gas_pressure=f * p, primed=[False, False, True])
+            for each, f in zip(laws, (1.0, ratio), strict=True)
+        )
+        np.testing.assert_allclose(one.velocity, other.velocity, rtol=1e-9)
+        assert np.array_equal(one.regime, other.regime)
+        lines = [
+            hump_profile(scene=each, law=law, fill_ratio=0.25, gas_pressure=f * p).pressure
+            for each, law, f in zip((on_shaft, on_liquid), laws, (1.0, ratio), strict=True)
+        ]
+        np.testing.assert_allclose(lines[0], lines[1], rtol=1e-9, atol=1e-3)
+    flows = [range_flow(each) for each in (on_shaft, on_liquid)]
+    np.testing.assert_allclose(flows[0].velocity, flows[1].velocity, rtol=1e-9)
 
 
 def test_uncertainty_of_a_turbulent_siphon_is_half_that_of_k_plus_1(

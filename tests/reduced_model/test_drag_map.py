@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ringbalance.physics.tube.loss import tube_loss
-from ringbalance.reduced_model.calibration import Calibration
+from ringbalance.reduced_model.calibration import Calibration, calibrate
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.heads import tube_heads
 from ringbalance.reports.studies.drag_map import (
@@ -58,6 +58,18 @@ def test_a_point_is_what_law_and_tube_loss_say(
     assert found.velocity_uncertainty[0, 0] == pytest.approx(float(flow.uncertainty), rel=3e-2)
     assert found.in_range[0, 0] == loss.in_range
     assert found.flow_state[0, 0] == loss.flow_state
+
+
+def test_a_point_holds_the_gas_column_as_the_law_does(calibration: Calibration) -> None:
+    gas = replace(calibration.scene.gas, measured_at="shaft")
+    on_shaft = calibrate(replace(calibration.scene, gas=gas))
+    law, (bore, viscosity) = on_shaft.flow_law, POINTS[0]
+    scene = moved(on_shaft.scene, bore, viscosity)
+    point = drag_map(calibration=on_shaft, bore=[bore], kinematic_viscosity=[viscosity]).point
+    flow = replace(law, heads=tube_heads(scene)).evaluate(
+        fill_ratio=0.25, opposite_fill_ratio=0.25, gas_pressure=scene.gas.pressure, primed=True
+    )
+    assert point.velocity[0, 0] == pytest.approx(float(flow.velocity), rel=1e-8)
 
 
 def test_stated_inputs_spread_k_as_they_do_in_tube_loss(calibration: Calibration) -> None:

@@ -1,4 +1,4 @@
-"""What uncertain inputs do to volume, wall pressure, moment and lambda of a chamber, by its closed forms."""
+"""What uncertain inputs do to wall pressure, moment and lambda of a chamber, by its closed forms."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.mesh.geometry import (
-    chamber_volume,
     liquid_first_moment,
     surface_centroid,
     surface_radius,
@@ -36,8 +35,6 @@ CHAMBER_INPUTS: Final = (
 class InputEffect:
     """Expanded uncertainties (95 %) by input; arrays along the fill ratio."""
 
-    volume: float
-    """V, m^3."""
     wall_pressure: FloatArray
     """Pa."""
     moment: FloatArray
@@ -60,14 +57,13 @@ def input_effects(*, scene: Scene, fill_ratio: FloatArray) -> Mapping[str, Input
 def _effect(scene: Scene, fill_ratio: FloatArray, quantity: str, width: float) -> InputEffect:
     fills = np.append(fill_ratio, scene.disc.max_fill_ratio / 2)
     here, *sides = (
-        (*measured_closed_forms(scene=s, fill_ratio=fills), chamber_volume(disc=s.disc))
+        measured_closed_forms(scene=s, fill_ratio=fills)
         for s in (scene, *(shifted(scene=scene, quantity=quantity, change=c) for c in (-width, width)))
     )
-    pressure, moment, ratio, volume = (
+    pressure, moment, ratio = (
         np.maximum(np.abs(low - at), np.abs(high - at)) for at, low, high in zip(here, *sides, strict=True)
     )
     return InputEffect(
-        volume=float(volume),
         wall_pressure=pressure[:-1],
         moment=moment[:-1],
         moment_per_mass=float(ratio[-1]),

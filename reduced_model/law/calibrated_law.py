@@ -116,7 +116,7 @@ class CalibratedLaw:
         return directed_flow(
             path=self.path,
             heads=self.heads,
-            hump_head=self.heads.return_hump_head if reverse else self.heads.hump_head,
+            hump_head=self.heads.to_crest(reverse=reverse),
             inputs=self.inputs,
             drive=Drive(
                 ends=ends.reversed() if reverse else ends,

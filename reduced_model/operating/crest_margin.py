@@ -30,7 +30,7 @@ class DirectedState:
 
         The state is that in the direction of the driving pressure.
         """
-        crest, head = law.path.crest, law.heads.return_hump_head if self.reverse else law.heads.hump_head
+        crest, head = law.path.crest, law.heads.to_crest(reverse=self.reverse)
         if crest is None or head is None:
             return None, None
         driving, (low, high) = np.asarray(self.ends.driving_pressure()), crest.cavity_bounds(self.ends)

@@ -147,7 +147,7 @@ def _profile(
 
 def _pressure_over_crest(law: CalibratedLaw, state: DirectedState, velocity: float) -> float | None:
     """Of the cavity or gas that the column spills into at a velocity; None where it is full, or at rest."""
-    crest, head = law.path.crest, law.heads.return_hump_head if state.reverse else law.heads.hump_head
+    crest, head = law.path.crest, law.heads.to_crest(reverse=state.reverse)
     if crest is None or head is None or velocity == 0:
         return None
     log_u, driving = np.log(velocity), state.ends.driving_pressure()

@@ -56,6 +56,10 @@ class TubeHeads:
     interpolation_error: float
     """Largest relative error of the head tables found between their nodes."""
 
+    def to_crest(self, *, reverse: bool) -> HermiteTable | None:
+        """From the chamber that gives liquid; None without a crest."""
+        return self.return_hump_head if reverse else self.hump_head
+
 
 def velocity_of(*, table: HermiteTable, head: npt.ArrayLike, where: BoolArray) -> FloatArray:
     """Velocity that belongs to a head.

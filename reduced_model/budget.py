@@ -66,7 +66,7 @@ class Budget:
         return math.hypot(self.numerical, self.input, self.model)
 
 
-class Calibrated(Protocol):
+class _Calibrated(Protocol):
     """What a budget needs of a calibration."""
 
     @property
@@ -113,7 +113,7 @@ def rounded(value: float, total: float) -> str:
     return f"{plain:f}" if place > -_DIGITS else f"{plain:e}"
 
 
-def budgets(*, scene: Scene, calibration: Calibrated) -> Mapping[str, Budget]:
+def budgets(*, scene: Scene, calibration: _Calibrated) -> Mapping[str, Budget]:
     """Budget of each of `UNITS`; wall pressure and moment at the largest fill, flow at the operating point.
 
     Every uncertain input is moved by its half-width to both sides, with the chamber and the tube solved
@@ -161,7 +161,7 @@ def _curve_parts(curve: Curve, at: int) -> _Parts:
     return float(curve.value[at]), float(curve.numerical[at]), model
 
 
-def _flow_parts(scene: Scene, calibration: Calibrated) -> dict[str, _Parts]:
+def _flow_parts(scene: Scene, calibration: _Calibrated) -> dict[str, _Parts]:
     """Value, numerical and model part of the quantities of the flow at the operating point."""
     point, rest = calibration.operating_point, calibration.residual
     law = _law_without_inputs(scene, calibration)
@@ -190,7 +190,7 @@ def _flow_parts(scene: Scene, calibration: Calibrated) -> dict[str, _Parts]:
     }
 
 
-def _level_parts(calibration: Calibrated) -> dict[str, _Parts]:
+def _level_parts(calibration: _Calibrated) -> dict[str, _Parts]:
     """The same of the gas pressures that hydrostatics alone give, for which two wall pressures count."""
     point, chamber = calibration.operating_point, calibration.chamber
     _, numerical, model = _curve_parts(chamber.wall_pressure, chamber.reported[-1])
@@ -216,7 +216,7 @@ def _crest_part(law: CalibratedLaw, point: OperatingPoint, state: DirectedState,
     return max(highest - pressure, pressure - max(low, full - margin), 0.0)
 
 
-def _law_without_inputs(scene: Scene, calibration: Calibrated) -> CalibratedLaw:
+def _law_without_inputs(scene: Scene, calibration: _Calibrated) -> CalibratedLaw:
     """The law with the uncertainties of numerics and models alone."""
     chamber, law, point = calibration.chamber, calibration.flow_law, calibration.operating_point
     return replace(
@@ -229,7 +229,7 @@ def _law_without_inputs(scene: Scene, calibration: Calibrated) -> CalibratedLaw:
     )
 
 
-def _input_effects(scene: Scene, calibration: Calibrated) -> dict[str, dict[str, float]]:
+def _input_effects(scene: Scene, calibration: _Calibrated) -> dict[str, dict[str, float]]:
     """Larger change of every quantity to either side, by the input's path in the scene."""
     near = calibration.operating_point.loss_velocity or 1.0
     here = device_of(scene, near=near, near_fill=calibration.residual.fill_ratio)

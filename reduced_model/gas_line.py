@@ -133,11 +133,11 @@ def standing_amplitude(
     Args: `times`: s, of all chambers. `rates`: of the vibration with each chamber driven, m/s.
     """
     if settings.kind == "law_based":
-        return largest_standing([time * rate for time, rate in zip(times, rates, strict=True)])
-    return largest_standing(times) / settings.proportional
+        return _largest_standing([time * rate for time, rate in zip(times, rates, strict=True)])
+    return _largest_standing(times) / settings.proportional
 
 
-def largest_standing(times: Sequence[float]) -> float:
+def _largest_standing(times: Sequence[float]) -> float:
     """Largest vector of which no chamber's share is above its time, in the unit of the times.
 
     Args: `times`: of all chambers in the order of the letters.

@@ -158,7 +158,7 @@ def _pressure_over_crest(law: CalibratedLaw, state: DirectedState, velocity: flo
 
 def _cavity_pressure(law: CalibratedLaw, state: DirectedState) -> float | None:
     crest = law.path.crest
-    return None if crest is None else crest.cavity_pressure(state.ends)
+    return None if crest is None else float(crest.cavity_pressure(state.ends))
 
 
 def _flowing(

@@ -45,7 +45,9 @@ def paper_closed_forms(scene: Scene, fill_ratio: npt.ArrayLike) -> tuple[FloatAr
     pressure = paper.wall_pressure_paper(
         disc=disc, density=rho, angular_velocity=scene.rotor.speed, liquid_volume=volume
     )
-    return pressure, paper.moment_paper(disc=disc, density=rho, surface_radius=radius)
+    moment = paper.moment_paper(disc=disc, density=rho, surface_radius=radius)
+    # A root and its square differ by rounding, of which an empty chamber shall have nothing.
+    return pressure, np.where(volume > 0, moment, 0.0)
 
 
 def by_paper(scene: Scene, fill: float) -> ChamberValues:

@@ -85,10 +85,8 @@ def operating_point(*, scene: Scene, law: CalibratedLaw) -> OperatingPoint:
         priming_vented=None if vented is None else float(vented),
         priming_trapped=None if trapped is None else float(trapped),
         stall=max(float(law.ends(fill_ratio=0.0).stall_pressure()) / law.gas_factor, 0.0),
-        stall_paper=float(
-            paper.stall_pressure(
-                disc=scene.disc, density=scene.liquid.density, angular_velocity=scene.rotor.speed
-            )
+        stall_paper=paper.stall_pressure(
+            disc=scene.disc, density=scene.liquid.density, angular_velocity=scene.rotor.speed
         ),
         hump_pressure=hump.hump_pressure,
         cavity_pressure=hump.cavity_pressure,

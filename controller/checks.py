@@ -7,6 +7,8 @@ from typing import Final
 
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.paper_law import PaperLaw
+from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.models import Scene
@@ -98,7 +100,9 @@ def _fill_faults(scene: Scene, model: BalancerModel) -> list[Fault]:
 
 
 def _volume_faults(scene: Scene, model: BalancerModel) -> list[Fault]:
-    volume = chamber_volume(disc=scene.disc)
+    # Eq. 4 knows no rib, fillet or gas tube of an imported chamber, which can be much of it.
+    by_paper = isinstance(model.flow, PaperLaw) and scene.disc.geometry is not None
+    volume = (paper.chamber_volume_paper if by_paper else chamber_volume)(disc=scene.disc)
     if abs(model.chamber_volume / volume - 1) <= VOLUME_TOLERANCE:
         return []
     found = model.chamber_volume

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ringbalance.controller.liquid_ring.opening import NEAR_RESIDUAL
 from ringbalance.controller.liquid_ring.plant import Operation
 from ringbalance.physics.gas.column import compression_work, normal_volume, nozzle_flow
 from ringbalance.physics.gas.supply import gas_line
@@ -91,6 +92,8 @@ def gas_use(*, scene: Scene, model: BalancerModel, operations: Sequence[Operatio
         ),
         run_dry=sum(operation.run_dry > 0 for operation in operations),
         residual_fill_ratio=residual,
-        below_residual=sum(done.run_dry > 0 or done.fill_after < residual for done in operations),
+        below_residual=sum(
+            done.run_dry > 0 or done.fill_after < residual - NEAR_RESIDUAL for done in operations
+        ),
         passed_through=normal_volume(pressure_volume=passed, temperature=gas.temperature),
     )

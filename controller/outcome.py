@@ -265,7 +265,7 @@ def _stalled(facts: Facts) -> str:
 
 def _capacity(facts: Facts) -> str:
     needed = abs(initial_unbalance(rotor=facts.scene.rotor)) / GRAM_MILLIMETRE
-    pair = largest_pair_moment(plant=facts.plant, state=facts.state) / GRAM_MILLIMETRE
+    pair = abs(largest_pair_moment(plant=facts.plant, state=facts.state)) / GRAM_MILLIMETRE
     return (
         f"{_not_settled(facts)}; capacity exceeded: the unbalance is {needed:.4g} g mm, one pair of chambers "
         f"can form {pair:.4g} g mm along its axis, so at best {_um(facts.unreachable_amplitude)} remain: "

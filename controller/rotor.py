@@ -49,13 +49,14 @@ def _check_chambers(chambers: int) -> None:
 def disc_unbalance(*, moment: MomentCurve, fill_ratio: npt.ArrayLike) -> ComplexArray:
     """Balancing moment of the whole disc, U = sum over pairs of M(x_i, x_(i+n/2)) e_i, kg m.
 
+    M is complex where an imported chamber is asymmetric: its moment along and across the chamber's middle.
     Fill ratios of every chamber in the order of the letters run along the first axis.
     Source: Eqs. 21 and 22 of the liquid-ring paper, for any number of pairs and any moment curve.
     """
     x = np.asarray(fill_ratio, dtype=np.float64)
     half = x.shape[0] // 2
     directions = chamber_directions(x.shape[0])[:half]
-    pair = moment.pair_moment(fill_ratio=x[:half], opposite_fill_ratio=x[half:])
+    pair = moment.pair_vector(fill_ratio=x[:half], opposite_fill_ratio=x[half:])
     return np.asarray(np.tensordot(directions, pair, axes=1), dtype=np.complex128)
 
 

@@ -189,7 +189,7 @@ class ControllerSettings:
         unused(
             "nothing is added",
             "target_vector and law_based: added to every valve-open time, such as the dead time in which gas "
-            "only fills the chamber; `ringbalance tune` recommends it",
+            "fills the chamber and liquid rises to the crest; `ringbalance tune` recommends it",
         ),
         shown("added to valve-open times", "ms", absent="nothing"),
     ] = None

@@ -34,14 +34,20 @@ def any_wet(shared: Record, run: Record) -> bool:
 
 
 @in_place
-def _moment(shared: Record, fill: float) -> float:
-    """Of one pair, kg m, by `moment.MomentTable`."""
+def _piece(shared: Record, share: float, cell: int, column: int) -> float:
+    y0, d0 = shared.moment[cell, column], shared.moment[cell, column + 1]
+    rise, d1 = shared.moment[cell + 1, column] - y0, shared.moment[cell + 1, column + 1]
+    return float(y0 + _piece_rise(share, rise, d0, d1))
+
+
+@in_place
+def _moment(shared: Record, fill: float) -> tuple[float, float]:
+    """Of one pair along its axis and across it, kg m, by `moment.MomentTable`."""
     last = shared.moment.shape[0] - 1
     place = min(max((fill - shared.lowest) / shared.moment_step, 0.0), float(last))
     cell = min(int(place), last - 1)
-    y0, d0 = shared.moment[cell, 0], shared.moment[cell, 1]
-    rise, d1 = shared.moment[cell + 1, 0] - y0, shared.moment[cell + 1, 1]
-    return float(y0 + _piece_rise(place - cell, rise, d0, d1))
+    along = _piece(shared, place - cell, cell, 0)
+    return along, _piece(shared, place - cell, cell, 2) if shared.asymmetric else 0.0
 
 
 @in_place
@@ -49,9 +55,9 @@ def vibration(shared: Record, run: Record, trial: bool) -> tuple[float, float]:
     """Real and imaginary part of the vibration with the disc's liquid, m; `trial`: by the fills on trial."""
     real, imaginary = 0.0, 0.0
     for i in range(shared.chambers // 2):
-        moment = _moment(shared, (run.trial[i] if trial else run.fill[i]))
-        real += shared.axis[i, 0] * moment
-        imaginary += shared.axis[i, 1] * moment
+        along, across = _moment(shared, (run.trial[i] if trial else run.fill[i]))
+        real += shared.axis[i, 0] * along - shared.axis[i, 1] * across
+        imaginary += shared.axis[i, 1] * along + shared.axis[i, 0] * across
     return (
         shared.start_real + run.gain_real * real - run.gain_imaginary * imaginary,
         shared.start_imaginary + run.gain_real * imaginary + run.gain_imaginary * real,

@@ -16,6 +16,7 @@ from ringbalance.controller.liquid_ring.compiled_march import (
     opening_within,
     rests,
 )
+from ringbalance.controller.liquid_ring.opening import NEAR_RESIDUAL
 from ringbalance.controller.liquid_ring.records import P, X
 from ringbalance.scene.arrays import FloatArray
 
@@ -66,7 +67,7 @@ def _keeps_residual(
 ) -> bool:
     """Move as commanded. Returns: whether each driven chamber keeps its residual fill, tail included."""
     half, least = shared.chambers // 2, run.residual_fill
-    if least > 0.0 and not (_driven(shared, run, False) > least and _driven(shared, run, True) > least):
+    if least > 0.0 and not (_above_residual(shared, run, False) and _above_residual(shared, run, True)):
         return False
     _open_valves(plant, run, motions)
     _pass(shared, plant, run, motions, notes, w)
@@ -80,12 +81,11 @@ def _keeps_residual(
 
 
 @in_place
-def _driven(shared: Record, run: Record, other: bool) -> float:
-    """Fill of a driven chamber; infinite without one."""
+def _above_residual(shared: Record, run: Record, other: bool) -> bool:
+    """Whether a driven chamber is above its residual fill, or there is none."""
     pair, first = (run.other_pair, run.other_first) if other else (run.pair, run.first)
-    if pair < 0:
-        return math.inf
-    return float(run.fill[pair] if first else shared.total - run.fill[pair])
+    driven = math.inf if pair < 0 else run.fill[pair] if first else shared.total - run.fill[pair]
+    return bool(driven > run.residual_fill + NEAR_RESIDUAL)
 
 
 @in_place
@@ -104,7 +104,7 @@ def _permitted(
     """A valve-open time, s, that leaves the residual fill; zero where it would be below the minimum."""
     pair, first = (run.other_pair, run.other_first) if other else (run.pair, run.first)
     found = 0.0
-    if _driven(shared, run, other) > run.residual_fill:
+    if _above_residual(shared, run, other):
         chamber, spare = 0 if first else 1, shared.chambers // 2 * 2
         found = opening_within(plant, motions, pair, spare, chamber, duration, w)
     return kept(shared, run, found, duration, pair if first else pair + shared.chambers // 2)

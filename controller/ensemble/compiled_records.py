@@ -48,6 +48,7 @@ _WHOLE: Final = (
     "chambers",
     "rises_tolerated",
     "idle_tolerated",
+    "asymmetric",  # whether a pair has a moment across its axis
     "moving",  # whether liquid, gas and valves have dynamics of their own
     "gas_points",
     "drift_points",
@@ -76,7 +77,7 @@ SHARED: Final = np.dtype(
         ("first", np.int64, (INTERVALS,)),  # node of the interval's path, where it has one
         ("last", np.int64, (INTERVALS,)),
         ("node", np.float64, (PATH_NODES, 4)),  # time, x, leaving and arriving dx/dt
-        ("moment", np.float64, (MOMENT_NODES, 2)),  # of a pair: value, and slope per step
+        ("moment", np.float64, (MOMENT_NODES, 4)),  # of a pair: value, slope per step; both across its axis
         ("axis", np.float64, (MAX_CHAMBERS // 2, 2)),  # directions of the pairs
         ("offset", np.float64, (MAX_CHAMBERS,)),  # added to a valve's share, s
     ]

@@ -32,6 +32,7 @@ from ringbalance.controller.formulas.stopping import (
     has_turned,
     stop_cause,
 )
+from ringbalance.controller.liquid_ring.opening import NEAR_RESIDUAL
 from ringbalance.scene.arrays import FloatArray
 
 _CERTAIN: Final = 1 + 1e-9
@@ -296,7 +297,8 @@ def _keep_residual(shared: Record, run: Record) -> None:
 def _permitted(shared: Record, run: Record, pair: int, first: bool, duration: float) -> float:
     """A valve-open time, s, that leaves the residual fill; zero where it would be below the minimum."""
     driven = run.fill[pair] if first else shared.total - run.fill[pair]
-    found = opening(shared, run, pair, first, duration) if driven > run.residual_fill else 0.0
+    above = driven > run.residual_fill + NEAR_RESIDUAL
+    found = opening(shared, run, pair, first, duration) if above else 0.0
     return kept(shared, run, found, duration, pair if first else pair + shared.chambers // 2)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ringbalance.controller.formulas.path_piece import piece_rise
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import ComplexArray, FloatArray
 
 MOMENT_NODES: Final = 4097
 
@@ -20,13 +20,13 @@ class MomentTable(NamedTuple):
     """Smallest x."""
     step: float
     """Distance of the nodes."""
-    value: FloatArray
-    """kg m, shape (n,)."""
-    slope: FloatArray
+    value: ComplexArray
+    """Along the pair's axis and across it, kg m, shape (n,)."""
+    slope: ComplexArray
     """kg m per step, shape (n,)."""
 
-    def at(self, fill: FloatArray) -> FloatArray:
-        """Moment along the pair's axis, kg m, for fills of the positive chamber."""
+    def at(self, fill: FloatArray) -> ComplexArray:
+        """Moment of the pair, kg m, for fills of the positive chamber."""
         place = np.clip((fill - self.lowest) / self.step, 0.0, self.value.size - 1.0)
         cell = np.minimum(place.astype(np.intp), self.value.size - 2)
         t = place - cell
@@ -41,9 +41,9 @@ def moment_table(*, model: BalancerModel, total: float) -> MomentTable:
     lowest, highest = max(0.0, total - largest), min(total, largest)
     step = (highest - lowest) / (MOMENT_NODES - 1)
 
-    def of(x: FloatArray) -> FloatArray:
+    def of(x: FloatArray) -> ComplexArray:
         held = np.clip(x, lowest, highest)
-        return model.moment.pair_moment(fill_ratio=held, opposite_fill_ratio=total - held)
+        return model.moment.pair_vector(fill_ratio=held, opposite_fill_ratio=total - held)
 
     x = np.linspace(lowest, highest, MOMENT_NODES)
     before, after = np.maximum(x - step / 2, lowest), np.minimum(x + step / 2, highest)

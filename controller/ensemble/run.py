@@ -116,7 +116,9 @@ def ensemble_plan(*, scene: Scene, model: BalancerModel, transfer: PairTransfer)
     shared, chambers = transfer.shared.copy(), scene.disc.chambers
     axes = chamber_directions(chambers)[: chambers // 2]
     moment = moment_table(model=model, total=2 * scene.disc.initial_fill)
-    shared["moment"], shared["moment_step"] = np.stack([moment.value, moment.slope], axis=1), moment.step
+    parts = [part for z in (np.real, np.imag) for part in (z(moment.value), z(moment.slope))]
+    shared["moment"], shared["moment_step"] = np.stack(parts, axis=1), moment.step
+    shared["asymmetric"] = bool(np.any(moment.value.imag))
     shared["axis"][0, : axes.size] = np.stack([axes.real, axes.imag], axis=1)
     for name, value in (_loop(scene) | _controller(scene)).items():
         shared[name] = value

@@ -8,8 +8,9 @@ with K = alpha + k_up up to the crest's end s_end, and e the fraction of it lost
 on the flow law's column continues at the same velocity.
 
 Liquid on the crest's circle is pulled to neither side.  What is there when the column parts is taken to drain
-evenly: what was lifted to the middle of the crest falls back, what was lifted beyond it has passed.  While
-liquid is lifted the fill of the state is that of the chamber alone; `shown` is with the tube's share.
+evenly: what was lifted to the middle of the crest falls back, what was lifted beyond it has passed.  Between
+injections gas is taken to lie over the crest; legs on both sides of a cavity would stand somewhat higher.
+While liquid is lifted the fill of the state is that of the chamber alone; `shown` is with the tube's share.
 """
 
 from __future__ import annotations
@@ -61,19 +62,27 @@ def shown(plant: Record, motion: Record, x: float) -> float:
     """Fill of chamber 0 with what the tube gives back to it."""
     if not motion.lifting:
         return x
-    direction = motion.direction
-    middle = (crest_start(plant, direction) + crest_stop(plant, direction)) / 2.0
-    begun = max(motion.front - middle, 0.0)
-    passed = max(front(plant, motion, x) - middle, 0.0) - begun
-    return float(motion.started - direction * passed * plant.hold_up)
+    return float(motion.started - motion.direction * _passed(plant, motion, front(plant, motion, x)))
+
+
+@inlined
+def _passed(plant: Record, motion: Record, place: float) -> float:
+    """Fill ratio that has passed with the front at a place, beyond the middle of the crest."""
+    middle = (crest_start(plant, motion.direction) + crest_stop(plant, motion.direction)) / 2.0
+    return float((max(place - middle, 0.0) - max(motion.front - middle, 0.0)) * plant.hold_up)
 
 
 @in_place
-def keep_front(plant: Record, motion: Record) -> None:
-    """Count what is lifted from its present place."""
-    x = motion.state[X]
-    fill, motion.front = shown(plant, motion, x), front(plant, motion, x)
-    motion.state[X], motion.started = fill, fill
+def stands(plant: Record, motion: Record) -> tuple[float, float]:
+    """Present `front`, and the fill that is `shown`."""
+    return front(plant, motion, motion.state[X]), shown(plant, motion, motion.state[X])
+
+
+@in_place
+def resume(plant: Record, motion: Record, place: float) -> None:
+    """The state of lifted liquid that `stands` at a place, from the fill that is shown."""
+    motion.started = motion.state[X] + motion.direction * _passed(plant, motion, place)
+    motion.state[X] = motion.started - motion.direction * (place - motion.front) * plant.hold_up
 
 
 @inlined

@@ -248,9 +248,8 @@ def _cut(plant: Record, motion: Record, h: float, w: FloatArray) -> float:
     near = plant.relative_error * (_REST_EVENT if motion.direction == 0 else 1.0)
     part = _event_part(plant, motion, h, near, w)
     if part < 1.0:
-        h *= part
-        shorten(plant, motion, h, w)
-    return h
+        shorten(plant, motion, h, part, w)
+    return h * part
 
 
 @in_place

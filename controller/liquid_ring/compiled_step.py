@@ -41,6 +41,9 @@ _SHORTEST_STEP: Final = 1e-15
 """s, below which no error is looked at."""
 _REST_STEP: Final = 0.25
 """In units of a gas's time constant, while both gases change."""
+_SLOW: Final = 30.0
+"""m/s, below which a velocity's error is not relative: a column keeps it for some 10 ms, in which a
+ten-thousandth of that moves less than 1e-6 of a chamber's liquid."""
 _SAFETY: Final = 0.85
 _SHRINK: Final = 0.2
 _GROW: Final = 2.5
@@ -265,10 +268,10 @@ def _rosenbrock(plant: Record, motion: Record, h: float, w: FloatArray) -> float
 @in_place
 def _error(plant: Record, y: FloatArray, w: FloatArray) -> float:
     """Largest error of a state over the allowed one; the works are integrals and allow any."""
-    worst, part, supply = 0.0, 0.1 * plant.relative_error, plant.gas_pressure + plant.ambient_pressure
+    worst, supply = 0.0, plant.gas_pressure + plant.ambient_pressure
     for i in range(WORK):
-        scale = part * (1.0 if i == X else 100.0 if i == U else supply if i < P + 2 else y[i])
-        error = abs(w[_ERROR, i]) / (scale + plant.relative_error * abs(y[i]))
+        scale = 0.1 if i == X else _SLOW if i == U else 0.1 * (supply if i < P + 2 else y[i])
+        error = abs(w[_ERROR, i]) / (plant.relative_error * (scale + abs(y[i])))
         worst = error if error > worst or math.isnan(error) else worst
     return worst
 
@@ -315,12 +318,13 @@ def _rest(plant: Record, motion: Record, left: float, w: FloatArray) -> float:
 
 
 @in_place
-def shorten(plant: Record, motion: Record, h: float, w: FloatArray) -> None:
-    """The step just taken again, with another length."""
-    if _in_closed_form(plant, motion):
-        rest_after(plant, motion, h, w, END)
+def shorten(plant: Record, motion: Record, h: float, part: float, w: FloatArray) -> None:
+    """End the step of length h just taken after a part of it, with what lies `between`."""
+    if (plant.inertia and motion.direction != 0) or _in_closed_form(plant, motion):
+        between(plant, motion, h, part, w)
+        _copy(w, BETWEEN, END)
     else:
-        _rosenbrock(plant, motion, h, w)
+        _rosenbrock(plant, motion, h * part, w)
 
 
 @in_place
@@ -329,7 +333,7 @@ def between(plant: Record, motion: Record, h: float, part: float, w: FloatArray)
     if _in_closed_form(plant, motion):
         rest_after(plant, motion, h * part, w, BETWEEN)
         return
-    for i in range(WORK):
+    for i in range(8):
         rise = w[END, i] - motion.state[i]
         d0, d1 = h * w[_FIRST_RATE, i], h * w[_RATE, i]
         w[BETWEEN, i] = motion.state[i] + part * (

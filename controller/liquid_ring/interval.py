@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ringbalance.controller.liquid_ring.compiled_lift import keep_front
+from ringbalance.controller.liquid_ring.compiled_lift import stands
 from ringbalance.controller.liquid_ring.compiled_march import advance, opening_within
 from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, packed, unpacked
-from ringbalance.controller.liquid_ring.records import WORKSPACE, X
+from ringbalance.controller.liquid_ring.records import WORKSPACE
 from ringbalance.scene.arrays import FloatArray
 
 
@@ -43,11 +43,10 @@ def pass_time(
     state = packed(plant, fill=fill, primed=primed, motion=motion)
     notes = np.stack([instants, instants])
     advance(plant[0], state[0], float(instants[-1]), notes, 1, instants.size, np.zeros(WORKSPACE))
-    keep_front(plant[0], state[0])
     lowest, highest = max(0.0, total - dynamics.max_fill_ratio), min(total, dynamics.max_fill_ratio)
     return Passage(
         fills=np.clip(notes[1], lowest, highest),
-        fill=float(state["state"][0, X]),
+        fill=stands(plant[0], state[0])[1],
         primed=bool(state["primed"][0]),
         motion=unpacked(plant, state),
         ran_back=float(state["ran_back"][0]),

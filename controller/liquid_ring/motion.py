@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.controller.liquid_ring.column import Column, Lift
+from ringbalance.controller.liquid_ring.compiled_lift import resume, stands
 from ringbalance.controller.liquid_ring.records import EVENTS, MOTION, PIECES, PLANT, WORK, P, U
 from ringbalance.controller.liquid_ring.transfer import Event
 from ringbalance.physics.gas.supply import (
@@ -76,9 +77,9 @@ class Motion:
     pending: tuple[Switch, ...] = ()
     """At most an opening and a closing of one valve."""
     record: Record = field(default_factory=Record)
-    lifted: tuple[float, int] = (0.0, 0)
-    """Fraction of the path up to which liquid stands in the tube, and the direction in which that counts; 0:
-    both legs stand at their chambers' levels."""
+    lifted: tuple[float, float, int] = (0.0, 0.0, 0)
+    """Fractions of the path up to which liquid stood in the tube as it began to move, and stands now, and the
+    direction in which they count; 0: both legs stand at their chambers' levels."""
 
     @property
     def rests(self) -> bool:
@@ -178,9 +179,7 @@ def _fill_line(plant: npt.NDArray[np.void], line: GasLine | None) -> None:
         plant["heat_capacity_ratio"] = 1.0 if line.process == "isothermal" else HEAT_CAPACITY_RATIO
 
 
-def packed(
-    plant: npt.NDArray[np.void], *, fill: float, primed: bool, motion: Motion, log_speed: float = 0.0
-) -> npt.NDArray[np.void]:
+def packed(plant: npt.NDArray[np.void], *, fill: float, primed: bool, motion: Motion) -> npt.NDArray[np.void]:
     """Record of type `MOTION`, shape (1,), of a pair; `fill` is x of chamber 0."""
     known, ambient, total = plant[0], float(plant["ambient_pressure"][0]), float(plant["total"][0])
     state = np.zeros(1, dtype=MOTION)
@@ -195,10 +194,10 @@ def packed(
     chamber = record.chamber
     for switch in motion.pending:
         state["opens" if switch.opens else "closes"], chamber = switch.after, switch.chamber
-    direction, (front, side) = int(np.sign(motion.velocity)), motion.lifted
+    begun, place, side = motion.lifted
+    direction = int(np.sign(motion.velocity)) or (side if place > begun else 0)
     stop = float(known["crest_end" if side > 0 else "return_crest_end"])
     for name, value in {
-        "log_speed": log_speed,
         "length": known["first_step"],
         "started": fill,
         "fill_before": record.fill,
@@ -210,15 +209,17 @@ def packed(
         "valve_0": motion.valves[0],
         "valve_1": motion.valves[1],
         "direction": direction,
-        "front": front,
+        "front": begun,
         "side": side,
-        "lifting": direction != 0 and side == direction and not primed and front < stop,
+        "lifting": direction != 0 and side == direction and not primed and place < stop,
         "chamber": chamber,
         "regime_start": record.regime_start,
         "regime_end": record.regime_end,
         "event": EVENTS.index(record.event),
     }.items():
         state[name] = value
+    if state["lifting"][0]:
+        resume(known, state[0], place)
     return state
 
 
@@ -235,7 +236,7 @@ def unpacked(plant: npt.NDArray[np.void], state: npt.NDArray[np.void]) -> Motion
         pending=tuple(
             Switch(after=after, chamber=chamber, opens=opens) for after, opens in waiting if after < math.inf
         ),
-        lifted=(float(one["front"]), int(one["side"])),
+        lifted=(float(one["front"]), stands(plant[0], one)[0], int(one["side"])),
         record=Record(
             chamber=chamber,
             fill=float(one["fill_before"]),

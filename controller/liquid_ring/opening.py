@@ -12,6 +12,9 @@ FILL_ERROR: Final = 1e-9
 """Error in fill ratio at which a valve-open time is good enough."""
 TIME_ERROR: Final = 1e-13
 """Of a shortened valve-open time, relative to the commanded one."""
+NEAR_RESIDUAL: Final = 1e-6
+"""Fill ratio to which a chamber counts as at its residual fill, which a run and an ensemble know as well:
+what is left above it changes no vibration."""
 _SCAN: Final = 33
 _MAX_NEWTON: Final = 30
 

@@ -10,7 +10,7 @@ import numpy as np
 from ringbalance.controller.formulas.stopping import NOTICEABLE
 from ringbalance.controller.liquid_ring.interval import longest_opening, pass_time
 from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, Record, Switch
-from ringbalance.controller.liquid_ring.opening import opening_within
+from ringbalance.controller.liquid_ring.opening import NEAR_RESIDUAL, opening_within
 from ringbalance.controller.liquid_ring.transfer import Drive, Event, Integrator, Transfer
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.model import BalancerModel
@@ -126,7 +126,7 @@ class LiquidRing:
     def _permitted(self, pair: PairState, first: bool, duration: float) -> float:
         if self.residual_fill <= 0:
             return duration
-        if (pair.fill if first else pair.opposite_fill) <= self.residual_fill:
+        if (pair.fill if first else pair.opposite_fill) <= self.residual_fill + NEAR_RESIDUAL:
             return 0.0
         if self.dynamics is not None:
             return longest_opening(

@@ -29,15 +29,15 @@ RUNS_BACK: Final = "raise rotor.speed or lower tube.hump_radius so that the colu
 """What to do about a full tube that lets liquid run back while the gas is off."""
 
 
-def largest_pair_moment(*, plant: LiquidRing, state: DiscState) -> float:
-    """Moment of a pair with its usable liquid moved to one side, kg m; all pairs hold the same.
+def largest_pair_moment(*, plant: LiquidRing, state: DiscState) -> complex:
+    """Moment of a pair with its usable liquid moved to one side, along and across, kg m; for all the same.
 
     Source: Eq. 7 of the liquid-ring paper for a pair, by the model's own moment curve.
     """
     total = state.pairs[0].total
     highest = min(total - min(plant.residual_fill, total / 2), plant.model.flow.max_fill_ratio)
-    moment = plant.model.moment.pair_moment(fill_ratio=highest, opposite_fill_ratio=total - highest)
-    return float(moment)
+    moment = plant.model.moment.pair_vector(fill_ratio=highest, opposite_fill_ratio=total - highest)
+    return complex(moment)
 
 
 def unreachable_moment(*, plant: LiquidRing, state: DiscState, wanted: complex) -> float:

@@ -31,7 +31,7 @@ def predict(scene: Scene, observations: Observations, models: Models) -> FloatAr
         chamber_numbers(scene, observations) % (scene.disc.chambers // 2),
     )
     law = device.law.moment
-    moved = law.pair_moment(fill_ratio=after, opposite_fill_ratio=total - after) - law.pair_moment(
+    moved = law.pair_vector(fill_ratio=after, opposite_fill_ratio=total - after) - law.pair_vector(
         fill_ratio=before, opposite_fill_ratio=total - before
     )
     k = influence(coefficient=scene.rotor.influence_coefficient, lag_angle=scene.rotor.lag_angle)

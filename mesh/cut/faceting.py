@@ -130,7 +130,7 @@ def drawing_error(geometry: ChamberGeometry, *, fill_ratio: FloatArray) -> Drawi
     table, walls, x = chamber_table(geometry), faceting(geometry), fill_ratio[:, None]
     level = table.level_of(fill_ratio * table.volume)
     radius, wetness = np.sqrt(level), -table.at(level)[1][3]
-    area, centroid = table.surface(radius)
+    area, centroid, _ = table.surface(radius)
     wet = walls.radius > radius[:, None]
     missed = SAFETY * walls.volume
     # dV = -(area/2) dL on a concentric surface of area a times `area`.

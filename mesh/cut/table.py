@@ -24,6 +24,8 @@ TOLERANCE: Final = 1e-9
 SLOPE_TOLERANCE: Final = 1e-5
 """The same of the free surface's area and its moment, of the largest."""
 _START: Final = 9
+_EMPTY: Final = 1 - 4 * float(np.finfo(np.float64).eps)
+"""Of the outermost L: a radius is a root, whose square falls short of it by rounding."""
 _SLIVER: Final = 1e-3
 """Of the volume, nearer to empty or full than which a free surface is that of this fill."""
 _SLIVER_FACTOR: Final = 100.0
@@ -70,19 +72,21 @@ class ChamberTable:
         level = np.asarray(levels, dtype=np.float64)
         held = np.clip(level, self.nodes[0], self.nodes[-1])
         cell = np.clip(np.searchsorted(self.nodes, held, side="right") - 1, 0, self.nodes.size - 2)
-        return _hermite(self.nodes, self.columns, cell, held)
+        values, slopes = _hermite(self.nodes, self.columns, cell, held)
+        return np.where(held >= self.nodes[-1] * _EMPTY, 0.0, values), slopes
 
     def at_radius(self, radius: npt.ArrayLike, column: int) -> FloatArray:
         """One column for a concentric surface, the shape of `radius`."""
         return np.asarray(self.at(np.asarray(radius, dtype=np.float64) ** 2)[0][column])
 
-    def surface(self, radius: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """The free surface of a radius a: its area over a, m, and the mean of x on it, m.
+    def surface(self, radius: npt.ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The free surface of a radius a: its area over a, m, and the means of x and y on it, m.
 
         An empty or a full chamber has none; there, and next to it, that of a nearby fill counts.
         """
         _, slopes = self.at(np.clip(np.asarray(radius, dtype=np.float64) ** 2, *self._ends))
-        return np.asarray(-2 * slopes[0]), np.asarray(slopes[1] / slopes[0])
+        area, along, across = slopes[:3]
+        return np.asarray(-2 * area), np.asarray(along / area), np.asarray(across / area)
 
     @cached_property
     def _ends(self) -> tuple[float, float]:

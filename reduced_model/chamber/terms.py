@@ -81,16 +81,16 @@ def wall_layers(scene: Scene, fills: FloatArray) -> tuple[FloatArray, float]:
 def unmodelled_fractions(scene: Scene, fills: FloatArray) -> Mapping[str, FloatArray]:
     """Contribution of what no model holds: surface tension, friction at the walls, waves of finite height.
 
-    An imported chamber has besides what its facets leave of smooth walls, and its moment across the middle,
-    which pairs are taken not to have.
+    An imported chamber has besides what its facets leave of smooth walls, and by how much its moment exceeds
+    that along its middle, for which moments and lambda are given.
     Returns: Relative, of "pressures" and "moments", shape (n,) each; zero without liquid.
     Source: sum of the estimates, errors of one sign at worst.
     """
     found, wet = {}, fills > 0
     common = wall_layers(scene, fills[wet])[0] + wave_mean(scene, fills[wet])
     drawn = drawing_shares(scene.disc, fills[wet])
-    across = np.abs(share_across(scene.disc, fills[wet]))
-    own = {"pressures": drawn.wall_pressure, "moments": drawn.moment + across}
+    aside = np.hypot(1.0, share_across(scene.disc, fills[wet])) - 1
+    own = {"pressures": drawn.wall_pressure, "moments": drawn.moment + aside}
     for part, share in capillary_share(scene, fills[wet]).items():
         found[part] = np.zeros(fills.shape)
         found[part][wet] = share + common + own[part]

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy.typing as npt
 
 from ringbalance.reduced_model.law.flow_law import FlowLaw
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import ComplexArray, FloatArray
 
 
 class MomentCurve(Protocol):
@@ -21,6 +21,10 @@ class MomentCurve(Protocol):
         Args: `fill_ratio`: x of the chamber on the positive side of the axis, any shape.
             `opposite_fill_ratio`: of the opposite chamber, broadcast with `fill_ratio`.
         """
+        ...
+
+    def pair_vector(self, *, fill_ratio: npt.ArrayLike, opposite_fill_ratio: npt.ArrayLike) -> ComplexArray:
+        """`pair_moment` and, as the imaginary part, the moment across the axis of an asymmetric chamber."""
         ...
 
 

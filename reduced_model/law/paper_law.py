@@ -14,7 +14,7 @@ from ringbalance.reduced_model.law.flow_law import Flow, Regime
 from ringbalance.reduced_model.law.model import BalancerModel, balancer_model
 from ringbalance.reduced_model.law.storage import save_record
 from ringbalance.reduced_model.paper import formulas as paper
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
 
@@ -38,6 +38,10 @@ class PaperMoment:
         x, y = (np.asarray(v, dtype=np.float64) for v in (fill_ratio, opposite_fill_ratio))
         transferred = self.density * self.chamber_volume * (x - y) / 2
         return np.asarray(self.moment_per_transferred_mass * transferred, dtype=np.float64)
+
+    def pair_vector(self, *, fill_ratio: npt.ArrayLike, opposite_fill_ratio: npt.ArrayLike) -> ComplexArray:
+        along = self.pair_moment(fill_ratio=fill_ratio, opposite_fill_ratio=opposite_fill_ratio)
+        return np.asarray(along, dtype=np.complex128)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,7 +147,7 @@ def paper_law(scene: AnyScene) -> PaperLaw:
         axial_width=scene.disc.axial_width,
         central_angle=scene.disc.central_angle,
         chamber_volume=volume,
-        tube_area=float(np.pi / 4 * scene.tube.bore**2),
+        tube_area=scene.tube.area,
         drag_coefficient=paper.PAPER_DRAG_COEFFICIENT if drag is None else drag,
         max_fill_ratio=scene.disc.max_fill_ratio,
         ambient_pressure=scene.gas.ambient_pressure,

@@ -14,6 +14,7 @@ from matplotlib.path import Path
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import given, number
+from ringbalance.reports.prose import key_words
 from ringbalance.reports.section import Record
 from ringbalance.scene.arrays import FloatArray
 
@@ -64,7 +65,7 @@ def disc_section(found: Record) -> Drawing:
 
 
 def _assumed(found: Record) -> str:
-    names = [name.replace("_", " ") for name, origin in found["origins"].items() if origin == "assumed"]
+    names = [key_words(f"tube.{name}") for name, origin in found["origins"].items() if origin == "assumed"]
     return f" Assumed: {', '.join(names)}." if names else ""
 
 
@@ -141,7 +142,7 @@ def _across(panel: Axes, found: Record, size: dict[str, float]) -> None:
         _filled(panel, area, ring)
         level = Circle((0, 0), surface, facecolor="none", edgecolor=style.INK, linewidth=0.6)
         panel.add_patch(level).set_clip_path(area, panel.transData)
-        place = (inner + surface) / 2 * np.exp(1j * (middle + 0.62 * half))
+        place = _letter_radius(size) * np.exp(1j * (middle + 0.62 * half))
         panel.text(place.real, place.imag, chr(ord("A") + index), ha="center", va="center", weight="bold")
     panel.plot(0, 0, "+", color=style.INK, markersize=9)
     _tube(panel, size)
@@ -161,6 +162,13 @@ def _across(panel: Axes, found: Record, size: dict[str, float]) -> None:
     _note(
         panel, f"t {number(strip, digits=3)} each side", (wall.real, wall.imag), (0.72 * outer, 1.25 * outer)
     )
+
+
+def _letter_radius(size: dict[str, float]) -> float:
+    """In the gas, in the wider of the gaps that the tube's way round leaves."""
+    inner, surface = size["inner_radius"], size["free_surface_radius"]
+    crest = min(max(size.get("crest_radius", inner), inner), surface)
+    return (inner + crest) / 2 if crest - inner > surface - crest else (crest + surface) / 2
 
 
 def _tube(panel: Axes, size: dict[str, float]) -> None:

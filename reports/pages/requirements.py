@@ -17,7 +17,7 @@ from ringbalance.reports.summary import MET, MISSED, OPEN, UNASKED, above, below
 from ringbalance.reports.traces import evidence_at, read, traced, untraced
 from ringbalance.scene import Scene
 
-STANDING: Final = "Vibration up to which the scene’s valve-open times only fill gas"
+STANDING: Final = "Vibration up to which the scene’s valve-open times transfer no liquid"
 _NONE: Final = "the scene asks for none"
 _LIKELY: Final = 0.95
 """Fraction of runs that must settle in time, the confidence of every interval in the report."""
@@ -250,7 +250,7 @@ def _settling(evidence: Record) -> Requirement | None:
     # Runs that do not settle at all are judged, whether or not a time is required.
     unasked = wanted is None and times.get("p95") is not None
     return Requirement(
-        name="Settling time with the recommended gain",
+        name="Settling time with the recommended settings",
         wanted=_NONE if unasked else f"at most {given(until, 's')} in {percent(_LIKELY)} of runs",
         result=f"{_times(evidence, times)}settled: "
         f"{traced(percent(tuning['fraction_settled']), 'summary.tuning.fraction_settled')} of "
@@ -285,7 +285,7 @@ def _residual_row(evidence: Record) -> Requirement | None:
         return None
     noise, limit = STAYING_DEVIATIONS * evidence_at(evidence, path), wanted["residual_m"]
     moment = read(evidence, "summary.requirement.residual_moment_kg_m", "kg m", digits=2)
-    gain = "the recommended gain" if tuning.get("stationary_deviation_m") else "the scene’s gain"
+    gain = "the recommended settings" if tuning.get("stationary_deviation_m") else "the scene’s gain"
     alone = below((noise,), limit)
     verdict = worst(alone, _line_verdict(evidence), _settles(evidence))
     return Requirement(
@@ -322,7 +322,7 @@ def _smallest(evidence: Record) -> Requirement | None:
 
 
 def _standing(evidence: Record) -> Requirement | None:
-    """With the scene's own gain and offsets, by the dead time in which gas only fills a chamber."""
+    """With the scene's own gain and offsets, by the dead time: gas fills, and liquid rises to the crest."""
     return _of_line(evidence, "standing_amplitude_m", STANDING)
 
 
@@ -363,7 +363,7 @@ def _line_verdict(evidence: Record) -> str:
 
 
 def _settles(evidence: Record) -> str:
-    """Whether runs with the recommended gain settle, late or not; met where no runs were made."""
+    """Whether runs with the recommended settings settle, late or not; met where no runs were made."""
     tuning = _tuning(evidence)
     if not tuning.get("runs") or tuning.get("fraction_settled") is None:
         return MET
@@ -384,7 +384,7 @@ def _grade_row(evidence: Record) -> Requirement | None:
     return Requirement(
         name="Balance quality grade (ISO 21940-11) where the residual is met",
         wanted=_NONE if bound is None else f"at most G {number(1e3 * bound, digits=3)}",
-        result=f"G {traced(number(1e3 * reached, digits=2), path)}, in mm/s",
+        result=f"G {traced(number(1e3 * reached, digits=2), path)}",
         verdict=verdict,
         rests=resting(evidence, "rotor.mass", "rotor.influence_coefficient"),
         required=bound if verdict == below((reached,), bound or reached) else None,

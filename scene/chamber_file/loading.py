@@ -22,10 +22,10 @@ from ringbalance.scene.chamber_file.placing import (
     placed,
     port_findings,
     port_radius,
-    scale_findings,
 )
 from ringbalance.scene.chamber_file.reading import content_of, contents_of, is_step
 from ringbalance.scene.chamber_file.record import ChamberGeometry
+from ringbalance.scene.chamber_file.scale import scale_findings
 from ringbalance.scene.chamber_file.shape import oriented
 from ringbalance.scene.chamber_file.step_file import STEP_UNIT
 from ringbalance.scene.chamber_file.topology import facets_of, topology_findings
@@ -133,12 +133,15 @@ def _unfitting(
     chambers = reading.values.get("disc.chambers") or even_number_of_chambers(extent)
     if chambers is not None:
         yield from opening_findings(body, found.points, chambers=chambers)
-    port = reading.values.get(_PORT)
+    port, own = reading.values.get(_PORT), port_radius(found.points, boundaries)
+    wrong = tuple(scale_findings(reading, found.dimensions, unit=unit, port=own))
+    if wrong:
+        yield from wrong
+        return
     if port is not None:
-        yield from scale_findings(found.dimensions, unit=unit, port=port)
         yield from port_findings(found.points, boundaries, found.dimensions, port=port)
     radii = {
-        "port_radius": port or port_radius(found.points, boundaries),
+        "port_radius": port or own,
         "inlet_radius": reading.values.get("gas.inlet_radius"),
     }
     yield from covered_findings(

@@ -16,7 +16,6 @@ from ringbalance.scene.chamber_file.facets import corners_of, edges_of
 from ringbalance.scene.chamber_file.keys import Axis
 from ringbalance.scene.chamber_file.names import PORT
 from ringbalance.scene.chamber_file.record import OUTER_WALL
-from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.rules.check import Finding, written
 
 _DRAWING_ROUNDING: Final = 1e-5
@@ -26,8 +25,6 @@ _FRAME: Final = [0, 1, 2, -1]
 """Corners of a cell that span it; for its share of the volume."""
 _SHARES: Final = tuple(step / 32 for step in range(33))
 """Of an edge of second order, between which it is as good as straight: a share 1e-3 of its bulge."""
-_LARGEST, _SMALLEST = 5.0, 1e-3
-"""Outer radii, m, beyond which no balancing disc is built."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,9 +126,6 @@ def _about_axis(body: Body, inner: float, outer: float, extent: float, node: int
         what = "touches the shaft's axis" if inner <= 1e-6 * outer else "reaches round the shaft's axis"
         problem = f"the chamber {what}: it takes {written(extent, 'deg')}, nearest to the axis is {label}"
         yield Finding(problem=problem, allowed="one chamber beside the axis; see mesh_axis and the origin")
-    if not _SMALLEST <= outer <= _LARGEST:
-        problem = f"with this unit it reaches to a radius of {written(outer, 'mm')}: wrong mesh_unit"
-        yield Finding(problem=problem, allowed=f"an outer radius of {_SMALLEST:g} m to {_LARGEST:g} m")
 
 
 def _walls(points: FloatArray, boundaries: Mapping[str, IntArray]) -> Iterator[Finding]:
@@ -206,21 +200,3 @@ def port_radius(points: FloatArray, boundaries: Mapping[str, IntArray]) -> float
         return None
     middles = points[boundaries[PORT]].mean(axis=1)
     return float(np.hypot(middles[:, 0], middles[:, 1]).mean())
-
-
-def scale_findings(dimensions: Mapping[str, float], *, unit: str, port: float) -> Iterator[Finding]:
-    """A port that no wall of this size has, where it would fit a mesh in another unit."""
-    inner, outer = dimensions["inner_radius"], dimensions["outer_radius"]
-    units = DIMENSIONS["length"].units
-    scale = float(units[unit].factor)
-    fitting = [
-        name
-        for name, other in units.items()
-        if inner * float(other.factor) / scale < port <= 1.0001 * outer * float(other.factor) / scale
-    ]
-    if fitting and unit not in fitting:
-        problem = (
-            f"the chamber reaches from {written(inner, 'mm')} to {written(outer, 'mm')}, and port_radius "
-        )
-        problem += f"is {written(port, 'mm')}: wrong scale"
-        yield Finding(problem=problem, allowed=" or ".join(f'mesh_unit = "{name}"' for name in fitting))

@@ -282,6 +282,15 @@ def _drawn(reading: Reading) -> bool:
     return not reading.known("disc.geometry")
 
 
+SIZE_CHECKS: tuple[Check, ...] = (
+    check(_port_in_chamber, _PORT, _INNER, _OUTER, moot=_NO_RING),
+    check(_crest_in_disc, _CREST, _OUTER),
+    check(_crest_inside_port, _CREST, _PORT, moot=(_port_in_chamber, _crest_in_disc)),
+    check(_bore_fits_chamber, _BORE, "disc.axial_width", _INNER, _OUTER, moot=_NO_RING),
+    check(_length_reaches_over_crest, _LENGTH, _ANGLE, _PORT, _CREST, moot=_NO_PATH),
+    check(_length_reaches, _LENGTH, _ANGLE, _PORT, moot=(_port_in_chamber, _length_reaches_over_crest)),
+)
+"""Lengths of the tube that a chamber of the right size has room for."""
 CHECKS: tuple[Check, ...] = (
     check(_radii_in_order, _INNER, _OUTER),
     check(_chamber_has_depth, _INNER, _OUTER, moot=_NO_RING),
@@ -291,7 +300,7 @@ CHECKS: tuple[Check, ...] = (
     check(_chambers_fit, _ANGLE, "disc.chambers"),
     check(_chambers_even, _ANGLE, when=lambda reading: not reading.given("disc.chambers")),
     check(_fills_share_the_liquid, "disc.initial_fill", _FILL),
-    check(_port_in_chamber, _PORT, _INNER, _OUTER, moot=_NO_RING),
+    *SIZE_CHECKS,
     check(
         _port_under_liquid,
         _PORT,
@@ -301,13 +310,8 @@ CHECKS: tuple[Check, ...] = (
         when=_drawn,
     ),
     check(_inlet_above_liquid, "gas.inlet_radius", _FILL, *_CHAMBER, moot=_NO_CHAMBER, when=_drawn),
-    check(_crest_in_disc, _CREST, _OUTER),
-    check(_crest_inside_port, _CREST, _PORT, moot=(_port_in_chamber, _crest_in_disc)),
     check(_bore_fits_bends, _BORE, "tube.bends"),
-    check(_bore_fits_chamber, _BORE, "disc.axial_width", _INNER, _OUTER, moot=_NO_RING),
     check(_roughness_fits_bore, "tube.roughness", _BORE),
     check(_length_holds_bends, _LENGTH, "tube.bends"),
-    check(_length_reaches_over_crest, _LENGTH, _ANGLE, _PORT, _CREST, moot=_NO_PATH),
-    check(_length_reaches, _LENGTH, _ANGLE, _PORT, moot=(_port_in_chamber, _length_reaches_over_crest)),
     check(_entrance_has_radius, "tube.entrance_radius", "tube.entrance"),
 )

@@ -194,13 +194,19 @@ def test_the_closed_form_ends_where_it_stalls(model: BalancerModel) -> None:
 
 
 def test_the_moment_table_is_the_curve(model: BalancerModel) -> None:
+    def of(x: Any) -> Any:
+        return np.sin(3 * np.asarray(x)) + 1j * np.cos(2 * np.asarray(x))
+
     class Curve:
-        def pair_moment(self, *, fill_ratio: Any, opposite_fill_ratio: Any) -> Any:
-            return np.sin(3 * np.asarray(fill_ratio)) - np.sin(3 * np.asarray(opposite_fill_ratio))
+        def pair_moment(self, **fills: Any) -> Any:
+            return self.pair_vector(**fills).real
+
+        def pair_vector(self, *, fill_ratio: Any, opposite_fill_ratio: Any) -> Any:
+            return of(fill_ratio) - of(opposite_fill_ratio)
 
     table = moment_table(model=replace(model, moment=Curve()), total=0.5)
     x = np.random.default_rng(0).uniform(0, 0.5, 200)
-    assert np.max(np.abs(table.at(x) - np.sin(3 * x) + np.sin(3 * (0.5 - x)))) < 1e-10
+    assert np.max(np.abs(table.at(x) - of(x) + of(0.5 - x))) < 1e-10
 
 
 @pytest.mark.parametrize("rate", [0.05, 0.4, 20.0])

@@ -17,7 +17,7 @@ from ringbalance.reports.figures.operation import (
     settling_histogram,
     tornado,
 )
-from ringbalance.reports.figures.section import disc_section
+from ringbalance.reports.figures.section import _letter_radius, disc_section
 from ringbalance.reports.figures.style import NARROW, Drawing
 from ringbalance.reports.pages.loop import SECTION as LOOP
 from ringbalance.reports.pages.operation import SECTION
@@ -175,3 +175,10 @@ def test_the_loop_s_reach_is_a_vibration(work: Work) -> None:
     assert reach is not None
     moment = work.calibration.residual.usable_pair_moment
     assert reach["vibration_m"] == pytest.approx(moment * work.scene.rotor.influence_coefficient)
+
+
+@pytest.mark.parametrize("crest", [None, 15.0, 22.0, 31.5, 38.0, 43.0])
+def test_a_chambers_letter_stands_in_its_gas_beside_the_tube(crest: float | None) -> None:
+    size = {"inner_radius": 20.0, "free_surface_radius": 40.0}
+    found = _letter_radius(size if crest is None else {**size, "crest_radius": crest})
+    assert min(found - 20.0, 40.0 - found, abs(found - (crest or 0.0))) >= 5.0

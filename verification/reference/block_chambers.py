@@ -117,3 +117,11 @@ def disc_chamber(
 def imported(disc: Disc, *, cells: tuple[int, int, int] = (4, 16, 2)) -> Disc:
     """The disc with its own chamber imported, and no other dimensions."""
     return replace(disc, geometry=disc_chamber(disc, cells))
+
+
+def turned(disc: Disc, *, angle: float) -> Disc:
+    """The disc with its own chamber imported, the mesh turned with the rotation and not its middle."""
+    geometry = disc.geometry or disc_chamber(disc, (4, 16, 2))
+    c, s = np.cos(angle), np.sin(angle)
+    points = geometry.points @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+    return replace(disc, geometry=replace(geometry, points=points, digest=f"{geometry.digest} at {angle}"))

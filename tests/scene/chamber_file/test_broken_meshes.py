@@ -301,7 +301,9 @@ MESHES: dict[str, Broken] = {
     "names exchanged": Broken(spoilt(exchanged), ("names exchanged",)),
     "unit missing": Broken(lambda: msh_4(drawn()), ("[disc] mesh_unit is missing",), keys={"mesh_unit": ""}),
     "too large for a disc": Broken(
-        lambda: msh_4(drawn()), ("40000 mm: wrong mesh_unit",), keys={"mesh_unit": "m"}
+        lambda: msh_4(drawn()),
+        ('in "m" the chamber reaches', "40000 mm: wrong scale"),
+        keys={"mesh_unit": "m"},
     ),
     "outside the opening": Broken(
         spoilt(turned(100)), ("outside the opening angle, 360 deg / 4 chambers", "node", "within 45 deg")

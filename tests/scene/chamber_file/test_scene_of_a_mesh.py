@@ -132,8 +132,8 @@ def test_the_number_of_chambers_is_given_or_follows(tmp_path: Path) -> None:
     assert found.disc.chambers == 4
 
 
-def test_port_and_scale(tmp_path: Path) -> None:
-    """A named port gives its radius; a port that no wall of this size has shows the unit that was meant."""
+def test_a_named_port(tmp_path: Path) -> None:
+    """It gives the tube's port its radius, and a radius given beside it lies on it."""
     drawing = drawn()
     drawing.names[2, 40] = "port"
     for number in drawing.facets("outer_wall")[:2]:
@@ -142,16 +142,47 @@ def test_port_and_scale(tmp_path: Path) -> None:
     assert isinstance(ported, Scene)
     assert ported.tube.port_radius == pytest.approx(0.0385, rel=0.02)
     assert ported.origin_of("tube.port_radius") == "derived"
-    for unit, radius, message in (
-        ("mm", "30 mm", 'port_radius is 30 mm, but the boundary "port" lies from'),
-        ("cm", "40 mm", 'wrong scale; allowed: mesh_unit = "mm"'),
-    ):
-        text = scene_text("chamber.msh", mesh_unit=unit)
-        text = text.replace("[tube]\n", f'[tube]\nport_radius = "{radius}"\n')
-        (tmp_path / "my_disc.toml").write_text(text, encoding="utf-8")
-        with pytest.raises(SceneError) as caught:
-            load_scene(tmp_path / "my_disc.toml")
-        assert message in str(caught.value)
+    text = scene_text("chamber.msh", mesh_unit="mm")
+    text = text.replace("[tube]\n", '[tube]\nport_radius = "30 mm"\n')
+    (tmp_path / "my_disc.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(SceneError, match='port_radius is 30 mm, but the boundary "port" lies from'):
+        load_scene(tmp_path / "my_disc.toml")
+
+
+@pytest.mark.parametrize(
+    ("drawing", "declared", "lengths", "reason"),
+    [
+        (1.0, "in", "", 'length = "120 mm": the tube cannot reach'),
+        (1.0, "cm", 'port_radius = "40 mm"', 'port_radius = "40 mm": the port lies outside'),
+        (1 / 25.4, "mm", 'hump_radius = "25 mm"', 'hump_radius = "25 mm": the siphon crest lies outside'),
+        (1 / 25.4, "mm", "", 'bore = "1.5 mm": no wall of the chamber is large enough'),
+    ],
+)
+def test_another_unit_is_named(
+    tmp_path: Path, drawing: float, declared: str, lengths: str, reason: str
+) -> None:
+    """A disc drawn in mm, or in inches, whose scene says another unit: by what, and which one would fit."""
+    mesh = drawn()
+    mesh.points = {n: (drawing * x, drawing * y, drawing * z) for n, (x, y, z) in mesh.points.items()}
+    (tmp_path / "chamber.msh").write_bytes(msh_4(mesh))
+    text = scene_text("chamber.msh", mesh_unit=declared).replace("[tube]\n", f"[tube]\n{lengths}\n")
+    (tmp_path / "my_disc.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(SceneError) as caught:
+        load_scene(tmp_path / "my_disc.toml")
+    message = str(caught.value)
+    assert message.count("\n") == 0
+    assert f'in "{declared}" the chamber reaches' in message
+    assert f"wrong scale; [tube] {reason}" in message
+    assert f'mesh_unit = "{"mm" if drawing == 1.0 else "in"}"' in message.partition("; allowed: ")[2]
+
+
+def test_a_length_that_fits_no_unit_is_its_own_error(tmp_path: Path) -> None:
+    (tmp_path / "chamber.msh").write_bytes(msh_4(drawn()))
+    text = scene_text("chamber.msh", mesh_unit="mm").replace('length = "120 mm"', 'length = "50 mm"')
+    (tmp_path / "my_disc.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(SceneError, match="the tube cannot reach the opposite port") as caught:
+        load_scene(tmp_path / "my_disc.toml")
+    assert "scale" not in str(caught.value)
 
 
 def test_the_file_is_found_from_the_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

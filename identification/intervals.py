@@ -24,11 +24,13 @@ from typing import Final
 import numpy as np
 from scipy.special import stdtrit
 
-from ringbalance.identification.optimisation import Optimum, constrained
+from ringbalance.identification.optimisation import Optimum, searched
 from ringbalance.scene.arrays import FloatArray
 
 _CLOSE: Final = 0.01
 """Relative, of the root of S at an end of the interval."""
+_GAIN: Final = 1e-3
+"""Of S, below which the other parameters are not moved further."""
 _TRIALS: Final = 16
 _LONGEST: Final = 0.7
 """In t, of a step beyond what is known."""
@@ -90,10 +92,9 @@ def _by_weights(optimum: Optimum) -> FloatArray:
     whole = covariance(np.concatenate([data, known]))
     added = np.zeros(count)
     for g, nu in enumerate(optimum.freedom.tolist()):
-        rows = data[problem.group == g] @ whole
-        # Diagonal of C (W - W C W) C by the rows' own covariance.
-        within = rows @ data[problem.group == g].T
-        left = rows.T @ (np.eye(within.shape[0]) - within) @ rows
+        mine = data[problem.group == g]
+        known_to = mine.T @ mine
+        left = whole @ (known_to - known_to @ whole @ known_to) @ whole
         added += 2 / nu * np.diag(left)[:count]
     return np.asarray(np.maximum(added, 0.0) / np.diag(whole)[:count])
 
@@ -141,9 +142,10 @@ def _end(optimum: Optimum, which: int, sign: float, factor: float, spread: Float
             place, distance = bound, abs(bound - here)
         begin = np.clip(start + along * (place - start[which]), *bounds)
         begin[which] = place
-        end, cost, slopes = constrained(optimum.residuals, begin, slopes, which)
-        root = math.sqrt(max(cost - least, 0.0))
-        points.append((place, cost - least))
+        found = searched(optimum.residuals, begin, slopes, gain=_GAIN, fixed=which)
+        end, slopes, rise = found.t, found.slopes, float(found.at @ found.at) - least
+        root = math.sqrt(max(rise, 0.0))
+        points.append((place, rise))
         at_bound = root < factor and place == bound
         if at_bound or abs(root - factor) <= _CLOSE * factor:
             return _End(place=place, bound=at_bound, t=end, points=points)

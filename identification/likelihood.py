@@ -31,6 +31,8 @@ from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 
 STEP: Final = 1e-3
 """In t, of central differences; their error is STEP^2/6 times a third derivative of order one."""
+_JUMP: Final = 0.1
+"""Part of the differences on both sides by which they may differ: beyond it there is a jump between them."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -109,15 +111,35 @@ class Problem:
             self._known[key] = self.predicted(self.scene_at(t))
         return self._known[key]
 
-    def slopes(self, t: FloatArray, *, step: float = STEP) -> FloatArray:
-        """d(L^-1 f)/dt by central differences, one-sided where a bound is nearer, shape (n, parameters)."""
+    def slopes(self, t: FloatArray) -> FloatArray:
+        """d(L^-1 f)/dt by central differences, one-sided where a bound is nearer, shape (n, parameters).
+
+        Where a prediction jumps, as when liquid just reaches the crest, the smaller of both one-sided
+        differences: a jump over the step is no slope.
+        """
         low, high = self.bounds
-        columns = []
+        here, columns = self.at(t), []
         for i in range(t.size):
-            ends = np.clip([t[i] - step, t[i] + step], low[i], high[i])
-            sides = [self.at(np.where(np.arange(t.size) == i, end, t)) for end in ends]
-            columns.append((sides[1] - sides[0]) / (ends[1] - ends[0]))
+            below, above = max(float(t[i]) - STEP, float(low[i])), min(float(t[i]) + STEP, float(high[i]))
+            down, up = (self._difference(t, here, i, end) for end in (below, above))
+            part = (t[i] - below) / (above - below)
+            apart = np.abs(up - down) > _JUMP * (np.abs(up) + np.abs(down))
+            smaller = np.where(np.abs(up) < np.abs(down), up, down)
+            columns.append(np.where(apart & (0 < part < 1), smaller, part * down + (1 - part) * up))
         return np.stack(columns, axis=1)
+
+    def quick_slopes(self, t: FloatArray) -> FloatArray:
+        """The same by differences to one side, for a search."""
+        ends = np.where(t + STEP < self.bounds[1], t + STEP, t - STEP)
+        here = self.at(t)
+        return np.stack([self._difference(t, here, i, float(end)) for i, end in enumerate(ends)], axis=1)
+
+    def _difference(self, t: FloatArray, here: FloatArray, i: int, end: float) -> FloatArray:
+        """Of L^-1 f, over that of one t; zero where there is none."""
+        if end == t[i]:
+            return np.zeros_like(here)
+        there = self.at(np.where(np.arange(t.size) == i, end, t))
+        return (there - here) / (end - float(t[i]))
 
     @cached_property
     def measured(self) -> FloatArray:
@@ -226,10 +248,9 @@ class Residuals:
         found = self.problem.at(t) if predicted is None else predicted
         return np.concatenate([self.projected(self.problem.measured - found), self.problem.priors(t)])
 
-    def slopes(self, t: FloatArray, *, of_prediction: FloatArray | None = None) -> FloatArray:
-        """d(residuals)/dt."""
-        slopes = self.problem.slopes(t) if of_prediction is None else of_prediction
-        return np.concatenate([-self.projected(slopes), self.problem.prior_slopes(t)])
+    def slopes(self, t: FloatArray, of_prediction: FloatArray) -> FloatArray:
+        """d(residuals)/dt. Args: `of_prediction`: d(L^-1 f)/dt."""
+        return np.concatenate([-self.projected(of_prediction), self.problem.prior_slopes(t)])
 
     def leverage(self, slopes: FloatArray) -> FloatArray:
         """Of every number of the data: how much of it parameters, b and n take up.

@@ -76,12 +76,11 @@ def next_measurement(result: FitResult, parameter: str | None = None) -> NextMea
 
     Raises: KeyError: the parameter was not fitted.
     """
-    problem = result.optimum.residuals.problem
     names = [each.name for each in result.parameters]
     chosen = parameter or _least_identified(result)
     result.parameter(chosen)
-    candidates = [c for kind in _grids(problem.scene_at(result.optimum.t)) for c in _candidates(result, kind)]
-    gains = expected_gains(_information(result), parameter=names.index(chosen), candidates=candidates)
+    which = names.index(chosen)
+    gains = expected_gains(_information(result), parameter=which, candidates=_candidates(result))
     return NextMeasurement(parameter=chosen, gains=gains)
 
 
@@ -110,40 +109,38 @@ def _information(result: FitResult) -> FloatArray:
     return np.asarray(whole)
 
 
-def _candidates(result: FitResult, kind: str) -> Iterator[Candidate]:
-    """Rows of one kind with derivatives in the columns of `_information`."""
+def _candidates(result: FitResult) -> Iterator[Candidate]:
+    """Rows of every kind with derivatives in the columns of `_information`."""
     best = result.optimum
     problem, t = best.residuals.problem, best.t
-    scene = problem.scene_at(t)
-    measured = next((b for b in problem.blocks if b.observations.kind == kind), None)
-    offered = offered_rows(scene, kind, None if measured is None else measured.observations)
-    if not len(offered):
-        return
-    block = block_of(offered)
-    asked = replace(problem, blocks=(block,))
-    scale = 1 / _noise(result, measured, asked, t)
-    rows = np.hstack(
-        [
-            asked.slopes(t),
-            _free(problem, measured, block),
-            held_effects(asked, t, [both_sides(problem.scene, n, sd) for n, sd in result.held.items()]),
-        ]
-    )
-    count = len(offered)
-    assumed = "" if measured is not None else f" (noise of {100 * ASSUMED_NOISE:g} % assumed)"
-    for i in range(count):
-        yield Candidate(
-            text=f"{words_of(offered, i)}{assumed}", derivatives=scale[i::count, None] * rows[i::count]
-        )
+    scene, measured = problem.scene_at(t), {block.observations.kind: block for block in problem.blocks}
+    of_kinds = {kind: measured[kind].observations if kind in measured else None for kind in _grids(scene)}
+    offered = [offered_rows(scene, kind, before) for kind, before in of_kinds.items()]
+    asked = replace(problem, blocks=tuple(block_of(each) for each in offered if len(each)))
+    changed = [(problem.scene, both_sides(problem.scene, n, sd)[1]) for n, sd in result.held.items()]
+    by_parameters, by_held = asked.quick_slopes(t), held_effects(asked, t, changed)
+    at = 0
+    for block in asked.blocks:
+        mine, count = slice(at, at + block.measured.size), len(block.observations)
+        at += block.measured.size
+        before = measured.get(block.observations.kind)
+        free = _free(problem, before, block)
+        rows = np.hstack([by_parameters[mine], free, by_held[mine]])
+        scale = 1 / _noise(result, before, block, asked.at(t)[mine])
+        assumed = "" if before is not None else f" (noise of {100 * ASSUMED_NOISE:g} % assumed)"
+        for i in range(count):
+            yield Candidate(
+                text=f"{words_of(block.observations, i)}{assumed}",
+                derivatives=scale[i::count, None] * rows[i::count],
+            )
 
 
-def _noise(result: FitResult, measured: Block | None, asked: Problem, t: FloatArray) -> FloatArray:
+def _noise(result: FitResult, measured: Block | None, block: Block, predicted: FloatArray) -> FloatArray:
     """Standard deviation of each whitened number of the candidates."""
-    size = asked.measured.size
+    size = block.measured.size
     residuals = result.optimum.residuals
     if measured is None:
-        count = len(asked.blocks[0].observations)
-        parts = np.reshape(asked.at(t), (-1, count))
+        parts = np.reshape(predicted, (-1, len(block.observations)))
         return np.full(size, ASSUMED_NOISE * max(float(np.max(np.hypot.reduce(parts, axis=0))), 1e-300))
     if not measured.estimated:
         return np.ones(size)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -23,13 +24,18 @@ _AGREES: Final = 1e-3
 """Relative change of the noise at which it is found."""
 _EVALUATIONS: Final = 40
 _NEARBY: Final = 1e-2
-"""Relative change of the sum of squares that tells one start's minimum from another's."""
+"""Change of the sum of squares, relative or of few standard deviations, that tells one start's minimum from
+another's."""
 _APART: Final = 1.0
 """Of t for a further start, in prior standard deviations or, without a prior, in half of ln 2."""
 _WIDE: Final = 0.35
 _STEPS: Final = 6
-_GAIN: Final = 1e-3
-"""Of the sum of squares, below which a step is not taken."""
+_LEAST_GAIN: Final = 1e-6
+"""Of the sum of squares, below which a step to the optimum is not taken: a thousandth of a standard deviation
+of a parameter."""
+_JUMPED: Final = 0.08
+"""Of the sum of squares, below which a gain that does not come on a profile is taken for lost to a jump of a
+prediction; it moves no end of an interval by more than 1 %."""
 _LONGEST: Final = 1.0
 """Of a step, in t."""
 _ROBUST: Final = 1.345
@@ -43,10 +49,6 @@ class Optimum:
     t: FloatArray
     residuals: Residuals
     """With the noise found there."""
-    slopes: FloatArray
-    """d(residuals)/dt."""
-    of_prediction: FloatArray
-    """d(L^-1 f)/dt."""
     freedom: FloatArray
     """Degrees of freedom of each estimated group."""
     starts: int
@@ -55,6 +57,16 @@ class Optimum:
     def at(self) -> FloatArray:
         """Residuals and priors at the optimum."""
         return self.residuals.at(self.t)
+
+    @cached_property
+    def of_prediction(self) -> FloatArray:
+        """d(L^-1 f)/dt."""
+        return self.residuals.problem.slopes(self.t)
+
+    @cached_property
+    def slopes(self) -> FloatArray:
+        """d(residuals)/dt."""
+        return self.residuals.slopes(self.t, self.of_prediction)
 
 
 def optimum(
@@ -74,22 +86,16 @@ def optimum(
     weights = np.ones(problem.measured.size) if before is None else before.residuals.weights
     residuals = Residuals(problem=problem, noise=noise, held=held, weights=weights)
     t = _from_starts(residuals, starts) if before is None else before.t
+    of_prediction = problem.slopes(t)
     for _ in range(_ROUNDS):
-        t = minimised(residuals, t)
-        of_prediction = problem.slopes(t)
+        t = searched(residuals, t, residuals.slopes(t, of_prediction), gain=_LEAST_GAIN).t
         changed, freedom = _settled_noise(residuals, t, of_prediction, loss)
         done = _same(changed, residuals)
         residuals = changed
         if done:
             break
-    return Optimum(
-        t=t,
-        residuals=residuals,
-        slopes=residuals.slopes(t, of_prediction=of_prediction),
-        of_prediction=of_prediction,
-        freedom=freedom,
-        starts=starts if before is None else before.starts,
-    )
+    used = starts if before is None else before.starts
+    return Optimum(t=t, residuals=residuals, freedom=freedom, starts=used)
 
 
 def _same(one: Residuals, other: Residuals) -> bool:
@@ -103,7 +109,13 @@ def _first_noise(problem: Problem) -> FloatArray:
 
 
 def _from_starts(residuals: Residuals, starts: int) -> FloatArray:
-    ends = [minimised(residuals, t, close=_NEARBY) for t in start_points(residuals.problem, starts)]
+    """The best of where searches from the scene and from around it come to, trust regions from the scene."""
+    problem = residuals.problem
+    first, *others = start_points(problem, starts)
+    ends = [minimised(residuals, first)]
+    for t in others:
+        slopes = residuals.slopes(t, problem.quick_slopes(t))
+        ends.append(searched(residuals, t, slopes, gain=_NEARBY).t)
     return min(ends, key=lambda t: float(np.sum(residuals.at(t) ** 2)))
 
 
@@ -130,16 +142,17 @@ def start_points(problem: Problem, count: int) -> list[FloatArray]:
     return points
 
 
-def minimised(residuals: Residuals, start: FloatArray, *, close: float = 1e-7) -> FloatArray:
-    """t of the least sum of squares near a start. Args: `close`: relative change at which to stop."""
+def minimised(residuals: Residuals, start: FloatArray) -> FloatArray:
+    """t near the least sum of squares that a search from a start comes to."""
+    problem = residuals.problem
     found = least_squares(
         residuals.at,
-        _inside(residuals.problem, start),
-        jac=residuals.slopes,
-        bounds=residuals.problem.bounds,
-        method="trf",
+        _inside(problem, start),
+        jac=lambda t: residuals.slopes(t, problem.quick_slopes(t)),
+        bounds=problem.bounds,
+        method="dogbox",
         x_scale="jac",
-        ftol=close,
+        ftol=_NEARBY,
         xtol=1e-8,
         gtol=1e-10,
         max_nfev=_EVALUATIONS,
@@ -161,7 +174,7 @@ def _settled_noise(
     freedom = np.zeros(len(problem.estimated_groups))
     for _ in range(_ROUNDS):
         whole = residuals.at(t, predicted=predicted)[: problem.measured.size] / np.sqrt(residuals.weights)
-        taken = residuals.leverage(residuals.slopes(t, of_prediction=of_prediction))
+        taken = residuals.leverage(residuals.slopes(t, of_prediction))
         noise = residuals.noise.copy()
         for g, name in enumerate(problem.estimated_groups):
             mine = problem.group == g
@@ -189,45 +202,46 @@ def _size(whole: FloatArray, freedom: float, loss: str) -> float:
     return float(np.median(np.abs(whole))) / 0.6745 * math.sqrt(whole.size / freedom)
 
 
-def constrained(
-    residuals: Residuals, t: FloatArray, slopes: FloatArray, fixed: int
-) -> tuple[FloatArray, float, FloatArray]:
-    """Least sum of squares with one parameter held, by Gauss-Newton steps with Broyden's updates.
+def searched(
+    residuals: Residuals, t: FloatArray, slopes: FloatArray, *, gain: float, fixed: int | None = None
+) -> Search:
+    """Least sum of squares nearby, by Gauss-Newton steps with Broyden's updates of the slopes.
 
     Where these come to no end, slopes are found again by differences.
-    Args: `t`: where to begin, with the held parameter's value. `slopes`: d(residuals)/dt nearby.
-    Returns: t, the sum of squares, and the updated slopes.
+    Args: `t`: where to begin, with the value of a parameter that is held `fixed`. `slopes`: d(residuals)/dt
+        nearby. `gain`: of the sum of squares, below which a step is not taken.
     Source: Broyden, Math. Comput. 19 (1965) 577.
     """
-    search = _Search(residuals=residuals, fixed=fixed, t=t, at=residuals.at(t), slopes=slopes)
-    for fresh in (False, True):
-        if fresh:
-            search.renew()
-        if any(search.ended() for _ in range(_STEPS)):
-            break
-    return search.t, float(search.at @ search.at), search.slopes
+    search = Search(residuals=residuals, fixed=fixed, t=t, at=residuals.at(t), slopes=slopes)
+    if not search.descends(gain):
+        search.slopes = residuals.slopes(search.t, residuals.problem.slopes(search.t))
+        search.descends(gain)
+    return search
 
 
 @dataclass(kw_only=True, eq=False)
-class _Search:
-    """State of one search; lives inside one call of `constrained`."""
+class Search:
+    """Where a search stands, and what it knows of the slopes there."""
 
     residuals: Residuals
-    fixed: int
+    fixed: int | None
     t: FloatArray
     at: FloatArray
     slopes: FloatArray
 
-    def renew(self) -> None:
-        """Find the slopes by differences."""
-        self.slopes = self.residuals.slopes(self.t)
+    def descends(self, gain: float) -> bool:
+        """Take steps while they gain; whether there is nothing left to gain."""
+        for _ in range(_STEPS):
+            step = self._step()
+            promised = float(np.sum((self.slopes @ step) ** 2))
+            if promised < gain:
+                return True
+            if not self._takes(step * min(1.0, _LONGEST / float(np.max(np.abs(step))))):
+                return self.fixed is not None and promised < _JUMPED
+        return False
 
-    def ended(self) -> bool:
-        """Take one step; whether there was nothing left to gain."""
-        step = self._step()
-        if float(np.sum((self.slopes @ step) ** 2)) < _GAIN:
-            return True
-        step *= min(1.0, _LONGEST / float(np.max(np.abs(step))))
+    def _takes(self, step: FloatArray) -> bool:
+        """Whether a step or a part of it gains; the slopes learn from those that do not, too."""
         low, high = self.residuals.problem.bounds
         for part in (1.0, 0.25, 0.0625):
             there = np.clip(self.t + part * step, low, high)
@@ -236,12 +250,14 @@ class _Search:
             self.slopes = self.slopes + np.outer(missed, moved) / max(float(moved @ moved), 1e-300)
             if float(found @ found) < float(self.at @ self.at):
                 self.t, self.at = there, found
-                return False
+                return True
         return False
 
     def _step(self) -> FloatArray:
         low, high = self.residuals.problem.bounds
-        free = (np.arange(self.t.size) != self.fixed) & ~_blocked(self.t, self.slopes.T @ self.at, low, high)
+        free = ~_blocked(self.t, self.slopes.T @ self.at, low, high)
+        if self.fixed is not None:
+            free[self.fixed] = False
         step = np.zeros(self.t.size)
         if np.any(free):
             step[free] = -np.linalg.lstsq(self.slopes[:, free], self.at, rcond=1e-10)[0]

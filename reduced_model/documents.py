@@ -135,6 +135,7 @@ def paper_columns(calibration: Calibration, fill_ratio: FloatArray) -> Mapping[s
     scene = calibration.scene
     volume = fill_ratio * paper.chamber_volume_paper(disc=scene.disc)
     radius = paper.surface_radius_paper(disc=scene.disc, liquid_volume=volume)
+    moment = paper.moment_paper(disc=scene.disc, density=scene.liquid.density, surface_radius=radius)
     return {
         "wall_pressure_paper_Pa": paper.wall_pressure_paper(
             disc=scene.disc,
@@ -142,9 +143,8 @@ def paper_columns(calibration: Calibration, fill_ratio: FloatArray) -> Mapping[s
             angular_velocity=scene.rotor.speed,
             liquid_volume=volume,
         ),
-        "moment_paper_kg_m": paper.moment_paper(
-            disc=scene.disc, density=scene.liquid.density, surface_radius=radius
-        ),
+        # A root and its square differ by rounding, of which an empty chamber shall have nothing.
+        "moment_paper_kg_m": np.where(fill_ratio > 0, moment, 0.0),
     }
 
 

@@ -112,12 +112,10 @@ def line_answers(scene: Scene, model: BalancerModel, *, inertia: bool = True) ->
     return tuple(_answer(scene, end, fills, one) for end, one in zip(ends, built, strict=True))
 
 
-def short_injection(
-    scene: Scene, end: LineEnd, fills: Fills, *, inertia: bool = True
-) -> ShortInjection | None:
+def short_injection(scene: Scene, end: LineEnd, fills: Fills) -> ShortInjection | None:
     """Injections by one gas line; None where the gas starts no flow."""
     edges = edges_of(fills, scene.gas.pressure)
-    return None if edges is None else _injection(scene, end, fills, edges, inertia=inertia)
+    return None if edges is None else _injection(scene, end, fills, edges, inertia=True)
 
 
 def _injection(scene: Scene, end: LineEnd, fills: Fills, edges: Edges, *, inertia: bool) -> ShortInjection:

@@ -8,9 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ringbalance.mesh.chamber import default_cells
 from ringbalance.physics.pressure.assembly import volume_points
 from ringbalance.physics.pressure.solve import PressureSolution
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Disc
 from ringbalance.verification.evidence import Convergence, Curve, Found, Series, figure
 
 ROUND_OFF = 1e-13
@@ -73,6 +75,13 @@ def orders_found(studies: Mapping[str, OrderStudy]) -> dict[str, Found]:
     """The settled order and the finest error of each study as judged quantities, by its name."""
     orders = {f"{name}_order": Found(value=study.settled_order) for name, study in studies.items()}
     return orders | {f"{name}_error": Found(value=study.finest_error) for name, study in studies.items()}
+
+
+def refined_cells(disc: Disc, levels: Sequence[int], *, dimension: int) -> list[tuple[int, ...]]:
+    """Cells of a chamber's meshes, radial, angular and, in three dimensions, axial, for levels 1, 2, ..."""
+    radial, share = (2, 4) if dimension == 2 else (1, 8)
+    angular = default_cells(disc=disc)[1] // share
+    return [(radial * n, angular * n, n)[:dimension] for n in levels]
 
 
 def field_error(solution: PressureSolution, exact: Callable[[FloatArray], FloatArray]) -> float:

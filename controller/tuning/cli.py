@@ -23,6 +23,7 @@ from ringbalance.reduced_model.selection.registry import neglected_in_injections
 from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.loader import load_scene
+from ringbalance.scene.narrowing import checked_law
 from ringbalance.scene.platform.progress import activity
 from ringbalance.scene.platform.terminal import results_console
 
@@ -57,6 +58,7 @@ def tune(
         SceneError: a scene or a law that cannot be used.
     """
     given = with_tolerance(load_scene(scene), tolerance=tolerance, models=models)
+    checked_law(given, law)
     if isinstance(given, EccentricScene):
         return _eccentric_masses(given, json=json)
     with activity("tune", f"flow law: {law} ...") as shown:

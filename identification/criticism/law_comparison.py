@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
-from scipy import stats
+from scipy.special import chdtri, ndtri
 
 from ringbalance.identification.criticism.linear_fit import LinearFit
 from ringbalance.scene.arrays import FloatArray
@@ -47,7 +47,7 @@ class LawComparison:
         """Which of both the data prefer."""
         if self.verdict == "cannot be told apart":
             return "undecided"
-        if abs(self.preference) < float(stats.chi2.isf(_LEVEL, 1)):
+        if abs(self.preference) < float(chdtri(1, _LEVEL)):
             return "between"
         return "fitted" if self.preference > 0 else "other"
 
@@ -67,7 +67,7 @@ def summaries(comparisons: Sequence[LawComparison]) -> Iterator[tuple[Outcome, s
 
 def needed_separation() -> float:
     """Separation at which a difference is seen with `POWER` at the 5 % level, by a normal statistic."""
-    return float((stats.norm.isf(_LEVEL / 2) + stats.norm.ppf(POWER)) ** 2)
+    return float((ndtri(POWER) - ndtri(_LEVEL / 2)) ** 2)
 
 
 def compare_laws(fit: LinearFit, *, other: str, residuals: FloatArray) -> LawComparison:

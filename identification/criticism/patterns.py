@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
-from scipy import stats
+from scipy.special import chdtrc, ndtr, ndtri, stdtr
 
 from ringbalance.identification.criticism.linear_fit import LinearFit
 from ringbalance.scene.arrays import BoolArray, FloatArray, distinct
@@ -154,10 +154,10 @@ def _pattern_test(
     score = projected / math.sqrt(left)
     freedom = fit.freedom(rows) - 1
     if bool(np.all(fit.known_noise[rows])):
-        p_value = 2 * float(stats.norm.sf(abs(score)))
+        p_value = 2 * float(ndtr(-abs(score)))
     else:
         rest = max(float(np.sum(fit.residuals[rows] ** 2)) - score**2, 1e-300)
-        p_value = 2 * float(stats.t.sf(abs(score) * math.sqrt(freedom / rest), freedom))
+        p_value = 2 * float(stdtr(freedom, -abs(score) * math.sqrt(freedom / rest)))
     return _Test(
         test="pattern",
         block=block,
@@ -186,7 +186,7 @@ def _sizes(fit: LinearFit) -> Iterator[_Test]:
                 test="size",
                 block=block,
                 against="",
-                p_value=float(stats.chi2.sf(square, freedom)),
+                p_value=float(chdtrc(freedom, square)),
                 text=f"residuals of {block} are {math.sqrt(square / freedom):.2g} times as large as the "
                 "stated noise",
             )
@@ -238,7 +238,7 @@ def _max_correction(patterns: list[_Test]) -> Mapping[int, float]:
     largest = np.max(np.abs(draws), axis=1)
     found = {}
     for each in patterns:
-        score = float(stats.norm.isf(max(each.p_value, 1e-300) / 2))
+        score = -float(ndtri(max(each.p_value, 1e-300) / 2))
         exceeded = (1 + np.count_nonzero(largest >= score)) / (1 + _DRAWS)
         # Where no draw is as large, Bonferroni's bound is closer.
         found[id(each)] = float(min(exceeded, len(patterns) * each.p_value))

@@ -81,7 +81,8 @@ class Column:
         if self.whole and value != round(value):
             raise FieldError("it is not a whole number", self._range())
         if abs(value) > self._largest:
-            raise FieldError(f"it is too large; is [{self.unit or 1}] meant?", self._range())
+            hint = f"; is [{self.unit}] meant?" if self.unit else ""
+            raise FieldError(f"it is too large{hint}", self._range())
 
     @property
     def _largest(self) -> float:
@@ -152,7 +153,7 @@ def _column(head: str, meaning: str, **declared: Any) -> Column:
 
 _measured: Final = partial(_column, measured=True)
 _positive: Final = partial(_column, above_zero=True)
-_amplitude: Final = partial(_measured, amplitude=True, lowest=0.0)
+_amplitude: Final = partial(_measured, amplitude=True, lowest=0.0, highest=0.2)
 _fill: Final = partial(_column, "fill_ratio", lowest=0.0, highest=1.0)
 _angle: Final = partial(_column, lowest=-_TURNS, highest=_TURNS)
 _phase: Final = partial(

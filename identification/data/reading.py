@@ -42,6 +42,8 @@ from ringbalance.scene.units import FieldError
 
 AMPLITUDE: Final = "amplitude"
 _NEEDED: Final = ("kind", "source")
+_ROUNDED: Final = 0.01
+"""Of a full chamber's fill, as it may be written down."""
 
 
 def read_observations(paths: Iterable[Path], *, scene: AnyScene) -> tuple[Observations, ...]:
@@ -101,6 +103,7 @@ def observations_of(
     columns, cell_faults = _columns(table, kind)
     wrong += cell_faults
     wrong += _chamber_faults(table, scene) if kind.has_chamber else []
+    wrong += _fill_faults(table, scene, columns) if kind is not KINDS["pressure"] else []
     uncertainty, stated_faults = stated_uncertainty(table, kind, columns)
     wrong += [*stated_faults, *_repeated(table)]
     if faults or wrong:
@@ -240,6 +243,19 @@ def _chamber_faults(table: Table, scene: AnyScene) -> Iterator[Fault]:
         if len(cell) != 1 or cell not in letters:
             problem = f"the disc has no chamber of that name{did_you_mean(cell, letters)}"
             yield table.fault(line, "chamber", cell, problem, ", ".join(letters))
+
+
+def _fill_faults(table: Table, scene: AnyScene, columns: Mapping[str, FloatArray]) -> Iterator[Fault]:
+    """Fills of a driven chamber beyond the liquid of its pair."""
+    if not isinstance(scene, Scene) or "fill_ratio" not in columns:
+        return
+    head = next(head for head in table.heads if (split_head(head) or ("",))[0] == "fill_ratio")
+    total = 2 * scene.disc.initial_fill
+    rows = zip(table.lines, texts(table, head), columns["fill_ratio"].tolist(), strict=True)
+    for line, cell, fill in rows:
+        if total * (1 + _ROUNDED) < fill <= 1:
+            problem = f"the chambers of a pair hold {total:.4g} together, twice disc.initial_fill"
+            yield table.fault(line, head, cell, problem, f"from 0 to {total:.4g}")
 
 
 def _repeated(table: Table) -> Iterator[Fault]:

@@ -23,6 +23,7 @@ MOST_ROWS: Final = 2000
 holds the covariance of every pair of rows: more would take gigabytes."""
 _MARK: Final = "#"
 _SEPARATORS: Final = ";\t,"
+_SETS_A_KEY: Final = re.compile(r'"?#\s*\w+\s*=')
 _NAMED_SEPARATOR: Final = re.compile(r'"?sep=.{0,2}"?[,;\t]*', re.IGNORECASE)
 _LINE: Final = re.compile(r"line (\d+)")
 _WORKBOOKS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
@@ -105,6 +106,7 @@ def parse_table(text: str, *, file: str) -> tuple[Table | None, tuple[Fault, ...
     numbered = list(enumerate(re.split(r"\r\n|\r|\n", text), 1))
     head_at = next((at for at, line in numbered if _is_data(line)), len(numbered) + 1)
     header, faults = _header(numbered[: head_at - 1], file)
+    faults = (*faults, *_late_keys(numbered[head_at:], file))
     data = [(at, line) for at, line in numbered[head_at - 1 :] if _is_data(line)]
     if len(data) < 2:
         problem = "there is no row of data below the names of the columns"
@@ -149,6 +151,14 @@ def _header(
         reason = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
         problem = f"the first lines, marked #, are not TOML: {' '.join(reason.split())}"
         return None, (data_fault(file, "", problem),)
+
+
+def _late_keys(lines: Sequence[tuple[int, str]], file: str) -> Iterator[Fault]:
+    """First lines that stand below the columns, as where files were joined: they would count for no row."""
+    for at, line in lines:
+        if _SETS_A_KEY.match(line):
+            problem = "this stands below the names of the columns; a file has one kind of data and one header"
+            yield data_fault(file, f"line {at}", problem)
 
 
 def _unmarked(line: str) -> str:

@@ -32,11 +32,12 @@ from ringbalance.scene.models import Scene
 from ringbalance.scene.tube_models import START_ERROR, TubeModels
 from ringbalance.scene.uncertain import NORMAL_95
 
-RELATIVE_ERROR: Final = 1e-6
-"""Allowed to one step of an injection: fills within 1e-9, so that differences of predictions are smooth."""
+RELATIVE_ERROR: Final = 1e-5
+"""Allowed to one step of an injection: the derivatives by differences are then within 1e-5 of those at a
+thousandth of it, below what counts as dependent."""
 _SETTLED: Final = 10.0
 """s after a valve has closed: the gas has vented and the liquid rests, or has run back."""
-_KEPT: Final = 32
+_KEPT: Final = 128
 _LEAST_LEFT: Final = 0.1
 """Of a valve-open time, when the start of the flow is supposed late."""
 

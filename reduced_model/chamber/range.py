@@ -79,11 +79,13 @@ def _waves(scene: Scene, fills: FloatArray) -> Status:
     worst = int(np.argmax(swing))
     if swing[worst] <= SMALL:
         return Status()
+    sector = "" if scene.disc.geometry is None else "in a plain sector of the same opening, "
     return Status(
         code=StatusCode.OUT_OF_RANGE,
         text=(
-            f"at a fill ratio of {fills[worst]:.3g} waves would reach about {swing[worst]:.2g} of the ring's "
-            "depth, too high for linear sloshing, the finest model: avoid that fill, or turn faster"
+            f"{sector}at a fill ratio of {fills[worst]:.3g} waves would reach about {swing[worst]:.2g} "
+            "of the ring's depth, too high for linear sloshing, the finest model: avoid that fill, or turn "
+            "faster"
         ),
     )
 

@@ -6,8 +6,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.physics.tube.uncertainty import INPUT_PART
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
@@ -92,11 +90,9 @@ def operating_point(*, scene: Scene, law: CalibratedLaw) -> OperatingPoint:
         k_model_uncertainty=None if loss is None else _model_part(loss.uncertainty_parts),
         priming_vented=None if vented is None else float(vented),
         priming_trapped=None if trapped is None else float(trapped),
-        stall=float(np.maximum(siphon_stall_pressure(law=law, fill_ratio=0.0), 0.0)),
-        stall_paper=float(
-            paper.stall_pressure(
-                disc=scene.disc, density=scene.liquid.density, angular_velocity=scene.rotor.speed
-            )
+        stall=max(siphon_stall_pressure(law), 0.0),
+        stall_paper=paper.stall_pressure(
+            disc=scene.disc, density=scene.liquid.density, angular_velocity=scene.rotor.speed
         ),
         hump_pressure=hump.hump_pressure,
         cavity_pressure=hump.cavity_pressure,

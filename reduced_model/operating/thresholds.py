@@ -37,20 +37,10 @@ def priming_pressure(
     return np.asarray(replace(crest, trapped=hump_gas == "trapped").priming_pressure(ends)) / law.gas_factor
 
 
-def siphon_stall_pressure(
-    *,
-    law: CalibratedLaw,
-    fill_ratio: npt.ArrayLike,
-    opposite_fill_ratio: npt.ArrayLike | None = None,
-) -> FloatArray:
-    """Gas pressure at which a full siphon stands still, P_C - P_A.
+def siphon_stall_pressure(law: CalibratedLaw) -> float:
+    """Gauge pressure of the gas at which a full siphon from an empty chamber stands still, P_C - P_A, Pa.
 
-    Args: `law`: the flow law. `fill_ratio`: x of the driven chamber, any shape. `opposite_fill_ratio`: of the
-        opposite chamber; default max_fill_ratio - fill_ratio.
-    Returns: Gauge pressure, Pa, of the broadcast shape; negative where the driven chamber holds more.
     Source: Eq. 18 of the liquid-ring paper with u = 0 and finite-element wall pressures.
     """
-    return (
-        law.ends(fill_ratio=fill_ratio, opposite_fill_ratio=opposite_fill_ratio).stall_pressure()
-        / law.gas_factor
-    )
+    ends = law.ends(fill_ratio=0.0, opposite_fill_ratio=None)
+    return float(ends.stall_pressure() / law.gas_factor)

@@ -182,21 +182,16 @@ def velocity_paper(
     )
 
 
-def stall_pressure(
-    *, disc: Disc, density: float, angular_velocity: float, fill_ratio: npt.ArrayLike = 0.0
-) -> FloatArray:
-    """Gas pressure at which Eq. 19's velocity vanishes, p0 = rho omega^2 V (x_max - 2 x_a)/(B theta).
+def stall_pressure(*, disc: Disc, density: float, angular_velocity: float) -> float:
+    """Gas pressure that Eq. 19 needs at an empty chamber, p0 = rho omega^2 V x_max/(B theta).
 
-    Returns: Gauge pressure, Pa, the shape of `fill_ratio`; 0.381 MPa for the paper's disc, which the paper
-        does not print: it quotes 0.54 to 1.77 MPa as the working range.
+    Returns: Gauge pressure, Pa; 0.381 MPa for the paper's disc, which the paper does not print: it quotes
+        0.54 to 1.77 MPa as the working range.
     Source: Eq. 19 with u = 0.
     """
-    x = np.asarray(fill_ratio, dtype=np.float64)
-    return wall_pressure_paper(
-        disc=disc,
-        density=density,
-        angular_velocity=angular_velocity,
-        liquid_volume=chamber_volume_paper(disc=disc) * (disc.max_fill_ratio - 2 * x),
+    full = chamber_volume_paper(disc=disc) * disc.max_fill_ratio
+    return float(
+        wall_pressure_paper(disc=disc, density=density, angular_velocity=angular_velocity, liquid_volume=full)
     )
 
 

@@ -175,6 +175,8 @@ def test_both_characters_for_micro_and_the_degree_sign_are_known(
         ("transfer", "mass [g]", "mass [mm]", ["mass [mm]", "unit of length"]),
         ("transfer", "mass [g]", "note", ["0 of the columns", "volume [ml]"]),
         ("transfer", "0.25,0.7,200", "25,0.7,200", ["fill_ratio", '"25"', "too large"]),
+        ("transfer", "0.25,0.7,200", "0.7,0.7,200", ["fill_ratio", '"0.7"', "hold 0.5 together"]),
+        ("flow", "20,4.1,a", '# kind = "transfer"\n20,4.1,a', ["line 11", "one kind of data"]),
         ("injection", "A,50", "a,50", ["chamber", '"a"', 'did you mean "A"', "A, B, C, D"]),
         ("injection", "A,50", "E,50", ["chamber", '"E"', "A, B, C, D"]),
         ("injection", "A,50,0.7,10", "A,50,0.7,-10", ["amplitude_before", "negative"]),
@@ -182,7 +184,7 @@ def test_both_characters_for_micro_and_the_degree_sign_are_known(
         ("injection", "## unc", '# uncertainty = {phase_after="2 %"} #', ["an angle has no percentage"]),
         ("injection", "## unc", '# uncertainty = {phase_after="2 deg"} #', ["not of amplitude_before"]),
         ("trial_weight", "0,0,10,90", "0,0,0,90", ["relative"]),
-        ("trial_weight", "amplitude [um]", "amplitude [m]", ['"11.5"', "is [um] meant?", "to 10 m"]),
+        ("trial_weight", "amplitude [um]", "amplitude [m]", ['"11.5"', "is [um] meant?", "to 0.2 m"]),
         ("transfer", "0.25,0.7,400", "0.25,2e4,400", ['"2e4"', "is [MPa] meant?"]),
     ],
 )

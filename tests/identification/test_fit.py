@@ -14,9 +14,10 @@ from synthetic_rigs import covered, fitted, measured, observations, rig
 from ringbalance.controller.rotor import influence
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.fitting import fit, problem_of
+from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.model_errors import model_errors, with_model_error
 from ringbalance.identification.parameters import FitError
-from ringbalance.identification.predict.device import models_of
+from ringbalance.identification.predict.device import Models, models_of
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.scene.arrays import ComplexArray, FloatArray
@@ -219,11 +220,37 @@ def test_derivatives_against_richardson() -> None:
     problem = problem_of(
         made.scene, made.data, ["bore", "lambda_factor", "influence_coefficient", "hump_radius"]
     )
-    coarse, fine = (problem.slopes(problem.start, step=step) for step in (4e-3, 2e-3))
+    coarse, fine = (central(problem, step) for step in (4e-3, 2e-3))
     better = fine + (fine - coarse) / 3
-    used = problem.slopes(problem.start)
     size = np.linalg.norm(better, axis=0)
-    assert np.all(np.linalg.norm(used - better, axis=0) < 2e-3 * size)
+    assert np.all(np.linalg.norm(problem.slopes(problem.start) - better, axis=0) < 2e-3 * size)
+    assert np.all(np.linalg.norm(problem.quick_slopes(problem.start) - better, axis=0) < 2e-2 * size)
+
+
+def central(problem: Problem, step: float) -> FloatArray:
+    t, each = problem.start, np.eye(problem.start.size)
+    return np.stack(
+        [(problem.at(t + step * e) - problem.at(t - step * e)) / (2 * step) for e in each], axis=1
+    )
+
+
+@pytest.mark.parametrize("place", [0.9999, 0.9995, 1.0001, 1.0005])
+def test_a_jump_is_no_slope(place: float) -> None:
+    """Data that jump by a hundredth within the step: a plain difference would be wrong by five."""
+    made = rig(0)
+    smooth = problem_of(made.scene, made.data, ["bore", "lambda_factor"])
+
+    def jumping(block: Block) -> Block:
+        def predict(scene: Scene, observations: Observations, models: Models) -> FloatArray:
+            found = block.kind.predict(scene, observations, models)
+            beyond = scene.tube.bore > place * made.scene.tube.bore
+            return np.asarray(found + 0.01 * np.max(np.abs(block.measured)) * beyond)
+
+        return replace(block, kind=replace(block.kind, predict=predict))
+
+    jumps = replace(smooth, blocks=tuple(map(jumping, smooth.blocks)))
+    slopes, found = smooth.slopes(smooth.start), jumps.slopes(smooth.start)
+    assert np.all(np.linalg.norm(found - slopes, axis=0) < 1e-2 * np.linalg.norm(slopes, axis=0))
 
 
 def test_the_ends_of_intervals_against_another_minimiser() -> None:

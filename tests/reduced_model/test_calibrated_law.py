@@ -118,7 +118,7 @@ def test_priming_thresholds_of_both_readings_are_0_54_mpa(
 
 
 def test_stall_by_eq_19_is_0_381_mpa_and_by_finite_elements_a_tenth_more(law: CalibratedLaw) -> None:
-    stall = float(siphon_stall_pressure(law=law, fill_ratio=0.0))
+    stall = siphon_stall_pressure(law)
     assert stall / 0.381154e6 == pytest.approx(1.0977, abs=2e-3)
     around = law.evaluate(fill_ratio=0.0, gas_pressure=[stall * 0.999, stall * 1.001], primed=True)
     assert list(around.velocity > 0) == [
@@ -128,7 +128,7 @@ def test_stall_by_eq_19_is_0_381_mpa_and_by_finite_elements_a_tenth_more(law: Ca
 
 
 def test_straight_tube_stalls_without_a_jump(straight: CalibratedLaw) -> None:
-    stall = float(siphon_stall_pressure(law=straight, fill_ratio=0.0))
+    stall = siphon_stall_pressure(straight)
     offsets = np.array([-1e3, 0.0, 1e-3, 1e-1, 1e1])
     flow = straight.evaluate(fill_ratio=0.0, gas_pressure=stall + offsets)
     assert list(flow.regime) == [Regime.BLOCKED, Regime.BLOCKED, *[Regime.SIPHON] * 3]

@@ -99,7 +99,7 @@ def test_the_angle_of_the_moment_is_reported(scene: Scene) -> None:
     told = calibration_document(calibration)["chamber"]["moment_angle_rad"]
     np.testing.assert_allclose(told, np.radians(2.0), rtol=1e-5)
     rows = dict(_summary_rows(calibration))
-    assert rows["direction"].startswith("liquid moves the moment 2 deg from the middle")
+    assert rows["direction"].startswith("a pair acts 2 deg from the middle")
 
 
 def test_a_gas_pressure_at_which_nothing_flows(scene: Scene) -> None:

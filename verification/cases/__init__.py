@@ -1,4 +1,5 @@
-"""One folder a case: what is claimed and how it is judged in case.toml, how it is computed in case.py.
+"""One folder a case: what is claimed and how it is judged in case.toml, how it is computed in case.py,
+or by the study that case.toml names.
 
 The folder has no `__init__.py` and is entered in no list: it is found by its case.toml, and is package data.
 `<id>_code` is a case's computation, loaded when it is first asked for: listing the cases loads none of them.

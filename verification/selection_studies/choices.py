@@ -1,14 +1,15 @@
 """The choice of models judged: error against the finest model, cost against the cheapest that would do."""
 
+# ruff: noqa: ARG001 - every study has the uniform case interface
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Evidence, Found, Table
+from ringbalance.verification.evidence import Evidence, Level, Table, as_found
 from ringbalance.verification.selection_studies.chamber_models import chamber_hierarchies
 from ringbalance.verification.selection_studies.choice import Values, choose
 from ringbalance.verification.selection_studies.cost import committed_costs
@@ -20,6 +21,8 @@ from ringbalance.verification.selection_studies.tube_models import LawBook, k_hi
 
 CHAMBER: Final = ("wall_pressure", "moment")
 TOLERANCES: Final = (0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+_FEW: Final = 12
+"""Scenes on which a mutation shows."""
 _DEFECTS: Final = {"estimate_off": 1e-3, "estimate_large": 1e3}
 """Factors on every contribution, by the mutation's name."""
 
@@ -122,33 +125,41 @@ def _judged(
     )
 
 
-def choices_evidence(
+def study(
     scene: Scene,
-    *,
-    numbers: Iterable[int],
-    quantities_of: Callable[[int], tuple[str, ...]],
+    level: Level,
     defect: str | None,
+    *,
+    scenes: int,
+    quantities: Sequence[str],
+    more: Sequence[str],
+    every: int,
+    first: int,
 ) -> Evidence:
-    """Choose models for random scenes of these numbers at every tolerance, and judge the choices.
+    """Choose models for random scenes at every tolerance, and judge the choices.
 
-    Args: `quantities_of`: judged on a scene, by its number. `defect`: with one nothing is checked.
+    Args: `defect`: with one nothing is checked, and a few scenes do. `quantities`: judged on all `scenes`.
+        `more`: judged on every so many of them, from the `first` on.
     """
-    taken = list(numbers)
+    taken = range(scenes if defect is None else min(scenes, _FEW))
     worth, check = (1.0, True) if defect is None else (_DEFECTS[defect], False)
     judged = [
         found
         for number in taken
         for found in judge(
-            random_scene(scene, number), quantities=quantities_of(number), check=check, worth=worth
+            random_scene(scene, number),
+            quantities=[*quantities, *(more if number % every == first else ())],
+            check=check,
+            worth=worth,
         )
     ]
     below = [j for j in judged if not j.said]
     return Evidence(
-        found={
-            "held": Found(value=sum(j.held for j in judged) / len(judged)),
-            "dearest": Found(value=max(j.cost_ratio for j in judged)),
-            "said": Found(value=1.0 - len(below) / len(judged)),
-        },
+        found=as_found(
+            held=sum(j.held for j in judged) / len(judged),
+            dearest=max(j.cost_ratio for j in judged),
+            said=1.0 - len(below) / len(judged),
+        ),
         numbers={
             "choices": float(len(judged)),
             "scenes": float(len(taken)),

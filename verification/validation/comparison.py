@@ -1,8 +1,10 @@
 """Measurements beside the program's predictions: statistics, verdict, scatter plot."""
 
+# ruff: noqa: ARG001 - every study has the uniform case interface
 from __future__ import annotations
 
-from collections.abc import Mapping
+import dataclasses
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
@@ -11,8 +13,9 @@ import numpy as np
 
 from ringbalance.identification.data.measurements import Measurements, MeasurementsError
 from ringbalance.scene.arrays import BoolArray, FloatArray, StringArray
-from ringbalance.verification.evidence import Curve, Evidence, Found, Series, figure
-from ringbalance.verification.validation.kinds import Kind
+from ringbalance.scene.models import Scene
+from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, as_found, figure
+from ringbalance.verification.validation.kinds import Kind, measurements
 from ringbalance.verification.validation.model_bias import (
     MUTATIONS,
     ModelStatistics,
@@ -142,14 +145,36 @@ def _meaning(kind: Kind, name: str) -> str:
     return kind.columns.get(name, f"the measured {kind.title}")
 
 
+def study(
+    scene: Scene,
+    level: Level,
+    defect: str | None,
+    *,
+    sets: Sequence[str],
+    unit: str,
+    without: Sequence[str] = (),
+    beside: Mapping[str, str] = MappingProxyType({}),
+) -> Evidence:
+    """Evidence of a case that compares bundled data sets of one kind, whatever the scene.
+
+    Args: `unit`: of what was measured, SI. `without`: series that are not judged. `beside`: a set that is
+        not judged either, by the name of its numbers.
+    """
+    judged = [measurements(name) for name in sets]
+    found = data_evidence(
+        *(data.where(~np.isin(data.series, without)) for data in judged), unit=unit, mutation=defect
+    )
+    more = {name: compare(measurements(other)).statistics for name, other in beside.items()}
+    points = {f"{name}_points": float(one.points) for name, one in more.items()}
+    within = {f"{name}_within": one.share_within for name, one in more.items()}
+    return dataclasses.replace(found, numbers={**found.numbers, **points, **within})
+
+
 def data_evidence(*sets: Measurements, unit: str, mutation: str | None = None) -> Evidence:
     """Evidence of a case that compares data sets of one kind. Args: `unit`: of what was measured, SI."""
     comparison = compare(*sets, mutation=mutation)
     return Evidence(
-        found={
-            "share_within": Found(value=comparison.statistics.share_within),
-            "bias": Found(value=abs(comparison.statistics.bias)),
-        },
+        found=as_found(share_within=comparison.statistics.share_within, bias=abs(comparison.statistics.bias)),
         numbers=statistics_numbers(comparison.statistics),
         series=(comparison.scatter(kind_of(sets[0]).title, unit),),
     )

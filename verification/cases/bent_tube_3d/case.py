@@ -27,8 +27,7 @@ from ringbalance.verification.evidence import (
     figure,
 )
 from ringbalance.verification.navier_stokes.rotating_section import SectionMesh
-from ringbalance.verification.reference.bend_shift import bend_shift
-from ringbalance.verification.reference.bent_tube import BentTubeFlow, bent_tube_flow
+from ringbalance.verification.reference.bent_tube import BentTubeFlow, bend_shift, bent_tube_flow
 
 REYNOLDS: Final = 200.0
 VISCOSITY: Final = 20e-6

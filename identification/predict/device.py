@@ -17,7 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.controller.liquid_ring.compiled_march import advance, command
-from ringbalance.controller.liquid_ring.motion import Motion, packed
+from ringbalance.controller.liquid_ring.interval import packed
+from ringbalance.controller.liquid_ring.motion import Motion
 from ringbalance.controller.liquid_ring.records import WORKSPACE, X
 from ringbalance.controller.terms import known_dynamics
 from ringbalance.identification.data.observations import Observations

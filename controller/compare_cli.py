@@ -6,20 +6,32 @@ import cmath
 import json as json_format
 import math
 from pathlib import Path
+from typing import Final
 
 from rich.console import Console
 from rich.table import Table
 
 from ringbalance.controller.compare import Comparison, Side
 from ringbalance.controller.compare import compare as compare_scenes
-from ringbalance.reduced_model.law_by_name import law_by_name
+from ringbalance.controller.tuning.dead_time import offset_text
+from ringbalance.reduced_model.calibration import law_by_name
 from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.loader import load_scene
+from ringbalance.scene.models import Scene
 from ringbalance.scene.platform.progress import activity
 from ringbalance.scene.platform.terminal import results_console
 
 SETTLED = 0
 NOT_SETTLED = 1
+_OFFSETS: Final = "controller.gas_time_offset."
+_UNITS: Final = {
+    "controller.proportional": ("s/um", 1e-6),
+    "friction_filter.drive_speed": ("rpm", 30 / math.pi),
+    "friction_filter.pair_gain": ("V/rad", 1.0),
+    "friction_filter.speed_gain": ("V*s/rad", 1.0),
+    "lqr.state_weight": ("", 1.0),
+}
+"""Of the keys that tuning may change: the usual unit in scene files, and how many of it one in SI is."""
 
 
 def compare(
@@ -62,15 +74,16 @@ def _show(comparison: Comparison, console: Console) -> None:
     lag = math.degrees(-cmath.phase(rotor.influence))
     console.print(
         f"rotor of {rotor.source}: {rotor.speed * 30 / math.pi:.6g} rpm, "
-        f"{abs(rotor.influence):.4g} m/(kg m) at a lag of {lag:.4g} deg, "
+        f"{abs(rotor.influence):.4g} um/(g*mm) at a lag of {lag:.4g} deg, "
         f"{1e6 * rotor.amplitude:.4g} um before balancing, limit {1e6 * rotor.limit:.4g} um; "
         f"over {comparison.span:.4g} s, medians (smallest to largest)",
         highlight=False,
     )
-    table = Table("", *(side.scene.name for side in comparison.sides))
+    names = [side.scene.name for side in comparison.sides]
+    table = Table("", *(names if len(set(names)) > 1 else [side.scene.source for side in comparison.sides]))
     rows = {
         "balancer": [side.scene.balancer.replace("_", " ") for side in comparison.sides],
-        "tuned": [_tuned(side) for side in comparison.sides],
+        "tuned": [tuned_text(side) for side in comparison.sides],
         "settled": [_settled(side) for side in comparison.sides],
         "time to the limit": [_cell(side, "time", 1.0, "s") for side in comparison.sides],
         "left over": [_cell(side, "residual_ratio", 100.0, "%") for side in comparison.sides],
@@ -100,5 +113,14 @@ def _settled(side: Side) -> str:
     return f"{sum(math.isfinite(r.time) for r in side.results)} of {len(side.results)} runs"
 
 
-def _tuned(side: Side) -> str:
-    return ", ".join(f"{key} = {value:.4g} (SI)" for key, value in side.tuned.items()) or "as it is"
+def tuned_text(side: Side) -> str:
+    """What tuning has changed, as a scene file has it."""
+    told = [_written(key, value) for key, value in side.tuned.items() if not key.startswith(_OFFSETS)]
+    if len(told) < len(side.tuned) and isinstance(side.scene, Scene):
+        told.append(offset_text(side.scene.controller.offsets(side.scene.disc.chambers)))
+    return ", ".join(told) or "as it is"
+
+
+def _written(key: str, value: float) -> str:
+    unit, factor = _UNITS[key]
+    return f'{key} = "{factor * value:.4g} {unit}"' if unit else f"{key} = {value:.4g}"

@@ -16,6 +16,7 @@ _HOME: Final = MappingProxyType(
         "reduced_waves": "ringbalance.physics.sloshing.body",
         "sloshing_response": "ringbalance.physics.sloshing.response",
         "solved_ring": "ringbalance.physics.pressure.imported",
+        "wave_system": "ringbalance.physics.sloshing.imported",
         "nnls": "scipy.optimize",
         "Sobol": "scipy.stats.qmc",
     }

@@ -14,13 +14,16 @@ from rich.text import Text
 
 from ringbalance.reduced_model.budget import Budget, rounded
 from ringbalance.reduced_model.calibration import Calibration
-from ringbalance.reduced_model.chamber.imported_walls import share_across
-from ringbalance.reduced_model.chamber.row_status import REMEDIES, row_status
-from ringbalance.reduced_model.documents import PRESSURE_FACTORS, paper_columns, velocity_status
+from ringbalance.reduced_model.chamber.row_status import REMEDIES
+from ringbalance.reduced_model.documents import (
+    PRESSURE_FACTORS,
+    chamber_status,
+    paper_columns,
+    velocity_status,
+)
 from ringbalance.reduced_model.gas_line import line_text, line_warning
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.operating.tube_liquid import TubeLiquid
-from ringbalance.scene.models import Disc
 
 _ASIDE: Final = 0.01
 """Angle below which a chamber counts as symmetric, deg."""
@@ -93,7 +96,7 @@ def _summary_rows(calibration: Calibration) -> Iterator[tuple[str, str]]:
         f"({rounded(1e3 * lam.value / 2, 1e3 * lam.total / 2)} mm per mass difference), "
         f"varies by {100 * calibration.lambda_variation:.2g} % over the fill range",
     )
-    yield from _direction(calibration.scene.disc)
+    yield from _direction(calibration)
     yield "usable", _usable_text(calibration)
     yield "operating point", _point_text(calibration)
     if "drag_coefficient" in told:
@@ -119,14 +122,16 @@ def _summary_rows(calibration: Calibration) -> Iterator[tuple[str, str]]:
         yield "warning", calibration.instability.warning
 
 
-def _direction(disc: Disc) -> Iterator[tuple[str, str]]:
-    """Where an imported chamber is not symmetric, the angle of its moment to its middle."""
-    angles = np.degrees(np.arctan(share_across(disc, disc.max_fill_ratio * np.linspace(0.05, 1.0, 20))))
+def _direction(calibration: Calibration) -> Iterator[tuple[str, str]]:
+    """Where an imported chamber is not symmetric, the angle from its middle in which its pair acts."""
+    total, moment = calibration.scene.disc.max_fill_ratio, calibration.flow_law.moment
+    fill = total * np.linspace(0.525, 1.0, 20)
+    angles = np.degrees(np.angle(moment.pair_vector(fill_ratio=fill, opposite_fill_ratio=total - fill)))
     if np.max(np.abs(angles)) >= _ASIDE:
         text = (
-            f"liquid moves the moment {angles[9]:.2g} deg from the middle of the chamber at equal fills, "
-            f"{angles.min():.2g} to {angles.max():.2g} deg over the range; the closed loop follows that, "
-            "moments and lambda are those along the middle"
+            f"a pair acts {angles[0]:.2g} deg from the middle of its chambers near equal fills, "
+            f"{angles[-1]:.2g} deg with all liquid in one; the closed loop follows that, moments and lambda "
+            "are those along the middle"
         )
         yield "direction", text
 
@@ -192,7 +197,7 @@ def _margin_text(calibration: Calibration) -> str:
 
 def _chamber_table(calibration: Calibration) -> Table:
     chamber, at = calibration.chamber, list(calibration.chamber.reported)
-    states = row_status(calibration.scene, fill_ratio=chamber.fill_ratio[at], closed=chamber.ring.closed[at])
+    states = chamber_status(calibration)
     limited = [state for state in REMEDIES if state in states]
     columns_shown = ("fill", "R1' mm", "p MPa", "Eq. 12", "off %", "U g mm", "Eq. 7", "off %")
     table = _table("Chamber", *columns_shown, *(["state"] if limited else []))

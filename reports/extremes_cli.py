@@ -16,6 +16,7 @@ from ringbalance.reports.numbers import number
 from ringbalance.reports.pages.extremes import axis_rows, map_drawings
 from ringbalance.reports.section import Cells
 from ringbalance.scene.platform.files import staged, write_whole
+from ringbalance.scene.platform.processes import checked_workers
 from ringbalance.scene.platform.progress import activity
 from ringbalance.scene.platform.terminal import messages_console, results_console
 from ringbalance.verification.evidence import Level
@@ -66,7 +67,7 @@ def extremes(
             found = find_extremes(
                 base,
                 size=SIZES[level],
-                workers=workers or min(2, os.cpu_count() or 1),
+                workers=min(2, os.cpu_count() or 1) if workers is None else checked_workers(workers),
                 progress=lambda what, done, number: shown.show(
                     f"{what}: {done} of {number} points", done=done, total=number
                 ),

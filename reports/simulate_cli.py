@@ -15,14 +15,14 @@ from ringbalance.controller.eccentric_mass.show import show_eccentric
 from ringbalance.controller.line_runs import line_runs, line_runs_document, line_runs_text
 from ringbalance.controller.loop import simulate as run_loop
 from ringbalance.controller.show import show
-from ringbalance.reduced_model.law_by_name import law_by_name
+from ringbalance.reduced_model.calibration import law_by_name
 from ringbalance.reports.figures import deferred
 from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.faults import option_error
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.models import Scene
-from ringbalance.scene.narrowing import AnyScene
+from ringbalance.scene.narrowing import AnyScene, checked_law
 from ringbalance.scene.platform.files import check_file, write_whole
 from ringbalance.scene.platform.progress import Activity, activity
 from ringbalance.scene.platform.terminal import results_console
@@ -75,6 +75,7 @@ def simulate(
     _check_output("--csv", csv, ".csv")
     _check_output("--plot", plot, ".svg")
     told = _with_seed(with_tolerance(load_scene(scene), tolerance=tolerance, models=models), seed)
+    checked_law(told, law)
     outputs = _Outputs(json=json, csv=csv, plot=plot)
     settled = (
         _eccentric_masses(told, outputs) if isinstance(told, EccentricScene) else _ring(told, law, outputs)

@@ -92,7 +92,7 @@ def common_causes(cases: list[Record]) -> list[Record]:
     """Claims that do not simply hold, grouped by what they have in common; the largest group first."""
     groups: dict[str, list[Record]] = {}
     for case in cases:
-        if case.get("cause") and case["verdict"] != "not run":
+        if case.get("cause"):
             groups.setdefault(case["cause"], []).append(case)
     ordered = sorted(groups.items(), key=lambda group: -len(group[1]))
     return [

@@ -51,6 +51,11 @@ def _lowered(text: str) -> str:
     return Markup(_INDEXED.sub(r"\1<sub>\2</sub>", str(escape(text)))) if _INDEXED.search(text) else text
 
 
+_ROUNDING: Final = 5e-4
+"""Relative half-width of an input of three digits, the fewest that scene files have."""
+_DIGITS: Final = 4
+
+
 def evidence_at(evidence: Any, path: str) -> Any:
     """What the evidence holds at a dotted place; in a list by position, or by the `id` of an item.
 
@@ -68,4 +73,18 @@ def evidence_at(evidence: Any, path: str) -> Any:
 
 def read(evidence: Any, path: str, unit: str, *, width: float | None = None, digits: int = 3) -> str:
     """The evidence's value at a place in the unit that suits it, with its half-width (95 %, SI), traced."""
-    return traced(shown(evidence_at(evidence, path), unit, width, digits=digits), path)
+    value = evidence_at(evidence, path)
+    known = believed(evidence, value, width)
+    return traced(shown(value, unit, known, digits=digits if known == width else _DIGITS), path)
+
+
+def states_uncertainty(evidence: Any) -> bool:
+    """Whether the scene file says of any input how uncertain it is."""
+    rows = evidence.get("scene", {}).get("table") or []
+    return any(row.get("uncertainty") for row in rows if row.get("origin") != "default")
+
+
+def believed(evidence: Any, value: float | None, width: float | None) -> float | None:
+    """The half-width of a value; None where it is finer than inputs of which the scene says nothing."""
+    fine = width is not None and value is not None and width <= _ROUNDING * abs(value)
+    return None if fine and not states_uncertainty(evidence) else width

@@ -13,8 +13,9 @@ import traceback
 from collections.abc import Sequence
 from contextlib import suppress
 from inspect import signature
+from typing import Any, get_args
 
-from cyclopts import App, CycloptsError, MissingArgumentError, Parameter, UnknownCommandError
+from cyclopts import App, CycloptsError, MissingArgumentError, Parameter, Token, UnknownCommandError, convert
 
 import ringbalance
 from ringbalance.signals import interrupts
@@ -74,6 +75,14 @@ THREAD_COUNTS = (
 EXAMPLE_SCENES = ("my_disc.toml", "other_disc.toml")
 
 
+def _converted(hint: Any, tokens: Sequence[Token]) -> Any:
+    """As cyclopts converts an argument, but a whole number is not made of another one by rounding."""
+    parts = [token.value for token in tokens if "." in token.value]
+    if parts and int in {hint, *get_args(hint)}:
+        raise ValueError(f"{parts[0]} is not a whole number.")
+    return convert(hint, tokens)
+
+
 def _build_app() -> App:
     """The application with its commands, none of them imported yet."""
     app = App(
@@ -85,7 +94,7 @@ def _build_app() -> App:
             "reader of standard output went away."
         ),
         version=ringbalance.__version__,
-        default_parameter=Parameter(negative=()),
+        default_parameter=Parameter(negative=(), converter=_converted),
         result_action="return_value",
         suppress_keyboard_interrupt=False,
     )

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
-from ringbalance.scene.faults import Fault, SceneError
+from ringbalance.scene.faults import Fault, SceneError, option_error
 from ringbalance.scene.models import Scene
 
 if TYPE_CHECKING:
     from ringbalance.scene.eccentric_models import EccentricScene
 
 AnyScene: TypeAlias = "Scene | EccentricScene"
+CALIBRATED: Final = "calibrated"
+"""The law of a liquid ring where no other is asked for."""
 
 
 def liquid_ring_scene(scene: AnyScene) -> Scene:
@@ -18,7 +20,7 @@ def liquid_ring_scene(scene: AnyScene) -> Scene:
     if isinstance(scene, Scene):
         return scene
     problem = "this needs the disc, liquid, tube and gas of a liquid-ring balancer"
-    raise _wrong_kind(scene, problem, 'a scene with balancer = "liquid_ring"; simulate and compare take both')
+    raise _wrong_kind(scene, problem, "liquid_ring")
 
 
 def eccentric_scene(scene: AnyScene) -> EccentricScene:
@@ -26,11 +28,20 @@ def eccentric_scene(scene: AnyScene) -> EccentricScene:
     if not isinstance(scene, Scene):
         return scene
     problem = "this needs the rotor, masses and motor of driven eccentric masses"
-    allowed = 'a scene with balancer = "eccentric_mass"; simulate and compare take both'
-    raise _wrong_kind(scene, problem, allowed)
+    raise _wrong_kind(scene, problem, "eccentric_mass")
 
 
-def _wrong_kind(scene: AnyScene, problem: str, allowed: str) -> SceneError:
+def checked_law(scene: AnyScene, law: str) -> None:
+    """Raises: SceneError: the option `--law` of a scene whose balancer has no flow law."""
+    if not isinstance(scene, Scene) and law != CALIBRATED:
+        problem = f"the balancer of {scene.source} has no flow law"
+        raise option_error(
+            option="--law", value=law, problem=problem, allowed="this option with a liquid ring alone"
+        )
+
+
+def _wrong_kind(scene: AnyScene, problem: str, kind: str) -> SceneError:
     value = f'"{scene.balancer}"'
+    allowed = f'a scene with balancer = "{kind}"; report, simulate, tune, compare and fit take both'
     fault = Fault(file=scene.file, table="", key="balancer", value=value, problem=problem, allowed=allowed)
     return SceneError([fault])

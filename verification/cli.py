@@ -15,6 +15,7 @@ from rich.text import Text
 
 from ringbalance.identification.data.measurements import MeasurementsError
 from ringbalance.scene import load_scene
+from ringbalance.scene.platform.processes import checked_workers
 from ringbalance.scene.platform.progress import Activity, activity
 from ringbalance.scene.platform.terminal import messages_console, results_console
 from ringbalance.verification.case import CaseDefinition
@@ -23,7 +24,7 @@ from ringbalance.verification.document import definition_document, results_docum
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.result import CaseResult, QuantityResult
 from ringbalance.verification.runner import paper_scene, run_cases
-from ringbalance.verification.validation.blind import data_document
+from ringbalance.verification.validation.comparison import data_document
 from ringbalance.verification.verdicts import Verdict
 
 DONE: Final = 0
@@ -88,7 +89,7 @@ def verify(
             scene=given,
             level=level,
             mutations=mutations,
-            workers=workers,
+            workers=checked_workers(workers),
             progress=lambda result: _show_done(shown, ids, result.definition.id),
         )
     if json:

@@ -17,6 +17,7 @@ from ringbalance.verification.verdicts import Verdict
 
 Document = dict[str, Any]
 _LISTED: Final = {"id", "kind", "about", "paper", "number", "title", "claim", "cost"}
+_DEPARTS: Final = {Verdict.CORRECTED, Verdict.REFUTED, Verdict.INCONCLUSIVE}
 _AS_DEFINED: Final = _LISTED | {
     *("protects", "assumes", "does_not_cover", "equations", "headline", "judged_on"),
 }
@@ -34,7 +35,7 @@ def case_document(result: CaseResult) -> Document:
         "consequence": _consequence(result),
         "reference": definition.reference.model_dump(exclude={"doubts"}),
         "doubts": [text for doubt in definition.reference.doubts if (text := result.filled(doubt))],
-        "cause": CAUSES[definition.cause] if result.verdict is not Verdict.CONFIRMED else "",
+        "cause": CAUSES[definition.cause] if result.verdict in _DEPARTS else "",
         "judgement": result.filled(definition.judgement),
         "rests_on": [vars(one) for one in result.assumptions],
         "level": result.level,

@@ -18,7 +18,14 @@ from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.sampled_loops import GAIN_MARGIN, RecommendedGains
 from ringbalance.controller.eccentric_mass.strategy.plan import STAGE_NAMES, Stage
 from ringbalance.controller.eccentric_mass.strategy.targets import target_angles
-from ringbalance.controller.eccentric_mass.uncertainty import Judged, effects, lost, moved_runs
+from ringbalance.controller.eccentric_mass.uncertainty import (
+    Judged,
+    drawn_runs,
+    effects,
+    interval,
+    lost,
+    moved_runs,
+)
 from ringbalance.controller.tuning.eccentric import (
     EccentricTuning,
     eccentric_tuning_document,
@@ -30,6 +37,7 @@ _AT_LEAST: Final = "at least"
 _AT_MOST: Final = "at most"
 _LIMIT: Final = "supervisor.limit"
 _ROUNDING: Final = 1e-12
+_FEWEST: Final = 3
 
 
 Interval = tuple[float, float]
@@ -56,9 +64,10 @@ class Requirement:
     """By how much each cause alone lowers and raises `excess`, by the input's path."""
     lost: tuple[str, ...] = ()
     """Causes with which a run does not come to it at all."""
-    least_excess: float = 0.0
-    """At the worst end of the interval, by which the requirement is more than met, less the excess itself."""
-    most_excess: float = 0.0
+    excess_interval: Interval | None = None
+    """None: as `achieved_interval`."""
+    reached: float = 1.0
+    """Fraction of the drawn runs that come to it at all."""
 
     @property
     def excess(self) -> float:
@@ -75,11 +84,12 @@ class Requirement:
 
     @property
     def verdict(self) -> str:
-        """Whether it is wherever the inputs lie within their intervals: met, not met, cannot be told."""
-        if self.excess + self.most_excess < 0:
+        """Whether it is with 95 % of what the inputs may be: met, not met, cannot be told."""
+        least, most = self.excess_interval or (self.excess, self.excess)
+        if most < 0:
             return "not met"
-        certain = self.excess + self.least_excess >= 0 and not self.lost
-        return "met" if certain else "cannot be told"
+        always = self.reached == 1.0 and not self.lost
+        return "met" if least >= 0 and always else "cannot be told"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,13 +122,16 @@ def eccentric_study(
 ) -> EccentricStudy:
     """Run a scene balanced and locked, and judge its loops and requirements; seed as in the run.
 
-    A scene that states uncertainties is run again with each input at both ends of its interval.
+    A scene that states uncertainties is run again with all inputs drawn, which gives the intervals, and with
+    each input at both ends of its own, which tells what they come from.
     """
     tuning = tune_eccentric(scene, runs=0)
     run = simulate_eccentric(scene, seed=seed, progress=progress)
     locked = locked_run(scene, progress=progress)
-    moved = moved_runs(scene, _judged, seed=scene.run.seed if seed is None else seed)
-    requirements = (*(_with_intervals(row, moved) for row in _of_run(scene, run)), *_of_loops(tuning.gains))
+    number = scene.run.seed if seed is None else seed
+    moved, drawn = moved_runs(scene, _judged, seed=number), drawn_runs(scene, _judged, seed=number)
+    rows = (_with_intervals(row, moved, drawn) for row in _of_run(scene, run))
+    requirements = (*rows, *_of_loops(tuning.gains))
     return EccentricStudy(scene=scene, run=run, locked=locked, tuning=tuning, requirements=requirements)
 
 
@@ -185,35 +198,29 @@ def _judged(scene: EccentricScene, run: EccentricRun) -> Judged:
     }
 
 
-def _with_intervals(row: Requirement, moved: Mapping[str, list[Judged]]) -> Requirement:
-    if not moved or row.achieved is None:
+def _with_intervals(
+    row: Requirement, moved: Mapping[str, list[Judged]], drawn: Sequence[Judged]
+) -> Requirement:
+    if not drawn or row.achieved is None:
         return row
-    achieved, required, excess = (
-        effects(value, moved, f"{row.quantity}.{side}")
-        for side, value in (("achieved", row.achieved), ("required", row.required), ("excess", row.excess))
-    )
-    worse, better = _together(excess)
     return replace(
         row,
-        required_interval=_interval(row.required, required),
-        achieved_interval=_interval(row.achieved, achieved),
-        effects=excess,
+        required_interval=_interval(row.required, drawn, f"{row.quantity}.required"),
+        achieved_interval=_interval(row.achieved, drawn, f"{row.quantity}.achieved"),
+        excess_interval=_interval(row.excess, drawn, f"{row.quantity}.excess"),
+        effects=effects(row.excess, moved, f"{row.quantity}.excess"),
         lost=lost(moved, f"{row.quantity}.achieved"),
-        least_excess=-worse,
-        most_excess=better,
+        reached=sum(run[f"{row.quantity}.achieved"] is not None for run in drawn) / len(drawn),
     )
 
 
-def _together(changes: Mapping[str, Interval]) -> Interval:
-    """Of independent causes: roots of the sums of squares."""
-    return math.hypot(*(down for down, _ in changes.values())), math.hypot(
-        *(up for _, up in changes.values())
-    )
-
-
-def _interval(value: float, changes: Mapping[str, Interval]) -> Interval | None:
-    down, up = _together(changes)
-    return (max(value - down, 0.0), value + up) if max(down, up) > _ROUNDING * abs(value) else None
+def _interval(value: float, drawn: Sequence[Judged], name: str) -> Interval | None:
+    """None where nothing moves it, or too few runs come to it."""
+    known = [number for run in drawn if (number := run[name]) is not None]
+    if len(known) < _FEWEST:
+        return None
+    low, high = interval(value, known)
+    return (low, high) if high - low > _ROUNDING * abs(value) else None
 
 
 def _largest_balanced(run: EccentricRun) -> float | None:

@@ -6,7 +6,7 @@ The plant is moved, not what the controller is configured with: it does not know
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -21,9 +21,9 @@ from ringbalance.scene.uncertain import NORMAL_95, eccentric_moved
 Judged = Mapping[str, float | None]
 """Numbers that a run comes to, by name; None: it does not come to it."""
 NOISE: Final = "sensor.noise"
-_SEEDS: Final = 4
-_STUDENT: Final = 2.776
-"""97.5 % quantile of Student's t with four degrees of freedom: of five runs."""
+_SEEDS: Final = 2
+DRAWS: Final = 39
+"""Of so many: 95 % of further ones lie between least and greatest, or between an end and the second."""
 
 
 def moved_runs(
@@ -45,6 +45,34 @@ def moved_runs(
         for each in scene.uncertainty
     }
     return moved | {NOISE: [came_to(scene, seed + more) for more in range(1, _SEEDS + 1)]}
+
+
+def drawn_runs(
+    scene: EccentricScene, judge: Callable[[EccentricScene, EccentricRun], Judged], *, seed: int
+) -> list[Judged]:
+    """What runs come to with all stated inputs, and the noise, drawn at once; empty: none is stated."""
+    if not scene.uncertainty:
+        return []
+    settings = strategy_settings(scene)
+    plants = (
+        (drawn_plant(scene, np.random.default_rng(np.random.SeedSequence(number, spawn_key=(1,)))), number)
+        for number in range(seed + 1, seed + 1 + DRAWS)
+    )
+    return [judge(plant, simulate_eccentric(plant, seed=n, settings=settings)) for plant, n in plants]
+
+
+def interval(value: float, drawn: Sequence[float]) -> tuple[float, float]:
+    """Both ends between which 95 % of what is drawn lies; the value as the scene says is among them.
+
+    An amplitude is least where nothing is wrong: such a value lies at the end of what is drawn, not in its
+    middle, and a sum of squares of the effects of single inputs would count an end that nothing reaches.
+    Source: order statistics; of n draws, a further one falls between two with i others between them with
+        probability (i + 1)/(n + 1), whatever the distribution.
+    """
+    low, *_, high = ordered = sorted(drawn)
+    if value < low:
+        return value, ordered[-2]
+    return (ordered[1], value) if value > high else (low, high)
 
 
 def _both_ends(scene: EccentricScene, uncertain: InputUncertainty) -> Iterator[EccentricScene]:
@@ -71,14 +99,10 @@ def _drawn(uncertain: InputUncertainty, part: float) -> Callable[[float], float]
 
 
 def effects(value: float, moved: Mapping[str, list[Judged]], name: str) -> dict[str, tuple[float, float]]:
-    """By how much each cause alone lowers and raises a number, both at least zero; of noise at 95 %."""
+    """By how much each cause alone lowers and raises a number, both at least zero."""
     found = {}
     for path, runs in moved.items():
-        changes = [number - value for run in runs if (number := run[name]) is not None]
-        if path == NOISE and changes:
-            width = _STUDENT * float(np.std([0.0, *changes], ddof=1))
-            found[path] = (width, width)
-        elif changes:
+        if changes := [number - value for run in runs if (number := run[name]) is not None]:
             found[path] = (max(0.0, -min(changes)), max(0.0, *changes))
     return found
 

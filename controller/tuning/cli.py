@@ -17,12 +17,13 @@ from ringbalance.controller.tuning.eccentric import (
 )
 from ringbalance.controller.tuning.tune import Tuning, tuning_document
 from ringbalance.controller.tuning.tune import tune as tune_scene
+from ringbalance.reduced_model.calibration import law_by_name
 from ringbalance.reduced_model.gas_line import line_text, line_warning
-from ringbalance.reduced_model.law_by_name import law_by_name
 from ringbalance.reduced_model.selection.registry import neglected_in_injections
 from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.loader import load_scene
+from ringbalance.scene.narrowing import checked_law
 from ringbalance.scene.platform.progress import activity
 from ringbalance.scene.platform.terminal import results_console
 
@@ -57,6 +58,7 @@ def tune(
         SceneError: a scene or a law that cannot be used.
     """
     given = with_tolerance(load_scene(scene), tolerance=tolerance, models=models)
+    checked_law(given, law)
     if isinstance(given, EccentricScene):
         return _eccentric_masses(given, json=json)
     with activity("tune", f"flow law: {law} ...") as shown:

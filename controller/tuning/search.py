@@ -11,7 +11,7 @@ from ringbalance.controller.algorithms.by_name import target_vector_of
 from ringbalance.controller.tuning.dead_time import compensated, dead_times, offset_text
 from ringbalance.controller.tuning.loop_factor import loop_factor, with_driving_gas
 from ringbalance.controller.tuning.recommendation import FactorUncertainty, recommended_gain
-from ringbalance.controller.tuning.settling import Progress, SettlingTimes, tried
+from ringbalance.controller.tuning.settling import Progress, SettlingTimes, many_runs, tried
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.models import Scene
 
@@ -23,6 +23,12 @@ _PRESSURES: Final = (1.25, 1.5)
 """Times the scene's: a shorter dead time, and a faster flow."""
 LIMITS: Final = (1.5, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0)
 """Times the scene's, of which the lowest that is reached is reported."""
+_OPENINGS: Final = (0.5, 0.2, 0.1)
+"""Times the scene's shortest valve-open time, likewise."""
+_PROMISING: Final = 0.5
+"""Fraction of the runs from which on an integral part may make up for the rest."""
+VALVES: Final = (2.0, 3.0, 5.0, 10.0)
+"""Times the scene's conductance and over its lag, of which the slowest that settles is reported."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,9 +61,17 @@ class Search:
     """Whether all of its few runs settle."""
     needs: float | None
     """s, in which they have settled and held; None: they have not."""
-    limit: float | None
-    """Lowest limit of the vibration that is reached where the scene's is not, m; None: none is."""
     tried: tuple[Tried, ...]
+    limit: float | None = None
+    """Lowest limit of the vibration that 95 % of many runs reach where the scene's is not reached, m."""
+    valve: float | None = None
+    """Times as fast a valve and line, with which they reach the scene's limit."""
+    opening: float | None = None
+    """Shortest valve-open time with which they do, s; tried where the scene's is too long for the limit."""
+
+    def needs_more_than(self, time: float) -> bool:
+        """Whether its few runs settle, and that takes longer than a time, s."""
+        return self.needs is not None and self.needs > time
 
 
 def recommended(scene: Scene, model: BalancerModel, known: FactorUncertainty) -> Candidate | None:
@@ -107,7 +121,7 @@ def search(
     settled: float,
     told: Progress,
 ) -> Search:
-    """Try one candidate after the other until one settles; then the limit, where none does.
+    """Try one candidate after the other until one settles.
 
     Args: `settled`: fraction of many runs that settle in the scene's time limit with `base`, which is all
         right only where a few runs show that more time would do.
@@ -128,9 +142,8 @@ def search(
         if share > most:
             best, most = each, share
         if most >= 1.0:
-            return Search(best=each, settles=True, needs=held, limit=None, tried=tuple(rows))
-    limit = next(_reached(replace(scene, gas=best.scene.gas), model, known, rows, told), None)
-    return Search(best=best, settles=False, needs=None, limit=limit, tried=tuple(rows))
+            return Search(best=each, settles=True, needs=held, tried=tuple(rows))
+    return Search(best=best, settles=False, needs=None, tried=tuple(rows))
 
 
 def _try(
@@ -183,16 +196,69 @@ def _gain(gain: float) -> str:
     return f'"{gain * 1e-6:.3g} s/um"'
 
 
-def _reached(
-    scene: Scene, model: BalancerModel, known: FactorUncertainty, rows: list[Tried], told: Progress
-) -> Iterator[float]:
-    for factor in LIMITS:
-        limit = factor * scene.controller.limit
+def with_ways_out(
+    found: Search,
+    scene: Scene,
+    model: BalancerModel,
+    known: FactorUncertainty,
+    *,
+    members: int,
+    runs: int,
+    told: Progress,
+) -> Search:
+    """What else lets 95 % of as many runs settle as the recommended settings are judged by."""
+    rows, asked = list(found.tried), replace(scene, gas=found.best.scene.gas)
+
+    def settled(each: Candidate, text: str) -> SettlingTimes:
+        what = ", ".join(t for t in (text, each.change) if t)
+        told(f"{what} ...")
+        many = many_runs(each.scene, model, known.widths, members=members, runs=runs, told=lambda _: None)
+        rows.append(Tried(change=what, settled=many.settled.value, runs=many.runs))
+        return many
+
+    def settles(each: Candidate, text: str) -> bool:
+        found = settled(each, text)
+        if found.quantiles["p95"] is None and found.settled.value >= _PROMISING:
+            return any(settled(one, text).quantiles["p95"] is not None for one in _pushed(each))
+        return found.quantiles["p95"] is not None
+
+    def first(ways: Iterator[tuple[float, Scene, str]]) -> float | None:
+        for value, changed, text in ways:
+            each = recommended(changed, model, known)
+            if each is not None and settles(each, text):
+                return value
+        return None
+
+    found = replace(
+        found,
+        limit=first(_limits(asked)),
+        valve=first(_valves(asked)),
+        opening=first(_openings(asked, found.best)),
+    )
+    return replace(found, tried=tuple(rows))
+
+
+def _openings(scene: Scene, best: Candidate) -> Iterator[tuple[float, Scene, str]]:
+    """Shorter ones, where at the limit the gain asks for less than the scene's."""
+    settings = scene.controller
+    if settings.minimum_gas_time <= best.scene.controller.proportional * settings.limit:
+        return
+    for time in (factor * settings.minimum_gas_time for factor in _OPENINGS):
+        shorter = replace(scene, controller=replace(settings, minimum_gas_time=time))
+        yield time, shorter, f'controller.minimum_gas_time = "{1e3 * time:.3g} ms"'
+
+
+def _limits(scene: Scene) -> Iterator[tuple[float, Scene, str]]:
+    for limit in (factor * scene.controller.limit for factor in LIMITS):
         wider = replace(scene, controller=replace(scene.controller, limit=limit))
-        each = recommended(wider, model, known)
-        if each is None:
-            continue
-        text = f'controller.limit = "{1e6 * limit:.3g} um"'
-        listed = replace(each, change=", ".join(t for t in (text, each.change) if t))
-        if _try(listed, model, known, rows, told).settled.value >= 1.0:
-            yield limit
+        yield limit, wider, f'controller.limit = "{1e6 * limit:.3g} um"'
+
+
+def _valves(scene: Scene) -> Iterator[tuple[float, Scene, str]]:
+    gas = scene.gas
+    if gas.conductance is None:
+        return
+    for factor in VALVES:
+        lag = None if gas.valve_lag is None else gas.valve_lag / factor
+        faster = replace(gas, conductance=factor * gas.conductance, valve_lag=lag)
+        yield factor, replace(scene, gas=faster), f"a valve and line {factor:.3g} times as fast"

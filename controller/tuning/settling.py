@@ -80,6 +80,17 @@ class SettlingTimes:
 def settling_times(
     scene: Scene, model: BalancerModel, widths: MemberUncertainty, *, members: int, runs: int, told: Progress
 ) -> SettlingTimes:
+    """`many_runs`, and what keeps them from settling where 95 % do not."""
+    found = many_runs(scene, model, widths, members=members, runs=runs, told=told)
+    if found.quantiles["p95"] is not None:
+        return found
+    beyond, driven = _beyond_capacity(scene, model, widths, runs=found.runs)
+    return replace(found, beyond_capacity=beyond, beyond_pressure=driven)
+
+
+def many_runs(
+    scene: Scene, model: BalancerModel, widths: MemberUncertainty, *, members: int, runs: int, told: Progress
+) -> SettlingTimes:
     """Few runs first, and more where these leave it open that 95 % settle.
 
     Args: `members`: the most of compiled runs. `runs`: the most of others.
@@ -90,11 +101,8 @@ def settling_times(
     first = (FIRST_MEMBERS if moving else most) if compiled else FIRST_RUNS
     found = _runs(scene, model, widths, number=min(first, most), told=told)
     if first < most and found.settled.high >= QUANTILES["p95"]:
-        found = _runs(scene, model, widths, number=most, told=told)
-    if found.quantiles["p95"] is not None:
-        return found
-    beyond, driven = _beyond_capacity(scene, model, widths, runs=most)
-    return replace(found, beyond_capacity=beyond, beyond_pressure=driven)
+        return _runs(scene, model, widths, number=most, told=told)
+    return found
 
 
 def tried(scene: Scene, model: BalancerModel, widths: MemberUncertainty, *, told: Progress) -> SettlingTimes:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ringbalance.controller.liquid_ring.reach import BEYOND_CAPACITY, RUNS_BACK
 from ringbalance.controller.tuning.loop_factor import LoopFactor
-from ringbalance.controller.tuning.search import LIMITS, Candidate, Search
+from ringbalance.controller.tuning.search import LIMITS, VALVES, Candidate, Search
 from ringbalance.controller.tuning.settling import SettlingTimes
 from ringbalance.scene.models import Scene
 
@@ -43,11 +43,11 @@ def status_of(
     reached = settling.quantiles["p95"]
     if reached is not None:
         return f"tuned{also}: 95 % of the runs settle within {reached:.3g} s"
-    if max(zone, smallest / 2) > limit:
+    if max(zone, smallest / 2) > limit and not settling.out_of_capacity:
         return (
             f"the valve is too slow for the limit of {limit * um:.4g} um: the shortest valve-open time moves "
-            f"the vibration by {smallest * um:.4g} um, and up to {zone * um:.4g} um none moves liquid: "
-            f"lower controller.minimum_gas_time{_reached(found)}"
+            f"the vibration by {smallest * um:.4g} um, and up to {zone * um:.4g} um none transfers liquid: "
+            f"{_ways_out(found)}"
         )
     return _unsettled(scene, settling, also=also, found=found)
 
@@ -63,7 +63,7 @@ def _unsettled(scene: Scene, settling: SettlingTimes, *, also: str, found: Searc
             f"{share}; {settling.beyond_capacity:.1%} of the runs would need more moment than the disc "
             f"can form above its residual fill: {BEYOND_CAPACITY}"
         )
-    if found is not None and found.needs is not None and found.needs > scene.run.time_limit:
+    if found is not None and found.needs is not None and found.needs_more_than(scene.run.time_limit):
         return f"{share}; they need some {found.needs:.2g} s: raise run.time_limit"
     if settling.explained_by(settling.beyond_pressure):
         return (
@@ -75,20 +75,26 @@ def _unsettled(scene: Scene, settling: SettlingTimes, *, also: str, found: Searc
             f"{share}, nor by other gains and pressures; in {settling.drifted:.1%} of the runs the full tube "
             f"lets liquid run back while the gas is off: {RUNS_BACK}"
         )
-    if found is not None and found.settles:
-        return f"{share}: raise controller.limit"
-    return f"{share}, nor by other gains and pressures{_reached(found)}"
+    others = "" if found is None or found.settles else ", nor by other gains and pressures"
+    return f"{share}{others}: {_ways_out(found)}"
 
 
-def _reached(found: Search | None) -> str:
-    """What to do about a limit that is out of reach."""
+def _ways_out(found: Search | None) -> str:
+    """What lets 95 % of as many runs settle."""
     if found is None:
-        return " or raise controller.limit"
-    if found.limit is None:
-        return (
-            f"; no limit up to {LIMITS[-1]:.3g} times as high is reached: take a faster valve or a larger "
-            "conductance"
+        return "raise controller.limit"
+    ways = [
+        text.format(value)
+        for value, text in (
+            (found.opening and 1e3 * found.opening, "lower controller.minimum_gas_time to {:.3g} ms"),
+            (found.limit and 1e6 * found.limit, "raise controller.limit to {:.3g} um"),
+            (found.valve, "take a valve and line {:.3g} times as fast"),
         )
+        if value is not None
+    ]
+    if ways:
+        return ", or ".join(ways)
     return (
-        f"; a limit of {found.limit * 1e6:.3g} um is reached: raise controller.limit, or take a faster valve"
+        f"neither a limit {LIMITS[-1]:.3g} times as high nor a valve and line {VALVES[-1]:.3g} times as fast "
+        "would do: state less uncertainty under [uncertainty] when the machine is known better"
     )

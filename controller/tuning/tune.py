@@ -26,7 +26,7 @@ from ringbalance.controller.tuning.recommendation import (
     FactorUncertainty,
     factor_uncertainty,
 )
-from ringbalance.controller.tuning.search import Candidate, Search, recommended, search
+from ringbalance.controller.tuning.search import Candidate, Search, recommended, search, with_ways_out
 from ringbalance.controller.tuning.settling import (
     MEMBERS,
     RUNS,
@@ -120,6 +120,8 @@ def tune(
                 settling = settling_times(
                     best.scene, model, known.widths, members=members, runs=runs, told=told
                 )
+            if settling.quantiles["p95"] is None and not found.needs_more_than(scene.run.time_limit):
+                found = with_ways_out(found, scene, model, known, members=members, runs=runs, told=told)
     return _judged(scene, model, known, best=best, found=found, settling=settling)
 
 
@@ -234,6 +236,8 @@ def tuning_document(tuning: Tuning) -> dict[str, Any]:
         "change": tuning.change,
         "tried": [] if tuning.search is None else [asdict(row) for row in tuning.search.tried],
         "reachable_limit_m": None if tuning.search is None else tuning.search.limit,
+        "faster_valve": None if tuning.search is None else tuning.search.valve,
+        "shorter_opening_s": None if tuning.search is None else tuning.search.opening,
         "limit_m": scene.controller.limit,
         "beyond_capacity_m": tuning.beyond_capacity,
         "reachable": tuning.reachable,

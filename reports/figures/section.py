@@ -14,6 +14,7 @@ from matplotlib.path import Path
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import given, number
+from ringbalance.reports.prose import key_words
 from ringbalance.reports.section import Record
 from ringbalance.scene.arrays import FloatArray
 
@@ -64,7 +65,7 @@ def disc_section(found: Record) -> Drawing:
 
 
 def _assumed(found: Record) -> str:
-    names = [name.replace("_", " ") for name, origin in found["origins"].items() if origin == "assumed"]
+    names = [key_words(f"tube.{name}") for name, origin in found["origins"].items() if origin == "assumed"]
     return f" Assumed: {', '.join(names)}." if names else ""
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, Final
 
 from ringbalance.reports.equations import equation_svg
@@ -37,6 +38,8 @@ _LOPSIDED: Final = 1.2
 _FINE: Final = 0.01
 """Half-width over error below which two digits of the error say enough."""
 _NAMED_INPUTS: Final = 2
+_DIGITS: Final = 4
+"""Most that a number in brief has: the inputs leave no more standing, however fine a comparison is."""
 _RELATIVE_METRICS: Final = ("relative", "validation", "within_uncertainty")
 
 
@@ -219,8 +222,10 @@ def _in_brief(case: Record) -> Record:
     path = f"{path}.{case['quantities'].index(quantity)}"
     value_text = _brief_value(quantity)
     paper = MISSING if reference is None else traced(given(reference, unit, digits=4), f"{path}.reference")
+    if reference is None and quantity.get("value") is not None:
+        paper = _criterion(quantity)
     return {
-        "paper": _criterion(quantity) if reference is None else paper,
+        "paper": paper,
         "found": value_text if quantity.get("value") is None else traced(value_text, f"{path}.value"),
         "half_width": _width(quantity),
         "what": quantity.get("title") or "",
@@ -233,6 +238,8 @@ def _brief_value(quantity: Record) -> str:
     width = max(quantity.get("value_uncertainty") or 0.0, quantity.get("uncertainty") or 0.0)
     if value and width > abs(value) / 2:
         return given(value, quantity.get("unit") or "1", digits=2)
+    if value and 0 < width < _last_place(value) / 2:
+        return shown(value, quantity.get("unit") or "1", digits=_DIGITS)
     return _without_half_width(_value(quantity, width or None))
 
 
@@ -240,6 +247,8 @@ def _width(quantity: Record) -> str:
     """Half-width of the comparison; a range where assumed inputs move the number further one way than the
     other."""
     value, half_width = quantity.get("value"), quantity.get("uncertainty")
+    if value and half_width and half_width < (place := _last_place(value)) / 2:
+        return f"<{THIN_SPACE}{given(place, quantity.get('unit') or '1', digits=1)}"
     display = display_unit(quantity.get("unit") or "1", value)
     low, high = quantity.get("value_low"), quantity.get("value_high")
     if value is not None and low is not None and high is not None:
@@ -252,6 +261,11 @@ def _width(quantity: Record) -> str:
     return with_unit(
         number(None if not half_width else half_width * display.factor, digits=2), display.symbol
     )
+
+
+def _last_place(value: float) -> float:
+    """One unit of the last of the digits that a number in brief has."""
+    return float(10.0 ** (math.floor(math.log10(abs(value))) - _DIGITS + 1))
 
 
 def _without_half_width(text: str) -> str:

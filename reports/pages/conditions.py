@@ -7,10 +7,10 @@ from typing import Final
 
 from ringbalance.reports.figures.operation import tornado
 from ringbalance.reports.figures.style import Drawing
-from ringbalance.reports.numbers import MISSING, display_unit, fixed, given, number, percent, shown
+from ringbalance.reports.numbers import MISSING, display_unit, fixed, given, number, shown
 from ringbalance.reports.origins import named_with_origin
 from ringbalance.reports.section import Cells, Record, Section, Table
-from ringbalance.reports.traces import read, traced
+from ringbalance.reports.traces import believed, read, states_uncertainty, traced
 from ringbalance.verification.standing import budget_standing
 
 _NAMES: Final = {
@@ -26,6 +26,10 @@ _NAMES: Final = {
 }
 _EXACT: Final = 1e-6
 """Relative total below which a number is a closed form of inputs that are taken as exact."""
+_UNSTATED: Final = (
+    " The scene states no uncertainty of its inputs: what theirs would add is in no ±, and a value without "
+    "one is as good as they are."
+)
 _DRAWN: Final = {"velocity": "Velocity", "usable_moment": "Usable moment", "lambda": "Lever arm λ"}
 _REGIMES: Final = {
     "blocked": "is blocked",
@@ -58,7 +62,8 @@ def _budget_table(evidence: Record) -> Table:
     budgets = evidence["calibration"].get("budgets") or {}
     return Table(
         caption="Numbers to use, with their expanded uncertainties (95 %): ± is the root of the sum of "
-        "squares of the three parts. Pressures are gauge.",
+        "squares of the three parts. Pressures are gauge."
+        f"{'' if states_uncertainty(evidence) else _UNSTATED}",
         heads=(
             "Quantity",
             "Value ± total",
@@ -85,10 +90,11 @@ def _row(evidence: Record, name: str) -> Cells:
         _part(budget[part] * unit.factor, budget["total"] * unit.factor, f"{path}.{part}")
         for part in ("numerical", "input", "model")
     ]
-    exact = budget["total"] < _EXACT * abs(budget["value"])
+    total = believed(evidence, budget["value"], budget["total"])
+    exact = total is None or total < _EXACT * abs(budget["value"])
     parts = [MISSING] * len(parts) if exact else parts
     value = traced(
-        shown(budget["value"], budget["unit"], None if exact else budget["total"], digits=6), f"{path}.value"
+        shown(budget["value"], budget["unit"], None if exact else total, digits=4), f"{path}.value"
     )
     behind = budget_standing(evidence["verification"], name)
     return _NAMES[name], value, *parts, _largest(evidence, budget), behind, _paper(evidence, name)
@@ -113,7 +119,7 @@ def _largest(evidence: Record, budget: Record) -> str:
 def _paper(evidence: Record, name: str) -> str:
     paper, point = evidence["paper"], evidence["operating_point"]
     if name == "lambda":
-        return f"{given(paper['lambda_m'], 'm')} within {percent(paper['lambda_spread'])}"
+        return f"{traced(given(paper['lambda_m'], 'm'), 'paper.lambda_m')} on its own disc"
     if name == "drag_coefficient":
         return f"about {traced(given(paper['drag_coefficient'], '1'), 'paper.drag_coefficient')}"
     if name == "velocity":

@@ -16,7 +16,7 @@ from ringbalance.reports.studies.consequences import find_consequences
 
 _MEMBERS: Final = MappingProxyType({"light": 500, "heavy": 20_000})
 """Runs of each ensemble, by level: at 500 a probability is known to about four per cent."""
-_COLUMNS: Final = ("the paper’s law", "the calibrated law", "the calibrated law, recommended gain")
+_COLUMNS: Final = ("the paper’s law", "the calibrated law", "the calibrated law, recommended settings")
 _CHANCES: Final = (
     ("not_settled", "not settled by the time limit"),
     ("overshoot", "overshoots"),
@@ -26,8 +26,10 @@ _CHANCES: Final = (
 
 def _collect(work: Work) -> Record:
     members = _MEMBERS[work.level]
-    found = find_consequences(work.scene, work.calibration.model, retuned=work.tuning.gain, members=members)
-    return found.document()
+    tuned = work.tuning.scene if work.tuning.gain else None
+    return find_consequences(
+        work.scene, work.calibration.model, recommended=tuned, members=members
+    ).document()
 
 
 def _view(found: Record, _evidence: Record) -> Record:

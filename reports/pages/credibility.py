@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import Final
 
@@ -11,6 +12,7 @@ from ringbalance.reports.section import Cells, Record, Section, Table
 from ringbalance.verification.standing import HEADS, standing_rows
 
 _UNSURE: Final = ("assumed", "inferred", "default")
+_NOBODYS: Final = {"assumed": "are assumed", "default": "are defaults of the program"}
 
 
 def _view(_own: Record, evidence: Record) -> Record:
@@ -89,12 +91,13 @@ def _development(evidence: Record) -> list[Cells]:
 def _use(evidence: Record) -> list[Cells]:
     budgets = (evidence.get("calibration") or {}).get("budgets")
     moved = any(row["achieved_interval"] for row in evidence.get("requirements", ()))
-    assumed = sum(origin == "assumed" for origin in _inputs(evidence).values())
+    origins = Counter(row["origin"] for row in evidence["scene"].get("table") or [])
+    unsure = " and ".join(f"{origins[each]} {words}" for each, words in _NOBODYS.items() if origins[each])
     return [
         (
             "Input pedigree",
-            "1" if assumed else "2",
-            f"{assumed} inputs are assumed." if assumed else "Every input is given, measured or inferred.",
+            "1" if unsure else "2",
+            f"Of the scene’s values {unsure}." if unsure else "Every input is given, measured or inferred.",
         ),
         (
             "Uncertainty characterisation",

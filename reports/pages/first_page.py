@@ -9,7 +9,6 @@ from ringbalance.controller.loop import simulate
 from ringbalance.controller.tuning.highest_pressure import highest_pressure
 from ringbalance.controller.tuning.tune import tuning_document
 from ringbalance.reduced_model.calibration import Calibration
-from ringbalance.reduced_model.chamber.inputs import half_widths
 from ringbalance.reports.numbers import THIN_SPACE, given, number, percent, shown
 from ringbalance.reports.origins import named_with_origin
 from ringbalance.reports.pages.requirements import (
@@ -24,8 +23,9 @@ from ringbalance.reports.pages.requirements import (
 from ringbalance.reports.prose import key_words
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.reports.summary import MISSED, OPEN
-from ringbalance.reports.traces import traced
+from ringbalance.reports.traces import states_uncertainty, traced
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
+from ringbalance.scene.uncertain import half_widths
 from ringbalance.verification.assumptions import assumptions_of
 from ringbalance.verification.case import RestsOn
 from ringbalance.verification.loops import calibration_of
@@ -158,17 +158,24 @@ def loop_sentences(evidence: Record) -> list[str]:
     tuned = retuned(evidence)
     if tuned is not None:
         gain, own = (shown(r, "s/m", digits=2) for r in _gains(evidence, tuned))
-        told.append(f"Recommended gain: {gain} (the scene has {own}). With it this run {_ending(tuned)}.")
-        change = ((evidence.get("summary") or {}).get("tuning") or {}).get("change")
-        told += [f"Recommended beside it, but not part of this run: {change}."] if change else []
+        change = _change(evidence)
+        told.append(
+            f"Recommended gain: {gain} (the scene has {own}){f', with {change}' if change else ''}. "
+            f"With {'these settings' if change else 'it'} this run {_ending(tuned)}."
+        )
     paper = evidence["closed_loop"].get("paper")
     if paper is not None:
         told.append(f"Under the paper’s law, with the scene’s gain, it {_ending(paper)}.")
     return told
 
 
+def _change(evidence: Record) -> str:
+    """Keys and values that are recommended beside the gain, as keys of the scene file; empty: none."""
+    return str(((evidence.get("summary") or {}).get("tuning") or {}).get("change") or "")
+
+
 def retuned(evidence: Record) -> Record | None:
-    """The run with the recommended gain, if there is one."""
+    """The run with the recommended settings, if there are any."""
     runs = (evidence.get("consequences") or {}).get("runs", [])
     return next((run for run in runs if run.get("name") == _RETUNED), None)
 
@@ -215,9 +222,11 @@ def chance(evidence: Record) -> list[str]:
         return []
     members, until = ensembles[1]["members"], given(found["time_limit_s"], "s")
     own, tuned = (percent(1 - e["probability"]["not_settled"]["value"]) for e in ensembles[1:])
+    line = evidence["calibration"].get("gas_line") or {"given": True}
     return [
-        f"With the scene’s gain {own} of {members} runs over the stated uncertainties and the noise have "
-        f"settled by {until}, with the recommended gain {tuned}. {_tuned(found['tuning'])}"
+        f"{'With' if line['given'] else 'For a valve that acts at once: with'} the scene’s gain {own} of "
+        f"{members} runs over the stated uncertainties and the noise have settled by {until}, with the "
+        f"recommended settings {tuned}. {_tuned(found['tuning'])}"
     ]
 
 
@@ -228,7 +237,7 @@ def _tuned(tuning: Record) -> str:
     fraction, low, high = (percent(f) for f in (tuning["fraction_settled"], *tuning["fraction_settled_95"]))
     return (
         f"With the fuller models that the tolerance selects, {fraction} (95 % confidence: {low} to {high}) "
-        f"of {tuning['runs']} runs settle with the recommended gain, {percent(0.95)} of all within "
+        f"of {tuning['runs']} runs settle with the recommended settings, {percent(0.95)} of all within "
         f"{shown(reached, 's', digits=2)}."
     )
 
@@ -264,11 +273,10 @@ def _actions(evidence: Record, rows: Sequence[Requirement]) -> list[str]:
     """What to do next, the most urgent first."""
     verdicts = {row.name.split(" with ")[0]: row.verdict for row in reversed(rows)}
     told = _valve_and_gain(evidence, verdicts)
-    change = ((evidence.get("summary") or {}).get("tuning") or {}).get("change")
-    if verdicts.get(STANDING) in {MISSED, OPEN} and not change:
+    if verdicts.get(STANDING) in {MISSED, OPEN} and not _change(evidence):
         told.append(
-            "With the valve in the scene, run tune: it recommends the times to add to the valve-open times, "
-            "without which small corrections transfer no liquid."
+            "Put the valve into the scene and run tune: it recommends the times to add to the valve-open "
+            "times, without which small corrections transfer no liquid."
         )
     if verdicts.get("Correction capacity of one pair") in {MISSED, OPEN}:
         told.append("Balance the rotor better by hand, or take a larger disc: the capacity has no reserve.")
@@ -309,12 +317,13 @@ def _valve_and_gain(evidence: Record, verdicts: Mapping[str, str]) -> list[str]:
     if tuning.get("fraction_settled") is not None and tuning["fraction_settled"] < _LIKELY:
         reached = tuning.get("reachable_limit_m")
         lowest = f"; a limit of {shown(reached, 'm', digits=2)} is reached" if reached else ""
+        share = percent(tuning["fraction_settled"])
         return [
             *told,
-            f"Do not expect a gain to make this loop settle: none that was tried does{lowest}. The run with "
-            f"the scene’s gain: {evidence['closed_loop']['calibrated']['status'].rstrip('.')}.",
+            f"Do not expect settings to make this loop settle in {percent(_LIKELY)} of runs: none that were "
+            f"tried do; with the recommended ones {share} settle{lowest}.",
         ]
-    change = tuning.get("change")
+    change = _change(evidence)
     if verdicts.get("Loop factor") == MISSED or change:
         later = " for a valve that acts at once, and tune again for the valve chosen"
         beside = f", and {change}" if change else ""
@@ -346,8 +355,7 @@ def _cause(evidence: Record, cause: str, effect: float, name: str) -> str:
 
 def _exact(evidence: Record) -> list[str]:
     """That results hold for exactly the scene's values, where it states no uncertainty."""
-    rows = evidence["scene"].get("table") or []
-    if any(row.get("uncertainty") for row in rows if row.get("origin") != "default"):
+    if states_uncertainty(evidence):
         return []
     return [
         "The scene states no uncertainty of its inputs: every ± holds for exactly its values, and tolerances "

@@ -11,7 +11,7 @@ from ringbalance.reports.pages.first_page import chance, retuned
 from ringbalance.reports.section import Cells, Record, Section, Table, Work
 
 _MICROMETRE: Final = 1e6
-_GAINS: Final = {1: "with the scene’s gain", 2: "with the recommended gain"}
+_GAINS: Final = {1: "with the scene’s gain", 2: "with the recommended settings"}
 """Titles of the calibrated law's ensembles, by their place in the evidence."""
 
 
@@ -56,7 +56,7 @@ def _loop_table(evidence: Record) -> Table:
     runs = evidence["closed_loop"]
     columns = {
         "Calibrated law,\nthe scene’s gain": runs.get("calibrated"),
-        "Calibrated law,\nrecommended gain": retuned(evidence),
+        "Calibrated law,\nrecommended settings": retuned(evidence),
         "The paper’s law,\nthe scene’s gain": runs.get("paper"),
     }
 

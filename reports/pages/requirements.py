@@ -250,7 +250,7 @@ def _settling(evidence: Record) -> Requirement | None:
     # Runs that do not settle at all are judged, whether or not a time is required.
     unasked = wanted is None and times.get("p95") is not None
     return Requirement(
-        name="Settling time with the recommended gain",
+        name="Settling time with the recommended settings",
         wanted=_NONE if unasked else f"at most {given(until, 's')} in {percent(_LIKELY)} of runs",
         result=f"{_times(evidence, times)}settled: "
         f"{traced(percent(tuning['fraction_settled']), 'summary.tuning.fraction_settled')} of "
@@ -285,7 +285,7 @@ def _residual_row(evidence: Record) -> Requirement | None:
         return None
     noise, limit = STAYING_DEVIATIONS * evidence_at(evidence, path), wanted["residual_m"]
     moment = read(evidence, "summary.requirement.residual_moment_kg_m", "kg m", digits=2)
-    gain = "the recommended gain" if tuning.get("stationary_deviation_m") else "the scene’s gain"
+    gain = "the recommended settings" if tuning.get("stationary_deviation_m") else "the scene’s gain"
     alone = below((noise,), limit)
     verdict = worst(alone, _line_verdict(evidence), _settles(evidence))
     return Requirement(
@@ -363,7 +363,7 @@ def _line_verdict(evidence: Record) -> str:
 
 
 def _settles(evidence: Record) -> str:
-    """Whether runs with the recommended gain settle, late or not; met where no runs were made."""
+    """Whether runs with the recommended settings settle, late or not; met where no runs were made."""
     tuning = _tuning(evidence)
     if not tuning.get("runs") or tuning.get("fraction_settled") is None:
         return MET
@@ -384,7 +384,7 @@ def _grade_row(evidence: Record) -> Requirement | None:
     return Requirement(
         name="Balance quality grade (ISO 21940-11) where the residual is met",
         wanted=_NONE if bound is None else f"at most G {number(1e3 * bound, digits=3)}",
-        result=f"G {traced(number(1e3 * reached, digits=2), path)}, in mm/s",
+        result=f"G {traced(number(1e3 * reached, digits=2), path)}",
         verdict=verdict,
         rests=resting(evidence, "rotor.mass", "rotor.influence_coefficient"),
         required=bound if verdict == below((reached,), bound or reached) else None,

@@ -59,7 +59,7 @@ class Consequences:
     retuned_proportional: float | None
     """Kc recommended for the calibrated law, s/m; None when nothing flows."""
     ensembles: tuple[Ensemble, ...]
-    """The paper's law, the calibrated one, and the calibrated one with the re-tuned gain."""
+    """The paper's law, the calibrated one, and the calibrated one with what is recommended."""
     notes: tuple[str, ...]
     """What could not be found, and why."""
     findings: tuple[str, ...]
@@ -83,13 +83,13 @@ def find_consequences(
     calibrated: BalancerModel,
     *,
     paper: BalancerModel | None = None,
-    retuned: float | None = None,
+    recommended: Scene | None = None,
     members: int = MEMBERS,
 ) -> Consequences:
     """Run a scene's target-vector controller under both laws, with its margins, re-tuned, and law-based.
 
     Args: `scene`: the scene; its controller's `kind` is not looked at. `paper`: by the paper's law; default
-    `paper_model(scene)`. `retuned`: Kc, s/m; default `recommended_gain`.
+    `paper_model(scene)`. `recommended`: the scene as tuned; default with `recommended_gain`.
     Raises: SceneError: a rotor too slow to form a ring, or a model made for another disc.
     Source: sections 5 and 6 of the liquid-ring paper; the comparison is this program's.
     """
@@ -97,15 +97,15 @@ def find_consequences(
     notes = _assumed(scene)
     transfers = {m.name: _transfer(scene, m, notes) for m in (nominal, calibrated)}
     gains = {m.name: _gain(scene, m, transfers[m.name], notes) for m in (nominal, calibrated)}
-    retuned = retuned or _recommended(scene, calibrated)
-    tuned = scene if retuned is None else _with_gain(scene, retuned)
-    asked = [(scene, nominal), (scene, calibrated)] + ([(tuned, calibrated)] if retuned else [])
+    tuned = recommended or _recommended(scene, calibrated)
+    retuned = None if tuned is None else tuned.controller.proportional
+    asked = [(scene, nominal), (scene, calibrated)] + ([(tuned, calibrated)] if tuned else [])
     ensembles = [
         simulate_ensemble(own, model, members, scene.run.seed, transfer=transfer)
         for own, model in asked
-        if (transfer := transfers[model.name]) is not None
+        if (transfer := _on(own, scene, model, transfers[model.name], notes)) is not None
     ]
-    runs = _runs(scene, tuned if retuned else None, nominal, calibrated)
+    runs = _runs(scene, tuned, nominal, calibrated)
     return Consequences(
         scene=scene.name,
         runs=runs,
@@ -124,8 +124,11 @@ def _assumed(scene: Scene) -> list[str]:
     return [f"These results rest on inputs that nobody gave: {', '.join(named)}."] if named else []
 
 
-def _with_gain(scene: Scene, proportional: float) -> Scene:
-    return replace(scene, controller=replace(scene.controller, proportional=proportional))
+def _on(
+    own: Scene, scene: Scene, model: BalancerModel, transfer: PairTransfer | None, notes: list[str]
+) -> PairTransfer | None:
+    """The transfer of a scene, made again only where its gas is another one."""
+    return transfer if own.gas == scene.gas else _transfer(own, model, notes)
 
 
 def _transfer(scene: Scene, model: BalancerModel, notes: list[str]) -> PairTransfer | None:
@@ -145,9 +148,10 @@ def _gain(
     return found
 
 
-def _recommended(scene: Scene, model: BalancerModel) -> float | None:
+def _recommended(scene: Scene, model: BalancerModel) -> Scene | None:
     loop = loop_factor(scene, model, target_vector_of(scene))
-    return recommended_gain(scene, model, loop=loop) or None
+    gain = recommended_gain(scene, model, loop=loop)
+    return replace(scene, controller=replace(scene.controller, proportional=gain)) if gain else None
 
 
 def _runs(
@@ -168,7 +172,7 @@ def _runs(
         run("calibrated", "the calibrated law, same controller", vector, scene, calibrated, same),
     ]
     if tuned is not None:
-        title = "the calibrated law, recommended gain"
+        title = "the calibrated law, recommended settings"
         runs.append(run("calibrated_retuned", title, vector, tuned, calibrated, target_vector_of(tuned)))
     title = "the calibrated law, no gain to tune"
     runs.append(run("law_based", title, law, scene, calibrated, law_based_of(scene, calibrated)))
@@ -196,7 +200,7 @@ def _findings(
     if retuned is not None:
         told.append(f"Recommended for the calibrated law is a gain of {retuned * 1e-6:.3g} s/um.")
     told += [f"Run under {run.title}: {_ending(run.simulation)}." for run in runs]
-    for ensemble, of in zip(ensembles, ("", "", " with the recommended gain"), strict=False):
+    for ensemble, of in zip(ensembles, ("", "", " with the recommended settings"), strict=False):
         told.append(
             f"Of {ensemble.members} runs under the {ensemble.law} law{of}, {ensemble.overshoot.value:.1%} "
             "overshoot, "

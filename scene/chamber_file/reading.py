@@ -30,7 +30,7 @@ def is_step(path: Path) -> bool:
 def content_of(path: Path) -> bytes:
     """The bytes of a mesh file. Raises: MeshFileError: it cannot be read, or is larger than any mesh."""
     if path.suffix.lower() not in (*_READERS, *STEP_ENDINGS):
-        raise unreadable(f"a file that ends with {path.suffix[:20] or 'nothing'} is not read", FORMATS)
+        raise unreadable(f"a name that ends with {path.suffix[:20] or 'no .ending'} is not read", FORMATS)
     try:
         # Without blocking: a pipe that nobody writes to must not hold the program.
         handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))

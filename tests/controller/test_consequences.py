@@ -174,9 +174,8 @@ def test_the_retuned_gain_is_the_recommended_one(
     assert retuned.proportional == found.retuned_proportional
     assert retuned.simulation.settled
     assert retuned.simulation.overshoots == 0
-    told = find_consequences(
-        noisy, true_model, paper=paper_model(noisy), retuned=nominal.gain / 2, members=20
-    )
+    half = replace(noisy, controller=replace(noisy.controller, proportional=nominal.gain / 2))
+    told = find_consequences(noisy, true_model, paper=paper_model(noisy), recommended=half, members=20)
     assert told.retuned_proportional == nominal.gain / 2
 
 

@@ -13,7 +13,7 @@ from ringbalance.controller.ensemble.monte_carlo import binomial_share
 from ringbalance.controller.liquid_ring.reach import least_driven_fill
 from ringbalance.controller.tuning.loop_factor import loop_factor, usable_fill, with_driving_gas
 from ringbalance.controller.tuning.recommendation import factor_uncertainty
-from ringbalance.controller.tuning.search import Candidate, Search, search
+from ringbalance.controller.tuning.search import Candidate, Search, search, with_ways_out
 from ringbalance.controller.tuning.settling import SettlingTimes
 from ringbalance.controller.tuning.status import status_of
 from ringbalance.controller.tuning.tune import Tuning, tune
@@ -74,7 +74,7 @@ def test_gas_that_stalls_a_chamber_is_raised(scene: Scene) -> None:
         ({"beyond_capacity": 0.3}, "need more moment than the disc can form"),
         ({"beyond_pressure": 0.3}, "raise gas.pressure"),
         ({"drifted": 0.3}, "lower tube.hump_radius"),
-        ({"drifted": 0.2}, "take a faster valve"),
+        ({"drifted": 0.2}, "raise controller.limit to 1 um, or take a valve and line 3 times as fast"),
     ],
 )
 def test_what_keeps_most_of_the_runs_from_settling_is_named(
@@ -83,16 +83,13 @@ def test_what_keeps_most_of_the_runs_from_settling_is_named(
     half = binomial_share(count=10, of=20)
     settling = SettlingTimes(runs=20, settled=half, quantiles={"p50": None, "p95": None}, **cause)
     best = Candidate(scene=scene, change="", dead=())
-    status = status_of(
-        scene,
-        loop_factor(scene, paper_model(scene), target_vector_of(scene)),
-        zone=0.0,
-        smallest=0.0,
-        settling=settling,
-        best=best,
-        found=Search(best=best, settles=False, needs=None, limit=1e-6, tried=()),
-    )
-    assert words in status
+    found = Search(best=best, settles=False, needs=None, limit=1e-6, valve=3.0, tried=())
+    assert words in _status(scene, settling, found)
+
+
+def _status(scene: Scene, settling: SettlingTimes, found: Search) -> str:
+    loop = loop_factor(scene, paper_model(scene), target_vector_of(scene))
+    return status_of(scene, loop, zone=0.0, smallest=0.0, settling=settling, best=found.best, found=found)
 
 
 @pytest.mark.parametrize(
@@ -128,3 +125,39 @@ def test_what_settles_a_few_runs_is_recommended(
     found = search(scene, model, known, base=base, settled=0.1, told=lambda _: None)
     assert found.settles
     assert found.best.change == change
+
+
+def test_ways_out_are_named_only_where_many_runs_settle(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Twice the limit would do, or a line three times as fast, or a valve-open time of a fifth."""
+
+    def many(asked: Scene, *_: object, **__: object) -> SettlingTimes:
+        settings, gas = asked.controller, asked.gas
+        done = settings.limit > 0.09e-6 or (gas.conductance or 0.0) > 2.5e-8
+        done = done or settings.minimum_gas_time < 0.03
+        quantiles = {"p50": 1.0, "p95": 2.0 if done else None}
+        share = binomial_share(count=200 if done else 150, of=200)
+        return SettlingTimes(runs=200, settled=share, quantiles=quantiles)
+
+    monkeypatch.setattr("ringbalance.controller.tuning.search.many_runs", many)
+    gas = replace(scene.gas, conductance=1e-8, critical_ratio=0.3, valve_lag=6e-3)
+    slow = replace(scene, gas=gas, controller=replace(scene.controller, minimum_gas_time=0.1))
+    model, best = paper_model(slow), Candidate(scene=slow, change="", dead=())
+    found = with_ways_out(
+        Search(best=best, settles=False, needs=None, tried=()),
+        slow,
+        model,
+        factor_uncertainty(slow, model),
+        members=200,
+        runs=20,
+        told=lambda _: None,
+    )
+    assert (found.limit, found.valve) == (pytest.approx(2 * slow.controller.limit), 3.0)
+    assert found.opening == pytest.approx(0.02)
+    assert [row.settled for row in found.tried].count(1.0) == 3
+    status = _status(slow, many(slow), found)
+    ways = "lower controller.minimum_gas_time to 20 ms, or raise controller.limit to 0.1 um, or take a valve"
+    assert f"{ways} and line 3 times as fast" in status
+    nothing = replace(found, limit=None, valve=None, opening=None)
+    assert "raise" not in _status(slow, many(slow), nothing)

@@ -210,3 +210,21 @@ def test_outputs_that_cannot_be_written_are_refused_before_the_run(
     assert said in printed.err
     assert len(printed.err.strip().splitlines()) == 1
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file.csv", "folder.svg"]
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["simulate", "SMALL", "--law", "paper"], '--law = "paper": the balancer of'),
+        (["tune", "SMALL", "--law", "paper"], '--law = "paper": the balancer of'),
+        (["simulate", "SMALL", "--seed", "1.5"], "1.5 is not a whole number"),
+        (["verify", "gci_behaviour", "--workers", "0"], "--workers = 0: there is no process to work"),
+    ],
+)
+def test_an_option_that_cannot_be_meant_is_refused(
+    words: list[str], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    small = str(ringbalance.bundled_scene("driven_masses_small"))
+    assert main([small if word == "SMALL" else word for word in words]) == 2
+    out, error = capsys.readouterr()
+    assert (out, told in error, len(error.splitlines())) == ("", True, 1)

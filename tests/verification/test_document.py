@@ -48,6 +48,7 @@ def test_a_case_that_was_not_run_is_still_listed(
 
     document = case_document(run_definition(claim, made_up_code(defect=refuse), scene=paper_scene))
     assert document["verdict"] == "not run"
+    assert document["cause"] == ""
     assert document["status"] == "there is no disc"
     assert document["consequence"] == document["explanation"] == ""
     assert document["quantities"][0]["value"] is None

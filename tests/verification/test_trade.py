@@ -13,14 +13,18 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from ringbalance.cli import main
+from ringbalance.mesh.cut.tilted import tilted_liquid
 from ringbalance.physics.tube.loss import tube_loss
+from ringbalance.reduced_model.chamber.values import by_quadrature
 from ringbalance.reduced_model.selection.loss_models import TABLES
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.verification.reference.block_chambers import imported
 from ringbalance.verification.selection_studies import study as trade_module
+from ringbalance.verification.selection_studies.chamber_elements import forget_solves
 from ringbalance.verification.selection_studies.choice import Values, choose
-from ringbalance.verification.selection_studies.choices import judge
+from ringbalance.verification.selection_studies.choices import judge, random_scene
 from ringbalance.verification.selection_studies.cost import CostModel, committed_costs
 from ringbalance.verification.selection_studies.hierarchy import ModelHierarchy
 from ringbalance.verification.selection_studies.law_models import CLOSED, REGIMES, LawModels, base_law
@@ -31,7 +35,6 @@ from ringbalance.verification.selection_studies.operation import (
     settling_hierarchy,
     time_models,
 )
-from ringbalance.verification.selection_studies.scenes import random_scene
 from ringbalance.verification.selection_studies.study import (
     held_tolerance,
     thinned,
@@ -61,12 +64,7 @@ def test_a_measured_hierarchy_of_k(scene: Scene) -> None:
     hierarchy = k_hierarchy(scene)
     found = measure(hierarchy, values=Values(hierarchy), costs=choose_costs(), clock=Clock())
     errors = {m.fidelity.name: m.error for m in found.fidelities}
-    top = tube_loss(
-        tube=scene.tube,
-        liquid=scene.liquid,
-        angular_velocity=scene.rotor.speed,
-        velocity=np.array([float(point.split()[0]) for point in hierarchy.points]),
-    ).k.value
+    top = tube_loss(scene, np.array([float(point.split()[0]) for point in hierarchy.points])).k.value
     assert errors["k = 50"] == pytest.approx(float(np.max(np.abs(51 / (top + 1) - 1))), rel=1e-2)
     assert errors["finite-element tables"] == 0.0
     assert all(m.seconds is not None and m.seconds > 0 and m.memory is not None for m in found.fidelities)
@@ -144,6 +142,14 @@ def test_a_column_that_spills_is_not_taken_for_one_without_a_crest(scene: Scene)
     assert len(judged) == 2
     assert all(j.held for j in judged)
     assert max(j.cost_ratio for j in judged) <= 2.0
+
+
+def test_integrals_over_an_imported_chamber_are_made_again_to_be_timed(scene: Scene) -> None:
+    disc = imported(scene.disc, cells=(1, 4, 1))
+    by_quadrature(dataclasses.replace(scene, disc=disc), 0.25)
+    assert tilted_liquid.cache_info().currsize > 0
+    forget_solves()
+    assert tilted_liquid.cache_info().currsize == 0
 
 
 def test_a_random_scene_is_the_same_again(scene: Scene) -> None:

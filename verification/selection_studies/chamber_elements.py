@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.chamber import default_cells
+from ringbalance.mesh.cut.tilted import tilted_liquid
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics import deferred
 from ringbalance.physics.pressure.ring import RingQuantities
@@ -118,8 +119,8 @@ def with_sloshing(
 
 def forget_solves() -> None:
     """Do every solve again when it is next asked for, so that it can be timed."""
-    _elements_at.cache_clear()
-    _sloshing_factors.cache_clear()
+    for kept in (_elements_at, _sloshing_factors, tilted_liquid, deferred.wave_system):
+        kept.cache_clear()
 
 
 def sloshing_meshes(scene: Scene) -> tuple[tuple[int, int], ...]:

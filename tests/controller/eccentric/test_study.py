@@ -6,9 +6,11 @@ import json
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from ringbalance.controller.eccentric_mass.study import EccentricStudy, Requirement, eccentric_study
+from ringbalance.controller.eccentric_mass.uncertainty import DRAWS, interval
 from ringbalance.scene import bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.models import InputUncertainty
@@ -77,11 +79,33 @@ def test_the_interval_of_the_capacity_follows_from_both_inputs(study: EccentricS
     scene = uncertain(study.scene, masses__mass=(0.01, True), imbalance__mass=(0.009, False))
     row = rows_of(scene)["balancing moment"]
     assert row.achieved is not None
-    assert row.achieved_interval == pytest.approx((0.99 * row.achieved, 1.01 * row.achieved))
     need = scene.imbalance.mass * scene.imbalance.radius
-    assert row.required_interval == pytest.approx((0.95 * need, 1.05 * need))
-    assert row.least_excess == pytest.approx(-math.hypot(0.01 * row.achieved, 0.05 * need))
+    # Least and greatest of 39 lie 1.4 to 3.2 standard deviations off, at 99.9 %.
+    for ends, middle, width in (
+        (row.achieved_interval, row.achieved, 0.01 * row.achieved),
+        (row.required_interval, need, 0.05 * need),
+        (row.excess_interval, row.achieved - need, math.hypot(0.01 * row.achieved, 0.05 * need)),
+    ):
+        assert ends is not None
+        below, above = ((middle - ends[0]) / width, (ends[1] - middle) / width)
+        assert 0.6 < below < 1.9
+        assert 0.6 < above < 1.9
     assert row.verdict == "met"
+
+
+def test_95_per_cent_of_further_draws_lie_in_an_interval() -> None:
+    """Of the length of a vector of two normal components, which is least where the scene stands."""
+    random = np.random.default_rng(0)
+
+    def lengths(number: int) -> list[float]:
+        return [abs(complex(*random.standard_normal(2))) for _ in range(number)]
+
+    spans = [interval(0.0, lengths(DRAWS)) for _ in range(400)]
+    held = np.mean([np.mean([low <= one <= high for one in lengths(50)]) for low, high in spans])
+    assert held == pytest.approx(0.95, abs=0.006)
+    normal = [interval(0.0, random.standard_normal(DRAWS).tolist()) for _ in range(400)]
+    inside = [np.mean([low <= one <= high for one in random.standard_normal(50)]) for low, high in normal]
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.006)
 
 
 def test_an_unknown_stiffness_is_one_that_the_controller_does_not_know(study: EccentricStudy) -> None:
@@ -103,8 +127,8 @@ def test_an_unknown_stiffness_is_one_that_the_controller_does_not_know(study: Ec
 
 
 def test_an_input_that_loses_a_result_leaves_it_open(study: EccentricStudy) -> None:
-    """An imbalance within reach, beyond it at the upper end of its interval."""
-    row = rows_of(uncertain(study.scene, imbalance__mass=(0.95, True)))
+    """An imbalance within reach, or beyond it at the upper end of its interval."""
+    row = rows_of(uncertain(study.scene, imbalance__mass=(0.5, True)))
     reach = rows_of(uncertain(study.scene, imbalance__radius=(0.24, False)))
     assert row["settling time"].verdict == "met"
     assert reach["settling time"].lost == ("imbalance.radius",)

@@ -10,7 +10,7 @@ from ringbalance.controller.tuning.highest_pressure import highest_pressure
 from ringbalance.controller.tuning.tune import tuning_document
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.chamber.inputs import half_widths
-from ringbalance.reports.numbers import THIN_SPACE, given, number, percent, shown
+from ringbalance.reports.numbers import MISSING, THIN_SPACE, given, number, percent, shown
 from ringbalance.reports.origins import named_with_origin
 from ringbalance.reports.pages.requirements import (
     STANDING,
@@ -24,7 +24,7 @@ from ringbalance.reports.pages.requirements import (
 from ringbalance.reports.prose import key_words
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.reports.summary import MISSED, OPEN
-from ringbalance.reports.traces import states_uncertainty, traced
+from ringbalance.reports.traces import found_at, read, states_uncertainty, traced
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.verification.assumptions import assumptions_of
 from ringbalance.verification.case import RestsOn
@@ -33,7 +33,8 @@ from ringbalance.verification.runner import paper_scene
 
 _OTHER_READING: Final = "liquid_ring_paper_calibrated"
 """The paper's disc with the bore that its Fig. 7 implies under the calibrated law."""
-_RETUNED: Final = "calibrated_retuned"
+RETUNED: Final = "calibrated_retuned"
+"""Name of the run with the recommended settings."""
 _VALVE: Final = {
     OPEN: "Choose the valve before anything else is built, and put its conductance, critical ratio and lag "
     "into the scene: only a fast one can reach the limit.",
@@ -157,7 +158,7 @@ def loop_sentences(evidence: Record) -> list[str]:
     told = [f"Under the calibrated law{ideal} the loop {_ending(run)}{_factor(run)}."]
     tuned = retuned(evidence)
     if tuned is not None:
-        gain, own = (shown(r, "s/m", digits=2) for r in _gains(evidence, tuned))
+        gain, own = (_gain_of(evidence, name) for name in (RETUNED, "calibrated"))
         change = _change(evidence)
         told.append(
             f"Recommended gain: {gain} (the scene has {own}){f', with {change}' if change else ''}. "
@@ -176,8 +177,14 @@ def _change(evidence: Record) -> str:
 
 def retuned(evidence: Record) -> Record | None:
     """The run with the recommended settings, if there are any."""
+    place = place_of_run(evidence, RETUNED)
+    return None if place is None else evidence["consequences"]["runs"][place]
+
+
+def place_of_run(evidence: Record, name: str) -> int | None:
+    """Position of a run among those of the consequences; None where it is not among them."""
     runs = (evidence.get("consequences") or {}).get("runs", [])
-    return next((run for run in runs if run.get("name") == _RETUNED), None)
+    return next((place for place, run in enumerate(runs) if run.get("name") == name), None)
 
 
 def _ending(run: Record) -> str:
@@ -186,10 +193,9 @@ def _ending(run: Record) -> str:
     return f"{_ENDINGS[verdict]}{when}"
 
 
-def _gains(evidence: Record, tuned: Record) -> tuple[float, float | None]:
-    runs = evidence["consequences"]["runs"]
-    own: Record = next((run for run in runs if run.get("name") == "calibrated"), {})
-    return tuned["proportional_s_per_m"], own.get("proportional_s_per_m")
+def _gain_of(evidence: Record, name: str) -> str:
+    path = f"consequences.runs.{place_of_run(evidence, name)}.proportional_s_per_m"
+    return MISSING if found_at(evidence, path) is None else read(evidence, path, "s/m", digits=2)
 
 
 def _factor(run: Record) -> str:

@@ -42,7 +42,7 @@ _VALVE: Final = {
     "with {valve} the last corrections are larger than the limit, whatever the gain.",
 }
 """What to do about a valve that may not, or cannot, reach the limit."""
-_LIKELY: Final = 0.95
+LIKELY: Final = 0.95
 """Fraction of runs that must settle before a gain is recommended for use."""
 _ROTOR: Final = ("rotor.influence_coefficient", "rotor.lag_angle", "rotor.initial_amplitude")
 _DOMINANT: Final = 3
@@ -220,34 +220,6 @@ def _factor(run: Record) -> str:
     return f". One injection removes {value} times a small residual, {end}"
 
 
-def chance(evidence: Record) -> list[str]:
-    """Fractions of the ensembles that have settled by the end, with the scene's gain and the recommended."""
-    ensembles = (evidence.get("consequences") or {}).get("ensembles", [])
-    found = evidence.get("summary")
-    if len(ensembles) < 3 or not found:
-        return []
-    members, until = ensembles[1]["members"], given(found["time_limit_s"], "s")
-    own, tuned = (percent(1 - e["probability"]["not_settled"]["value"]) for e in ensembles[1:])
-    line = evidence["calibration"].get("gas_line") or {"given": True}
-    return [
-        f"{'With' if line['given'] else 'For a valve that acts at once: with'} the scene’s gain {own} of "
-        f"{members} runs over the stated uncertainties and the noise have settled by {until}, with the "
-        f"recommended settings {tuned}. {_tuned(found['tuning'])}"
-    ]
-
-
-def _tuned(tuning: Record) -> str:
-    reached = (tuning["settling_time_s"] or {}).get("p95")
-    if reached is None:
-        return f"{tuning['status'][0].upper()}{tuning['status'][1:]}."
-    fraction, low, high = (percent(f) for f in (tuning["fraction_settled"], *tuning["fraction_settled_95"]))
-    return (
-        f"With the fuller models that the tolerance selects, {fraction} (95 % confidence: {low} to {high}) "
-        f"of {tuning['runs']} runs settle with the recommended settings, {percent(0.95)} of all within "
-        f"{shown(reached, 's', digits=2)}."
-    )
-
-
 def _dry(evidence: Record) -> list[str]:
     run = evidence["closed_loop"].get("calibrated") or {"injections": []}
     warning = (run.get("gas") or {}).get("warning")
@@ -320,13 +292,13 @@ def _valve_and_gain(evidence: Record, verdicts: Mapping[str, str]) -> list[str]:
     if tuned is None:
         return told
     gain = shown(tuned["proportional_s_per_m"], "s/m", digits=2)
-    if tuning.get("fraction_settled") is not None and tuning["fraction_settled"] < _LIKELY:
+    if tuning.get("fraction_settled") is not None and tuning["fraction_settled"] < LIKELY:
         reached = tuning.get("reachable_limit_m")
         lowest = f"; a limit of {shown(reached, 'm', digits=2)} is reached" if reached else ""
         share = percent(tuning["fraction_settled"])
         return [
             *told,
-            f"Do not expect settings to make this loop settle in {percent(_LIKELY)} of runs: none that were "
+            f"Do not expect settings to make this loop settle in {percent(LIKELY)} of runs: none that were "
             f"tried do; with the recommended ones {share} settle{lowest}.",
         ]
     change = _change(evidence)

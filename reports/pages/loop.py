@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from ringbalance.reports.figures.operation import residual_polar, settling_histogram
-from ringbalance.reports.numbers import MISSING, given, number, shown
-from ringbalance.reports.pages.first_page import RETUNED, chance, place_of_run
+from ringbalance.reports.numbers import MISSING, given, number, percent, shown
+from ringbalance.reports.pages.first_page import RETUNED, place_of_run
 from ringbalance.reports.section import Cells, Record, Section, Table, Work
 from ringbalance.reports.traces import found_at, traced
 
@@ -30,11 +30,39 @@ def _reach(work: Work) -> Record:
 def _view(found: Record, evidence: Record) -> Record:
     run = evidence["closed_loop"].get("calibrated")
     return {
-        "chance": chance(evidence),
+        "chance": _chance(evidence),
         "table": _loop_table(evidence),
         "polar": residual_polar(run, found) if run and found else None,
         "settling": settling_histogram(_samples(found, evidence)) if found else None,
     }
+
+
+def _chance(evidence: Record) -> list[str]:
+    """Fractions of the ensembles that have settled by the end, with the scene's gain and the recommended."""
+    ensembles = (evidence.get("consequences") or {}).get("ensembles", [])
+    found = evidence.get("summary")
+    if len(ensembles) < 3 or not found:
+        return []
+    members, until = ensembles[1]["members"], given(found["time_limit_s"], "s")
+    own, tuned = (percent(1 - e["probability"]["not_settled"]["value"]) for e in ensembles[1:])
+    line = evidence["calibration"].get("gas_line") or {"given": True}
+    return [
+        f"{'With' if line['given'] else 'For a valve that acts at once: with'} the scene’s gain {own} of "
+        f"{members} runs over the stated uncertainties and the noise have settled by {until}, with the "
+        f"recommended settings {tuned}. {_tuned(found['tuning'])}"
+    ]
+
+
+def _tuned(tuning: Record) -> str:
+    reached = (tuning["settling_time_s"] or {}).get("p95")
+    if reached is None:
+        return f"{tuning['status'][0].upper()}{tuning['status'][1:]}."
+    fraction, low, high = (percent(f) for f in (tuning["fraction_settled"], *tuning["fraction_settled_95"]))
+    return (
+        f"With the fuller models that the tolerance selects, {fraction} (95 % confidence: {low} to {high}) "
+        f"of {tuning['runs']} runs settle with the recommended settings, {percent(0.95)} of all within "
+        f"{shown(reached, 's', digits=2)}."
+    )
 
 
 def _samples(found: Record, evidence: Record) -> list[Record]:

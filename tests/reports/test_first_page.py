@@ -18,7 +18,7 @@ from ringbalance.reports.pages.requirements import (
     requirements,
 )
 from ringbalance.reports.summary import OPEN
-from ringbalance.reports.traces import read, untraced
+from ringbalance.reports.traces import untraced
 from ringbalance.scene import Scene
 from ringbalance.verification.loops import calibration_of
 
@@ -392,13 +392,3 @@ def test_settling_beyond_stability_is_called_chance(evidence: Record) -> None:
     assert untraced(loop_sentences(evidence)[0]).endswith(
         "so that it grows; that this run settles is chance."
     )
-
-
-def test_a_number_is_not_finer_than_inputs_of_which_nothing_is_said(evidence: Record) -> None:
-    row = {"origin": "given", "uncertainty": "1 %"}
-    stated = {**evidence, "scene": {**evidence["scene"], "table": [row]}, "length_m": 0.123456}
-    bare = {**stated, "scene": {**evidence["scene"], "table": [{**row, "uncertainty": ""}]}}
-    assert untraced(read(stated, "length_m", "m", width=1e-5)) == "(123.456\u00a0±\u00a00.010)\u202fmm"
-    assert untraced(read(bare, "length_m", "m", width=1e-5)) == "123.5\u202fmm"
-    wide = (untraced(read(each, "length_m", "m", width=1e-3)) for each in (bare, stated))
-    assert len(set(wide)) == 1

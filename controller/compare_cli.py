@@ -14,7 +14,7 @@ from rich.table import Table
 from ringbalance.controller.compare import Comparison, Side
 from ringbalance.controller.compare import compare as compare_scenes
 from ringbalance.controller.tuning.dead_time import offset_text
-from ringbalance.reduced_model.law_by_name import law_by_name
+from ringbalance.reduced_model.calibration import law_by_name
 from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.models import Scene
@@ -79,7 +79,8 @@ def _show(comparison: Comparison, console: Console) -> None:
         f"over {comparison.span:.4g} s, medians (smallest to largest)",
         highlight=False,
     )
-    table = Table("", *(side.scene.name for side in comparison.sides))
+    names = [side.scene.name for side in comparison.sides]
+    table = Table("", *(names if len(set(names)) > 1 else [side.scene.source for side in comparison.sides]))
     rows = {
         "balancer": [side.scene.balancer.replace("_", " ") for side in comparison.sides],
         "tuned": [tuned_text(side) for side in comparison.sides],

@@ -22,6 +22,7 @@ from ringbalance.scene import liquid_ring_scene, load_scene, read_scene
 from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.faults import option_error
+from ringbalance.scene.platform.clock import since_start
 from ringbalance.scene.platform.files import staged
 from ringbalance.scene.platform.progress import activity
 from ringbalance.scene.platform.terminal import messages_console
@@ -115,4 +116,4 @@ def _summarise(console: Console, finished: Report) -> None:
         console.print(untraced(line), markup=False, highlight=False)
     if not evidence["pictures"]["drawn"]:
         console.print(evidence["pictures"]["text"], markup=False, highlight=False)
-    console.print(f"took {evidence['times']['total_s']:.0f} s", style="dim", highlight=False)
+    console.print(f"took {since_start():.0f} s", style="dim", highlight=False)

@@ -33,7 +33,7 @@ from ringbalance.reports.numbers import (
 from ringbalance.reports.pages.cases import case_view
 from ringbalance.reports.pages.eccentric_scene import BALANCER
 from ringbalance.reports.section import Cells, Record, Table
-from ringbalance.reports.sections import drawings_in, viewed
+from ringbalance.reports.sections import drawings_in, section_views, viewed
 from ringbalance.reports.traces import traced
 
 Facts = tuple[tuple[str, str], ...]
@@ -236,17 +236,20 @@ def page_content(
     *,
     pictures: Mapping[str, bytes] | None = None,
     views_of: Callable[[list[Record]], Record] = case_views,
+    sections_by: Callable[[Record], Mapping[str, Record | None]] = section_views,
 ) -> PageContent:
     """Turn the evidence into texts, tables and figures.
 
     Args: `pictures`: PNG bytes by the file names that the evidence lists; a picture that is missing is left
-    out. `views_of`: what `case_views` answers, perhaps made by another process meanwhile.
+    out. `views_of`, `sections_by`: what `case_views` and `section_views` answer, perhaps made by another
+    process while this one draws the rest.
     Raises: KeyError: an evidence document that lacks a part.
     """
-    sections = viewed(evidence)
     if evidence.get("balancer") == BALANCER:
+        sections = viewed(evidence, sections_by(evidence))
         return PageContent(context=_frame(evidence, sections), drawings=tuple(drawings_in(sections)))
-    figures = _page_figures(evidence)
+    figures, shown_pictures = _page_figures(evidence), _pictures(evidence["pictures"], pictures or {})
+    sections = viewed(evidence, sections_by(evidence))
     views = views_of(evidence["verification"])
     claims = [
         {**views[case["id"]], "elsewhere": summary.elsewhere(case, evidence)}
@@ -260,7 +263,7 @@ def page_content(
         "causes": _causes(evidence),
         "equations": _equations(),
         "figures": figures,
-        "pictures": _pictures(evidence["pictures"], pictures or {}),
+        "pictures": shown_pictures,
         "chamber": _chamber_table(calibration["chamber"]),
         "drag_at": _drag_table(calibration["tube"], evidence["operating_point"]),
         "injections": _injections(runs.get("calibrated")),

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -22,12 +22,14 @@ from ringbalance.reports.pictures.view import VIEW, view_page
 from ringbalance.reports.render import render_pages
 from ringbalance.reports.saved import saved_cases
 from ringbalance.reports.section import Level, Record
+from ringbalance.reports.sections import section_view, sections_of
 from ringbalance.reports.tables import FOLDER as TABLES
 from ringbalance.reports.tables import csv_tables
 from ringbalance.scene import AnyScene, Scene
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.platform.files import staged
-from ringbalance.scene.platform.processes import Workers, beside
+from ringbalance.scene.platform.processes import Workers, beside, seldom_collected
+from ringbalance.verification.runner import paper_scene
 
 FILES: Final = ("evidence.json", *DOCUMENTS)
 """Of a report, the page last: where it is, all else is."""
@@ -56,21 +58,44 @@ class Report:
 
 
 @dataclass(kw_only=True)
-class _CaseViews:
-    """What the page shows of the cases, made by a worker while this process goes on."""
+class _Views:
+    """What the page shows of cases and annex, made by a worker while this process goes on.
+
+    A section that no worker has begun when this process has nothing else to do, it makes itself.
+    """
 
     pool: Workers | None
-    begun: Future[Record] | None = None
+    cases: list[Future[Record]] = field(default_factory=list)
+    sections: dict[str, Future[Record | None]] = field(default_factory=dict)
+    _text: str = ""
 
-    def begin(self, cases: list[Record]) -> None:
+    def begin_cases(self, cases: list[Record]) -> None:
+        """Called with all cases as soon as they are judged."""
         if self.pool is not None:
             # As they read back from the evidence's file.
-            self.begun = self.pool.submit(case_views, json.loads(json.dumps(cases)))
+            self.cases = [self.pool.submit(case_views, json.loads(json.dumps(cases)))]
 
-    def of(self, cases: list[Record]) -> Record:
-        if self.pool is None or self.begun is None:
+    def begin_annex(self, evidence: Record, text: str) -> None:
+        """Called with the whole evidence, which `text` is in its file."""
+        self._text = text
+        if self.pool is not None:
+            names = [section.name for section in sections_of(evidence) if section.place == "annex"]
+            self.sections = {name: self.pool.submit(section_view, name, text) for name in names}
+
+    def of_cases(self, cases: list[Record]) -> Record:
+        if self.pool is None or not self.cases:
             return case_views(cases)
-        return self.pool.result(self.begun, partial(case_views, cases))
+        return self.pool.result(self.cases[0], partial(case_views, cases))
+
+    def of_sections(self, evidence: Record) -> dict[str, Record | None]:
+        own = [section for section in sections_of(evidence) if section.name not in self.sections]
+        views = {section.name: section.view(evidence) for section in own}
+        for name, begun in reversed(self.sections.items()):
+            views[name] = self._made(begun, partial(section_view, name, self._text))
+        return views
+
+    def _made(self, begun: Future[Record | None], here: Callable[[], Record | None]) -> Record | None:
+        return here() if self.pool is None or begun.cancel() else self.pool.result(begun, here)
 
 
 def write_report(
@@ -94,8 +119,15 @@ def write_report(
     """
     folder, start = Path(out), time.perf_counter()
     saved = saved_cases(folder)
-    with staged(folder, files=FILES, folders=(*FOLDERS, TABLES)) as stage, beside(workers) as pool:
-        views = _CaseViews(pool=pool)
+    with (
+        seldom_collected(),
+        staged(folder, files=FILES, folders=(*FOLDERS, TABLES)) as stage,
+        beside(workers) as pool,
+    ):
+        if pool is not None:
+            # A worker takes its time to start, and cases come later.
+            pool.submit(paper_scene)
+        views = _Views(pool=pool)
         if isinstance(scene, EccentricScene):
             evidence = collect_eccentric(
                 scene, level=level, scene_text=scene_text, pool=pool, progress=progress
@@ -111,7 +143,7 @@ def write_report(
                     saved=saved,
                     pool=pool,
                     progress=progress,
-                    judged=views.begin,
+                    judged=views.begin_cases,
                 )
                 _tell(progress, "pictures")
                 evidence["pictures"] = pictures()
@@ -138,16 +170,17 @@ def _tell(progress: Progress | None, stage: str) -> None:
         progress(stage)
 
 
-def _write_page(evidence: Record, stage: Path, views: _CaseViews) -> Record:
+def _write_page(evidence: Record, stage: Path, views: _Views) -> Record:
     """Evidence, figures and page; the page is made of the evidence as it reads back from its file."""
     text = evidence_text(evidence)
     kept: Record = json.loads(text)
+    views.begin_annex(kept, text)
     (stage / "evidence.json").write_text(text, encoding="utf-8")
     figures = stage / "figures"
     figures.mkdir(exist_ok=True)
     names = [item[theme] for item in evidence["pictures"]["files"] for theme in ("light", "dark")]
     pictures = {name: (figures / name).read_bytes() for name in names}
-    content = page_content(kept, pictures=pictures, views_of=views.of)
+    content = page_content(kept, pictures=pictures, views_of=views.of_cases, sections_by=views.of_sections)
     for drawing in content.drawings:
         (figures / f"{drawing.name}.svg").write_text(drawing.standalone(), encoding="utf-8")
     (stage / TABLES).mkdir()

@@ -5,6 +5,7 @@ A new one is a module with its `SECTION`, a template of its name, and a line in 
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from itertools import count
 from types import MappingProxyType
@@ -72,11 +73,24 @@ def collected(work: Work, *, last: bool) -> Record:
     return {name: record for name, record in found.items() if record is not None}
 
 
-def viewed(evidence: Record) -> list[Record]:
-    """What each section shows, in order and numbered, without those that have nothing to show."""
-    sections = eccentric_scene.SECTIONS if evidence.get("balancer") == eccentric_scene.BALANCER else SECTIONS
-    views = [(section, section.view(evidence)) for section in sections]
-    shown = [(section, view) for section, view in views if view is not None]
+def sections_of(evidence: Record) -> tuple[Section, ...]:
+    """The sections of a report on the evidence's kind of balancer."""
+    return eccentric_scene.SECTIONS if evidence.get("balancer") == eccentric_scene.BALANCER else SECTIONS
+
+
+def section_view(name: str, text: str) -> Record | None:
+    """What one section shows of the evidence, given as its file has it."""
+    evidence = json.loads(text)
+    return next(section for section in sections_of(evidence) if section.name == name).view(evidence)
+
+
+def section_views(evidence: Record) -> dict[str, Record | None]:
+    """What each section shows, by name; None where it has nothing to show."""
+    return {section.name: section.view(evidence) for section in sections_of(evidence)}
+
+
+def viewed(evidence: Record, views: Mapping[str, Record | None]) -> list[Record]:
+    """The sections that have something to show, in order and numbered. Args: `views`: as `section_views`."""
     counts = {"report": count(1), "annex": count(1)}
     return [
         {
@@ -87,7 +101,8 @@ def viewed(evidence: Record) -> list[Record]:
             "number": f"{PREFIXES[s.place]}{next(counts[s.place])}",
             "view": view,
         }
-        for s, view in shown
+        for s in sections_of(evidence)
+        if (view := views[s.name]) is not None
     ]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, model_validator
 
@@ -29,18 +29,6 @@ CAUSES: Final[Mapping[str, str]] = MappingProxyType(
     }
 )
 """Common causes of a claim's departure, as readers see them."""
-Cause = Literal[
-    "",
-    "plates",
-    "tube",
-    "settings",
-    "gas_pressure",
-    "two_masses",
-    "gravity",
-    "eccentric_masses",
-    "friction",
-    "force",
-]
 Identifier = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*$")]
 Basis = Literal["total", "per unit depth", "pointwise", "ratio", "count", "time"]
 ReferenceKind = Literal[
@@ -123,6 +111,14 @@ class Mutation(_Record):
     cost: Literal["light", "heavy"] = "light"
 
 
+class Study(_Record):
+    """A computation that several cases share, in place of a `case.py`."""
+
+    of: Literal["pressure under gravity", "manufactured pressure", "choice of models", "measurements"]
+    settings: Mapping[str, Any]
+    """Arguments of its function, by name."""
+
+
 class CaseDefinition(_Record):
     """All of a case that is not computed."""
 
@@ -148,11 +144,13 @@ class CaseDefinition(_Record):
     """One sentence for a designer, by verdict, or "default"."""
     equations: tuple[Text, ...]
     reference: _ReferenceText
+    study: Study | None = None
+    """What computes it where the folder has no `case.py`."""
     judged_on: Literal["scene", "paper"] = "scene"
     """Whether the scene at hand is judged, or always the paper's own disc, or rotor with eccentric masses."""
     shape: Literal["any", "sector"] = "any"
     """Whether an imported chamber can be judged, or only the sector between plates that the keys give."""
-    cause: Cause = ""
+    cause: str = ""
     """Why a claim does not simply hold: one of `CAUSES`; shared by claims that fail together."""
     judgement: str = ""
     """Why the criteria lead to this verdict and no other, where that may be disputed."""
@@ -215,6 +213,8 @@ class CaseDefinition(_Record):
         plain = all(q.judges == "number" and not q.correction for q in self.quantity)
         if self.kind != "claim" and not (plain and not self.cause and not self.rests_on):
             raise ValueError("judges, correction, cause and rests_on are for claims")
+        if self.cause not in CAUSES:
+            raise ValueError(f"cause: one of {', '.join(filter(None, CAUSES))}")
         if any(quantity.correction for quantity in self.quantity) and not ideas:
             raise ValueError("a correction needs a quantity that judges the idea")
 

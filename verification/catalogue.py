@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import difflib
 import re
+from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import files
-from typing import Final, cast
+from typing import Any, Final, cast
 
 from ringbalance.verification import cases
-from ringbalance.verification.case import CaseDefinition, parse_case
-from ringbalance.verification.evidence import CaseCode
+from ringbalance.verification.case import CaseDefinition, Study, parse_case
+from ringbalance.verification.evidence import CaseCode, Evidence, Level
 
 _PAPERS: Final = ("liquid_ring", "eccentric_mass")
 
@@ -30,9 +31,26 @@ class UnknownCaseError(KeyError):
 
 
 def case_code(case_id: str) -> CaseCode:
-    """The `case.py` of a case. Raises: UnknownCaseError: no such id; the text names the nearest one."""
-    _check_known(case_id)
+    """The `case.py` of a case, or the study that it shares with others.
+
+    Raises: UnknownCaseError: no such id; the text names the nearest one.
+    """
+    study = load_case(case_id).study
+    if study is not None:
+        return SharedCode(study)
     return cast(CaseCode, getattr(cases, f"{case_id}_code"))
+
+
+@dataclass(frozen=True)
+class SharedCode:
+    """The computation of a case whose case.toml names a study and its settings."""
+
+    study: Study
+
+    def compute(self, scene: Any, level: Level, defect: str | None = None) -> Evidence:
+        module = getattr(cases, self.study.of)
+        found: Evidence = module.study(scene, level, defect, **self.study.settings)
+        return found
 
 
 @lru_cache(maxsize=64)

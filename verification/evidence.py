@@ -6,7 +6,7 @@ import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, Protocol, SupportsFloat
 
 import numpy as np
 import numpy.typing as npt
@@ -72,6 +72,11 @@ class Found:
     def with_correction(self) -> Found:
         """The number with its correction made: what a case finds once the plates are left out."""
         return Found(value=self.value if self.corrected is None else self.corrected)
+
+
+def as_found(**values: SupportsFloat) -> dict[str, Found]:
+    """Numbers without an uncertainty of their own, by the names of the quantities that are judged."""
+    return {name: Found(value=float(value)) for name, value in values.items()}
 
 
 @dataclass(frozen=True, kw_only=True)

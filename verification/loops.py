@@ -33,6 +33,10 @@ PERIODS: Final = (0.25, 0.5, 1.0)
 """Between operations, s: the paper gives none; the middle one is judged and the others bound it."""
 
 
+_POINTS: Final = 400
+"""Of a curve."""
+
+
 def loop_scene(
     scene: Scene,
     *,
@@ -101,15 +105,26 @@ def settling(run: Simulation) -> float:
     return math.inf if run.settling_time is None else run.settling_time
 
 
+def slowest_within(scene: Scene, runs: Sequence[Simulation]) -> float:
+    """The longest settling time of some runs, s, at most the time limit."""
+    return min(max(map(settling, runs)), scene.run.time_limit)
+
+
+def settled_after(runs: Sequence[Simulation]) -> float | str:
+    """The longest settling time of some runs, s, for a table."""
+    time = max(map(settling, runs))
+    return time if math.isfinite(time) else "not settled"
+
+
 def over_period(numbers: Sequence[float]) -> Found:
     """A number found with each of `PERIODS`: the middle one's, which the others move."""
     value = float(numbers[1])
     return Found(value=value).moved(min(numbers) - value, max(numbers) - value)
 
 
-def amplitude_series(name: str, runs: dict[str, Simulation], *, points: int = 400) -> Series:
+def amplitude_series(name: str, runs: dict[str, Simulation]) -> Series:
     """Amplitude against time of several runs, by the name of their curve, on one time axis."""
     longest = max(float(run.time[-1]) for run in runs.values())
-    time = np.linspace(0.0, longest, points)
+    time = np.linspace(0.0, longest, _POINTS)
     curves = tuple(Curve(label, "m", np.interp(time, run.time, run.amplitude)) for label, run in runs.items())
     return figure(name, ("time", "s", time), *curves)

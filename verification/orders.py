@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ringbalance.mesh.chamber import default_cells
 from ringbalance.physics.pressure.assembly import volume_points
 from ringbalance.physics.pressure.solve import PressureSolution
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Disc
 from ringbalance.verification.evidence import Convergence, Curve, Found, Series, figure
 
 ROUND_OFF = 1e-13
@@ -75,6 +76,13 @@ def orders_found(studies: Mapping[str, OrderStudy]) -> dict[str, Found]:
     return orders | {f"{name}_error": Found(value=study.finest_error) for name, study in studies.items()}
 
 
+def refined_cells(disc: Disc, levels: Sequence[int], *, dimension: int) -> list[tuple[int, ...]]:
+    """Cells of a chamber's meshes, radial, angular and, in three dimensions, axial, for levels 1, 2, ..."""
+    radial, share = (2, 4) if dimension == 2 else (1, 8)
+    angular = default_cells(disc=disc)[1] // share
+    return [(radial * n, angular * n, n)[:dimension] for n in levels]
+
+
 def field_error(solution: PressureSolution, exact: Callable[[FloatArray], FloatArray]) -> float:
     """Root mean square over the liquid of a pressure's error, relative to that of the exact one at places."""
     volume = volume_points(solution.chamber, extra=2)
@@ -89,13 +97,3 @@ def order_figure(studies: Mapping[str, OrderStudy]) -> Series:
     size = next(iter(studies.values())).size
     curves = (Curve(name, "1", np.array(study.error)) for name, study in studies.items())
     return figure("error against mesh size", ("relative mesh size", "1", size), *curves, log=True)
-
-
-def extrapolate(*, coarse: float, fine: float, ratio: float, order: float) -> float:
-    """Richardson extrapolation, S = f + (f - c)/(ratio^order - 1), ratio = h_coarse/h_fine.
-
-    Raises: ValueError: a ratio that is not above one, or an order that is not positive.
-    """
-    if not (ratio > 1 and order > 0):
-        raise ValueError("the ratio must be above one and the order positive")
-    return fine + (fine - coarse) / (math.pow(ratio, order) - 1)

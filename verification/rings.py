@@ -17,21 +17,19 @@ from ringbalance.verification.reference.exact_chamber import exact_moment
 
 
 @lru_cache(maxsize=64)
-def ring_of(
-    scene: Scene, fills: tuple[float, ...], *, density: float | None = None, dimension: int = 2
-) -> RingQuantities:
+def ring_of(scene: Scene, fills: tuple[float, ...], *, density: float | None = None) -> RingQuantities:
     """Finite-element totals of a scene without gravity, with another density, kg/m^3, where one is given."""
     return ring_quantities(
         disc=scene.disc,
         density=density or scene.liquid.density,
         angular_velocity=scene.rotor.speed,
         fill_ratio=fills,
-        dimension=dimension,
+        dimension=2,
     )
 
 
-def found_of(quantities: RingQuantities, name: str, index: int, *, input_: float = 0.0) -> Found:
-    """One total of a ring by its name and the index of its fill, with u from the inputs.
+def found_of(quantities: RingQuantities, name: str, index: int) -> Found:
+    """One total of a ring by its name and the index of its fill.
 
     It is not conclusive where the meshes do not converge steadily.
     """
@@ -39,7 +37,6 @@ def found_of(quantities: RingQuantities, name: str, index: int, *, input_: float
     return Found(
         value=float(estimate.value[index]),
         numerical=from_half_width(float(estimate.uncertainty[index])),
-        input=input_,
         conclusive=quantities.status.ok and _conclusive(quantities.convergence[name][index]),
     )
 

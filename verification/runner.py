@@ -40,17 +40,20 @@ def paper_scene() -> Scene:
     return liquid_ring_scene(load_scene(bundled_scene(PAPER_SCENE)))
 
 
-def run_case(case_id: str, *, scene: Scene, level: Level = "light", defect: str | None = None) -> CaseResult:
+def run_case(case_id: str, *, scene: Scene, level: Level = "light", mutations: bool = False) -> CaseResult:
     """Run one case and judge it; one that cannot be run is `not run`, with the reason in its status.
 
     Args: `scene`: a case on the paper's own numbers takes the paper's disc instead. `level`: "light" leaves
-        heavy cases unrun. `defect`: id of a mutation to build in.
-    Raises: KeyError: an unknown case or mutation.
+        heavy cases unrun. `mutations`: whether each is built in and judged as well.
+    Raises: KeyError: an unknown case.
     """
-    definition = load_case(case_id)
-    return run_definition(
-        definition, case_code(case_id), scene=_scene_of(definition, scene), level=level, defect=defect
-    )
+    definition, code = load_case(case_id), case_code(case_id)
+    own = _scene_of(definition, scene)
+    result = run_definition(definition, code, scene=own, level=level)
+    if not mutations or result.verdict is Verdict.NOT_RUN:
+        return result
+    caught = mutate_definition(definition, code, scene=own, level=level)
+    return dataclasses.replace(result, mutations=caught)
 
 
 def run_definition(
@@ -158,16 +161,10 @@ def _mutation(definition: CaseDefinition, defect: str) -> Mutation:
     return found[0]
 
 
-def _run_mutations(case_id: str, *, scene: Scene, level: Level = "light") -> tuple[MutationResult, ...]:
-    """Run a case once with each of its mutations; "light" leaves out those that are heavy."""
-    definition = load_case(case_id)
-    return mutate_definition(definition, case_code(case_id), scene=_scene_of(definition, scene), level=level)
-
-
 def mutate_definition(
     definition: CaseDefinition, code: CaseCode, *, scene: Scene, level: Level = "light"
 ) -> tuple[MutationResult, ...]:
-    """The same of a case given by its text and its code."""
+    """Run a case once with each of its mutations; "light" leaves out those that are heavy."""
     if definition.cost == "heavy" and level == "light":
         return ()
     affordable = [m for m in definition.must_fail if level == "heavy" or m.cost == "light"]
@@ -185,13 +182,6 @@ def mutate_definition(
             )
         )
     return tuple(results)
-
-
-def _run_whole(case_id: str, *, scene: Scene, level: Level, mutations: bool) -> CaseResult:
-    result = run_case(case_id, scene=scene, level=level)
-    if not mutations or result.verdict is Verdict.NOT_RUN:
-        return result
-    return dataclasses.replace(result, mutations=_run_mutations(case_id, scene=scene, level=level))
 
 
 def run_cases(
@@ -239,7 +229,7 @@ def cases_under_way(
     """
     scene = liquid_ring_scene(scene)
     wanted = tuple(case_ids) or tuple(definition.id for definition in load_cases())
-    run = partial(_run_whole, scene=scene, level=level, mutations=mutations)
+    run = partial(run_case, scene=scene, level=level, mutations=mutations)
     with beside(workers) if pool is None else nullcontext(pool) as crew:
         if crew is None:
             yield map(run, wanted)

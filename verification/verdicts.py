@@ -34,17 +34,13 @@ class Verdict(StrEnum):
     NOT_RUN = "not run"
 
 
+_OF_A_CHECK = (Verdict.FAILED, Verdict.INCONCLUSIVE, Verdict.PASSED, Verdict.NOT_RUN)
+_OF_A_MODEL = (Verdict.REFUTED, Verdict.INCONCLUSIVE, Verdict.CONFIRMED, Verdict.NOT_RUN)
 VOCABULARY: dict[Kind, tuple[Verdict, ...]] = {
-    "claim": (
-        Verdict.REFUTED,
-        Verdict.INCONCLUSIVE,
-        Verdict.CORRECTED,
-        Verdict.CONFIRMED,
-        Verdict.NOT_RUN,
-    ),
-    "validation": (Verdict.REFUTED, Verdict.INCONCLUSIVE, Verdict.CONFIRMED, Verdict.NOT_RUN),
-    "code_verification": (Verdict.FAILED, Verdict.INCONCLUSIVE, Verdict.PASSED, Verdict.NOT_RUN),
-    "solution_verification": (Verdict.FAILED, Verdict.INCONCLUSIVE, Verdict.PASSED, Verdict.NOT_RUN),
+    "claim": (*_OF_A_MODEL[:2], Verdict.CORRECTED, *_OF_A_MODEL[2:]),
+    "validation": _OF_A_MODEL,
+    "code_verification": _OF_A_CHECK,
+    "solution_verification": _OF_A_CHECK,
 }
 """Verdicts of each kind of case, the one that decides the case first."""
 

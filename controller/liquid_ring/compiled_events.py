@@ -56,7 +56,7 @@ def pair_ends(plant: Record, state: Four, direction: int) -> Four:
 
 
 @in_place
-def pair_steady(plant: Record, motion: Record, state: Four) -> tuple[float, bool]:
+def _pair_steady(plant: Record, motion: Record, state: Four) -> tuple[float, bool]:
     """Quasi-steady flow in a state, as `compiled_column.steady`."""
     x, _, p, q = state
     ambient, primed = plant.ambient_pressure, motion.primed > 0
@@ -195,7 +195,7 @@ def regime(plant: Record, motion: Record) -> int:
     if direction != outward(motion):
         return _REVERSE
     if not plant.inertia:
-        return _SEPARATED if pair_steady(plant, motion, state)[1] else _SIPHON
+        return _SEPARATED if _pair_steady(plant, motion, state)[1] else _SIPHON
     at, speed = pair_ends(plant, state, direction), max(state[1] * direction, 0.0)
     found = accelerations(plant, at, speed, direction, motion.primed > 0, motion.log_speed)
     return _SEPARATED if found[1] < found[0] else _SIPHON

@@ -8,8 +8,9 @@ with K = alpha + k_up up to the crest's end s_end, and e the fraction of it lost
 on the flow law's column continues at the same velocity.
 
 Liquid on the crest's circle is pulled to neither side.  What is there when the column parts is taken to drain
-evenly: what was lifted to the middle of the crest falls back, what was lifted beyond it has passed.  While
-liquid is lifted the fill of the state is that of the chamber alone; `shown` is with the tube's share.
+evenly: what was lifted to the middle of the crest falls back, what was lifted beyond it has passed.  Between
+injections gas is taken to lie over the crest; legs on both sides of a cavity would stand somewhat higher.
+While liquid is lifted the fill of the state is that of the chamber alone; `shown` is with the tube's share.
 """
 
 from __future__ import annotations

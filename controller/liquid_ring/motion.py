@@ -179,9 +179,7 @@ def _fill_line(plant: npt.NDArray[np.void], line: GasLine | None) -> None:
         plant["heat_capacity_ratio"] = 1.0 if line.process == "isothermal" else HEAT_CAPACITY_RATIO
 
 
-def packed(
-    plant: npt.NDArray[np.void], *, fill: float, primed: bool, motion: Motion, log_speed: float = 0.0
-) -> npt.NDArray[np.void]:
+def packed(plant: npt.NDArray[np.void], *, fill: float, primed: bool, motion: Motion) -> npt.NDArray[np.void]:
     """Record of type `MOTION`, shape (1,), of a pair; `fill` is x of chamber 0."""
     known, ambient, total = plant[0], float(plant["ambient_pressure"][0]), float(plant["total"][0])
     state = np.zeros(1, dtype=MOTION)
@@ -200,7 +198,6 @@ def packed(
     direction = int(np.sign(motion.velocity)) or (side if place > begun else 0)
     stop = float(known["crest_end" if side > 0 else "return_crest_end"])
     for name, value in {
-        "log_speed": log_speed,
         "length": known["first_step"],
         "started": fill,
         "fill_before": record.fill,

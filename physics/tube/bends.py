@@ -4,7 +4,7 @@ What a laminar bend costs beyond the friction of its own arc was computed for r 
 0.18, 0.55, 0.94 and 1.14 at Re 20, 50, 100 and 200 (`verification.reference.bent_tube`).
 K_0 De^2/(De^2 + De_0^2) with the Dean number De = Re sqrt(d/2r) meets them within 0.05; other shapes are
 scaled by it and carry a wide half-width.  In a tube that turns, curvature acts as rotation, R' = R +- s with
-s = (4/3) Re d/2r (`verification.reference.bend_shift`): a bend then costs more or less by its sense of
+s = (4/3) Re d/2r (`verification.reference.bent_tube`): a bend then costs more or less by its sense of
 turning, which a scene does not give.
 """
 
@@ -18,7 +18,7 @@ import numpy.typing as npt
 from fluids.fittings import bend_rounded
 
 from ringbalance.physics.tube.friction import turbulent_share
-from ringbalance.physics.tube.rotation import laminar_ratio
+from ringbalance.physics.tube.rotation_table import laminar_ratio
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Bend, Tube
 

@@ -9,7 +9,6 @@ from ringbalance.controller.loop import simulate
 from ringbalance.controller.tuning.highest_pressure import highest_pressure
 from ringbalance.controller.tuning.tune import tuning_document
 from ringbalance.reduced_model.calibration import Calibration
-from ringbalance.reduced_model.chamber.inputs import half_widths
 from ringbalance.reports.numbers import MISSING, THIN_SPACE, given, number, percent, shown
 from ringbalance.reports.origins import named_with_origin
 from ringbalance.reports.pages.requirements import (
@@ -26,6 +25,7 @@ from ringbalance.reports.section import Record, Section, Work
 from ringbalance.reports.summary import MISSED, OPEN
 from ringbalance.reports.traces import found_at, read, states_uncertainty, traced
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
+from ringbalance.scene.uncertain import half_widths
 from ringbalance.verification.assumptions import assumptions_of
 from ringbalance.verification.case import RestsOn
 from ringbalance.verification.loops import calibration_of

@@ -54,18 +54,22 @@ def main(arguments: list[str]) -> int:
     lengths = {key: None if value is None else value * _MILLIMETRES for key, value in job["lengths"].items()}
     walls = _walls(job["fields"].get("chamber"))
     paints = {"pressure": _draw_pressure, "disc": _draw_disc} | ({"tube": draw_tube} if job["tube"] else {})
+    # One window for all: the driver then compiles its shaders once.
+    plotter: Any = pv.Plotter(
+        off_screen=True, window_size=[SCALE * side for side in PICTURE], lighting="light kit"
+    )
+    # The reduction smooths already.
+    plotter.render_window.SetMultiSamples(0)
     for name, paint in paints.items():
         field = job["fields"].get(name)
         liquid = None if field is None else _in_millimetres(pv.read(field))
         for theme in THEMES:
-            plotter: Any = pv.Plotter(
-                off_screen=True, window_size=[SCALE * side for side in PICTURE], lighting="light kit"
-            )
-            # The reduction smooths already.
-            plotter.render_window.SetMultiSamples(0)
+            plotter.suppress_rendering = True
+            plotter.clear_actors()
             plotter.set_background(theme.background)
             labels, scale = paint(plotter, job | {"lengths": lengths, "walls": walls}, liquid, theme)
             _save(plotter, labels, scale, theme, Path(job["folder"]) / f"{name}-{theme.name}.png")
+    plotter.close()
     return 0
 
 
@@ -98,12 +102,13 @@ def _pixel(plotter: Any, place: FloatArray) -> tuple[float, float]:
 
 def _save(plotter: Any, labels: list[tuple[FloatArray, Label]], scale: Bar, theme: Theme, path: Path) -> None:
     """Letters, reduces and writes the picture."""
+    plotter.suppress_rendering = False
+    plotter.render()
     image = Image.fromarray(plotter.screenshot(return_img=True))
     placed = [
         replace(label, place=_pixel(plotter, place), shift=(SCALE * label.shift[0], SCALE * label.shift[1]))
         for place, label in labels
     ]
-    plotter.close()
     lettered = letter(image, labels=placed, bar=scale, ink=theme.ink, ground=theme.background, scale=SCALE)
     few = lettered.resize(PICTURE, Image.Resampling.LANCZOS).quantize(_COLOURS, dither=Image.Dither.NONE)
     few.save(path, optimize=True)

@@ -66,7 +66,7 @@ class Column:
         """Of entrance, friction so far and the bends passed so far, with the kinetic energy, Pa."""
         scene, tube = self.scene, self.scene.tube
         speed = np.array([max(u, 1e-4)])
-        state = tube_state(tube=tube, liquid=scene.liquid, angular_velocity=scene.rotor.speed, velocity=speed)
+        state = tube_state(scene, speed)
         along = state.terms["friction"] + state.terms["rotation"]
         passed = state.terms["entrance"] + state.kinetic_factor + along * s / tube.length
         return float(passed[0]) * scene.liquid.density * u * u / 2

@@ -20,7 +20,7 @@ from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.verification.validation.measurements import measurements
+from ringbalance.verification.validation.kinds import measurements
 
 WASHER, WASHER_95 = 12.4e-6, 0.5e-6
 """kg m; the second one is the expanded uncertainty (95 %) of each washer."""

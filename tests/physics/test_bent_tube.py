@@ -8,8 +8,12 @@ import pytest
 from ringbalance.mesh.bent_tube import Segment
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.verification.navier_stokes.rotating_section import SectionMesh
-from ringbalance.verification.reference.bend_shift import bend_shift, rotation_with_curvature
-from ringbalance.verification.reference.bent_tube import BentTubeFlow, bent_tube_flow
+from ringbalance.verification.reference.bent_tube import (
+    BentTubeFlow,
+    bend_shift,
+    bent_tube_flow,
+    rotation_with_curvature,
+)
 
 COARSE = SectionMesh(around=2, across=2, wall_ratio=3.0)
 STRAIGHT = (Segment(length=2.0, cells=2),)

@@ -73,7 +73,7 @@ def test_stall_pressure_of_the_papers_disc(table_1_scene: Scene) -> None:
     stall = paper.stall_pressure(
         disc=table_1_scene.disc, density=1000.0, angular_velocity=table_1_scene.rotor.speed
     )
-    assert printed(float(stall) / 1e6, 3) == "0.381"
+    assert printed(stall / 1e6, 3) == "0.381"
 
 
 def test_eq_12_equals_the_integrated_element_without_plates(table_1_scene: Scene) -> None:

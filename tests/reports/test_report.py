@@ -19,10 +19,12 @@ from ringbalance.reports import evidence as evidence_module
 from ringbalance.reports import report as report_module
 from ringbalance.reports.page import case_views, page_content
 from ringbalance.reports.pages import consequences as consequences_module
+from ringbalance.reports.pages.document import evidence_text
 from ringbalance.reports.pictures.opengl import OpenGL
 from ringbalance.reports.render import render
 from ringbalance.reports.report import Report, write_report
 from ringbalance.reports.saved import heavy_cases, saved_cases
+from ringbalance.reports.sections import section_views
 from ringbalance.reports.studies.consequences import find_consequences
 from ringbalance.scene import Scene, SceneError, bundled_scene
 from ringbalance.scene.platform.processes import Workers
@@ -310,6 +312,15 @@ def test_a_broken_scene_writes_nothing(tmp_path: Path) -> None:
 def test_a_worker_makes_the_same_views_of_the_cases(first: Report) -> None:
     cases = first.evidence["verification"]
     with Workers(1) as pool:
-        views = report_module._CaseViews(pool=pool)
-        views.begin(cases)
-        assert views.of([]) == case_views(cases) != {}
+        views = report_module._Views(pool=pool)
+        views.begin_cases(cases)
+        assert views.of_cases([]) == case_views(cases) != {}
+
+
+def test_a_worker_makes_the_same_views_of_the_annex(first: Report) -> None:
+    with Workers(1) as pool:
+        views = report_module._Views(pool=pool)
+        views.begin_annex(first.evidence, evidence_text(first.evidence))
+        assert set(views.sections) > {"trade", "inside"}
+        views.sections["disc"].result()
+        assert views.of_sections(first.evidence) == section_views(first.evidence)

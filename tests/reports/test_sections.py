@@ -23,7 +23,7 @@ from ringbalance.reports.pages import tube_flow as inside
 from ringbalance.reports.pictures.view import VIEW
 from ringbalance.reports.render import render
 from ringbalance.reports.section import Section, Work
-from ringbalance.reports.sections import SECTIONS, drawings_in, viewed
+from ringbalance.reports.sections import SECTIONS, drawings_in, section_views, viewed
 from ringbalance.reports.traces import untraced
 from ringbalance.scene.models import Scene
 from ringbalance.verification.loops import loop_scene
@@ -45,7 +45,7 @@ def test_every_section_has_its_template_and_nothing_else_lies_there() -> None:
 @pytest.mark.parametrize("name", ["report.html", "annex.html"])
 def test_the_contents_follow_the_list(pages: dict[str, str], whole: Record, name: str) -> None:
     links = re.findall(r'<li><a href="#(\w+)">', pages[name])
-    assert links == [e["name"] for e in viewed(whole) if f"{e['place']}.html" == name]
+    assert links == [e["name"] for e in viewed(whole, section_views(whole)) if f"{e['place']}.html" == name]
     assert links[0] == {"report.html": "summary", "annex.html": "disc"}[name]
     places = [pages[name].index(f'<section id="{link}"') for link in links]
     assert places == sorted(places)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
+import subprocess
+import sys
 import time
 
 import pytest
 
-from ringbalance.scene.platform.processes import Workers
+from ringbalance.scene.platform.processes import Workers, seldom_collected
 
 
 def test_the_work_of_an_ended_worker_is_done_again(caplog: pytest.LogCaptureFixture) -> None:
@@ -30,3 +33,25 @@ def test_leaving_waits_for_nobody() -> None:
         pool.submit(time.sleep, 60)
         start = time.perf_counter()
     assert time.perf_counter() - start < 5
+
+
+def test_a_worker_collects_garbage_more_seldom() -> None:
+    with Workers(1) as pool:
+        assert pool.submit(gc.get_threshold).result()[0] > gc.get_threshold()[0]
+
+
+def test_a_block_leaves_the_collector_as_it_was() -> None:
+    before = gc.get_threshold()
+    with seldom_collected():
+        assert gc.get_threshold()[0] > before[0]
+    assert gc.get_threshold() == before
+
+
+def test_the_time_since_the_start_holds_the_interpreter_s() -> None:
+    code = "import time; a = time.perf_counter(); from ringbalance.scene.platform.clock import since_start; "
+    code += "time.sleep(0.3); print(since_start(), time.perf_counter() - a)"
+    start = time.perf_counter()
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    whole = time.perf_counter() - start
+    told, within = map(float, done.stdout.split())
+    assert 0.3 <= within - 0.02 <= told <= whole + 0.02

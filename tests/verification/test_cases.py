@@ -56,9 +56,11 @@ def test_other_cases_come_first_each_with_its_own_order() -> None:
 
 
 def test_a_case_s_code_is_a_module_that_other_processes_import_by_name() -> None:
-    for case in CASES:
+    for case, definition in CASES.items():
         name = f"ringbalance.verification.cases.{case}.case"
-        assert case_code(case).compute.__module__ == name
+        shared = "ringbalance.verification.catalogue"
+        assert case_code(case).compute.__module__ == (shared if definition.study else name)
+        assert (FOLDER / case / "case.py").is_file() != bool(definition.study)
 
 
 def test_texts_ask_for_no_number_that_is_typed_in() -> None:

@@ -17,13 +17,13 @@ from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import NORMAL_95
-from ringbalance.verification.catalogue import case_code
+from ringbalance.verification.catalogue import case_code, load_case
 from ringbalance.verification.validation import tube_at_rest
 from ringbalance.verification.validation.comparison import KINDS, compare
-from ringbalance.verification.validation.measurements import measurements
+from ringbalance.verification.validation.kinds import measurements
 from ringbalance.verification.validation.model_bias import ModelStatistics, model_statistics
 from ringbalance.verification.validation.tube_friction import friction_points
-from ringbalance.verification.validation.wave_frequency import CALIBRATING, tank_frequency
+from ringbalance.verification.validation.wave_frequency import tank_frequency
 
 _DATA = files("ringbalance.verification.validation") / "data"
 _NAMES = sorted(path.name.removesuffix(".csv") for path in _DATA.iterdir() if path.name.endswith(".csv"))
@@ -108,8 +108,8 @@ def test_points_come_in_ascending_order_with_their_walls() -> None:
 def test_the_budget_of_k_holds_bias_and_scatter_of_turbulent_friction(paper_scene: Scene) -> None:
     numbers = case_code("measured_smooth_tubes").compute(paper_scene, "light").numbers
     spread = math.hypot(numbers["turbulent_bias"], 2 * numbers["turbulent_standard_deviation"])
-    smooth = replace(paper_scene.tube, roughness=0.0)
-    loss = tube_loss(tube=smooth, liquid=paper_scene.liquid, angular_velocity=0.0, velocity=np.array([15.0]))
+    tube, rotor = replace(paper_scene.tube, roughness=0.0), replace(paper_scene.rotor, speed=0.0)
+    loss = tube_loss(replace(paper_scene, tube=tube, rotor=rotor), np.array([15.0]))
     assert loss.uncertainty_parts["friction correlation"] >= spread * loss.terms["friction"]
     assert loss.k.uncertainty >= loss.uncertainty_parts["friction correlation"]
 
@@ -190,7 +190,9 @@ def test_a_comparison_is_confirmed_by_its_own_predictions_and_refuted_by_others(
 
 def test_the_uncertainty_of_wave_frequencies_comes_from_tanks_that_are_not_judged() -> None:
     data = measurements("addington_1960")
-    taught = np.isin(data.series, CALIBRATING)
+    study = load_case("measured_waves").study
+    assert study is not None
+    taught = np.isin(data.series, study.settings["without"])
     found = compare(data.where(taught)).statistics
     width = math.hypot(found.bias, 2 * found.standard_deviation)
     assert round(width, 2) == FREQUENCY_UNCERTAINTY

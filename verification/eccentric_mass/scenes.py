@@ -38,20 +38,29 @@ def driven_scene() -> EccentricScene:
     return scene
 
 
-def thinned(values: npt.ArrayLike, *, count: int = _DRAWN) -> FloatArray:
-    """Evenly chosen values along the last axis, at most `count`, the first and last among them."""
+def thinned(values: npt.ArrayLike) -> FloatArray:
+    """Evenly chosen values along the last axis, at most 240, the first and last among them."""
     array = np.asarray(values, dtype=np.float64)
-    return np.asarray(array[..., _places(array.shape[-1], count)], dtype=np.float64)
+    return np.asarray(array[..., _places(array.shape[-1])], dtype=np.float64)
 
 
-def envelope(values: npt.ArrayLike, *, count: int = _DRAWN) -> FloatArray:
+def envelope(values: npt.ArrayLike) -> FloatArray:
     """Largest value in each of so many stretches, so that a thinned curve keeps its peaks."""
     array = np.asarray(values, dtype=np.float64)
-    return np.asarray(np.maximum.reduceat(array, _places(array.size, count)), dtype=np.float64)
+    return np.asarray(np.maximum.reduceat(array, _places(array.size)), dtype=np.float64)
 
 
-def _places(size: int, count: int) -> IntArray:
-    return np.unique(np.linspace(0, size - 1, count).round().astype(np.int64))
+def convergence_time(time: FloatArray, error: FloatArray, *, limit: float) -> float:
+    """Instant from which on an error stays within a limit, s; infinite when the last is beyond it."""
+    beyond = np.flatnonzero(error > limit)
+    if beyond.size == 0:
+        return float(time[0])
+    last = int(beyond[-1])
+    return math.inf if last == time.size - 1 else float(time[last + 1])
+
+
+def _places(size: int) -> IntArray:
+    return np.unique(np.linspace(0, size - 1, _DRAWN).round().astype(np.int64))
 
 
 def changed(scene: EccentricScene, table: str, **values: Any) -> EccentricScene:

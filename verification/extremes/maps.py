@@ -170,7 +170,6 @@ def stability_maps(
     base: Base,
     *,
     count: int,
-    pairs: Sequence[tuple[str, str]] = PAIRS,
     workers: int = 1,
     progress: Progress | None = None,
 ) -> tuple[StabilityMap, ...]:
@@ -181,7 +180,7 @@ def stability_maps(
     grid = np.linspace(0, 1, count)
     points: list[Point] = [
         {x: float(vx), y: float(vy)}
-        for x, y in pairs
+        for x, y in PAIRS
         for vy in axis_of(y).at(grid)
         for vx in axis_of(x).at(grid)
     ]
@@ -195,5 +194,5 @@ def stability_maps(
             y_values=axis_of(y).at(grid),
             judgements=found[k * size : (k + 1) * size],
         )
-        for k, (x, y) in enumerate(pairs)
+        for k, (x, y) in enumerate(PAIRS)
     )

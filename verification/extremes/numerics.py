@@ -8,7 +8,6 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.liquid_ring.closed_form import closed_form
-from ringbalance.controller.liquid_ring.transfer import Drive
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.mesh.geometry import chamber_volume, liquid_area
 from ringbalance.physics.pressure.ring import ring_quantities
@@ -18,7 +17,7 @@ from ringbalance.verification.extremes.axes import Axis
 from ringbalance.verification.extremes.maps import Sweep, swept
 from ringbalance.verification.extremes.point import ROUND_OFF, Ending, Judgement
 from ringbalance.verification.reference.exact_chamber import exact_wall_pressure
-from ringbalance.verification.reference.explicit_segments import explicit_segments
+from ringbalance.verification.reference.explicit_segments import explicit_segments, paper_drive
 
 ASPECT: Final = Axis("aspect", "aspect ratio of the cells", "1", 1.0, 1e12, usual=(1.0, 1e5))
 STEP: Final = Axis("step", "step of the explicit segments", "s", 1e-7, 100.0, usual=(1e-4, 0.1))
@@ -72,14 +71,8 @@ def at_step(scene: Scene, step: float) -> Judgement:
     the error over that bound.
     """
     law = paper_law(scene)
-    drive = Drive(
-        law=law,
-        fill=scene.disc.initial_fill,
-        total=2 * scene.disc.initial_fill,
-        exchange_rate=law.tube_area / law.chamber_volume,
-        gas_pressure=scene.gas.pressure,
-        primed=False,
-    )
+    fill = scene.disc.initial_fill
+    drive = paper_drive(law, gas_pressure=scene.gas.pressure, fill=fill, total=2 * fill)
     duration = max(step, SHORTEST)
     instants = np.array([duration])
     exact = closed_form(drive, instants)

@@ -76,12 +76,11 @@ class SectionMesh(_HalfSection):
     """Cells of the ring between core and wall."""
     wall_ratio: float = 12.0
     """Innermost cell of the ring over the cell at the wall."""
-    shape: str = "quad"
 
     def mesh(self) -> Any:
         """Quadratic mesh of the half section (y, z >= 0) of a tube of unit bore, refined at its wall."""
         n = self.around
-        core, edges = _core(n, 0.26, 0.2)
+        core, edges = _core(n)
         vertices = geometric_vertices(cells=self.across, ratio=self.wall_ratio)
         blend = 1 - with_midpoints(vertices=vertices)[::-1]
         patches = [Patch(nodes=core, sides={"south": "symmetry"})]
@@ -92,7 +91,7 @@ class SectionMesh(_HalfSection):
             wall[np.abs(wall) < 1e-15] = 0.0
             sides = {"north": "wall"} | ({flat: "symmetry"} if flat else {})
             patches.append(ruled_patch(inner=edge, outer=wall, blend=blend, sides=sides))
-        return patch_mesh(patches=patches, shape=self.shape)
+        return patch_mesh(patches=patches)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,8 +128,9 @@ def _lines(points: FloatArray, count: int) -> FloatArray:
     return np.asarray((1 - share) * points[0] + share * points[1], dtype=np.float64)
 
 
-def _core(n: int, half_width: float, corner: float) -> tuple[FloatArray, list[FloatArray]]:
+def _core(n: int) -> tuple[FloatArray, list[FloatArray]]:
     """Nodes of the core, and its right, top and left edges in the order of growing angle."""
+    half_width, corner = 0.26, 0.2
     bottom = _lines(np.array([[-half_width, 0.0], [half_width, 0.0]]), 2 * n)
     angles = np.pi * np.linspace(0.75, 0.25, 4 * n + 1)
     straight = _lines(np.array([[-corner, corner], [corner, corner]]), 2 * n)

@@ -28,9 +28,9 @@ class March:
     vector: FloatArray
     """All unknowns after the last."""
 
-    def mean_gradient(self, *, share: float = 0.5) -> float:
-        """Mean of G over the last share of the steps."""
-        return float(np.mean(self.gradients[-round(share * self.gradients.size) :]))
+    def mean_gradient(self) -> float:
+        """Mean of G over the second half of the steps."""
+        return float(np.mean(self.gradients[-round(self.gradients.size / 2) :]))
 
 
 def march_flow(

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.integrate import quad
 
-from ringbalance.mesh.geometry import half_angle, surface_radius
+from ringbalance.mesh.geometry import chamber_volume, half_angle, surface_radius
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
 
@@ -60,6 +60,17 @@ def central_lambda(*, disc: Disc) -> float:
     a = surface_radius(disc=disc, fill_ratio=disc.max_fill_ratio / 2)
     alpha = half_angle(disc=disc, radius=a)
     return float(2 * a * np.sin(alpha) / alpha)
+
+
+def exact_totals(scene: Scene) -> dict[str, float]:
+    """Volume, m^3, and at the largest fill moment, kg m, and wall pressure, Pa; lambda at equal fills, m."""
+    disc, full = scene.disc, scene.disc.max_fill_ratio
+    return {
+        "volume": chamber_volume(disc=disc),
+        "moment": float(exact_moment(disc=disc, density=scene.liquid.density, fill_ratio=full)),
+        "wall_pressure": float(wall_pressure_of(scene, full)),
+        "lambda": central_lambda(disc=disc),
+    }
 
 
 def whole_ring_pressure(scene: Scene) -> float:

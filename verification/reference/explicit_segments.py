@@ -15,7 +15,20 @@ from ringbalance.controller.liquid_ring.transfer import (
     still,
 )
 from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.scene.arrays import FloatArray
+
+
+def paper_drive(law: PaperLaw, *, gas_pressure: float, fill: float, total: float) -> Drive:
+    """One chamber that gives liquid away from a fill ratio, by the paper's law, its tube empty."""
+    return Drive(
+        law=law,
+        fill=fill,
+        total=total,
+        exchange_rate=law.tube_area / law.chamber_volume,
+        gas_pressure=gas_pressure,
+        primed=False,
+    )
 
 
 def explicit_segments(segments: int) -> Integrator:

@@ -23,8 +23,14 @@ from ringbalance.physics.pressure.surface import solve_with_gravity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loop_models import Shaft
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.evidence import Evidence, Found
-from ringbalance.verification.orders import field_error, order_figure, order_study, orders_found
+from ringbalance.verification.evidence import Evidence, Found, Level
+from ringbalance.verification.orders import (
+    field_error,
+    order_figure,
+    order_study,
+    orders_found,
+    refined_cells,
+)
 from ringbalance.verification.reference.mutated_pressure import mutated_pressure
 
 _GAUSS: Final = 60
@@ -140,14 +146,16 @@ def _mean_area_along(disc: Disc, ring: _ExactRing) -> float:
     return float(weight @ liquid_area(disc=disc, surface_radius=radius) / 2)
 
 
-def gravity_evidence(
-    scene: Scene, *, cells: Sequence[tuple[int, ...]], shaft: Shaft, defect: str | None
+def study(
+    scene: Scene, level: Level, defect: str | None, *, shaft: Shaft, levels: Mapping[Level, Sequence[int]]
 ) -> Evidence:
-    """Find the free surface on meshes that halve h each time, coarse to fine; compare it with the exact one.
+    """Find the free surface on ever finer meshes; compare it with the exact one.
 
-    Gravity points across the chamber of a horizontal shaft, along a vertical one.
+    Gravity points across the chamber of a horizontal shaft, on flat meshes, and along a vertical one.
+    Args: `levels`: of `refined_cells`.
     Raises: ValueError: a search or solve that failed on some level.
     """
+    cells = refined_cells(scene.disc, levels[level], dimension=3 if shaft == "vertical" else 2)
     disc, fill = scene.disc, _FILL_SHARE * scene.disc.max_fill_ratio
     true = tilted_liquid(disc=disc, density=scene.liquid.density, fill_ratio=fill, shaft=shaft)
     exact = exact_ring(

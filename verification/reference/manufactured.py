@@ -19,9 +19,15 @@ from ringbalance.mesh.geometry import half_angle, surface_radius
 from ringbalance.physics.pressure.assembly import facet_points
 from ringbalance.physics.pressure.solve import PressureProblem, PressureSolution, solve_pressure
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import Disc
-from ringbalance.verification.evidence import Convergence, Evidence, Found
-from ringbalance.verification.orders import OrderStudy, field_error, order_figure, order_study
+from ringbalance.scene.models import Disc, Scene
+from ringbalance.verification.evidence import Convergence, Evidence, Level, as_found
+from ringbalance.verification.orders import (
+    OrderStudy,
+    field_error,
+    order_figure,
+    order_study,
+    refined_cells,
+)
 
 _SCALE: Final = 1e5
 """P, Pa."""
@@ -105,24 +111,28 @@ def _without_one_plate(
     return np.where(on_plate, 0.0, exact.wall_flux(places, normals))
 
 
-def manufactured_evidence(*, disc: Disc, cells: Sequence[tuple[int, ...]], defect: str | None) -> Evidence:
-    """Orders and finest errors on meshes that halve h each time, coarse to fine.
+def study(
+    scene: Scene, level: Level, defect: str | None, *, dimension: int, levels: Mapping[Level, Sequence[int]]
+) -> Evidence:
+    """Orders and finest errors on ever finer meshes.
 
     Quadratic cells with curved and with straight sides, and quartic ones with curved sides, whose integrals
     soon meet rounding.
+    Args: `levels`: of `refined_cells`.
     Raises: ValueError: an unknown defect.
     """
+    disc, cells = scene.disc, refined_cells(scene.disc, levels[level], dimension=dimension)
     exact = Manufactured(length=disc.outer_radius, width=disc.axial_width, half_angle=disc.central_angle / 2)
     solved = partial(_solutions, disc, exact.problem(defect), cells)
     quadratic, straight, quartic = solved(2, "curved"), solved(2, "straight"), solved(4, "curved")
-    study = partial(order_study, size=[cells[0][0] / count[0] for count in cells])
+    of_sizes = partial(order_study, size=[cells[0][0] / count[0] for count in cells])
     fields = {
-        name: study(error=[field_error(s, exact.pressure) for s in solutions])
+        name: of_sizes(error=[field_error(s, exact.pressure) for s in solutions])
         for name, solutions in (("quadratic", quadratic), ("straight", straight), ("quartic", quartic))
     }
-    wall = _exact_wall_integral(disc, exact, dimension=len(cells[0]))
+    wall = _exact_wall_integral(disc, exact, dimension=dimension)
     walls = {
-        name: study(error=[abs(_wall_integral(s) / wall - 1) for s in solutions])
+        name: of_sizes(error=[abs(_wall_integral(s) / wall - 1) for s in solutions])
         for name, solutions in (("quadratic", quadratic), ("straight", straight))
     }
     orders = {f"field_order_{name}": found.settled_order for name, found in fields.items()}
@@ -132,7 +142,7 @@ def manufactured_evidence(*, disc: Disc, cells: Sequence[tuple[int, ...]], defec
     unknowns = quartic[-1].pressure.size
     note = f"cells {', '.join(' x '.join(map(str, count)) for count in cells)}; up to {unknowns} unknowns"
     return Evidence(
-        found={name: Found(value=value) for name, value in (orders | errors).items()},
+        found=as_found(**orders | errors),
         numbers={
             "curving": walls["straight"].finest_error / walls["quadratic"].finest_error,
             "unknowns": float(unknowns),

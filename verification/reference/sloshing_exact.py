@@ -18,6 +18,8 @@ from scipy.linalg import eigvals
 
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 
+_TERMS = 160
+
 
 @dataclass(frozen=True, kw_only=True)
 class CosineWaves:
@@ -68,9 +70,9 @@ class CosineWaves:
         return float(abs(1 + 2 * stream / drive))
 
 
-def cosine_waves(*, central_angle: float, depth: float, terms: int = 160) -> CosineWaves:
-    """The problem at a depth H = ln(R2/a); frequencies of the lowest modes converge like `terms`^-3."""
-    n = np.arange(1, terms + 1)
+def cosine_waves(*, central_angle: float, depth: float) -> CosineWaves:
+    """The problem at a depth H = ln(R2/a); the lowest frequencies converge like the cube of 1/terms."""
+    n = np.arange(1, _TERMS + 1)
     k = np.asarray(np.pi * n / central_angle, dtype=np.float64)
     rows, columns = np.meshgrid(n, n, indexing="ij")
     odd = (rows + columns) % 2 == 1

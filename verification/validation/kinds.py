@@ -1,11 +1,12 @@
-"""What a kind of measurement is compared with: the columns it needs, and the program's prediction."""
+"""Measurements by others that come with the program, and what a kind of them is compared with."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from importlib.resources import files
 
-from ringbalance.identification.data.measurements import Measurements
+from ringbalance.identification.data.measurements import Measurements, parse_measurements
 from ringbalance.scene.arrays import FloatArray
 
 
@@ -30,3 +31,9 @@ class Kind:
     optional: Mapping[str, str] = field(default_factory=dict)
     """Columns that it uses where they are there."""
     predict: Callable[[Measurements], Prediction]
+
+
+def measurements(name: str) -> Measurements:
+    """The data set of a file in `data/`, by its name without ".csv"."""
+    path = files("ringbalance.verification.validation") / "data" / f"{name}.csv"
+    return parse_measurements(path.read_text(encoding="utf-8"), file=f"{name}.csv")

@@ -16,8 +16,7 @@ from ringbalance.verification.navier_stokes.rotating_section import (
     friction_ratio,
     solve_section_without_inertia,
 )
-from ringbalance.verification.validation.kinds import Kind, Prediction
-from ringbalance.verification.validation.measurements import measurements
+from ringbalance.verification.validation.kinds import Kind, Prediction, measurements
 from ringbalance.verification.validation.model_bias import ModelStatistics, model_statistics
 
 _WIDEST: Final = 20

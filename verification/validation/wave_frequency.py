@@ -17,8 +17,6 @@ from ringbalance.physics.sloshing.system import sloshing_system
 from ringbalance.scene.models import Disc
 from ringbalance.verification.validation.kinds import Kind, Prediction
 
-CALIBRATING: Final = ("tank 1", "tank 3", "tank 5", "tank 7")
-"""Tanks of Addington whose points gave the uncertainty that the program states, and are not judged."""
 _RADIUS: Final = 1e4
 """Of the chamber, in widths of the tank."""
 _DEPTHS: Final = (0.01, 10.0)

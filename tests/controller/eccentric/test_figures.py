@@ -18,19 +18,16 @@ from ringbalance.controller.eccentric_mass.strategy.settings import drive_law
 from ringbalance.controller.eccentric_mass.strategy.targets import target_angles
 from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.units import FieldError
-from ringbalance.verification.eccentric_mass.bound import motion_bound
-from ringbalance.verification.eccentric_mass.effort import figure_six, printed_compensation
-from ringbalance.verification.eccentric_mass.imbalance import (
+from ringbalance.verification.cases.driven_bound.case import motion_bound
+from ringbalance.verification.cases.driven_fig4_imbalance.case import (
     estimate_imbalance,
     figure_four,
     imbalance_record,
 )
-from ringbalance.verification.eccentric_mass.runs import (
-    figure_eight,
-    figure_five,
-    figure_nine,
-    figure_seven,
-)
+from ringbalance.verification.cases.driven_fig5_friction.case import friction_runs, friction_time
+from ringbalance.verification.cases.driven_fig6_effort.case import efforts, growth, printed_compensation
+from ringbalance.verification.cases.driven_fig9_run_up.case import compute as run_up
+from ringbalance.verification.eccentric_mass.runs import figure_eight, figure_seven
 from ringbalance.verification.eccentric_mass.scenes import RPM, at_constant_speed, changed
 
 
@@ -51,20 +48,19 @@ def test_figure_four_honest_filters_need_no_seconds(scene: EccentricScene) -> No
 
 
 def test_figure_five_finds_both_friction_arms(scene: EccentricScene) -> None:
-    found = figure_five(scene, time_limit=8.0)
-    for run, arm in zip(found.runs, found.arms, strict=True):
+    for arm, run in friction_runs(scene, time_limit=8.0).items():
         assert run.estimates.friction_arm[-1] == pytest.approx((arm, arm), rel=0.02)
-    assert max(found.time_to_converge) < 1.0
+        assert friction_time(run, arm) < 1.0
 
 
 def test_figure_six_grows_only_with_what_compensation_leaves(scene: EccentricScene) -> None:
-    found = figure_six(scene, step=5e-4)
-    np.testing.assert_allclose(found.growth(found.exact), 1.0, rtol=1e-3)
-    assert np.all(found.growth(found.short) > 1.5)
-    assert np.all(found.growth(found.without) > 3)
+    found = efforts(scene, step=5e-4)
+    np.testing.assert_allclose(growth(found["exact"]), 1.0, rtol=1e-3)
+    assert np.all(growth(found["short"]) > 1.5)
+    assert np.all(growth(found["without"]) > 3)
     # q/r and mass ratio as the paper has them: a larger ratio costs more.
-    assert np.all(np.diff(found.exact, axis=1) > 0)
-    assert np.all(found.short[0, :, -1] > found.short[1, :, -1])
+    assert np.all(np.diff(found["exact"], axis=1) > 0)
+    assert np.all(found["short"][0, :, -1] > found["short"][1, :, -1])
 
 
 def test_figure_seven_balances_both_imbalances(scene: EccentricScene) -> None:
@@ -90,19 +86,20 @@ def test_figure_eight_is_mended_by_fine_tuning(scene: EccentricScene) -> None:
 
 
 def test_figure_nine_passes_the_models_own_critical_speed(scene: EccentricScene) -> None:
-    found = figure_nine(scene)
-    assert found.critical_speed / RPM == pytest.approx(130.43, abs=0.01)
-    assert found.rotor_critical_speed / RPM == pytest.approx(135.05, abs=0.01)
+    evidence = run_up(scene, "light")
+    critical, numbers = evidence.found["critical"].value, evidence.numbers
+    assert critical == pytest.approx(130.43, abs=0.01)
+    assert numbers["without"] == pytest.approx(135.05, abs=0.01)
     # A ramp of 1 rpm/s peaks behind the steady peak.
     expected, at = fixed_frame_peak(plant_parameters(scene))
-    amplitude, speed = found.locked_peak
+    amplitude, speed = numbers["locked"], numbers["peak_speed"] * RPM
     assert amplitude == pytest.approx(expected, rel=1e-6)
     assert speed == pytest.approx(at, abs=1e-3)
     plant = plant_parameters(scene)
     ratio = plant.damping / (2 * math.sqrt(plant.stiffness * plant.mass))
-    steady = found.critical_speed / math.sqrt(1 - 2 * ratio**2)
+    steady = critical * RPM / math.sqrt(1 - 2 * ratio**2)
     assert steady < speed < steady + 4 * RPM
-    assert found.balanced_peak[0] < 2e-3 * amplitude
+    assert numbers["balanced"] < 2e-3 * amplitude
 
 
 def fixed_frame_peak(plant: PlantParameters) -> tuple[float, float]:

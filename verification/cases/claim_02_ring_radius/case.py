@@ -7,7 +7,7 @@ import numpy as np
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.reduced_model.paper.formulas import surface_radius_paper
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
+from ringbalance.verification.evidence import Curve, Evidence, Level, Series, as_found, figure
 from ringbalance.verification.paper_numbers import (
     INITIAL_LIQUID_VOLUME,
     MAX_LIQUID_VOLUME,
@@ -30,11 +30,11 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     volume = chamber_volume(disc=scene.disc)
     bare = with_plate(scene.disc, 0.0)
     return Evidence(
-        found={
-            "ring_radius": Found(value=_half_full_radius(scene.disc)),
-            "max_liquid": Found(value=_HALF * volume),
-            "initial_liquid": Found(value=_QUARTER * volume),
-        },
+        found=as_found(
+            ring_radius=_half_full_radius(scene.disc),
+            max_liquid=_HALF * volume,
+            initial_liquid=_QUARTER * volume,
+        ),
         numbers={"radius_bare": _half_full_radius(bare)},
         series=(_radius_over_fill(scene.disc, bare),),
     )

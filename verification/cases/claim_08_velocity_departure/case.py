@@ -71,7 +71,7 @@ def _level(scene: Scene, disc: Disc) -> float:
 
 def _stall(scene: Scene) -> float:
     """The same by Eq. 12."""
-    return float(stall_pressure(disc=scene.disc, density=DENSITY, angular_velocity=scene.rotor.speed))
+    return stall_pressure(disc=scene.disc, density=DENSITY, angular_velocity=scene.rotor.speed)
 
 
 def _physics(scene: Scene, pressure: float) -> Found:

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ringbalance.reduced_model.paper.formulas import PAPER_DRAG_COEFFICIENT, stall_pressure, velocity_paper
+from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
+from ringbalance.reduced_model.paper.formulas import (
+    PAPER_DRAG_COEFFICIENT,
+    stall_pressure,
+    velocity_from_pressures,
+)
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Curve, Evidence, Found, Level, NotRunError, Series, figure
+from ringbalance.verification.evidence import Curve, Evidence, Level, NotRunError, Series, as_found, figure
 from ringbalance.verification.paper_numbers import DENSITY, HIGHEST_PRESSURE, LOWEST_PRESSURE
 from ringbalance.verification.reference.exact_chamber import wall_pressure_of
 
@@ -18,38 +23,31 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     if scene.tube.hump_radius is None:
         raise NotRunError("the scene's tube has no siphon crest to prime over")
     return Evidence(
-        found={
-            "by_eq_19": Found(value=_stall(scene)),
-            "by_priming": Found(value=_priming(scene, scene.tube.hump_radius)),
-        },
+        found=as_found(by_eq_19=_stall(scene), by_priming=_priming(scene, scene.tube.hump_radius)),
         numbers={
             "by_ring": float(wall_pressure_of(scene, scene.disc.max_fill_ratio, density=DENSITY)),
             "scene_hump": scene.tube.hump_radius,
-            "velocity_high": _velocity(scene, HIGHEST_PRESSURE.value),
+            "velocity_high": _velocity(HIGHEST_PRESSURE.value),
         },
         series=(_figure(scene),),
     )
 
 
 def _stall(scene: Scene) -> float:
-    return float(stall_pressure(disc=scene.disc, density=DENSITY, angular_velocity=scene.rotor.speed))
+    return stall_pressure(disc=scene.disc, density=DENSITY, angular_velocity=scene.rotor.speed)
 
 
 def _priming(scene: Scene, hump_radius: float) -> float:
     """Gas pressure that lifts an almost empty chamber's liquid over the crest, the other side vented."""
-    lift = (scene.disc.outer_radius - hump_radius) * (scene.disc.outer_radius + hump_radius) / 2
-    return DENSITY * scene.rotor.speed**2 * lift
+    omega, outer = scene.rotor.speed, scene.disc.outer_radius
+    return hydrostatic_pressure(density=DENSITY, angular_velocity=omega, inner=hump_radius, outer=outer)
 
 
-def _velocity(scene: Scene, pressure: float) -> float:
+def _velocity(pressure: float) -> float:
+    """At equal fills, where gas alone drives."""
     return float(
-        velocity_paper(
-            disc=scene.disc,
-            density=DENSITY,
-            angular_velocity=scene.rotor.speed,
-            drag_coefficient=PAPER_DRAG_COEFFICIENT,
-            gas_pressure=pressure,
-            fill_ratio=scene.disc.max_fill_ratio / 2,
+        velocity_from_pressures(
+            density=DENSITY, drag_coefficient=PAPER_DRAG_COEFFICIENT, pressure_difference=pressure
         )
     )
 

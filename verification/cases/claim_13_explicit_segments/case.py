@@ -9,7 +9,7 @@ import numpy as np
 
 from ringbalance.controller.liquid_ring.closed_form import closed_form
 from ringbalance.controller.liquid_ring.transfer import Drive
-from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_law
+from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.scene.models import Scene
 from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import (
@@ -22,8 +22,8 @@ from ringbalance.verification.evidence import (
     Series,
     figure,
 )
-from ringbalance.verification.orders import extrapolate, order_study
-from ringbalance.verification.reference.explicit_segments import explicit_segments
+from ringbalance.verification.orders import order_study
+from ringbalance.verification.reference.explicit_segments import explicit_segments, paper_drive
 
 _COUNTS = (4, 8, 16, 32, 64, 128, 256, 512)
 _SHARE = 0.9
@@ -74,7 +74,8 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     moved = [operation.frozen() if frozen else operation.stepped(count) for count in _COUNTS]
     error = [abs(value / exact - 1) for value in moved]
     study = order_study(size=[_COUNTS[0] / count for count in _COUNTS], error=error)
-    limit = extrapolate(coarse=moved[-2], fine=moved[-1], ratio=2, order=1)
+    # Richardson's extrapolation at first order, from segments half as long.
+    limit = moved[-1] + (moved[-1] - moved[-2])
     # One half of the last correction bounds what the extrapolation has left.
     standard_uncertainty = from_half_width(abs(limit - moved[-1]) / 2)
     return Evidence(
@@ -104,22 +105,12 @@ def _numbers(operation: _Operation) -> dict[str, float]:
 
 def _long_operation(scene: Scene) -> _Operation:
     law = paper_law(scene)
-    drive = _drive(law, scene)
+    full = law.max_fill_ratio
+    drive = paper_drive(law, gas_pressure=scene.gas.pressure, fill=full, total=full)
     end = closed_form(drive, np.array([1e6])).event_time
     if not end:
         raise NotRunError("the gas pressure of this scene does not start the flow by Eq. 19: raise it")
     return _Operation(drive=drive, duration=_SHARE * end)
-
-
-def _drive(law: PaperLaw, scene: Scene) -> Drive:
-    return Drive(
-        law=law,
-        fill=law.max_fill_ratio,
-        total=law.max_fill_ratio,
-        exchange_rate=law.tube_area / law.chamber_volume,
-        gas_pressure=scene.gas.pressure,
-        primed=False,
-    )
 
 
 def _segments_for(operation: _Operation, tolerance: float) -> float:

@@ -13,7 +13,15 @@ from ringbalance.controller.simulation import Simulation
 from ringbalance.scene.models import Scene
 from ringbalance.verification.comparison import from_rounding
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Series, Table
-from ringbalance.verification.loops import PHASES, amplitude_series, loop_scene, run_loop, settling
+from ringbalance.verification.loops import (
+    PHASES,
+    amplitude_series,
+    loop_scene,
+    run_loop,
+    settled_after,
+    settling,
+    slowest_within,
+)
 
 _TEN_SECONDS: Final = 10.0
 _ABOUT: Final = 40.0
@@ -40,7 +48,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         raise ValueError("no set of steps settles at all four phases")
     counts = [run.misadjustments for runs in sets for run in runs if run.settled]
     trials = [run_loop(loop_scene(scene, kind="trial", phase=phase)) for phase in PHASES]
-    own = min(max(map(settling, trials)), scene.run.time_limit)
+    own = slowest_within(scene, trials)
     return Evidence(
         found={
             "settling_time": Found(value=own).moved(float(settled.min()) - own, float(settled.max()) - own),
@@ -58,7 +66,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "most": float(max(counts)),
         },
         series=(_figure(sets[len(sets) // 2]),),
-        tables=(_table(scene, level, sets),),
+        tables=(_table(level, sets),),
     )
 
 
@@ -77,9 +85,8 @@ def _figure(runs: Sequence[Simulation]) -> Series:
     return amplitude_series("amplitude under the trial algorithm", dict(zip(names, runs, strict=True)))
 
 
-def _table(scene: Scene, level: Level, sets: Sequence[Sequence[Simulation]]) -> Table:
+def _table(level: Level, sets: Sequence[Sequence[Simulation]]) -> Table:
     steps = list(itertools.product(*_STEPS[level]))
-    slowest = [max(settling(run) for run in runs) for runs in sets]
     return Table(
         name="sets of steps, and the slowest of the four phases",
         columns={
@@ -87,7 +94,7 @@ def _table(scene: Scene, level: Level, sets: Sequence[Sequence[Simulation]]) -> 
             "long step": [one[1] for one in steps],
             "short step": [one[2] for one in steps],
             "period": [one[3] for one in steps],
-            "settled after": [time if math.isfinite(time) else "not settled" for time in slowest],
+            "settled after": [settled_after(runs) for runs in sets],
             "misadjustments": [float(max(run.misadjustments for run in runs)) for runs in sets],
         },
         units=dict.fromkeys(("first trial", "long step", "short step", "period", "settled after"), "s"),

@@ -15,7 +15,7 @@ from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.models import Scene
 from ringbalance.verification.comparison import from_range
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table
-from ringbalance.verification.loops import amplitude_series, flow_law_of, loop_scene, run_loop, settling
+from ringbalance.verification.loops import amplitude_series, flow_law_of, loop_scene, run_loop, settled_after
 from ringbalance.verification.reference.fig_7 import readings
 
 _GAINS: Final = (0.04e6, 0.08e6, 0.12e6, 0.16e6, 0.20e6)
@@ -109,14 +109,13 @@ def _turn(scene: Scene) -> Found:
 
 
 def _table(runs: Mapping[float, Simulation]) -> Table:
-    times = [settling(run) for run in runs.values()]
     return Table(
         name="target-vector algorithm, proportional part alone, 10 micrometres at 90 degrees",
         columns={
             "Kp": list(runs),
             "overshoots": [float(run.overshoots) for run in runs.values()],
             "misadjustments": [float(run.misadjustments) for run in runs.values()],
-            "settled after": [time if math.isfinite(time) else "not settled" for time in times],
+            "settled after": [settled_after([run]) for run in runs.values()],
         },
         units={"Kp": "s/m", "settled after": "s"},
     )

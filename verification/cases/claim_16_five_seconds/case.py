@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from typing import Final
 
@@ -18,7 +17,9 @@ from ringbalance.verification.loops import (
     mistaken_lag,
     over_period,
     run_loop,
+    settled_after,
     settling,
+    slowest_within,
 )
 from ringbalance.verification.reference.fig_7 import readings
 
@@ -27,13 +28,14 @@ _BOUND: Final = 5.0
 
 def values(scene: Scene) -> dict[str, float]:
     runs = _runs(scene, PERIODS[1])
-    return {"settling_time": _slowest(scene, runs), "misadjustments": max(run.misadjustments for run in runs)}
+    rises = max(run.misadjustments for run in runs)
+    return {"settling_time": slowest_within(scene, runs), "misadjustments": rises}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     given = mistaken_lag(scene) if defect == "lag_angle_wrong" else scene
     runs = {period: _runs(given, period) for period in PERIODS}
-    slowest = [_slowest(scene, group) for group in runs.values()]
+    slowest = [slowest_within(scene, group) for group in runs.values()]
     rises = [max(run.misadjustments for run in group) for group in runs.values()]
     _, bare = readings()
     calibrated = _short_runs(bare)
@@ -61,10 +63,6 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     )
 
 
-def _slowest(scene: Scene, runs: list[Simulation]) -> float:
-    return min(max(map(settling, runs)), scene.run.time_limit)
-
-
 def _runs(scene: Scene, period: float) -> list[Simulation]:
     return [
         run_loop(loop_scene(scene, kind="target_vector", amplitude=amplitude, period=period))
@@ -85,13 +83,12 @@ def _table(runs: Mapping[float, list[Simulation]]) -> Table:
     rows = [
         (period, a, run) for period, group in runs.items() for a, run in zip(AMPLITUDES, group, strict=True)
     ]
-    times = [settling(run) for _, _, run in rows]
     return Table(
         name="target-vector algorithm with the paper's parameters and law",
         columns={
             "period": [period for period, _, _ in rows],
             "amplitude": [amplitude for _, amplitude, _ in rows],
-            "settled after": [time if math.isfinite(time) else "not settled" for time in times],
+            "settled after": [settled_after([run]) for _, _, run in rows],
             "misadjustments": [float(run.misadjustments) for _, _, run in rows],
             "overshoots": [float(run.overshoots) for _, _, run in rows],
         },

@@ -19,7 +19,8 @@ from ringbalance.verification.loops import (
     over_period,
     run_loop,
     sampled_amplitudes,
-    settling,
+    settled_after,
+    slowest_within,
 )
 
 _TRIAL: Final = {"first_trial": 0.02, "long_step": 0.1, "short_step": 0.005}
@@ -60,10 +61,9 @@ def _runs(aimed: Scene, scene: Scene, period: float) -> tuple[list[Simulation], 
 
 
 def _judged(scene: Scene, target: list[Simulation], trial: list[Simulation]) -> dict[str, float]:
-    longest = scene.run.time_limit
     return {
         "speed_ratio": min(
-            min(settling(slow), longest) / min(settling(fast), longest)
+            slowest_within(scene, [slow]) / slowest_within(scene, [fast])
             for slow, fast in zip(trial, target, strict=True)
         ),
         "largest_rise": max(map(_largest_rise, target)),
@@ -87,16 +87,13 @@ def _table(runs: Mapping[float, tuple[list[Simulation], list[Simulation]]]) -> T
         for phase, target, trial in zip(PHASES, *both, strict=True)
     ]
 
-    def time(run: Simulation) -> float | str:
-        return run.settling_time if run.settling_time is not None else "not settled"
-
     return Table(
         name="settling times of both algorithms",
         columns={
             "period": [period for period, _, _, _ in rows],
             "phase": [phase for _, phase, _, _ in rows],
-            "target vector": [time(target) for _, _, target, _ in rows],
-            "trial": [time(trial) for _, _, _, trial in rows],
+            "target vector": [settled_after([target]) for _, _, target, _ in rows],
+            "trial": [settled_after([trial]) for _, _, _, trial in rows],
             "misadjustments, target vector": [float(target.misadjustments) for _, _, target, _ in rows],
             "misadjustments, trial": [float(trial.misadjustments) for _, _, _, trial in rows],
         },

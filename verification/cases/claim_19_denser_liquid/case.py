@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import surface_radius
+from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
 from ringbalance.reduced_model.law.flow_law import FlowLaw
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.scene.models import Scene
@@ -129,11 +130,11 @@ def _ability(scene: Scene, density: float, fill: float) -> float:
 
 def _priming(scene: Scene, density: float) -> float:
     """Gas pressure that lifts the liquid over the crest from equal fills, the other chamber vented."""
-    if scene.tube.hump_radius is None:
+    crest, omega = scene.tube.hump_radius, scene.rotor.speed
+    if crest is None:
         return 0.0
     level = float(surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio / 2))
-    lift = density * scene.rotor.speed**2 * (level**2 - scene.tube.hump_radius**2) / 2
-    return max(lift, 0.0)
+    return max(hydrostatic_pressure(density=density, angular_velocity=omega, inner=crest, outer=level), 0.0)
 
 
 def _figure(scene: Scene, laws: Sequence[FlowLaw]) -> Series:

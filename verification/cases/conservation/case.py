@@ -15,7 +15,7 @@ from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid
 from ringbalance.physics.pressure.surface import solve_with_gravity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Evidence, Found, Level
+from ringbalance.verification.evidence import Evidence, Level, as_found
 from ringbalance.verification.reference.gravity import tilted_liquid
 from ringbalance.verification.reference.mutated_pressure import mutated_pressure
 from ringbalance.verification.rings import ring_of
@@ -46,7 +46,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         "volume_found": max(balance.volume for balance in balances),
         "volume_drawn": abs(drawn / (fill * chamber_volume(disc=scene.disc)) - 1),
     }
-    return Evidence(found={name: Found(value=value) for name, value in found.items()})
+    return Evidence(found=as_found(**found))
 
 
 def _section_balance(scene: Scene, fill: float, cells: tuple[int, ...], defect: str | None) -> _Balance:

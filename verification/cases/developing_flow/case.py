@@ -10,7 +10,7 @@ import numpy as np
 from ringbalance.physics.tube.development import developing_length
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table
+from ringbalance.verification.evidence import Evidence, Level, Reference, Table, as_found
 from ringbalance.verification.navier_stokes.newton import FlowSystem
 from ringbalance.verification.navier_stokes.rotating_section import SectionMesh
 from ringbalance.verification.reference.entry_length import slowest_decay
@@ -52,11 +52,11 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     lengths = [_lengths(coarse, *point) for point in _POINTS[level]]
     shares = [found / bound for found, bound in lengths]
     return Evidence(
-        found={
-            "creeping": Found(value=float(np.min(np.abs(rates + exact)) / abs(exact))),
-            "fast": Found(value=(fast[1] * step - fast[0]) / (step - 1)),
-            "bound": Found(value=max(shares)),
-        },
+        found=as_found(
+            creeping=np.min(np.abs(rates + exact)) / abs(exact),
+            fast=(fast[1] * step - fast[0]) / (step - 1),
+            bound=max(shares),
+        ),
         numbers={"slower": fast[0], "faster": fast[1], "least": min(shares)},
         tables=(
             Table(

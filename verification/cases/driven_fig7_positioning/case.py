@@ -7,7 +7,7 @@ import numpy as np
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.verification.eccentric_mass.runs import BalancingFigure, figure_eight, figure_seven
 from ringbalance.verification.eccentric_mass.scenes import thinned
-from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
+from ringbalance.verification.evidence import Curve, Evidence, Level, Series, as_found, figure
 
 _SHOWN = 12.0
 """s."""
@@ -19,7 +19,7 @@ def compute(scene: EccentricScene, level: Level, defect: str | None = None) -> E
     ratios = np.divide(found.positioned, found.before)
     arrived = [stage.end for run in found.runs for stage in run.stages if stage.name == "positioning"]
     return Evidence(
-        found={"ratio": Found(value=float(ratios.max()))},
+        found=as_found(ratio=ratios.max()),
         numbers={
             "before": found.before[0],
             "first": found.positioned[0],

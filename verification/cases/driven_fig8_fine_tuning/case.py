@@ -6,7 +6,7 @@ import numpy as np
 
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.verification.eccentric_mass.runs import figure_eight
-from ringbalance.verification.evidence import Evidence, Found, Level
+from ringbalance.verification.evidence import Evidence, Level, as_found
 
 _TIME = {None: 200.0, "tuning_given_up": 25.0}
 """s."""
@@ -19,7 +19,7 @@ def compute(scene: EccentricScene, level: Level, defect: str | None = None) -> E
     ended = np.divide(found.after, found.before)
     settled = [run.settling_time or run.time[-1] for run in found.runs]
     return Evidence(
-        found={"left": Found(value=float(left.min())), "ended": Found(value=float(ended.max()))},
+        found=as_found(left=left.min(), ended=ended.max()),
         numbers={"left_m": min(found.positioned), "end": max(found.after), "time": float(max(settled))},
         series=(found.amplitudes(),),
     )

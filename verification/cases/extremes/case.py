@@ -8,7 +8,7 @@ from typing import Final
 from ringbalance.scene import bundled_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.platform.files import cache_folder
-from ringbalance.verification.evidence import Evidence, Found, Level, Table
+from ringbalance.verification.evidence import Evidence, Level, Table, as_found
 from ringbalance.verification.extremes.design import Base
 from ringbalance.verification.extremes.point import SOUND, Defect, Ending
 from ringbalance.verification.extremes.study import (
@@ -47,7 +47,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     endings = counted(everything)
     worst = max(j.worst_ratio for j in everything)
     return Evidence(
-        found={"broken": Found(value=float(found.broken())), "worst": Found(value=worst)},
+        found=as_found(broken=found.broken(), worst=worst),
         numbers={
             "judged": float(len(everything)),
             "points": float(len(found.points)),

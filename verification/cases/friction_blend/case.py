@@ -9,7 +9,7 @@ import numpy as np
 from ringbalance.physics.tube.friction import friction_factor
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Curve, Evidence, Found, Level, figure
+from ringbalance.verification.evidence import Curve, Evidence, Level, as_found, figure
 
 _TURBULENT: Final = 4000.0
 _STEP: Final = 1.01
@@ -25,7 +25,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         "head_slope": np.min(np.diff(np.log(curve * sweep**2)) / np.log(_STEP)),
     }
     return Evidence(
-        found={name: Found(value=float(value)) for name, value in found.items()},
+        found=as_found(**found),
         series=(
             figure(
                 "friction factor of a smooth tube",

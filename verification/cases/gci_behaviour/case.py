@@ -11,7 +11,7 @@ import numpy as np
 from ringbalance.physics.convergence.grid import GridConvergence, Verdict, gci
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table
+from ringbalance.verification.evidence import Evidence, Level, Reference, Table, as_found
 
 _LIMIT: Final = 1.0
 _FORMAL: Final = 2.0
@@ -78,12 +78,12 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     errors = {one.name: abs(float(one.values[0]) - _LIMIT) for one in sequences if one.converges}
     missed = sum(error > judged[name].uncertainty for name, error in errors.items())
     return Evidence(
-        found={
-            "wrong_verdicts": Found(value=float(wrong)),
-            "capped_order": Found(value=judged["faster than formal"].order),
-            "missed_limits": Found(value=float(missed)),
-            "fitted_order": Found(value=judged["five levels, third order, noise"].observed_order),
-        },
+        found=as_found(
+            wrong_verdicts=wrong,
+            capped_order=judged["faster than formal"].order,
+            missed_limits=missed,
+            fitted_order=judged["five levels, third order, noise"].observed_order,
+        ),
         numbers={"sequences": float(len(sequences))},
         tables=(_table(judged),),
     )

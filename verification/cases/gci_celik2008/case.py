@@ -11,7 +11,7 @@ from typing import Final
 
 from ringbalance.physics.convergence.grid import GridConvergence, Verdict, gci
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Evidence, Found, Level, Table
+from ringbalance.verification.evidence import Evidence, Found, Level, Table, as_found
 
 _FORMAL_ORDER: Final = 2.0
 _LAST_DIGIT: Final = {"order": 0.01, "limit": 0.0001, "error": 0.1, "index": 0.1}
@@ -43,7 +43,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     wrong = sum(result.verdict is not expected for result, expected in zip(found, _EXPECTED, strict=True))
     return Evidence(
         found={f"{name}_digits": Found(value=value) for name, value in digits.items()}
-        | {"wrong_verdicts": Found(value=float(wrong))},
+        | as_found(wrong_verdicts=wrong),
         numbers={"worst": max(digits.values())},
         tables=(_table(columns, found),),
     )

@@ -21,7 +21,7 @@ from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference
 from ringbalance.verification.orders import order_study
 from ringbalance.verification.reference.block_chambers import disc_chamber
-from ringbalance.verification.reference.exact_chamber import central_lambda, exact_moment, wall_pressure_of
+from ringbalance.verification.reference.exact_chamber import exact_totals
 from ringbalance.verification.reference.manufactured import Manufactured
 
 _CELLS: Final = ((8, 32, 2), (4, 16, 1), (2, 8, 1))
@@ -34,14 +34,9 @@ _MANUFACTURED: Final = ("source_off_by_a_percent", "wall_flux_dropped", "surface
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
-    disc, full = scene.disc, scene.disc.max_fill_ratio
-    values = {
-        "volume": chamber_volume(disc=disc),
-        "moment": float(exact_moment(disc=disc, density=scene.liquid.density, fill_ratio=full)),
-        "lever": central_lambda(disc=disc),
-        "wall_pressure": float(wall_pressure_of(scene, full)),
-    }
-    return {name: Reference(value=value) for name, value in values.items()}
+    exact = exact_totals(scene)
+    exact["lever"] = exact.pop("lambda")
+    return {name: Reference(value=value) for name, value in exact.items()}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

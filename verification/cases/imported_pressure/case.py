@@ -17,7 +17,7 @@ from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import CellKind
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.evidence import Evidence, Found, Level
+from ringbalance.verification.evidence import Evidence, Level, as_found
 from ringbalance.verification.orders import OrderStudy, order_figure, order_study
 from ringbalance.verification.reference.block_chambers import disc_chamber
 from ringbalance.verification.reference.manufactured import Manufactured
@@ -50,7 +50,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         "loads": _balance(rings[0], omega),
     }
     return Evidence(
-        found={name: Found(value=value) for name, value in found.items()},
+        found=as_found(**found),
         numbers={"straight": off[1] / exact, "unknowns": float(rings[0].statistics.unknowns)},
         series=(order_figure({"pressure field": field, "force on the outer wall": wall}),),
         convergence=(

@@ -13,7 +13,7 @@ from ringbalance.physics.sloshing.imported import WaveSystem, answer, frequencie
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import CellKind
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.evidence import Curve, Evidence, Found, Level, figure
+from ringbalance.verification.evidence import Curve, Evidence, Level, as_found, figure
 from ringbalance.verification.orders import OrderStudy, order_study
 from ringbalance.verification.reference.block_chambers import disc_chamber, sector_chamber
 from ringbalance.verification.reference.ring_waves_exact import ring_frequencies, still_frequency
@@ -48,7 +48,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         "still_error": study.finest_error,
     }
     return Evidence(
-        found={name: Found(value=value) for name, value in judged.items()},
+        found=as_found(**judged),
         numbers={"vortical": float(shares[nearest].max()), "unknowns": float(ring.unknowns)},
         series=(
             figure(

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, Reference
 from ringbalance.verification.paper_numbers import with_plate
-from ringbalance.verification.reference.exact_chamber import central_lambda, exact_moment, wall_pressure_of
+from ringbalance.verification.reference.exact_chamber import exact_totals
 from ringbalance.verification.reference.mutated_pressure import mutated_pressure
 from ringbalance.verification.rings import found_of, mesh_table
 
@@ -17,14 +16,11 @@ _SCALARS = {"wall_pressure": "Pa", "moment": "kg m", "liquid_volume": "m^3"}
 
 
 def reference(scene: Scene) -> Mapping[str, Reference]:
-    disc, full = scene.disc, scene.disc.max_fill_ratio
-    values = {
-        "wall_pressure": float(wall_pressure_of(scene, full)),
-        "moment": float(exact_moment(disc=disc, density=scene.liquid.density, fill_ratio=full)),
-        "volume": full * chamber_volume(disc=disc),
-    }
-    exact = {f"{name}_{d}d": Reference(value=value) for name, value in values.items() for d in (2, 3)}
-    return exact | {"lambda_2d": Reference(value=central_lambda(disc=disc))}
+    values = exact_totals(scene)
+    values["volume"] *= scene.disc.max_fill_ratio
+    middle = Reference(value=values.pop("lambda"))
+    both = {f"{name}_{d}d": Reference(value=value) for name, value in values.items() for d in (2, 3)}
+    return both | {"lambda_2d": middle}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

@@ -21,10 +21,10 @@ from ringbalance.verification.cases.integrator_orders.side_by_side import (
     tapered_error,
 )
 from ringbalance.verification.cases.integrator_orders.stall import stall_study
-from ringbalance.verification.evidence import Evidence, Found, Level
+from ringbalance.verification.evidence import Evidence, Level, as_found
 from ringbalance.verification.orders import OrderStudy, order_study
 from ringbalance.verification.reference.adaptive_ode import adaptive_ode
-from ringbalance.verification.reference.explicit_segments import explicit_segments
+from ringbalance.verification.reference.explicit_segments import explicit_segments, paper_drive
 
 _COUNTS: Final = (8, 16, 32, 64, 128, 256)
 _INSTANTS: Final = 200
@@ -43,14 +43,16 @@ def _kinked(fill_ratio: FloatArray, largest: float) -> FloatArray:
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     law = paper_law(scene)
-    empties = float(
-        stall_pressure(disc=scene.disc, density=scene.liquid.density, angular_velocity=scene.rotor.speed)
+    omega = scene.rotor.speed
+    empties = stall_pressure(disc=scene.disc, density=scene.liquid.density, angular_velocity=omega)
+    full = law.max_fill_ratio
+    long, low = (
+        paper_drive(law, gas_pressure=above * empties, fill=full, total=full)
+        for above in (_ABOVE_STALL, _BELOW_STALL)
     )
-    long = _drive(law, _ABOVE_STALL * empties)
     spoiled = 1.001 if defect == "exchange_rate_off" else 1.0
     duration = _SHARE * _end(long)
     study = _explicit(long, duration, frozen=defect == "frozen_velocity")
-    low = _drive(law, _BELOW_STALL * empties)
     stall = stall_study(low, law, spoiled=defect == "stall_rate_off")
     t = np.linspace(0, duration, 21)[1:]
     found = {
@@ -67,22 +69,11 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         "cycle_error": stall.cycle_error,
     }
     return Evidence(
-        found={name: Found(value=value) for name, value in found.items()},
+        found=as_found(**found),
         numbers={"longest_for_per_mille": stall.longest_for_per_mille, "time_to_stall": _end(low)},
         series=(stall.series,),
         tables=(side_by_side(long, law, duration),),
         convergence=(study.table("fill by explicit segments, relative error", 1.0),),
-    )
-
-
-def _drive(law: PaperLaw, pressure: float) -> Drive:
-    return Drive(
-        law=law,
-        fill=law.max_fill_ratio,
-        total=law.max_fill_ratio,
-        exchange_rate=law.tube_area / law.chamber_volume,
-        gas_pressure=pressure,
-        primed=False,
     )
 
 

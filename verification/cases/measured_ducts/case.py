@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Evidence, Found, Level
+from ringbalance.verification.evidence import Evidence, Level, as_found
 from ringbalance.verification.validation.model_bias import MUTATIONS, ModelStatistics, statistics_numbers
 from ringbalance.verification.validation.tube_friction import FrictionPoints, friction_points
 
@@ -32,10 +32,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         )
     )
     return Evidence(
-        found={
-            "share_within": Found(value=whole.share_within),
-            "laminar": Found(value=abs(laminar.bias)),
-        },
+        found=as_found(share_within=whole.share_within, laminar=abs(laminar.bias)),
         numbers={
             **statistics_numbers(whole),
             "laminar_points": float(laminar.points),

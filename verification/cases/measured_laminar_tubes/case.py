@@ -12,7 +12,7 @@ from ringbalance.scene.arrays import BoolArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level
 from ringbalance.verification.validation.comparison import compare, data_evidence
-from ringbalance.verification.validation.measurements import measurements
+from ringbalance.verification.validation.kinds import measurements
 from ringbalance.verification.validation.tube_at_rest import CALIBRATING, tube_numbers
 
 _DEVELOPED: Final = 0.0125

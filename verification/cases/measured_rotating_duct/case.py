@@ -9,7 +9,7 @@ import numpy as np
 from ringbalance.physics.tube.rotation_table import laminar_ratio
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Curve, Evidence, Found, Level, figure
+from ringbalance.verification.evidence import Curve, Evidence, Level, as_found, figure
 from ringbalance.verification.navier_stokes.rotating_section import (
     POISEUILLE_GRADIENT,
     DuctMesh,
@@ -34,10 +34,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     fanning, measured = np.array(gradients) / (2 * re), _correlated(s, re)
     deviation = fanning / measured - 1
     return Evidence(
-        found={
-            "bias": Found(value=float(abs(np.mean(deviation)))),
-            "worst": Found(value=float(np.max(np.abs(deviation)))),
-        },
+        found=as_found(bias=abs(np.mean(deviation)), worst=np.max(np.abs(deviation))),
         numbers={"signed_bias": float(np.mean(deviation))} | ({} if defect else _tube()),
         series=(
             figure(

@@ -9,7 +9,7 @@ import numpy as np
 
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Evidence, Found, Level, Series
+from ringbalance.verification.evidence import Evidence, Level, Series, as_found
 from ringbalance.verification.validation.model_bias import MUTATIONS, statistics_numbers
 from ringbalance.verification.validation.tube_friction import FrictionPoints, friction_points
 
@@ -24,10 +24,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     deviation = predicted / points.friction - 1
     rough = points.where(grain > _FULLY_ROUGH).statistics(predicted[grain > _FULLY_ROUGH])
     return Evidence(
-        found={
-            "share_within": Found(value=statistics.share_within),
-            "fully_rough": Found(value=abs(rough.bias)),
-        },
+        found=as_found(share_within=statistics.share_within, fully_rough=abs(rough.bias)),
         numbers={
             **statistics_numbers(statistics),
             "worst": float(np.max(deviation)),

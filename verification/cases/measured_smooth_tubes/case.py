@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Evidence, Found, Level
+from ringbalance.verification.evidence import Evidence, Level, as_found
 from ringbalance.verification.validation.model_bias import MUTATIONS, statistics_numbers
 from ringbalance.verification.validation.tube_friction import FrictionPoints, friction_points, joined
 
@@ -28,10 +28,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     for name, one in statistics.items():
         numbers |= {f"{name}_{key}": float(value) for key, value in vars(one).items()}
     return Evidence(
-        found={
-            "share_within": Found(value=whole.share_within),
-            "bias": Found(value=abs(statistics["turbulent"].bias)),
-        },
+        found=as_found(share_within=whole.share_within, bias=abs(statistics["turbulent"].bias)),
         numbers=numbers,
         series=(turbulent.figure("smooth tubes", factor * turbulent.predicted()),),
     )

@@ -14,7 +14,7 @@ from scipy.integrate import quad
 from ringbalance.physics.tube.friction import friction_factor
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
+from ringbalance.verification.evidence import Curve, Evidence, Level, Series, as_found, figure
 from ringbalance.verification.reference.mixing_length import MixingLength, mixing_length, mixing_length_flow
 from ringbalance.verification.validation.tube_friction import friction_points
 
@@ -64,11 +64,11 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     grain = sand.reynolds * np.sqrt(sand.friction / 8) * sand.relative_roughness
     between = (grain > _BETWEEN[0]) & (grain < _BETWEEN[1])
     return Evidence(
-        found={
-            "quadrature": Found(value=_quadrature_gap(closure, cells)),
-            "smooth": Found(value=float(np.max(np.abs(apart[even >= _HIGH])))),
-            "between": Found(value=float(np.mean(np.abs(wall[between])))),
-        },
+        found=as_found(
+            quadrature=_quadrature_gap(closure, cells),
+            smooth=np.max(np.abs(apart[even >= _HIGH])),
+            between=np.mean(np.abs(wall[between])),
+        ),
         numbers={
             "low": float(np.max(np.abs(apart[even < _HIGH]))),
             "measured": float(np.max(np.abs(measured))),

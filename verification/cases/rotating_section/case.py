@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, Series, figure
+from ringbalance.verification.evidence import Curve, Evidence, Level, Reference, Series, as_found, figure
 from ringbalance.verification.navier_stokes.newton import FlowSystem
 from ringbalance.verification.navier_stokes.rotating_section import (
     SectionMesh,
@@ -45,12 +45,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     fast = np.array([_linear(system, factor * rotation) for rotation in _FAST])
     gaps = fast / (_LIMIT * np.sqrt(_FAST)) - 1
     return Evidence(
-        found={
-            "at_rest": Found(value=abs(rest - 1)),
-            "slow": Found(value=slow),
-            "inertia": Found(value=inertia),
-            "ekman": Found(value=float(gaps[2] / gaps[3])),
-        },
+        found=as_found(at_rest=abs(rest - 1), slow=slow, inertia=inertia, ekman=gaps[2] / gaps[3]),
         numbers={"gap": float(gaps[-1])},
         series=(_figure(fast),),
     )

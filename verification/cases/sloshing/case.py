@@ -18,7 +18,7 @@ from ringbalance.physics.sloshing.response import SloshingResponse, sloshing_res
 from ringbalance.physics.sloshing.system import SloshingSystem, sloshing_system
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
+from ringbalance.verification.evidence import Curve, Evidence, Level, Series, as_found, figure
 from ringbalance.verification.reference.sloshing_exact import (
     CosineWaves,
     cosine_waves,
@@ -42,7 +42,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     }
     return replace(
         _overview(scene, _POINTS[level]),
-        found={name: Found(value=value) for name, value in judged.items()},
+        found=as_found(**judged),
     )
 
 

@@ -134,14 +134,12 @@ class Comparison:
         }
 
 
-def compare(
-    first: AnyScene, second: AnyScene, *, model_of: _ModelOf, runs: int = RUNS, tuned: bool = True
-) -> Comparison:
+def compare(first: AnyScene, second: AnyScene, *, model_of: _ModelOf, runs: int = RUNS) -> Comparison:
     """Put two balancers on the rotor of the first scene, tune each, and let each balance it over one span.
 
-    Of the second scene its balancer alone counts; `model_of` makes the model of a liquid ring.  `tuned`: with
-    the gain that `tune` recommends for the target-vector algorithm, and gains of eccentric masses lowered to
-    the recommended ones.
+    Of the second scene its balancer alone counts; `model_of` makes the model of a liquid ring.  A liquid ring
+    has the gain that `tune` recommends for the target-vector algorithm, eccentric masses have theirs lowered
+    to the recommended ones.
     Raises: SceneError: a balancer that cannot work on that rotor.
     """
     rotor = rotor_of(first)
@@ -149,7 +147,7 @@ def compare(
         # Whether the second can work there at all is known before anything is run.
         scenes = own_scene(first), scene_on(rotor, second)
         span = max(_span(scene) for scene in scenes)
-        one, other = (_side(rotor, scene, model_of, span=span, runs=runs, tuned=tuned) for scene in scenes)
+        one, other = (_side(rotor, scene, model_of, span=span, runs=runs) for scene in scenes)
     except SceneError as error:
         raise SceneError(_placed(first, fault) for fault in error.faults) from error
     return Comparison(rotor=rotor, span=span, sides=(one, other))
@@ -166,18 +164,16 @@ def _placed(first: AnyScene, fault: Fault) -> Fault:
     return replace(fault, problem=f"on the rotor of {first.source}: {fault.problem}")
 
 
-def _side(
-    rotor: OneRotor, scene: AnyScene, model_of: _ModelOf, *, span: float, runs: int, tuned: bool
-) -> Side:
+def _side(rotor: OneRotor, scene: AnyScene, model_of: _ModelOf, *, span: float, runs: int) -> Side:
     if isinstance(scene, EccentricScene):
-        return _driven_side(rotor, scene, span=span, runs=runs, tuned=tuned)
-    return _liquid_side(scene, model_of(scene), span=span, runs=runs, tuned=tuned)
+        return _driven_side(rotor, scene, span=span, runs=runs)
+    return _liquid_side(scene, model_of(scene), span=span, runs=runs)
 
 
-def _liquid_side(scene: Scene, model: BalancerModel, *, span: float, runs: int, tuned: bool) -> Side:
+def _liquid_side(scene: Scene, model: BalancerModel, *, span: float, runs: int) -> Side:
     # Valve-open times of the trial algorithm are the scene's.
     best = None
-    if tuned and scene.controller.kind != "trial":
+    if scene.controller.kind != "trial":
         best = recommended(scene, model, factor_uncertainty(scene, model))
     ready = scene if best is None else best.scene
     changes = _changes(scene.controller, ready.controller, chambers=scene.disc.chambers)
@@ -210,10 +206,9 @@ def _changes(before: ControllerSettings, after: ControllerSettings, *, chambers:
     return changes
 
 
-def _driven_side(rotor: OneRotor, scene: EccentricScene, *, span: float, runs: int, tuned: bool) -> Side:
+def _driven_side(rotor: OneRotor, scene: EccentricScene, *, span: float, runs: int) -> Side:
     start = scene.supervisor.start
-    ready = replace(scene, run=replace(scene.run, time_limit=span + start))
-    ready, changes = advised(ready) if tuned else (ready, {})
+    ready, changes = advised(replace(scene, run=replace(scene.run, time_limit=span + start)))
     results = []
     for i in range(runs):
         run = simulate_eccentric(replace(ready, run=replace(ready.run, seed=ready.run.seed + i)))

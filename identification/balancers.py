@@ -16,14 +16,15 @@ from ringbalance.identification.model_errors import MODEL_ERRORS, model_errors, 
 from ringbalance.identification.parameters import FitError, Parameter, scene_parameter
 from ringbalance.identification.predict.device import Models, models_of
 from ringbalance.identification.predict.kinds import PREDICTED
-from ringbalance.reduced_model.chamber.inputs import half_widths, shifted
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.uncertain import (
     NORMAL_95,
     UNCERTAIN_QUANTITIES,
     eccentric_value,
+    half_widths,
     nominal_value,
+    shifted,
 )
 
 _LITTLE: Final = 1e-4

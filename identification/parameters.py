@@ -15,10 +15,16 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from ringbalance.identification.predict.device import device_of, models_of
-from ringbalance.reduced_model.chamber.inputs import half_widths
 from ringbalance.scene.faults import did_you_mean
 from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import NORMAL_95, SHAPE, UNCERTAIN_QUANTITIES, nominal_value, with_value
+from ringbalance.scene.uncertain import (
+    NORMAL_95,
+    SHAPE,
+    UNCERTAIN_QUANTITIES,
+    half_widths,
+    nominal_value,
+    with_value,
+)
 
 
 class FitError(ValueError):

@@ -12,16 +12,15 @@ import numpy as np
 
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, Curve
 from ringbalance.reduced_model.chamber.imported_walls import drawing_shares
-from ringbalance.reduced_model.chamber.inputs import half_widths, shifted
 from ringbalance.reduced_model.device import HEAD_INPUTS, Device, device_of
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.operating.crest_margin import directed_state
+from ringbalance.reduced_model.operating.crest_margin import DirectedState, directed_state
 from ringbalance.reduced_model.operating.point import OperatingPoint
 from ringbalance.reduced_model.operating.residual import ResidualLiquid, usable_moment_uncertainty
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
 from ringbalance.reduced_model.tube.heads import without_inputs
 from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
+from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, half_widths, shifted
 
 UNITS: Final = {
     "chamber_volume": "m^3",
@@ -67,7 +66,7 @@ class Budget:
         return math.hypot(self.numerical, self.input, self.model)
 
 
-class Calibrated(Protocol):
+class _Calibrated(Protocol):
     """What a budget needs of a calibration."""
 
     @property
@@ -114,7 +113,7 @@ def rounded(value: float, total: float) -> str:
     return f"{plain:f}" if place > -_DIGITS else f"{plain:e}"
 
 
-def budgets(*, scene: Scene, calibration: Calibrated) -> Mapping[str, Budget]:
+def budgets(*, scene: Scene, calibration: _Calibrated) -> Mapping[str, Budget]:
     """Budget of each of `UNITS`; wall pressure and moment at the largest fill, flow at the operating point.
 
     Every uncertain input is moved by its half-width to both sides, with the chamber and the tube solved
@@ -162,7 +161,7 @@ def _curve_parts(curve: Curve, at: int) -> _Parts:
     return float(curve.value[at]), float(curve.numerical[at]), model
 
 
-def _flow_parts(scene: Scene, calibration: Calibrated) -> dict[str, _Parts]:
+def _flow_parts(scene: Scene, calibration: _Calibrated) -> dict[str, _Parts]:
     """Value, numerical and model part of the quantities of the flow at the operating point."""
     point, rest = calibration.operating_point, calibration.residual
     law = _law_without_inputs(scene, calibration)
@@ -186,12 +185,12 @@ def _flow_parts(scene: Scene, calibration: Calibrated) -> dict[str, _Parts]:
     margin = state.margin(law=law)[1] or 0.0
     rounding = error * abs(point.gas_pressure)
     return found | {
-        "crest_pressure": (point.hump_pressure, rounding, _crest_part(law, point, margin)),
+        "crest_pressure": (point.hump_pressure, rounding, _crest_part(law, point, state, margin)),
         "cavitation_margin": (point.cavitation_margin, rounding, margin),
     }
 
 
-def _level_parts(calibration: Calibrated) -> dict[str, _Parts]:
+def _level_parts(calibration: _Calibrated) -> dict[str, _Parts]:
     """The same of the gas pressures that hydrostatics alone give, for which two wall pressures count."""
     point, chamber = calibration.operating_point, calibration.chamber
     _, numerical, model = _curve_parts(chamber.wall_pressure, chamber.reported[-1])
@@ -204,10 +203,8 @@ def _level_parts(calibration: Calibrated) -> dict[str, _Parts]:
     return {name: (value, width, math.sqrt(2) * model) for name, value in values.items() if value is not None}
 
 
-def _crest_part(law: CalibratedLaw, point: OperatingPoint, margin: float) -> float:
+def _crest_part(law: CalibratedLaw, point: OperatingPoint, state: DirectedState, margin: float) -> float:
     """Model part of the crest's pressure, the larger of a cavity's, which has bounds, and a full siphon's."""
-    fills = (point.fill_ratio, point.fill_ratio)
-    state = directed_state(law=law, fills=fills, gas_pressure=point.gas_pressure, reverse=point.velocity < 0)
     crest = law.path.crest
     if crest is None or point.cavitation_margin is None or point.cavity_pressure is None:
         return 0.0
@@ -219,7 +216,7 @@ def _crest_part(law: CalibratedLaw, point: OperatingPoint, margin: float) -> flo
     return max(highest - pressure, pressure - max(low, full - margin), 0.0)
 
 
-def _law_without_inputs(scene: Scene, calibration: Calibrated) -> CalibratedLaw:
+def _law_without_inputs(scene: Scene, calibration: _Calibrated) -> CalibratedLaw:
     """The law with the uncertainties of numerics and models alone."""
     chamber, law, point = calibration.chamber, calibration.flow_law, calibration.operating_point
     return replace(
@@ -232,7 +229,7 @@ def _law_without_inputs(scene: Scene, calibration: Calibrated) -> CalibratedLaw:
     )
 
 
-def _input_effects(scene: Scene, calibration: Calibrated) -> dict[str, dict[str, float]]:
+def _input_effects(scene: Scene, calibration: _Calibrated) -> dict[str, dict[str, float]]:
     """Larger change of every quantity to either side, by the input's path in the scene."""
     near = calibration.operating_point.loss_velocity or 1.0
     here = device_of(scene, near=near, near_fill=calibration.residual.fill_ratio)

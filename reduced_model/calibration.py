@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -18,8 +19,9 @@ from ringbalance.reduced_model.chamber.instability import AsynchronousInstabilit
 from ringbalance.reduced_model.gas_line import LineAnswer, line_answers
 from ringbalance.reduced_model.law.building import calibrated_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.law.loading import load_law
 from ringbalance.reduced_model.law.model import BalancerModel, balancer_model
-from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_law
+from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_law, paper_model
 from ringbalance.reduced_model.operating.point import OperatingPoint, operating_point
 from ringbalance.reduced_model.operating.residual import ResidualLiquid, residual_liquid
 from ringbalance.reduced_model.operating.tube_liquid import TubeLiquid, tube_liquid
@@ -120,7 +122,7 @@ def calibrate(scene: AnyScene) -> Calibration:
     return Calibration(
         scene=scene,
         chamber=chamber,
-        tube=_tube(scene, np.geomspace(*VELOCITIES, VELOCITY_POINTS)),
+        tube=tube_loss(scene, np.geomspace(*VELOCITIES, VELOCITY_POINTS)),
         flow_law=law,
         paper_law=paper_law(scene),
         operating_point=point,
@@ -151,17 +153,17 @@ def calibrated_model(scene: Scene) -> BalancerModel:
     return balancer_model(_chamber_and_law(with_tube_models(scene))[1])
 
 
+def law_by_name(scene: Scene, law: str) -> BalancerModel:
+    """Model of a scene under the law "calibrated", "paper", or that of a saved file.
+
+    Raises: SceneError: a scene that cannot be calibrated, or a file that holds no law.
+    """
+    if law == "calibrated":
+        return calibrated_model(scene)
+    return paper_model(scene) if law == "paper" else balancer_model(load_law(Path(law)))
+
+
 def _chamber_and_law(scene: Scene) -> tuple[ChamberCalibration, CalibratedLaw]:
     check_ring(scene)
     chamber = calibrate_chamber(scene)
     return chamber, calibrated_law(scene=scene, chamber=chamber, heads=tube_heads(scene))
-
-
-def _tube(scene: Scene, velocity: FloatArray) -> TubeLoss:
-    return tube_loss(
-        tube=scene.tube,
-        liquid=scene.liquid,
-        angular_velocity=scene.rotor.speed,
-        velocity=velocity,
-        inputs=scene.uncertainty,
-    )

@@ -125,11 +125,11 @@ class Device:
         disc, top = self.scene.disc, self.scene.disc.max_fill_ratio
         area = float(liquid_area(disc=disc, surface_radius=disc.inner_radius))
         acceleration = self.scene.rotor.speed**2 * self.scene.tube.port_radius
-        section, x = math.pi / 4 * self.scene.tube.bore**2, self.near_fill
+        x = self.near_fill
         for _ in range(_ROUNDS):
             pressure, _, _ = measured_closed_forms(scene=self.scene, fill_ratio=np.array([x, top - x]))
             u = self._flow(self._ends(float(pressure[0]), float(pressure[1])), primed=True).velocity
-            depth = float(draw_down_depth(flow_rate=section * u, acceleration=acceleration))
+            depth = float(draw_down_depth(flow_rate=self.scene.tube.area * u, acceleration=acceleration))
             level = min(max(self.scene.tube.port_radius - depth, disc.inner_radius), disc.outer_radius)
             x = min(float(liquid_area(disc=disc, surface_radius=level)) / area, top)
         rest = min(x, top / 2)

@@ -16,6 +16,7 @@ from ringbalance.reduced_model.chamber.element_check import CHECKED, ElementChec
 from ringbalance.reduced_model.chamber.gravity import closed_ring
 from ringbalance.reduced_model.chamber.imported_walls import share_across
 from ringbalance.reduced_model.chamber.row_status import RowStatus, row_status
+from ringbalance.reduced_model.chamber.values import paper_closed_forms
 from ringbalance.reduced_model.gas_line import line_document
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.paper import formulas as paper
@@ -88,9 +89,7 @@ def _chamber(calibration: Calibration) -> dict[str, Any]:
             "max_liquid_volume_m3": scene.disc.max_fill_ratio * chamber.volume,
             "fill_ratio": _listed(fills),
             "free_surface_radius_m": _listed(chamber.ring.surface_radius[at]),
-            "row_status": [
-                str(status) for status in row_status(scene, fill_ratio=fills, closed=chamber.ring.closed[at])
-            ],
+            "row_status": [str(status) for status in chamber_status(calibration)],
         }
         | _curve(chamber.wall_pressure, at, "wall_pressure", "Pa")
         | _curve(chamber.moment, at, "moment", "kg_m")
@@ -130,22 +129,9 @@ def paper_columns(calibration: Calibration, fill_ratio: FloatArray) -> Mapping[s
     """What the liquid-ring paper gives for wall pressure and moment at fill ratios.
 
     Returns: "wall_pressure_paper_Pa" and "moment_paper_kg_m", shape (n,), by the paper's own volume.
-    Source: Eqs. 3, 4, 7 and 12.
     """
-    scene = calibration.scene
-    volume = fill_ratio * paper.chamber_volume_paper(disc=scene.disc)
-    radius = paper.surface_radius_paper(disc=scene.disc, liquid_volume=volume)
-    moment = paper.moment_paper(disc=scene.disc, density=scene.liquid.density, surface_radius=radius)
-    return {
-        "wall_pressure_paper_Pa": paper.wall_pressure_paper(
-            disc=scene.disc,
-            density=scene.liquid.density,
-            angular_velocity=scene.rotor.speed,
-            liquid_volume=volume,
-        ),
-        # A root and its square differ by rounding, of which an empty chamber shall have nothing.
-        "moment_paper_kg_m": np.where(fill_ratio > 0, moment, 0.0),
-    }
+    pressure, moment = paper_closed_forms(calibration.scene, fill_ratio)
+    return {"wall_pressure_paper_Pa": pressure, "moment_paper_kg_m": moment}
 
 
 def _lambda(calibration: Calibration) -> dict[str, Any]:
@@ -204,6 +190,13 @@ def _budget(budget: Budget) -> dict[str, Any]:
         "total": budget.total,
         "inputs": dict(budget.inputs),
     }
+
+
+def chamber_status(calibration: Calibration) -> tuple[RowStatus, ...]:
+    """What limits a chamber at the reported fill ratios."""
+    scene, chamber = calibration.scene, calibration.chamber
+    fills, computed = chamber.reported_fill_ratio, chamber.ring.closed[list(chamber.reported)]
+    return row_status(scene, fill_ratio=fills, closed=computed & closed_ring(scene, fills))
 
 
 def velocity_status(calibration: Calibration, fill_ratio: FloatArray) -> tuple[RowStatus, ...]:

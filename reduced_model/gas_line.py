@@ -12,18 +12,12 @@ import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import Any, Final
 
 from ringbalance.physics.gas.supply import GasLine, line_with
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.short_injection import (
-    Edges,
-    Fills,
-    ShortInjection,
-    accelerated_part,
-    edges_of,
-    lifted_of,
-)
+from ringbalance.reduced_model.short_injection import Fills, ShortInjection, short_injections
 from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.models import Gas, Scene
 
@@ -105,34 +99,9 @@ def line_answers(scene: Scene, model: BalancerModel, *, inertia: bool = True) ->
     """
     fill = model.flow.max_fill_ratio / 2
     fills = Fills(model=model, driven=fill, opposite=fill)
-    ends, edges = line_ends(scene), edges_of(fills, scene.gas.pressure)
-    if edges is None:
-        return tuple(_answer(scene, end, fills, None) for end in ends)
-    built = (_injection(scene, end, fills, edges, inertia=inertia) for end in ends)
-    return tuple(_answer(scene, end, fills, one) for end, one in zip(ends, built, strict=True))
-
-
-def short_injection(scene: Scene, end: LineEnd, fills: Fills) -> ShortInjection | None:
-    """Injections by one gas line; None where the gas starts no flow."""
-    edges = edges_of(fills, scene.gas.pressure)
-    return None if edges is None else _injection(scene, end, fills, edges, inertia=True)
-
-
-def _injection(scene: Scene, end: LineEnd, fills: Fills, edges: Edges, *, inertia: bool) -> ShortInjection:
-    model = fills.model
-    return ShortInjection(
-        fills=fills,
-        line=end.line,
-        volume=_gas_volume(scene, fills),
-        edges=edges,
-        mass=model.density * scene.tube.length if inertia else 0.0,
-        part=accelerated_part(scene.tube, model),
-        lifted=lifted_of(scene.tube, model, inertia=inertia),
-    )
-
-
-def _gas_volume(scene: Scene, fills: Fills) -> float:
-    return (1 - fills.driven) * fills.model.chamber_volume + (scene.gas.dead_volume or 0.0)
+    ends = line_ends(scene)
+    injections = short_injections(scene, [end.line for end in ends], fills, inertia=inertia)
+    return tuple(_answer(scene, end, fills, one) for end, one in zip_longest(ends, injections))
 
 
 def _vibration(scene: Scene, fills: Fills, metres: float) -> float:
@@ -164,11 +133,11 @@ def standing_amplitude(
     Args: `times`: s, of all chambers. `rates`: of the vibration with each chamber driven, m/s.
     """
     if settings.kind == "law_based":
-        return largest_standing([time * rate for time, rate in zip(times, rates, strict=True)])
-    return largest_standing(times) / settings.proportional
+        return _largest_standing([time * rate for time, rate in zip(times, rates, strict=True)])
+    return _largest_standing(times) / settings.proportional
 
 
-def largest_standing(times: Sequence[float]) -> float:
+def _largest_standing(times: Sequence[float]) -> float:
     """Largest vector of which no chamber's share is above its time, in the unit of the times.
 
     Args: `times`: of all chambers in the order of the letters.
@@ -180,7 +149,7 @@ def largest_standing(times: Sequence[float]) -> float:
 
 
 def _answer(scene: Scene, end: LineEnd, fills: Fills, injection: ShortInjection | None) -> LineAnswer:
-    line, limit, volume = end.line, scene.controller.limit, _gas_volume(scene, fills)
+    line, limit, volume = end.line, scene.controller.limit, fills.gas_volume(scene)
     opening = correction = dead = standing = None
     if injection is not None:
         shortest = injection.shortest(end.valve_lag)

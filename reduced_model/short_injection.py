@@ -24,7 +24,7 @@ T moves the column by s.  A controller that counts on the steady velocity adds i
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
@@ -37,7 +37,7 @@ from ringbalance.reduced_model.law.flow_law import Flow
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.tube.path import crest_middle, crest_span
 from ringbalance.scene.arrays import BoolArray, FloatArray
-from ringbalance.scene.models import Tube
+from ringbalance.scene.models import Scene, Tube
 
 _PRESSURES: Final = 257
 """Per refinement of a threshold: few calls of the law with many pressures cost least."""
@@ -58,7 +58,7 @@ _ROUNDS: Final = 3
 
 
 @dataclass(frozen=True, kw_only=True)
-class Moved:
+class _Moved:
     """How far a column has come."""
 
     metres: float = 0.0
@@ -78,6 +78,10 @@ class Fills:
     driven: float
     opposite: float
 
+    def gas_volume(self, scene: Scene) -> float:
+        """Of the driven chamber, with the scene's dead volume, m^3."""
+        return (1 - self.driven) * self.model.chamber_volume + (scene.gas.dead_volume or 0.0)
+
     def flow(self, pressure: FloatArray, *, primed: bool) -> Flow:
         """At gauge pressures, Pa."""
         return self.model.flow.evaluate(
@@ -93,7 +97,7 @@ class Fills:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Edges:
+class _Edges:
     """Gauge pressures, Pa."""
 
     starts: float
@@ -106,7 +110,7 @@ class Edges:
     """At which a full siphon would stall."""
 
 
-def edges_of(fills: Fills, pressure: float) -> Edges | None:
+def _edges_of(fills: Fills, pressure: float) -> _Edges | None:
     """Up to a supply's gauge pressure, Pa; None where the gas starts no flow."""
     starts = least_pressure(lambda p: fills.flow(p, primed=False).velocity > 0, 0.0, pressure)
     if starts is None:
@@ -117,7 +121,7 @@ def edges_of(fills: Fills, pressure: float) -> Edges | None:
     if isinstance(law, CalibratedLaw):
         ends = law.ends(fill_ratio=fills.driven, opposite_fill_ratio=fills.opposite)
         stalls = float(ends.stall_pressure()) / law.gas_factor
-    return Edges(
+    return _Edges(
         starts=starts,
         primes=pressure if primes is None else max(primes, starts),
         stops=stops,
@@ -143,34 +147,48 @@ def least_pressure(
     return high
 
 
-def accelerated_part(tube: Tube, model: BalancerModel) -> float:
-    """L_up/L, the part of a separated column that is accelerated; 1 for a law or a tube without a crest."""
-    if tube.hump_radius is None or not isinstance(model.flow, CalibratedLaw):
-        return 1.0
-    return crest_span(tube)[1]
-
-
 @dataclass(frozen=True, kw_only=True)
-class Lifted:
-    """What becomes of the liquid on the crest; lengths of tube, m."""
+class _Crest:
+    """What the crest does to a column; as it stands, without one or under a law that knows none."""
 
+    part: float = 1.0
+    """L_up/L, of a separated column that is accelerated."""
     way: float = 0.0
-    """By which the column moves until its front reaches the crest's end."""
+    """By which the column moves until its front reaches the crest's end, m."""
     passed: float = 0.0
-    """From the crest's middle to its end: of the way, what does not fall back."""
+    """From the crest's middle to its end: of the way, what does not fall back, m."""
 
 
-def lifted_of(tube: Tube, model: BalancerModel, *, inertia: bool) -> Lifted:
-    """The lift of a leg that has followed the filling gas up to the crest; nothing without a crest.
+def _crest_of(tube: Tube, model: BalancerModel, *, inertia: bool) -> _Crest:
+    """The lift of a leg that has followed the filling gas up to the crest.
 
     The column that starts from rest is taken as long as up to the crest's end.  The one that is lifted is as
     long as up to the crest's middle, in the mean, and comes further in the same time: by the inverse ratio.
     """
     if tube.hump_radius is None or not isinstance(model.flow, CalibratedLaw):
-        return Lifted()
+        return _Crest()
     (start, stop), middle = crest_span(tube), crest_middle(tube)
     ratio = middle / stop if inertia else 1.0
-    return Lifted(way=(stop - start) * ratio * tube.length, passed=(stop - middle) * tube.length)
+    return _Crest(part=stop, way=(stop - start) * ratio * tube.length, passed=(stop - middle) * tube.length)
+
+
+def short_injections(
+    scene: Scene, lines: Sequence[GasLine], fills: Fills, *, inertia: bool = True
+) -> tuple[ShortInjection, ...]:
+    """Injections by each of several gas lines; none where the gas starts no flow.
+
+    Args: `inertia`: whether the column in the tube has its mass, or follows the pressure at once.
+    """
+    edges, model = _edges_of(fills, scene.gas.pressure), fills.model
+    if edges is None:
+        return ()
+    crest = _crest_of(scene.tube, model, inertia=inertia)
+    mass = model.density * scene.tube.length if inertia else 0.0
+    volume = fills.gas_volume(scene)
+    return tuple(
+        ShortInjection(fills=fills, line=line, volume=volume, edges=edges, mass=mass, crest=crest)
+        for line in lines
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -181,14 +199,12 @@ class ShortInjection:
     line: GasLine
     volume: float
     """Of the gas, m^3."""
-    edges: Edges
+    edges: _Edges
     mass: float
     """rho L, kg/m^2; zero: the column follows the pressure at once."""
-    part: float
-    """L_up/L."""
-    lifted: Lifted = Lifted()
+    crest: _Crest
 
-    def shortest(self, least: float) -> Moved:
+    def shortest(self, least: float) -> _Moved:
         """By the shortest valve-open time that primes the tube and is not below `least`, s."""
         return self._closed(self._opened(least))
 
@@ -204,34 +220,34 @@ class ShortInjection:
         return dead
 
     @cached_property
-    def _primed(self) -> Moved:
+    def _primed(self) -> _Moved:
         """When the tube is primed, with its front past the crest."""
         ambient = self.line.ambient_pressure
         rising = np.linspace(ambient + self.edges.starts, ambient + self.edges.primes, _STEPS)
         filled = float(self.line.filling_time(rising[0], volume=self.volume))
-        begun = self.lifted.passed - self.lifted.way
-        now = Moved(metres=begun, time=filled, pressure=float(rising[0]))
+        begun = self.crest.passed - self.crest.way
+        now = _Moved(metres=begun, time=filled, pressure=float(rising[0]))
         now = self._passed(rising, now, primed=False)
         for _ in range(_LIFTING):
-            if now.metres >= self.lifted.passed or begun == 0.0:
+            if now.metres >= self.crest.passed or begun == 0.0:
                 break
             now = self._open(now, now.time + _INSTANT)
         return now
 
-    def _opened(self, opening: float) -> Moved:
+    def _opened(self, opening: float) -> _Moved:
         """When the valve shuts, at the earliest as the tube is primed."""
         now = self._primed
         if now.time >= opening:
             return now
         return self._open(now, opening)
 
-    def _open(self, now: Moved, until: float) -> Moved:
+    def _open(self, now: _Moved, until: float) -> _Moved:
         """Of a primed tube, up to a time, s."""
         rising = np.linspace(now.pressure, self.line.supply_pressure, _STEPS)
         now = self._passed(rising, now, primed=True, until=until)
         return self._held(now, until - now.time) if now.time < until else now
 
-    def _closed(self, before: Moved) -> Moved:
+    def _closed(self, before: _Moved) -> _Moved:
         """At rest, with the chamber vented; its time stays that of the opening."""
         ambient = self.line.ambient_pressure
         stop = ambient + min(self.edges.stops, before.pressure - ambient)
@@ -241,7 +257,9 @@ class ShortInjection:
             now = self._braked(now)
         return replace(now, metres=max(now.metres, 0.0), time=before.time)
 
-    def _passed(self, pressure: FloatArray, before: Moved, *, primed: bool, until: float = math.inf) -> Moved:
+    def _passed(
+        self, pressure: FloatArray, before: _Moved, *, primed: bool, until: float = math.inf
+    ) -> _Moved:
         """Along an absolute pressure that rises or falls, V dp = (f - p S u) dt, f = V dp/dt of the line, up
         to a time."""
         falls = pressure[-1] < pressure[0]
@@ -261,7 +279,7 @@ class ShortInjection:
                 break
         return now
 
-    def _held(self, before: Moved, time: float) -> Moved:
+    def _held(self, before: _Moved, time: float) -> _Moved:
         gauge = np.array([before.pressure - self.line.ambient_pressure])
         steady, push = self._driven(gauge, primed=True)
         return self._moved(before, float(steady[0]), float(push[0]), time)
@@ -277,7 +295,7 @@ class ShortInjection:
         return steady, self._push(gauge, alike)
 
     def _push(self, gauge: FloatArray, alike: FloatArray) -> FloatArray:
-        broken = (alike - self.edges.stops) / self.part
+        broken = (alike - self.edges.stops) / self.crest.part
         return np.asarray(np.minimum(broken, gauge - self.edges.stalls) / self.mass)
 
     @cached_property
@@ -289,7 +307,7 @@ class ShortInjection:
         # Where supply and stop coincide, round-off would leave no push, or one below zero.
         return p, u, np.maximum(self._push(p, p), _LEAST_PUSH) / u**2
 
-    def _moved(self, before: Moved, steady: float, push: float, time: float) -> Moved:
+    def _moved(self, before: _Moved, steady: float, push: float, time: float) -> _Moved:
         velocity, metres = steady, steady * time
         if self.mass:
             _, velocities, frictions = self._losses
@@ -297,9 +315,9 @@ class ShortInjection:
             velocity, metres = ridden(velocity=before.velocity, push=push, friction=friction, time=time)
         return replace(before, metres=before.metres + metres, time=before.time + time, velocity=velocity)
 
-    def _braked(self, before: Moved) -> Moved:
+    def _braked(self, before: _Moved) -> _Moved:
         """To rest without gas."""
-        push = -self.edges.stops / (self.part * self.mass) if self.mass else 0.0
+        push = -self.edges.stops / (self.crest.part * self.mass) if self.mass else 0.0
         return self._moved(before, 0.0, push, math.inf) if push and before.velocity else before
 
 

@@ -14,8 +14,13 @@ from rich.text import Text
 
 from ringbalance.reduced_model.budget import Budget, rounded
 from ringbalance.reduced_model.calibration import Calibration
-from ringbalance.reduced_model.chamber.row_status import REMEDIES, row_status
-from ringbalance.reduced_model.documents import PRESSURE_FACTORS, paper_columns, velocity_status
+from ringbalance.reduced_model.chamber.row_status import REMEDIES
+from ringbalance.reduced_model.documents import (
+    PRESSURE_FACTORS,
+    chamber_status,
+    paper_columns,
+    velocity_status,
+)
 from ringbalance.reduced_model.gas_line import line_text, line_warning
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.operating.tube_liquid import TubeLiquid
@@ -192,7 +197,7 @@ def _margin_text(calibration: Calibration) -> str:
 
 def _chamber_table(calibration: Calibration) -> Table:
     chamber, at = calibration.chamber, list(calibration.chamber.reported)
-    states = row_status(calibration.scene, fill_ratio=chamber.fill_ratio[at], closed=chamber.ring.closed[at])
+    states = chamber_status(calibration)
     limited = [state for state in REMEDIES if state in states]
     columns_shown = ("fill", "R1' mm", "p MPa", "Eq. 12", "off %", "U g mm", "Eq. 7", "off %")
     table = _table("Chamber", *columns_shown, *(["state"] if limited else []))

@@ -15,7 +15,7 @@ from ringbalance.controller.eccentric_mass.show import show_eccentric
 from ringbalance.controller.line_runs import line_runs, line_runs_document, line_runs_text
 from ringbalance.controller.loop import simulate as run_loop
 from ringbalance.controller.show import show
-from ringbalance.reduced_model.law_by_name import law_by_name
+from ringbalance.reduced_model.calibration import law_by_name
 from ringbalance.reports.figures import deferred
 from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.eccentric_models import EccentricScene

@@ -5,19 +5,14 @@ radians, positive with the rotation; amplitudes are zero-to-peak; gas pressures 
 absolute.  What a field's key takes and means, and its default, stand in its annotation, see `scene.keys`.
 """
 
+import math
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.keys.declaration import UNCERTAIN, derived, listed, needed, shown, standard, unused
 from ringbalance.scene.keys.derivations import even_number_of_chambers, half_of, radius_of_edge
-from ringbalance.scene.keys.fields import (
-    NOT_NEGATIVE,
-    POSITIVE,
-    chamber_count,
-    number,
-    quantity,
-)
+from ringbalance.scene.keys.fields import NOT_NEGATIVE, POSITIVE, chamber_count, number, quantity
 from ringbalance.scene.keys.quantities import (
     FillRatio,
     Length,
@@ -285,6 +280,11 @@ class Tube:
     ]
     models: TubeModels = FINEST_MODELS
     """Of its loss; no key."""
+
+    @property
+    def area(self) -> float:
+        """S, m^2."""
+        return math.pi / 4 * self.bore**2
 
 
 @dataclass(frozen=True, kw_only=True)

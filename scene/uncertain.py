@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -15,6 +16,10 @@ from ringbalance.scene.models import Scene
 
 NORMAL_95: Final = 1.959963984540054
 """Expanded uncertainty (95 %) of a normal distribution in standard deviations."""
+ASSUMED_ROUGHNESS_UNCERTAINTY: Final = 0.5
+"""Relative expanded uncertainty (95 %) of a roughness for which the scene states none."""
+_MAY_VANISH: Final = frozenset({"roughness", "extra_loss"})
+"""Quantities of the tube that may be zero; where others would reach it, a tenth of the value counts."""
 _PATH: Final = re.compile(r"(\w+)\.(\w+)(?:\[([01])\])?")
 UNCERTAIN_QUANTITIES: Mapping[str, str] = MappingProxyType(
     {
@@ -57,6 +62,46 @@ def with_value(*, scene: Scene, quantity: str, value: float) -> Scene:
         dimensions = {each: getattr(disc, each) for each in STRETCHED}
         changed["geometry"] = stretched(geometry, dimensions=dimensions, quantity=quantity, value=value)
     return replace(scene, **{table: replace(getattr(scene, table), **changed)})
+
+
+def half_widths(scene: Scene) -> Mapping[str, float]:
+    """Absolute expanded uncertainties (95 %) of a scene's inputs; the liquid's own where the scene states
+    none.
+    Returns: SI half-width by quantity; only those above zero.
+    """
+    liquid = scene.liquid
+    found = {
+        "roughness": ASSUMED_ROUGHNESS_UNCERTAINTY * scene.tube.roughness,
+        "density": liquid.density_uncertainty * liquid.density,
+        "kinematic_viscosity": liquid.viscosity_uncertainty * liquid.kinematic_viscosity,
+    }
+    for stated in scene.uncertainty:
+        value = nominal_value(scene=scene, quantity=stated.quantity)
+        if value is not None:
+            found[stated.quantity] = stated.absolute(value)
+    return {name: width for name, width in found.items() if width > 0}
+
+
+def shifted(*, scene: Scene, quantity: str, change: float) -> Scene:
+    """The scene with one of its quantities changed, as far as a device can have it.
+
+    An interval that would reach zero or below reports "unknown"; a tenth of the value already shows that.
+    """
+    value = nominal_value(scene=scene, quantity=quantity)
+    if value is None:
+        raise ValueError(f"the scene has no {quantity}")
+    low, high = 0.0 if quantity in _MAY_VANISH else 0.1 * value, math.inf
+    if quantity == "length":
+        low = max(low, sum(b.angle * b.radius for b in scene.tube.bends))
+    if quantity == "hump_position":
+        low, high = 0.0, 1.0
+    if quantity == "hump_radius":
+        high = scene.tube.port_radius
+    if quantity == "port_radius":
+        low = scene.tube.hump_radius or low
+    if value <= 0:
+        low = min(value, 0.0)
+    return with_value(scene=scene, quantity=quantity, value=min(max(value + change, low), high))
 
 
 def eccentric_value(scene: EccentricScene, path: str) -> float:

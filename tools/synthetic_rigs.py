@@ -23,11 +23,10 @@ from ringbalance.identification.model_errors import model_errors, with_model_err
 from ringbalance.identification.predict.device import Models, models_of
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
-from ringbalance.reduced_model.chamber.inputs import half_widths, shifted
 from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import InputUncertainty, Scene
-from ringbalance.scene.uncertain import NORMAL_95, nominal_value
+from ringbalance.scene.uncertain import NORMAL_95, half_widths, nominal_value, shifted
 
 SCENES: Final = ("liquid_ring_paper", "six_chamber", "perfluorinated_oil")
 FITTED: Final = ("influence_coefficient", "lag_angle", "bore", "lambda_factor")

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from importlib import import_module
 from importlib.resources import files
 from typing import Any, Final, cast
 
@@ -43,15 +41,6 @@ def case_code(case_id: str) -> CaseCode:
     return cast(CaseCode, getattr(cases, f"{case_id}_code"))
 
 
-_STUDIES: Final[Mapping[str, str]] = {
-    "pressure under gravity": "reference.gravity",
-    "manufactured pressure": "reference.manufactured",
-    "choice of models": "selection_studies.choices",
-    "measurements": "validation.comparison",
-}
-"""Modules whose `study` cases share, loaded when one is first computed."""
-
-
 @dataclass(frozen=True)
 class SharedCode:
     """The computation of a case whose case.toml names a study and its settings."""
@@ -59,7 +48,7 @@ class SharedCode:
     study: Study
 
     def compute(self, scene: Any, level: Level, defect: str | None = None) -> Evidence:
-        module = import_module(f"ringbalance.verification.{_STUDIES[self.study.of]}")
+        module = getattr(cases, self.study.of)
         found: Evidence = module.study(scene, level, defect, **self.study.settings)
         return found
 

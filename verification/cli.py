@@ -24,7 +24,7 @@ from ringbalance.verification.document import definition_document, results_docum
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.result import CaseResult, QuantityResult
 from ringbalance.verification.runner import paper_scene, run_cases
-from ringbalance.verification.validation.blind import data_document
+from ringbalance.verification.validation.comparison import data_document
 from ringbalance.verification.verdicts import Verdict
 
 DONE: Final = 0

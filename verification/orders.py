@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -98,13 +97,3 @@ def order_figure(studies: Mapping[str, OrderStudy]) -> Series:
     size = next(iter(studies.values())).size
     curves = (Curve(name, "1", np.array(study.error)) for name, study in studies.items())
     return figure("error against mesh size", ("relative mesh size", "1", size), *curves, log=True)
-
-
-def extrapolate(*, coarse: float, fine: float, ratio: float, order: float) -> float:
-    """Richardson extrapolation, S = f + (f - c)/(ratio^order - 1), ratio = h_coarse/h_fine.
-
-    Raises: ValueError: a ratio that is not above one, or an order that is not positive.
-    """
-    if not (ratio > 1 and order > 0):
-        raise ValueError("the ratio must be above one and the order positive")
-    return fine + (fine - coarse) / (math.pow(ratio, order) - 1)

@@ -14,14 +14,14 @@ _MOST_ROWS: Final = 2500
 """Instants in the document; a run has a hundred times as many."""
 
 
-def eccentric_document(run: EccentricRun, *, rows: int = _MOST_ROWS) -> dict[str, Any]:
+def eccentric_document(run: EccentricRun) -> dict[str, Any]:
     """Turn a run into plain numbers, lists and text, all in SI.
 
     Lists run along `time_s`: instants at equal distances, with the beginning and the end of each stage and
     the largest vibration among them.
     Returns: Document that `json.dumps(..., allow_nan=False)` accepts.
     """
-    kept = thinned(run, rows=rows)
+    kept = thinned(run)
     return {
         "balancer": run.balancer,
         "scene": run.scene,

@@ -17,8 +17,8 @@ from ringbalance.controller.tuning.eccentric import (
 )
 from ringbalance.controller.tuning.tune import Tuning, tuning_document
 from ringbalance.controller.tuning.tune import tune as tune_scene
+from ringbalance.reduced_model.calibration import law_by_name
 from ringbalance.reduced_model.gas_line import line_text, line_warning
-from ringbalance.reduced_model.law_by_name import law_by_name
 from ringbalance.reduced_model.selection.registry import neglected_in_injections
 from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.eccentric_models import EccentricScene

@@ -19,10 +19,10 @@ from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, Switch
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import balanced_fills, vibration_rates
 from ringbalance.physics.roots import bracketed_root
-from ringbalance.reduced_model.gas_line import line_ends, short_injection, standing_amplitude
+from ringbalance.reduced_model.gas_line import line_ends, standing_amplitude
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.selection.estimates import FILLING, HELD
-from ringbalance.reduced_model.short_injection import Fills
+from ringbalance.reduced_model.short_injection import Fills, short_injections
 from ringbalance.scene.models import Scene
 
 _TAIL: Final = 0.5
@@ -54,12 +54,12 @@ def dead_times(scene: Scene, model: BalancerModel) -> tuple[float, ...]:
 
 
 def _dead_time(scene: Scene, fills: Fills, dynamics: Dynamics | None, *, rate: float) -> float:
-    injection = short_injection(scene, line_ends(scene)[0], fills)
-    if injection is None or rate == 0.0:
+    injections = short_injections(scene, [line_ends(scene)[0].line], fills)
+    if not injections or rate == 0.0:
         return 0.0
     steady = scene.controller.limit / rate
     metres = steady * fills.steady_velocity(scene.gas.pressure)
-    lost = injection.dead_time(metres) if dynamics is None else _lost(fills, dynamics, metres, steady)
+    lost = injections[0].dead_time(metres) if dynamics is None else _lost(fills, dynamics, metres, steady)
     return round(max(float(lost), 0.0), _DIGITS)
 
 

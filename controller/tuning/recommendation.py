@@ -15,7 +15,6 @@ import numpy as np
 
 from ringbalance.controller.ensemble.samples import MemberUncertainty, member_uncertainty
 from ringbalance.controller.tuning.loop_factor import LoopFactor, vibration_rates
-from ringbalance.reduced_model.chamber.inputs import half_widths, shifted
 from ringbalance.reduced_model.device import HEAD_INPUTS, device_of
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.model import BalancerModel
@@ -24,6 +23,7 @@ from ringbalance.reduced_model.selection.tube_terms import with_tube_models
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
 from ringbalance.reduced_model.tube.heads import without_inputs
 from ringbalance.scene.models import Scene
+from ringbalance.scene.uncertain import half_widths, shifted
 
 _ELSEWHERE: Final = frozenset({"influence_coefficient", "lag_angle", "density"})
 """Inputs with a part of their own; the density is in that of the moment, and the velocity makes up for some

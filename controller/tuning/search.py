@@ -25,6 +25,8 @@ LIMITS: Final = (1.5, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0)
 """Times the scene's, of which the lowest that is reached is reported."""
 _OPENINGS: Final = (0.5, 0.2, 0.1)
 """Times the scene's shortest valve-open time, likewise."""
+_PROMISING: Final = 0.5
+"""Fraction of the runs from which on an integral part may make up for the rest."""
 VALVES: Final = (2.0, 3.0, 5.0, 10.0)
 """Times the scene's conductance and over its lag, of which the slowest that settles is reported."""
 
@@ -207,17 +209,23 @@ def with_ways_out(
     """What else lets 95 % of as many runs settle as the recommended settings are judged by."""
     rows, asked = list(found.tried), replace(scene, gas=found.best.scene.gas)
 
-    def settles(each: Candidate, text: str) -> bool:
+    def settled(each: Candidate, text: str) -> SettlingTimes:
         what = ", ".join(t for t in (text, each.change) if t)
         told(f"{what} ...")
         many = many_runs(each.scene, model, known.widths, members=members, runs=runs, told=lambda _: None)
         rows.append(Tried(change=what, settled=many.settled.value, runs=many.runs))
-        return many.quantiles["p95"] is not None
+        return many
+
+    def settles(each: Candidate, text: str) -> bool:
+        found = settled(each, text)
+        if found.quantiles["p95"] is None and found.settled.value >= _PROMISING:
+            return any(settled(one, text).quantiles["p95"] is not None for one in _pushed(each))
+        return found.quantiles["p95"] is not None
 
     def first(ways: Iterator[tuple[float, Scene, str]]) -> float | None:
         for value, changed, text in ways:
             each = recommended(changed, model, known)
-            if each is not None and any(settles(one, text) for one in (each, *_pushed(each))):
+            if each is not None and settles(each, text):
                 return value
         return None
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import Final
 
@@ -42,11 +41,12 @@ def _flow_rate(device: Device, observations: Observations) -> FloatArray:
         log_u = log_u + np.clip(change, -1.0, 1.0)
         if np.max(np.abs(change)) < _DONE:
             break
-    return np.asarray(math.pi / 4 * scene.tube.bore**2 * np.exp(log_u))
+    return np.asarray(scene.tube.area * np.exp(log_u))
 
 
 def _loss(scene: Scene, velocity: FloatArray) -> FloatArray:
     """k of the tube at rest, by the finest models: the scene's are chosen for its own velocities."""
     tube = replace(scene.tube, models=replace(FINEST_MODELS, errors=scene.tube.models.errors))
-    state = tube_state(tube=tube, liquid=scene.liquid, angular_velocity=0.0, velocity=velocity)
+    still = replace(scene, rotor=replace(scene.rotor, speed=0.0))
+    state = tube_state(still, velocity, tube=tube)
     return with_errors(tube=tube, state=state).k

@@ -13,7 +13,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from ringbalance.physics.convergence.least_squares import Fit, best_fit
+from ringbalance.physics.roots import bracketed_minimum
 from ringbalance.scene.arrays import FloatArray
 
 _LOWEST_ORDER = 0.5
@@ -95,7 +95,7 @@ def gci(
         change = abs(float(phi[1] - phi[0]))
         return _record(Verdict.ROUND_OFF, phi, 0.0, 0.0, float(phi[0]), 0.0, noise + change)
     if phi.size > 3:
-        return _from_fit(phi, best_fit(phi, h, formal_order=formal_order), formal_order, noise, safety)
+        return _from_fit(phi, _best_fit(phi, h, formal_order=formal_order), formal_order, noise, safety)
     return _from_three(phi, h, formal_order, noise, safety)
 
 
@@ -115,17 +115,16 @@ def _is_noise(phi: FloatArray, h: FloatArray, formal_order: float, noise: float)
     return bool(first <= noise and foretold <= 10 * noise)
 
 
-def celik_order(*, first_change: float, second_change: float, r21: float, r32: float) -> float:
+def _celik_order(e21: float, e32: float, r21: float, r32: float) -> float:
     """Observed order from two changes, by fixed-point iteration; negative when the changes grow.
 
-    Args: `first_change`: e21 = phi2 - phi1, finest mesh 1; zero counts as the highest order. `second_change`:
-        e32 = phi3 - phi2; not zero. `r21`: h2/h1, above 1. `r32`: h3/h2, above 1.
+    Args: `e21`: zero counts as the highest order. `e32`: not zero.
     Returns: p with the sign that Celik's absolute value drops; limited to +-50.
     Source: Celik et al. (2008), Eqs. 5a to 5c, doi:10.1115/1.2960953.
     """
-    if first_change == 0:
+    if e21 == 0:
         return _HIGHEST_ORDER
-    ratio = second_change / first_change
+    ratio = e32 / e21
     s, logarithm = np.sign(ratio), np.log(abs(ratio))
     p = float(logarithm / np.log(r21))
     if abs(r21 - r32) <= 1e-12 * r21:
@@ -146,7 +145,7 @@ def _from_three(
     r21, r32 = float(h[1] / h[0]), float(h[2] / h[1])
     if abs(e32) <= noise:
         return _record(Verdict.DIVERGING, phi, 0.0, 0.0, phi[0], 0.0, 3 * abs(e21) + noise)
-    observed = celik_order(first_change=e21, second_change=e32, r21=r21, r32=r32)
+    observed = _celik_order(e21, e32, r21, r32)
     verdict = _verdict(observed, e21 * e32 < 0, formal_order)
     if observed <= 0:
         return _record(verdict, phi, observed, 0.0, phi[0], 0.0, 3 * max(abs(e21), abs(e32)) + noise)
@@ -170,7 +169,9 @@ def _verdict(observed: float, oscillates: bool, formal_order: float) -> Verdict:
     return Verdict.MONOTONE if near else Verdict.NOT_ASYMPTOTIC
 
 
-def _from_fit(phi: FloatArray, fit: Fit, formal_order: float, noise: float, safety: float) -> GridConvergence:
+def _from_fit(
+    phi: FloatArray, fit: _Fit, formal_order: float, noise: float, safety: float
+) -> GridConvergence:
     error, misfit = abs(fit.error), fit.deviation + abs(fit.misfit)
     spread = float(np.ptp(phi)) / (phi.size - 1)
     good = fit.deviation < spread and _LOWEST_ORDER <= fit.observed_order <= 1.05 * formal_order
@@ -187,6 +188,83 @@ def _from_fit(phi: FloatArray, fit: Fit, formal_order: float, noise: float, safe
         verdict = Verdict.DIVERGING if fit.observed_order <= 0 else Verdict.NOT_ASYMPTOTIC
     index = half_width
     return _record(verdict, phi, fit.observed_order, fit.order, fit.limit, index, half_width + noise)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Fit:
+    """One fit phi_i = limit + sum_k a_k h_i^p_k."""
+
+    limit: float
+    """phi for vanishing cells."""
+    error: float
+    """phi(h1) - limit as the fit has it."""
+    misfit: float
+    """Finest value minus the fit there."""
+    deviation: float
+    """Standard deviation of the fit, weighted as the fit was."""
+    observed_order: float
+    """Of the free fit, whether or not it was kept."""
+    order: float
+    """Highest power in the fit that was kept."""
+
+
+def _best_fit(values: FloatArray, sizes: FloatArray, *, formal_order: float) -> _Fit:
+    """The fit with a free order when that lies within [0.5, formal], else the best one of fixed orders.
+
+    Fixed orders: formal; formal/2; and, when convergence is slower than 0.5, both together.  Every fit is
+    tried with equal weights and with weights proportional to 1/h; the one with the smaller deviation is kept.
+    Args: `values`: finest first, shape (n,), at least four.
+    Source: Eca and Hoekstra (2014), section 3, doi:10.1016/j.jcp.2014.01.006; their orders 1 and 2 stand here
+        as half the formal order and the formal order.
+    """
+    h = sizes / sizes[0]
+    free = min((_free(values, h, w, formal_order) for w in _weights(h)), key=lambda fit: fit.deviation)
+    if 0.5 <= free.observed_order <= 1.05 * formal_order:
+        return free
+    powers: list[tuple[float, ...]] = [(formal_order,), (formal_order / 2,)]
+    if free.observed_order < 0.5:
+        powers.append((formal_order / 2, formal_order))
+    fits = [_linear(values, h, w, p, free.observed_order) for p in powers for w in _weights(h)]
+    return min(fits, key=lambda fit: fit.deviation)
+
+
+def _weights(h: FloatArray) -> tuple[FloatArray, FloatArray]:
+    return np.full(h.size, 1 / h.size), (1 / h) / np.sum(1 / h)
+
+
+def _free(values: FloatArray, h: FloatArray, weights: FloatArray, formal_order: float) -> _Fit:
+    def deviation(order: float) -> float:
+        return _linear(values, h, weights, (order,), order).deviation
+
+    # The deviation may have a second valley; a coarse scan finds the right one.
+    grid = np.concatenate([-np.arange(0.1, 3.05, 0.1)[::-1], np.arange(0.1, 2.5 * formal_order, 0.1)])
+    start = float(grid[int(np.argmin([deviation(p) for p in grid]))])
+    low, high = start - 0.1, start + 0.1
+    if low <= 0 <= high:
+        low, high = (0.02, high) if start > 0 else (low, -0.02)
+    order = bracketed_minimum(deviation, low, high, tolerance=1e-9)
+    return _linear(values, h, weights, (order,), order)
+
+
+def _linear(
+    values: FloatArray, h: FloatArray, weights: FloatArray, powers: tuple[float, ...], observed: float
+) -> _Fit:
+    columns = np.stack([np.ones(h.size), *(h**p for p in powers)], axis=1)
+    root = np.sqrt(weights)
+    scale = np.abs(columns).max(axis=0)
+    shift = values[0]  # the fit is of changes, so that a large common value costs no digits
+    coefficients = np.linalg.lstsq(columns / scale * root[:, None], (values - shift) * root, rcond=None)[0]
+    coefficients = coefficients / scale
+    residual = values - shift - columns @ coefficients
+    freedom = max(values.size - len(powers) - 2, 1) if len(powers) == 1 else max(values.size - 3, 1)
+    return _Fit(
+        limit=float(coefficients[0] + shift),
+        error=float(np.sum(coefficients[1:])),
+        misfit=float(residual[0]),
+        deviation=float(np.sqrt(values.size * np.sum(weights * residual**2) / freedom)),
+        observed_order=observed,
+        order=max(powers),
+    )
 
 
 def _record(

@@ -16,17 +16,6 @@ NORMAL_TEMPERATURE: Final = 273.15
 """Of a normal litre, Pa and K: DIN 1343."""
 
 
-def column_ratio(
-    *, angular_velocity: float, inner_radius: float, outer_radius: float, temperature: float
-) -> float:
-    """p(r)/p(r0) of isothermal air in solid-body rotation, exp(omega^2 (r^2 - r0^2)/(2 R T)).
-
-    Source: dp/dr = rho omega^2 r with rho = p/(R T).
-    """
-    head = angular_velocity**2 * (outer_radius**2 - inner_radius**2) / 2
-    return math.exp(head / (AIR_CONSTANT * temperature))
-
-
 def nozzle_flow(*, pressure: float, area: float, temperature: float) -> float:
     """R T m' of air through a choked nozzle, W: the most that passes an opening.
 
@@ -42,17 +31,23 @@ def nozzle_flow(*, pressure: float, area: float, temperature: float) -> float:
 def pressure_factor(scene: Scene) -> float:
     """Gauge pressure of the gas on the liquid over the one where the scene's pressure is measured.
 
-    Measured on the shaft's axis it is the column's ratio up to the surface at equal fills, for the driven
-    chamber and, because it vents to the same place, for the opposite one: p_abs f - p_a f = p f.
+    Measured on the shaft's axis it is the ratio of an isothermal column that turns with the disc up to the
+    surface at equal fills, exp(omega^2 a^2/(2 R T)), for the driven chamber and, because it vents to the same
+    place, for the opposite one: p_abs f - p_a f = p f.
+    Source: dp/dr = rho omega^2 r with rho = p/(R T).
     """
     if scene.gas.measured_at == "chamber":
         return 1.0
-    return column_ratio(
-        angular_velocity=scene.rotor.speed,
-        inner_radius=0.0,
-        outer_radius=float(surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio / 2)),
-        temperature=scene.gas.temperature,
-    )
+    surface = float(surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio / 2))
+    return math.exp((scene.rotor.speed * surface) ** 2 / (2 * AIR_CONSTANT * scene.gas.temperature))
+
+
+def vented_pressure(scene: Scene) -> float:
+    """Absolute pressure of the gas on the liquid of a vented chamber, from which gauge pressures there count.
+
+    The surroundings', times `pressure_factor` where the scene's pressures hold on the shaft.
+    """
+    return scene.gas.ambient_pressure * pressure_factor(scene)
 
 
 def normal_volume(*, pressure_volume: float, temperature: float) -> float:

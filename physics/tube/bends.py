@@ -18,7 +18,7 @@ import numpy.typing as npt
 from fluids.fittings import bend_rounded
 
 from ringbalance.physics.tube.friction import turbulent_share
-from ringbalance.physics.tube.rotation import laminar_ratio
+from ringbalance.physics.tube.rotation_table import laminar_ratio
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Bend, Tube
 

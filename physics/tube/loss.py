@@ -16,7 +16,7 @@ from ringbalance.physics.tube.rotation import STRAIGHT_CRITICAL_REYNOLDS
 from ringbalance.physics.tube.state import TubeState, tube_state
 from ringbalance.physics.tube.uncertainty import uncertainty_parts
 from ringbalance.scene.arrays import BoolArray, FloatArray
-from ringbalance.scene.models import InputUncertainty, Liquid, Tube
+from ringbalance.scene.models import Scene
 
 
 class FlowState(StrEnum):
@@ -49,28 +49,17 @@ class TubeLoss:
     """False wherever a correlation is used outside the range that its source states."""
     range_notes: Mapping[str, BoolArray]
     """Why not: a sentence, and where it holds."""
-    upstream_k: FloatArray
-    """The part of k between the driven chamber and the crest, beyond the profile's kinetic energy there."""
-    kinetic_factor: FloatArray
-    """alpha of the velocity profile."""
+    state: TubeState
+    """Of the same velocities."""
 
 
-def tube_loss(
-    *,
-    tube: Tube,
-    liquid: Liquid,
-    angular_velocity: float,
-    velocity: npt.ArrayLike,
-    inputs: tuple[InputUncertainty, ...] = (),
-) -> TubeLoss:
+def tube_loss(scene: Scene, velocity: npt.ArrayLike) -> TubeLoss:
     """Loss coefficient k(u) of a full tube between two chambers.
 
     k + 1 = f L/d + rotation + K_entrance + K_bends + extra + (1 + K_exit); the "1" is the exit loss of
     turbulent flow, so K_exit holds only what a laminar exit adds.  k is smooth in u and (k + 1) u^2 grows
     with u, so that a head has one velocity.
-    Args: `tube`: the tube; a `drag_coefficient` prescribes k. `velocity`: u, mean over the bore, m/s, any
-        shape, positive. `inputs`: expanded uncertainties (95 %) of scene quantities; those of the tube, the
-        viscosity and the speed are used.
+    Args: `velocity`: u, mean over the bore, m/s, any shape, positive.
     Raises: ValueError: a velocity that is not positive and finite, or arcs longer than the tube.
     Range: calibrated from 0.1 to 20 m/s; `in_range` and `range_notes` say where a correlation is stretched.
     Source: definition of k from Eq. 14 of the liquid-ring paper; the sources of the terms stand with them.
@@ -78,11 +67,9 @@ def tube_loss(
     u = np.asarray(velocity, dtype=np.float64)
     if not np.all(np.isfinite(u) & (u > 0)):
         raise ValueError("velocity must be positive and finite")
-    state = tube_state(tube=tube, liquid=liquid, angular_velocity=angular_velocity, velocity=u)
-    parts = uncertainty_parts(
-        tube=tube, liquid=liquid, angular_velocity=angular_velocity, velocity=u, state=state, inputs=inputs
-    )
-    notes = range_notes(tube=tube, state=state, velocity=u)
+    state = tube_state(scene, u)
+    parts = uncertainty_parts(scene, velocity=u, state=state)
+    notes = range_notes(tube=scene.tube, state=state, velocity=u)
     outside = np.any(np.array([np.zeros(u.shape, dtype=np.bool_), *notes.values()]), axis=0)
     return TubeLoss(
         velocity=u,
@@ -94,8 +81,7 @@ def tube_loss(
         flow_state=flow_states(state),
         in_range=np.asarray(~outside),
         range_notes=MappingProxyType(dict(notes)),
-        upstream_k=state.upstream_loss(tube=tube),
-        kinetic_factor=state.kinetic_factor,
+        state=state,
     )
 
 

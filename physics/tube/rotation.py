@@ -1,8 +1,7 @@
 """Extra friction of a tube that turns about an axis across it: Coriolis forces drive a secondary flow.
 
-Laminar flow rests on a table of finite-element solutions, turbulent flow and transition on correlations:
-`rotating_friction_ratio`, `turbulent_friction_ratio` and `critical_reynolds` are all that the rest of the
-program knows of it.
+Turbulent flow and transition, by correlations; laminar flow rests on the table of finite-element solutions,
+`rotation_table`.
 """
 
 from __future__ import annotations
@@ -13,18 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.physics.results import Estimate
-from ringbalance.physics.tube.rotation_table import laminar_ratio, rotating_friction_ratio
 from ringbalance.scene.arrays import FloatArray
-
-__all__ = [
-    "STRAIGHT_CRITICAL_REYNOLDS",
-    "critical_reynolds",
-    "curved_friction_ratio",
-    "laminar_ratio",
-    "rotating_friction_ratio",
-    "turbulent_friction_ratio",
-]
-
 
 STRAIGHT_CRITICAL_REYNOLDS: Final = 1070 * 28**0.23
 """Critical Re without rotation: the recalled formula at its lower end, R_Om = 28, about 2303."""

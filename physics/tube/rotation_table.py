@@ -77,7 +77,7 @@ class Rectangle:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class FrictionTable:
+class _FrictionTable:
     """The table with its interpolants."""
 
     slow: Rectangle
@@ -149,7 +149,7 @@ def _gap(rectangle: Rectangle, rows: Rows) -> FloatArray:
 
 
 @lru_cache(maxsize=1)
-def friction_table() -> FrictionTable:
+def friction_table() -> _FrictionTable:
     """The table that comes with the package. Returns: The table, read once."""
     path = resources.files("ringbalance.physics") / "data" / "rotating_friction.csv"
     lines = path.read_text(encoding="utf-8").splitlines()
@@ -160,7 +160,7 @@ def friction_table() -> FrictionTable:
     inner = {"slow_check": float(slow_first(1e6)), "fast_check": float(fast_first(1e4))}
     gaps = {name: _gap(slow if name == "slow_check" else fast, part[name]) for name in inner}
     near = {name: np.array([float(r["a"]) <= inner[name] for r in part[name]]) for name in inner}
-    return FrictionTable(
+    return _FrictionTable(
         slow=slow,
         fast=fast,
         interpolation_error=max(float(gaps[n][near[n]].max()) for n in inner),
@@ -283,7 +283,7 @@ def _unsteady(kl: FloatArray, rotation: FloatArray) -> FloatArray:
     return np.asarray(np.where(far, _OUTSIDE, np.minimum(_UNSTEADY * decades, _OUTSIDE)), dtype=np.float64)
 
 
-def _interpolation_uncertainty(table: FrictionTable, kl: FloatArray, rotation: FloatArray) -> FloatArray:
+def _interpolation_uncertainty(table: _FrictionTable, kl: FloatArray, rotation: FloatArray) -> FloatArray:
     """Measured interpolation error, rising from its inner to its edge value over half a decade."""
     near_edge = np.maximum(kl / 1e6, rotation / 1e4)
     weight = _smooth_step(np.log10(np.maximum(near_edge, 1e-300)) / 0.5)

@@ -27,15 +27,16 @@ from ringbalance.physics.tube.numbers import reynolds_number, rotation_reynolds_
 from ringbalance.physics.tube.rotation import (
     STRAIGHT_CRITICAL_REYNOLDS,
     critical_reynolds,
-    laminar_ratio,
     turbulent_friction_ratio,
 )
-from ringbalance.physics.tube.rotation_table import ito_nanbu_laminar
+from ringbalance.physics.tube.rotation_table import ito_nanbu_laminar, laminar_ratio
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import Bend, Liquid, Tube
+from ringbalance.scene.models import Bend, Scene, Tube
 from ringbalance.scene.tube_models import CORRELATION, FINEST_MODELS, LEFT_OUT, Fidelity
 
 _LEAST_KL: Final = 220.0
+_SPREAD: Final = ("friction", "rotation", "extra", "decree")
+"""Terms that are spread evenly along the path."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,8 +49,6 @@ class TubeState:
     """R_Om."""
     critical_ratio: FloatArray
     """Critical Re over the straight tube's."""
-    straight_friction: FloatArray
-    """f without rotation."""
     rotating_friction: FloatArray
     """f with rotation."""
     laminar_ratio: FloatArray
@@ -68,38 +67,39 @@ class TubeState:
         """Sum of the terms."""
         return np.asarray(sum(self.terms.values()), dtype=np.float64)
 
-    def upstream_loss(self, *, tube: Tube) -> FloatArray:
-        """The part of k between the driven chamber and the crest.
+    @property
+    def along(self) -> FloatArray:
+        """The part of k that is spread evenly along the path."""
+        spread = (self.terms[name] for name in _SPREAD if name in self.terms)
+        return np.asarray(sum(spread), dtype=np.float64)
 
-        Entrance, the share `hump_position` of friction, rotation and extra loss, and the bends of the first
-        leg (`bends_before`); of a prescribed k the share `hump_position`.
+    def upstream_loss(self, share: float) -> FloatArray:
+        """The part of k between the driven chamber and a place on the crest, a fraction of the path.
+
+        Entrance, that share of what is spread along the path, and the bends of the first leg.  A bend belongs
+        to a leg, wherever the crest is, so that nothing jumps when the crest moves.  Both legs have equal
+        numbers; the crest halves the middle one of an odd number.
         Source: energy balance from the chamber to the crest; the scene does not say where the bends lie.
         """
-        share = tube.hump_position
+        along = share * self.along
         if "decree" in self.terms:
-            return np.asarray(share * self.terms["decree"], dtype=np.float64)
-        along = share * (self.terms["friction"] + self.terms["rotation"] + self.terms["extra"])
-        bends = sum(part * bend for part, bend in zip(bends_before(len(tube.bends)), self.bends, strict=True))
+            return np.asarray(along)
+        before = len(self.bends) / 2
+        bends = sum(min(max(before - i, 0.0), 1.0) * bend for i, bend in enumerate(self.bends))
         return np.asarray(self.terms["entrance"] + along + bends, dtype=np.float64)
 
 
-def bends_before(count: int) -> tuple[float, ...]:
-    """Fraction of each bend that lies between the driven chamber and the crest.
+def tube_state(scene: Scene, velocity: npt.ArrayLike, *, tube: Tube | None = None) -> TubeState:
+    """Every term of k at velocities above zero, m/s, any shape, of the scene's tube or another in its place.
 
-    A bend belongs to a leg, wherever the crest is, so that nothing jumps when the crest moves.  Both legs
-    have equal numbers; the crest halves the middle one of an odd number.
+    Raises: ValueError: as `straight_length`.
     """
-    return tuple(min(max(count / 2 - i, 0.0), 1.0) for i in range(count))
-
-
-def tube_state(*, tube: Tube, liquid: Liquid, angular_velocity: float, velocity: npt.ArrayLike) -> TubeState:
-    """Every term of k at velocities above zero, m/s, any shape. Raises: ValueError: as `straight_length`."""
-    nu = liquid.kinematic_viscosity
+    tube, nu = tube or scene.tube, scene.liquid.kinematic_viscosity
     return tube_state_at(
         tube=tube,
         reynolds=reynolds_number(velocity=velocity, bore=tube.bore, kinematic_viscosity=nu),
         rotation_reynolds=rotation_reynolds_number(
-            angular_velocity=angular_velocity, bore=tube.bore, kinematic_viscosity=nu
+            angular_velocity=scene.rotor.speed, bore=tube.bore, kinematic_viscosity=nu
         ),
     )
 
@@ -135,7 +135,6 @@ def tube_state_at(*, tube: Tube, reynolds: npt.ArrayLike, rotation_reynolds: npt
         reynolds=re,
         rotation_reynolds=rotation,
         critical_ratio=critical,
-        straight_friction=straight,
         rotating_friction=turning,
         bends=tuple(k for k, _ in bends),
         bend_half_width=np.asarray(sum((w for _, w in bends), start=np.zeros(re.shape))),

@@ -12,14 +12,13 @@ from ringbalance.physics.tube.bends import straight_length
 from ringbalance.physics.tube.development import developing_length, development_uncertainty
 from ringbalance.physics.tube.ends import entrance_loss, exit_loss
 from ringbalance.physics.tube.friction import friction_factor, friction_uncertainty, turbulent_share
-from ringbalance.physics.tube.rotation import rotating_friction_ratio, turbulent_friction_ratio
+from ringbalance.physics.tube.rotation import turbulent_friction_ratio
+from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.physics.tube.state import TubeState, finest_state, tube_state
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import InputUncertainty, Liquid, Tube
-from ringbalance.scene.uncertain import NORMAL_95
+from ringbalance.scene.models import Scene, Tube
+from ringbalance.scene.uncertain import NORMAL_95, half_widths, shifted
 
-ASSUMED_ROUGHNESS_UNCERTAINTY: Final = 0.5
-"""Relative expanded uncertainty (95 %) of a roughness for which the scene states none."""
 SIMPLER: Final = "left out"
 """Part by what models simpler than the finest neglect."""
 INPUT_PART: Final = "input: "
@@ -33,32 +32,27 @@ MODEL_CAUSES: Final[Mapping[str, str]] = {
     SIMPLER: "extra",
 }
 """Causes of `model_parts`, each with the term of k that its error changes."""
-TUBE_INPUTS: Final = ("bore", "length", "roughness", "extra_loss", "drag_coefficient")
+TUBE_INPUTS: Final = (
+    "bore",
+    "length",
+    "roughness",
+    "extra_loss",
+    "drag_coefficient",
+    "kinematic_viscosity",
+    "speed",
+)
+"""Quantities of a scene that k depends on."""
 
 
-def uncertainty_parts(
-    *,
-    tube: Tube,
-    liquid: Liquid,
-    angular_velocity: float,
-    velocity: FloatArray,
-    state: TubeState,
-    inputs: tuple[InputUncertainty, ...],
-) -> Mapping[str, FloatArray]:
+def uncertainty_parts(scene: Scene, *, velocity: FloatArray, state: TubeState) -> Mapping[str, FloatArray]:
     """Expanded uncertainties (95 %) of k, one per cause; independent, so they combine by the root of the sum
     of squares.
-    Args: `liquid`: the liquid; its own viscosity uncertainty is used unless `inputs` has one. `state`: the
-        terms of k at these velocities. `inputs`: expanded uncertainties (95 %) of scene quantities.
+    Args: `state`: the terms of k of the scene's tube at these velocities.
     Returns: Half-width of k by cause, each the shape of `velocity`; parts that vanish everywhere are kept.
     Source: ASME V&V 20-2009, input uncertainty by sensitivity; model spreads stand with the correlations.
     """
-
-    def k_of(t: Tube, q: Liquid, w: float) -> FloatArray:
-        return tube_state(tube=t, liquid=q, angular_velocity=w, velocity=velocity).k
-
-    return model_parts(tube=tube, state=state) | input_parts(
-        tube=tube, liquid=liquid, angular_velocity=angular_velocity, inputs=inputs, k_of=k_of, k=state.k
-    )
+    by_input = input_parts(scene, k_of=lambda moved: tube_state(moved, velocity).k, k=state.k)
+    return model_parts(tube=scene.tube, state=state) | by_input
 
 
 def model_parts(*, tube: Tube, state: TubeState) -> dict[str, FloatArray]:
@@ -136,63 +130,16 @@ def _development_part(tube: Tube, state: TubeState, friction_ratio: FloatArray) 
     )
 
 
-def input_parts(
-    *,
-    tube: Tube,
-    liquid: Liquid,
-    angular_velocity: float,
-    inputs: tuple[InputUncertainty, ...],
-    k_of: Callable[[Tube, Liquid, float], FloatArray],
-    k: FloatArray,
-) -> dict[str, FloatArray]:
+def input_parts(scene: Scene, *, k_of: Callable[[Scene], FloatArray], k: FloatArray) -> dict[str, FloatArray]:
     """Expanded uncertainties (95 %) of k by what the scene leaves uncertain.
 
-    Args: `liquid`: the liquid; its own viscosity uncertainty is used unless `inputs` has one. `inputs`:
-        expanded uncertainties (95 %) of scene quantities. `k_of`: k for another tube, liquid and omega.
+    Args: `k_of`: k for the scene with another value.
     Returns: Half-width of k by input, each the shape of `k`.
     Source: ASME V&V 20-2009, input uncertainty by sensitivity.
     """
-
-    def effect(quantity: str, half_width: float) -> FloatArray:
-        sides = (
-            _shifted(tube, liquid, angular_velocity, quantity, sign * half_width) for sign in (-1.0, 1.0)
-        )
-        changes = [k_of(*side) - k for side in sides]
-        return np.asarray(np.max(np.abs(np.array(changes)), axis=0), dtype=np.float64)
-
-    widths = _half_widths(tube, liquid, angular_velocity, {i.quantity: i for i in inputs})
-    return {f"{INPUT_PART}{name}": effect(name, width) for name, width in widths.items()}
-
-
-def _half_widths(
-    tube: Tube, liquid: Liquid, angular_velocity: float, stated: Mapping[str, InputUncertainty]
-) -> dict[str, float]:
-    """Absolute half-widths of the inputs that k knows, from the scene or, failing that, assumed."""
-    nominal = {name: getattr(tube, name) for name in TUBE_INPUTS}
-    nominal |= {"kinematic_viscosity": liquid.kinematic_viscosity, "speed": angular_velocity}
-    assumed = {
-        "kinematic_viscosity": liquid.viscosity_uncertainty * liquid.kinematic_viscosity,
-        "roughness": ASSUMED_ROUGHNESS_UNCERTAINTY * tube.roughness,
-    }
-    given = {name: i.absolute(nominal[name]) for name, i in stated.items() if nominal.get(name) is not None}
-    return {name: width for name, width in (assumed | given).items() if width > 0}
-
-
-def _shifted(
-    tube: Tube, liquid: Liquid, angular_velocity: float, quantity: str, change: float
-) -> tuple[Tube, Liquid, float]:
-    if quantity == "speed":
-        return tube, liquid, angular_velocity + change
-    if quantity == "kinematic_viscosity":
-        # Never to zero or below: an interval that wide says "unknown", and a tenth already shows it.
-        value = max(liquid.kinematic_viscosity + change, 0.1 * liquid.kinematic_viscosity)
-        return tube, replace(liquid, kinematic_viscosity=value), angular_velocity
-    value = getattr(tube, quantity) + change
-    floor = {
-        "bore": 0.1 * tube.bore,
-        "length": sum(b.angle * b.radius for b in tube.bends) or 0.1 * tube.length,
-        "roughness": 0.0,
-        "extra_loss": 0.0,
-        "drag_coefficient": 0.0,
-    }[quantity]
-    return replace(tube, **{quantity: max(value, floor)}), liquid, angular_velocity
+    found = {}
+    for name, width in half_widths(scene).items():
+        if name in TUBE_INPUTS:
+            sides = [k_of(shifted(scene=scene, quantity=name, change=c)) - k for c in (-width, width)]
+            found[f"{INPUT_PART}{name}"] = np.asarray(np.max(np.abs(np.array(sides)), axis=0))
+    return found

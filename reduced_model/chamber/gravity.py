@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -55,17 +55,8 @@ def gravity_effect(scene: Scene, *, fill_ratio: FloatArray) -> GravityEffect:
     """Change of the means over a turn, a dry part of the outer wall included; zero where empty."""
     pressure, moment = np.zeros_like(fill_ratio), np.zeros_like(fill_ratio)
     wet = fill_ratio > 0
-    ring, level = (
-        tilted_ring(
-            disc=scene.disc,
-            density=scene.liquid.density,
-            angular_velocity=scene.rotor.speed,
-            gravity=gravity,
-            shaft=scene.environment.shaft,
-            fill_ratio=fill_ratio[wet],
-        )
-        for gravity in (scene.environment.gravity, 0.0)
-    )
+    still = replace(scene, environment=replace(scene.environment, gravity=0.0))
+    ring, level = (tilted_ring(each, fill_ratio[wet]) for each in (scene, still))
     pressure[wet], moment[wet] = ring.wall_pressure - level.wall_pressure, ring.moment - level.moment
     return GravityEffect(wall_pressure=pressure, moment=moment)
 
@@ -73,16 +64,11 @@ def gravity_effect(scene: Scene, *, fill_ratio: FloatArray) -> GravityEffect:
 def closed_ring(scene: Scene, fill_ratio: FloatArray) -> BoolArray:
     """Whether the liquid still covers the whole outer wall under gravity; an empty chamber counts as closed.
 
-    Horizontal shaft: R2 - a > g/omega^2; vertical: R2^2 - a^2 > g B/omega^2.
-    Source: the free surface |r + g/omega^2| = const, to first order.
+    Source: `tilted_ring`.
     """
-    disc, gravity = scene.disc, scene.environment.gravity
-    a, delta = surface_radius(disc=disc, fill_ratio=fill_ratio), gravity / scene.rotor.speed**2
-    if scene.environment.shaft == "vertical":
-        closed = disc.outer_radius**2 - a**2 > delta * disc.axial_width
-    else:
-        closed = disc.outer_radius - a > delta
-    return np.asarray(closed | (fill_ratio == 0) | (gravity == 0))
+    closed, wet = np.ones(fill_ratio.shape, dtype=np.bool_), fill_ratio > 0
+    closed[wet] = tilted_ring(scene, fill_ratio[wet]).closed
+    return closed
 
 
 def spilling_ring(scene: Scene, fill_ratio: FloatArray) -> BoolArray:

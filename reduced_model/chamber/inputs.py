@@ -1,8 +1,7 @@
-"""What uncertain inputs do to volume, wall pressure, moment and lambda of a chamber, by its closed forms."""
+"""What uncertain inputs do to wall pressure, moment and lambda of a chamber, by its closed forms."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
@@ -11,16 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.mesh.geometry import (
-    chamber_volume,
     liquid_first_moment,
     surface_centroid,
     surface_radius,
     wall_square,
 )
-from ringbalance.physics.tube.uncertainty import ASSUMED_ROUGHNESS_UNCERTAINTY
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import nominal_value, with_value
+from ringbalance.scene.uncertain import half_widths, shifted
 
 CHAMBER_INPUTS: Final = (
     "outer_radius",
@@ -38,32 +35,12 @@ CHAMBER_INPUTS: Final = (
 class InputEffect:
     """Expanded uncertainties (95 %) by input; arrays along the fill ratio."""
 
-    volume: float
-    """V, m^3."""
     wall_pressure: FloatArray
     """Pa."""
     moment: FloatArray
     """kg m."""
     moment_per_mass: float
     """lambda at equal fills, m."""
-
-
-def half_widths(scene: Scene) -> Mapping[str, float]:
-    """Absolute expanded uncertainties (95 %) of a scene's inputs; the liquid's own where the scene states
-    none.
-    Returns: SI half-width by quantity; only those above zero.
-    """
-    liquid = scene.liquid
-    found = {
-        "roughness": ASSUMED_ROUGHNESS_UNCERTAINTY * scene.tube.roughness,
-        "density": liquid.density_uncertainty * liquid.density,
-        "kinematic_viscosity": liquid.viscosity_uncertainty * liquid.kinematic_viscosity,
-    }
-    for stated in scene.uncertainty:
-        value = nominal_value(scene=scene, quantity=stated.quantity)
-        if value is not None:
-            found[stated.quantity] = stated.absolute(value)
-    return {name: width for name, width in found.items() if width > 0}
 
 
 def input_effects(*, scene: Scene, fill_ratio: FloatArray) -> Mapping[str, InputEffect]:
@@ -80,40 +57,17 @@ def input_effects(*, scene: Scene, fill_ratio: FloatArray) -> Mapping[str, Input
 def _effect(scene: Scene, fill_ratio: FloatArray, quantity: str, width: float) -> InputEffect:
     fills = np.append(fill_ratio, scene.disc.max_fill_ratio / 2)
     here, *sides = (
-        (*measured_closed_forms(scene=s, fill_ratio=fills), chamber_volume(disc=s.disc))
+        measured_closed_forms(scene=s, fill_ratio=fills)
         for s in (scene, *(shifted(scene=scene, quantity=quantity, change=c) for c in (-width, width)))
     )
-    pressure, moment, ratio, volume = (
+    pressure, moment, ratio = (
         np.maximum(np.abs(low - at), np.abs(high - at)) for at, low, high in zip(here, *sides, strict=True)
     )
     return InputEffect(
-        volume=float(volume),
         wall_pressure=pressure[:-1],
         moment=moment[:-1],
         moment_per_mass=float(ratio[-1]),
     )
-
-
-def shifted(*, scene: Scene, quantity: str, change: float) -> Scene:
-    """The scene with one of its quantities changed, as far as a device can have it.
-
-    An interval that would reach zero or below reports "unknown"; a tenth of the value already shows that.
-    """
-    value = nominal_value(scene=scene, quantity=quantity)
-    if value is None:
-        raise ValueError(f"the scene has no {quantity}")
-    low, high = 0.1 * value, math.inf
-    if quantity == "length":
-        low = max(low, sum(b.angle * b.radius for b in scene.tube.bends))
-    if quantity == "hump_position":
-        low, high = 0.0, 1.0
-    if quantity == "hump_radius":
-        high = scene.tube.port_radius
-    if quantity == "port_radius":
-        low = scene.tube.hump_radius or low
-    if value <= 0:
-        low = min(value, 0.0)
-    return with_value(scene=scene, quantity=quantity, value=min(max(value + change, low), high))
 
 
 def chamber_closed_forms(

@@ -10,13 +10,13 @@ import numpy as np
 
 from ringbalance.physics.results import Status, StatusCode
 from ringbalance.physics.sloshing.range import SMALL
+from ringbalance.reduced_model.chamber.gravity import closed_ring
 from ringbalance.reduced_model.chamber.terms import (
     MEAN,
     chamber_contributions,
     resonant_fill,
     wave_height,
 )
-from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing, tilted_ring
 from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.scene.arrays import FloatArray, distinct
 from ringbalance.scene.models import Scene
@@ -25,13 +25,14 @@ FILLS: Final = (0.2, 0.5, 1.0)
 """Shares of max_fill_ratio."""
 
 
+@lru_cache(maxsize=64)
 def chamber_fills(scene: Scene) -> FloatArray:
     """Fill ratios at which a chamber is judged: those of the range at which gravity leaves a closed ring.
 
     Returns: x, shape (n,); empty where there is none.
     """
     fills = range_fills(scene)
-    return fills[_tilted(scene, tuple(float(x) for x in fills)).closed]
+    return fills[closed_ring(scene, fills)]
 
 
 def range_fills(scene: Scene) -> FloatArray:
@@ -87,16 +88,4 @@ def _waves(scene: Scene, fills: FloatArray) -> Status:
             "of the ring's depth, too high for linear sloshing, the finest model: avoid that fill, or turn "
             "faster"
         ),
-    )
-
-
-@lru_cache(maxsize=64)
-def _tilted(scene: Scene, fills: tuple[float, ...]) -> TiltedRing:
-    return tilted_ring(
-        disc=scene.disc,
-        density=scene.liquid.density,
-        angular_velocity=scene.rotor.speed,
-        gravity=scene.environment.gravity,
-        shaft=scene.environment.shaft,
-        fill_ratio=np.array(fills),
     )

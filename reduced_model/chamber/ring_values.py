@@ -73,22 +73,14 @@ def _under_gravity(
     scene: Scene, fills: FloatArray, plain: FloatArray
 ) -> tuple[FloatArray, BoolArray, FloatArray]:
     """Values, whether the ring is closed, and half-widths of the quadrature or of what gravity could do."""
-    gravity, speed, wet = scene.environment.gravity, scene.rotor.speed, fills > 0
-    ring = tilted_ring(
-        disc=scene.disc,
-        density=scene.liquid.density,
-        angular_velocity=speed,
-        gravity=gravity,
-        shaft=scene.environment.shaft,
-        fill_ratio=fills[wet],
-    )
+    gravity, wet = scene.environment.gravity, fills > 0
+    ring = tilted_ring(scene, fills[wet])
     found = plain.copy()
     found[:, wet] = [ring.wall_pressure, ring.moment, ring.moment_per_volume]
     closed = ~spilling_ring(scene, fills) | ~wet
     closed[wet] &= ring.closed
-    turn = turn_samples(disc=scene.disc, angular_velocity=speed, gravity=gravity)
-    tilt = gravity / (speed**2 * scene.disc.inner_radius)
-    quadrature = (_QUADRATURE + min(tilt, 1.0) ** turn) * np.abs(plain)
+    tilt = gravity / (scene.rotor.speed**2 * scene.disc.inner_radius)
+    quadrature = (_QUADRATURE + min(tilt, 1.0) ** turn_samples(scene)) * np.abs(plain)
     displaced = displaced_by_gravity(
         disc=scene.disc, density=scene.liquid.density, gravity=gravity, fill_ratio=fills
     )

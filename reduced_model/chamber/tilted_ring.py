@@ -25,8 +25,7 @@ from ringbalance.mesh.geometry import (
     surface_radius,
 )
 from ringbalance.scene.arrays import BoolArray, FloatArray
-from ringbalance.scene.loop_models import Shaft
-from ringbalance.scene.models import Disc
+from ringbalance.scene.models import Disc, Scene
 
 POINTS: Final = 20
 """Gauss points along the angle or the axis."""
@@ -77,34 +76,26 @@ class _Turned:
     closed: BoolArray
 
 
-def turn_samples(*, disc: Disc, angular_velocity: float, gravity: float) -> int:
+def turn_samples(scene: Scene) -> int:
     """Angles of gravity for means good to twelve digits: harmonics fall like (g/(omega^2 R1))^n."""
-    tilt = gravity / (angular_velocity**2 * disc.inner_radius)
+    tilt = scene.environment.gravity / (scene.rotor.speed**2 * scene.disc.inner_radius)
     if tilt < 1e-12:
         return _TURN[0]
     wanted = np.log(_AVERAGING) / np.log(min(tilt, 0.9))
     return 2 * int(np.clip(np.ceil(wanted / 2), _TURN[0] // 2, _TURN[1] // 2))
 
 
-def tilted_ring(
-    *,
-    disc: Disc,
-    density: float,
-    angular_velocity: float,
-    gravity: float,
-    shaft: Shaft,
-    fill_ratio: FloatArray,
-) -> TiltedRing:
+def tilted_ring(scene: Scene, fill_ratio: FloatArray) -> TiltedRing:
     """Wall pressure, moment and dU/dV' of a chamber under gravity, exactly for liquid at rest.
 
     p = rho omega^2 (|r + g/omega^2|^2 - b^2)/2; dU/dV' = rho int x w / int w on the surface, w = 1/|grad p|.
-    Args: `gravity`: g; "horizontal" turns it across the chamber. `fill_ratio`: x, shape (n,), above zero.
+    On a horizontal shaft gravity turns across the chamber.
+    Args: `fill_ratio`: x, shape (n,), above zero.
     Range: a surface that stays outside the plates' inner edge; the inner radius is not looked at.
     Source: Eqs. 9 to 11 of the liquid-ring paper with gravity and exact plates; hydrostatics.
     """
-    length = gravity / angular_velocity**2
-    turn = turn_samples(disc=disc, angular_velocity=angular_velocity, gravity=gravity)
-
+    disc, density, square = scene.disc, scene.liquid.density, scene.rotor.speed**2
+    length, turn, shaft = scene.environment.gravity / square, turn_samples(scene), scene.environment.shaft
     table = imported_table(disc)
 
     def turned(fills: FloatArray, *, cut: bool) -> _Turned:
@@ -120,7 +111,7 @@ def tilted_ring(
         parts = turned(fill_ratio[is_open], cut=True)
         for name in ("wall_pressure", "moment", "moment_per_volume"):
             getattr(found, name)[is_open] = getattr(parts, name)
-    scale = density * angular_velocity**2 / 2
+    scale = density * square / 2
     return TiltedRing(
         wall_pressure=scale * found.wall_pressure.mean(axis=1),
         moment=density * disc.axial_width * found.moment.mean(axis=1),

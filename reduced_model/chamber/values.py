@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from ringbalance.reduced_model.chamber.inputs import chamber_closed_forms
 from ringbalance.reduced_model.chamber.tilted_ring import tilted_ring
@@ -18,11 +19,11 @@ class ChamberValues:
     """Both quantities of a chamber at one fill ratio."""
 
     wall_pressure: float
-    wall_pressure_ripple: float
     moment: float
-    moment_ripple: float
     moment_per_mass: float
     """lambda for liquid added at this fill: 2 (dU/dV')/rho, m."""
+    wall_pressure_ripple: float = 0.0
+    moment_ripple: float = 0.0
 
     def pressures(self) -> FloatArray:
         """Mean and largest over a turn, Pa."""
@@ -33,24 +34,27 @@ class ChamberValues:
         return np.array([self.moment, self.moment + self.moment_ripple, self.moment_per_mass])
 
 
-def by_paper(scene: Scene, fill: float) -> ChamberValues:
-    """Eqs. 3, 4, 7 and 12, and lambda = 72 mm.
+def paper_closed_forms(scene: Scene, fill_ratio: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Wall pressure, Pa, and moment, kg m, by the liquid-ring paper, with the paper's own volume.
 
-    Source: the liquid-ring paper.
+    Source: Eqs. 3, 4, 7 and 12.
     """
     disc, rho = scene.disc, scene.liquid.density
-    volume = fill * paper.chamber_volume_paper(disc=disc)
+    volume = np.asarray(fill_ratio) * paper.chamber_volume_paper(disc=disc)
     radius = paper.surface_radius_paper(disc=disc, liquid_volume=volume)
     pressure = paper.wall_pressure_paper(
         disc=disc, density=rho, angular_velocity=scene.rotor.speed, liquid_volume=volume
     )
     moment = paper.moment_paper(disc=disc, density=rho, surface_radius=radius)
+    # A root and its square differ by rounding, of which an empty chamber shall have nothing.
+    return pressure, np.where(volume > 0, moment, 0.0)
+
+
+def by_paper(scene: Scene, fill: float) -> ChamberValues:
+    """`paper_closed_forms`, and lambda = 72 mm."""
+    pressure, moment = paper_closed_forms(scene, fill)
     return ChamberValues(
-        wall_pressure=float(pressure),
-        wall_pressure_ripple=0.0,
-        moment=float(moment),
-        moment_ripple=0.0,
-        moment_per_mass=paper.PAPER_LAMBDA,
+        wall_pressure=float(pressure), moment=float(moment), moment_per_mass=paper.PAPER_LAMBDA
     )
 
 
@@ -61,13 +65,7 @@ def by_closed_form(scene: Scene, fill: float) -> ChamberValues:
     Source: hydrostatics with the chamber's exact geometry.
     """
     pressure, moment, ratio = chamber_closed_forms(scene=scene, fill_ratio=fill)
-    return ChamberValues(
-        wall_pressure=float(pressure),
-        wall_pressure_ripple=0.0,
-        moment=float(moment),
-        moment_ripple=0.0,
-        moment_per_mass=float(ratio),
-    )
+    return ChamberValues(wall_pressure=float(pressure), moment=float(moment), moment_per_mass=float(ratio))
 
 
 def by_quadrature(scene: Scene, fill: float) -> ChamberValues:
@@ -76,14 +74,7 @@ def by_quadrature(scene: Scene, fill: float) -> ChamberValues:
     Returns: ChamberValues, exact for liquid at rest in the rotating frame at every instant.
     Source: `tilted_ring`.
     """
-    found = tilted_ring(
-        disc=scene.disc,
-        density=scene.liquid.density,
-        angular_velocity=scene.rotor.speed,
-        gravity=scene.environment.gravity,
-        shaft=scene.environment.shaft,
-        fill_ratio=np.array([fill]),
-    )
+    found = tilted_ring(scene, np.array([fill]))
     return ChamberValues(
         wall_pressure=float(found.wall_pressure[0]),
         wall_pressure_ripple=float(found.wall_pressure_ripple[0]),

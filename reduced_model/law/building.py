@@ -8,11 +8,10 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, wall_radius
-from ringbalance.physics.gas.column import pressure_factor
+from ringbalance.physics.gas.column import pressure_factor, vented_pressure
 from ringbalance.physics.pressure.hydrostatics import Radius, hydrostatic_pressure
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes
 from ringbalance.reduced_model.chamber.imported_walls import across_table
-from ringbalance.reduced_model.chamber.inputs import half_widths
 from ringbalance.reduced_model.chamber.moment import CalibratedMoment
 from ringbalance.reduced_model.chamber.ring_values import ring_values
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
@@ -23,7 +22,7 @@ from ringbalance.reduced_model.tube.heads import TubeHeads, nominal_heads
 from ringbalance.reduced_model.tube.regime import CLEARING_UNCERTAINTY, RELEASED, TubePath
 from ringbalance.scene.models import Scene
 from ringbalance.scene.tube_models import CAVITY_ERROR, CLEARING_ERROR
-from ringbalance.scene.uncertain import NORMAL_95
+from ringbalance.scene.uncertain import NORMAL_95, half_widths
 
 # Density and speed act on both wall pressures and on the tube at once, so the law handles them separately.
 _SHARED: Final = ("density", "speed")
@@ -92,7 +91,7 @@ def _put_together(
         max_fill_ratio=scene.disc.max_fill_ratio,
         ambient_pressure=scene.gas.ambient_pressure,
         chamber_volume=chamber_volume(disc=scene.disc),
-        tube_area=math.pi / 4 * scene.tube.bore**2,
+        tube_area=scene.tube.area,
         wall_pressure=wall_pressure,
         wall_pressure_uncertainty=wall_pressure_uncertainty,
         path=tube_path(scene),
@@ -117,7 +116,7 @@ def tube_path(scene: Scene) -> TubePath:
         port_pressure=column_pressure(scene=scene, radius=scene.tube.port_radius),
         hump_pressure=None if hump is None else column_pressure(scene=scene, radius=hump),
         trapped=scene.tube.hump_gas == "trapped",
-        vapour_pressure=scene.liquid.vapour_pressure - scene.gas.ambient_pressure,
+        vapour_pressure=scene.liquid.vapour_pressure - vented_pressure(scene),
         released=released if scene.liquid.dissolved_gas == "saturated" else 0.0,
         froude_velocity=froude * abs(scene.rotor.speed) * math.sqrt((hump or 0.0) * scene.tube.bore),
     )

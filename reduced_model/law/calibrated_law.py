@@ -107,24 +107,28 @@ class CalibratedLaw:
             port_pressure=self.path.port_pressure,
         )
 
-    def _directed(self, asked: Conditions, *, reverse: bool) -> DirectedFlow:
+    def drive(self, asked: Conditions, *, reverse: bool) -> Drive:
+        """What acts on the tube in one direction; `reverse`: out of the opposite chamber."""
         own, other = asked.fill_ratio, asked.opposite_fill_ratio
         ends = self.ends(fill_ratio=own, opposite_fill_ratio=other, gas_pressure=asked.gas_pressure)
         allowed = np.ones_like(asked.primed)
         if self.path.hump_pressure is None:
             allowed = (asked.gas_pressure > 0) & (asked.primed | (not reverse))
+        return Drive(
+            ends=ends.reversed() if reverse else ends,
+            upstream_uncertainty=self.wall_pressure_uncertainty(other if reverse else own),
+            downstream_uncertainty=self.wall_pressure_uncertainty(own if reverse else other),
+            primed=asked.primed,
+            allowed=allowed,
+        )
+
+    def _directed(self, asked: Conditions, *, reverse: bool) -> DirectedFlow:
         return directed_flow(
             path=self.path,
             heads=self.heads,
-            hump_head=self.heads.return_hump_head if reverse else self.heads.hump_head,
+            hump_head=self.heads.to_crest(reverse=reverse),
             inputs=self.inputs,
-            drive=Drive(
-                ends=ends.reversed() if reverse else ends,
-                upstream_uncertainty=self.wall_pressure_uncertainty(other if reverse else own),
-                downstream_uncertainty=self.wall_pressure_uncertainty(own if reverse else other),
-                primed=asked.primed,
-                allowed=allowed,
-            ),
+            drive=self.drive(asked, reverse=reverse),
         )
 
     def save(self, path: Path | str) -> Path:

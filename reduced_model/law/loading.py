@@ -14,7 +14,7 @@ import numpy as np
 
 from ringbalance.reduced_model.chamber.moment import CalibratedMoment
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw, balancer_model
+from ringbalance.reduced_model.law.model import CompleteLaw
 from ringbalance.reduced_model.law.paper_law import PaperLaw, PaperMoment
 from ringbalance.reduced_model.law.storage import FORMAT, VERSION
 from ringbalance.reduced_model.tables.hermite import HermiteTable
@@ -186,11 +186,3 @@ def _content(reader: _Reader, file: Path) -> Iterator[Mapping[str, object]]:
             )
         else:
             yield content
-
-
-def load_model(path: Path | str) -> BalancerModel:
-    """Read a saved law as the balancer that the closed loop takes.
-
-    Raises: SceneError: a file that cannot be read or is no law.
-    """
-    return balancer_model(load_law(path))

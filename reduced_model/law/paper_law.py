@@ -147,7 +147,7 @@ def paper_law(scene: AnyScene) -> PaperLaw:
         axial_width=scene.disc.axial_width,
         central_angle=scene.disc.central_angle,
         chamber_volume=volume,
-        tube_area=float(np.pi / 4 * scene.tube.bore**2),
+        tube_area=scene.tube.area,
         drag_coefficient=paper.PAPER_DRAG_COEFFICIENT if drag is None else drag,
         max_fill_ratio=scene.disc.max_fill_ratio,
         ambient_pressure=scene.gas.ambient_pressure,

@@ -17,7 +17,6 @@ from ringbalance.reduced_model.operating.rest import rest
 from ringbalance.reduced_model.tube.path import (
     Places,
     crest_span,
-    loss_along,
     loss_before,
     lowest_place,
     path_radius,
@@ -148,7 +147,7 @@ def _profile(
 
 def _pressure_over_crest(law: CalibratedLaw, state: DirectedState, velocity: float) -> float | None:
     """Of the cavity or gas that the column spills into at a velocity; None where it is full, or at rest."""
-    crest, head = law.path.crest, law.heads.return_hump_head if state.reverse else law.heads.hump_head
+    crest, head = law.path.crest, law.heads.to_crest(reverse=state.reverse)
     if crest is None or head is None or velocity == 0:
         return None
     log_u, driving = np.log(velocity), state.ends.driving_pressure()
@@ -159,14 +158,14 @@ def _pressure_over_crest(law: CalibratedLaw, state: DirectedState, velocity: flo
 
 def _cavity_pressure(law: CalibratedLaw, state: DirectedState) -> float | None:
     crest = law.path.crest
-    return None if crest is None else crest.cavity_pressure(state.ends)
+    return None if crest is None else float(crest.cavity_pressure(state.ends))
 
 
 def _flowing(
     scene: Scene, tube: Tube, velocity: float, ends: TubeEnds[float], cavity: float | None, points: int
 ) -> _Line:
     """Along a tube in which liquid flows or a column rests, from its upstream end."""
-    terms = _terms(scene, tube, velocity)
+    terms = tube_state(scene, velocity, tube=tube) if velocity else None
     head = scene.liquid.density * velocity**2 / 2
     if cavity is not None and terms is not None:
         return _separated(scene, tube, terms, ends, cavity, head, points)
@@ -177,14 +176,6 @@ def _flowing(
         share=at.share,
         pressure=np.asarray(ends.upstream_pressure() - hydrostatic - lost),
         full=np.ones(at.share.shape, dtype=np.bool_),
-    )
-
-
-def _terms(scene: Scene, tube: Tube, velocity: float) -> TubeState | None:
-    if velocity == 0:
-        return None
-    return tube_state(
-        tube=tube, liquid=scene.liquid, angular_velocity=scene.rotor.speed, velocity=np.asarray(velocity)
     )
 
 
@@ -208,9 +199,7 @@ def _separated(
         )
 
     first = places(tube=tube, points=points)
-    crest = lowest_place(
-        tube, float(loss_along(terms.terms)) * head / scene.liquid.density, scene.rotor.speed**2
-    )
+    crest = lowest_place(tube, float(terms.along) * head / scene.liquid.density, scene.rotor.speed**2)
     again = 1.0 if ends.downstream_open() else _full_again(first, behind, cavity, crest)
     at = places(tube=tube, points=points, doubled=(crest, again))
     from_top = ends.upstream_pressure() - column_pressure(

@@ -127,8 +127,7 @@ def _acceleration(scene: Scene) -> float:
 def _flow_rate(scene: Scene, law: FlowLaw, fills: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Q of the running tube and its expanded uncertainty, m^3/s."""
     flow = law.evaluate(fill_ratio=fills, gas_pressure=scene.gas.pressure, primed=True)
-    area = math.pi / 4 * scene.tube.bore**2
-    return area * np.maximum(flow.velocity, 0.0), area * flow.uncertainty
+    return scene.tube.area * np.maximum(flow.velocity, 0.0), scene.tube.area * flow.uncertainty
 
 
 def _residual(scene: Scene, law: FlowLaw, factors: FloatArray) -> FloatArray:

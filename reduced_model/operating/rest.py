@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ringbalance.mesh.geometry import wall_radius
+from ringbalance.physics.gas.column import vented_pressure
 from ringbalance.physics.pressure.hydrostatics import column_radius
 from ringbalance.physics.roots import bracketed_root
 from ringbalance.reduced_model.tube.path import share_at_radius
@@ -65,7 +66,7 @@ def rest(*, scene: Scene, ends: TubeEnds[float], cavity: float | None, crest_pre
     elif scene.tube.hump_gas == "vented":
         between = 0.0
     else:
-        between = _trapped(scene.gas.ambient_pressure, ends, filled, crest_pressure)
+        between = _trapped(vented_pressure(scene), ends, filled, crest_pressure)
     first, last = filled(between, near)
     return _Rest(near=first, far=last, between=between)
 

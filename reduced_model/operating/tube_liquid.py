@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -90,7 +89,7 @@ def _held(scene: Scene, profile: HumpProfile) -> _HeldLiquid:
     arm = profile.radius * np.exp(1j * path_angle(tube=scene.tube, share=share))
     # A piece counts where both of its ends are full; where fullness changes a place stands twice.
     wet = profile.full[1:] & profile.full[:-1]
-    line = scene.liquid.density * math.pi / 4 * scene.tube.bore**2 * np.diff(profile.path) * wet
+    line = scene.liquid.density * scene.tube.area * np.diff(profile.path) * wet
     moment = complex(np.sum(line * (arm[1:] + arm[:-1]) / 2))
     return _HeldLiquid(state=_state(profile), mass=float(np.sum(line)), along=moment.real, across=moment.imag)
 
@@ -112,4 +111,4 @@ def _returned(scene: Scene, *, flowing: HumpProfile, after: HumpProfile) -> floa
         return 0.0
     near = float(after.path[int(np.argmin(after.full))])
     parts = crest_middle(scene.tube) * scene.tube.length
-    return math.pi / 4 * scene.tube.bore**2 * max(parts - near, 0.0)
+    return scene.tube.area * max(parts - near, 0.0)

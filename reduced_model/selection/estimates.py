@@ -285,7 +285,7 @@ def injection_time(scene: Scene) -> float:
     Returns: s, of `deciding_gas_time` with the flow at equal fills.
     """
     equal = by_closed_form(scene, scene.disc.max_fill_ratio / 2)
-    area = np.pi / 4 * scene.tube.bore**2
+    area = scene.tube.area
     flow = scene.liquid.density * area * equal_velocity(steady(scene))
     arm = scene.disc.moment_factor * equal.moment_per_mass
     return deciding_gas_time(scene, rate=scene.rotor.influence_coefficient * arm * flow)

@@ -53,12 +53,7 @@ def loss_at(scene: Scene, *, loss: str, velocity: npt.ArrayLike, tube: Tube | No
         such as the same one from its other end.
     Raises: ValueError: a model that does not exist.
     """
-    return tube_state(
-        tube=_with_loss(tube or scene.tube, loss),
-        liquid=scene.liquid,
-        angular_velocity=scene.rotor.speed,
-        velocity=velocity,
-    )
+    return tube_state(scene, velocity, tube=_with_loss(tube or scene.tube, loss))
 
 
 def head_at(

@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.physics.gas.column import pressure_factor
 from ringbalance.reduced_model.chamber.values import by_closed_form
 from ringbalance.reduced_model.law.building import tube_path
 from ringbalance.reduced_model.selection.loss_models import CORRELATIONS, ROTATING, velocity_under_head
@@ -57,7 +58,7 @@ def equal_velocity(scene: Scene) -> float:
 
     Source: (k + 1) u^2/2 = p/rho.
     """
-    head = scene.gas.pressure / scene.liquid.density
+    head = pressure_factor(scene) * scene.gas.pressure / scene.liquid.density
     return float(velocity_under_head(scene, loss=CORRELATIONS, head=head)) if head >= _LEAST_HEAD else 0.0
 
 
@@ -136,7 +137,7 @@ def range_ends(scene: Scene) -> TubeEnds[FloatArray]:
     """Pressures at the tube's ends at the points, by the closed form."""
     own = np.array([by_closed_form(scene, scene.disc.max_fill_ratio * x).wall_pressure for x in SHARES])
     return TubeEnds(
-        upstream_gas=np.full_like(own, scene.gas.pressure),
+        upstream_gas=np.full_like(own, pressure_factor(scene) * scene.gas.pressure),
         downstream_gas=np.zeros_like(own),
         upstream_hydrostatic=own,
         downstream_hydrostatic=own[::-1],

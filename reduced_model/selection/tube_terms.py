@@ -82,7 +82,7 @@ def loss_effect(scene: Scene, models: TubeModels) -> _LossEffect:
 def _heads(scene: Scene, models: TubeModels) -> tuple[FloatArray, ...]:
     """k, and the heads of the full tube and, where it has a crest, up to there."""
     tube, u = replace(scene.tube, models=models), range_velocities(scene)
-    state = tube_state(tube=tube, liquid=scene.liquid, angular_velocity=scene.rotor.speed, velocity=u)
+    state = tube_state(scene, u, tube=tube)
     full = state.k, (state.k + 1) * u**2 / 2
     if tube.hump_radius is None:
         return full
@@ -144,7 +144,7 @@ def flow_contributions(scene: Scene) -> Mapping[str, Contribution]:
         for term, models, formula in _LACKING
     }
     fills = scene.disc.max_fill_ratio * np.array(SHARES)
-    chamber = chamber_contributions(scene, _closed(scene, fills))["pressures"]
+    chamber = chamber_contributions(scene, fills[closed_ring(scene, fills)])["pressures"]
     lever = _lever(scene)
     levels = {
         name: Contribution(
@@ -164,11 +164,6 @@ def _contribution(term: str, value: float, formula: str) -> Contribution:
     return Contribution(
         term=term, value=value, formula=formula, source="over the range of velocities", rough=True
     )
-
-
-def _closed(scene: Scene, fills: np.ndarray) -> np.ndarray:
-    closed = closed_ring(scene, fills)
-    return np.asarray(fills[closed])
 
 
 def _lever(scene: Scene) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.physics.splines import monotone_slopes
-from ringbalance.reduced_model.tables.hermite import HermiteTable
+from ringbalance.reduced_model.tables.hermite import HermiteTable, quintic
 from ringbalance.scene.arrays import FloatArray
 
 _REACH: Final = 50
@@ -67,9 +67,7 @@ def _joints(count: int) -> tuple[FloatArray, FloatArray]:
     identity = np.eye(3 * count)
     y, d, c = identity[:count], identity[count : 2 * count], identity[2 * count :] / 2
     rise, turn, bend = y[1:] - y[:-1] - d[:-1] - c[:-1], d[1:] - d[:-1] - 2 * c[:-1], 2 * (c[1:] - c[:-1])
-    a3 = 10 * rise - 4 * turn + bend / 2
-    a4 = -15 * rise + 7 * turn - bend
-    a5 = 6 * rise - 3 * turn + bend / 2
+    a3, a4, a5 = quintic(rise, turn, bend)
     third = (a3 + 4 * a4 + 10 * a5)[:-1] - a3[1:]
     fourth = (a4 + 5 * a5)[:-1] - a4[1:]
     fifth = (a5[:-1] - a5[1:])[[0, 1, -2, -1]]

@@ -93,6 +93,16 @@ class HermiteTable:
         return np.asarray(self.start + self.step * (cell + t) + (wanted - found) / slope, dtype=np.float64)
 
 
+def quintic(
+    rise: FloatArray, turn: FloatArray, bend: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Third to fifth coefficient of a piece from 0 to 1.
+
+    By what its lower ones leave of value, slope and curvature at its end.
+    """
+    return 10 * rise - 4 * turn + bend / 2, -15 * rise + 7 * turn - bend, 6 * rise - 3 * turn + bend / 2
+
+
 def _polynomials(table: HermiteTable) -> FloatArray:
     """Coefficients of every piece in t from 0 to 1, of the value from t^0 up and of its slope from t^1 up."""
     h = table.step
@@ -100,7 +110,5 @@ def _polynomials(table: HermiteTable) -> FloatArray:
     rise = table.value[1:] - y0 - d0 - c0
     turn = h * table.slope[1:] - d0 - 2 * c0
     bend = h * h * table.curvature[1:] - 2 * c0
-    a3 = 10 * rise - 4 * turn + bend / 2
-    a4 = -15 * rise + 7 * turn - bend
-    a5 = 6 * rise - 3 * turn + bend / 2
+    a3, a4, a5 = quintic(rise, turn, bend)
     return np.array([y0, d0, c0, a3, a4, a5, 2 * c0, 3 * a3, 4 * a4, 5 * a5])

@@ -13,24 +13,24 @@ import numpy.typing as npt
 
 from ringbalance.physics.tube.state import TubeState, finest_state, tube_state
 from ringbalance.physics.tube.uncertainty import SIMPLER, model_parts, uncertainty_parts, with_errors
-from ringbalance.reduced_model.chamber.inputs import half_widths
 from ringbalance.reduced_model.tables.fit import flat_table, level_table, refined_table
 from ringbalance.reduced_model.tables.hermite import HermiteTable
 from ringbalance.reduced_model.tube.path import (
     crest_end_uncertainty,
+    crest_span,
     head_behind_crest,
-    loss_along,
     reversed_tube,
-    to_crest_end,
 )
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Scene, Tube
+from ringbalance.scene.uncertain import half_widths
 
 TABLE_VELOCITIES: Final = (1e-5, 1e3)
 """m/s; below, the flow creeps and the head is proportional to u; above, to a power of u."""
 TABLE_ERROR: Final = 1e-9
 """Aimed at, relative, between the nodes."""
 _UNCERTAINTY_NODES: Final = 513
+_FIRST_NODES: Final = 129
 _NOMINAL_NODES: Final = 257
 
 LogHead = Callable[[FloatArray], FloatArray]
@@ -56,6 +56,10 @@ class TubeHeads:
     interpolation_error: float
     """Largest relative error of the head tables found between their nodes."""
 
+    def to_crest(self, *, reverse: bool) -> HermiteTable | None:
+        """From the chamber that gives liquid; None without a crest."""
+        return self.return_hump_head if reverse else self.hump_head
+
 
 def velocity_of(*, table: HermiteTable, head: npt.ArrayLike, where: BoolArray) -> FloatArray:
     """Velocity that belongs to a head.
@@ -72,17 +76,11 @@ def tube_heads(scene: Scene) -> TubeHeads:
     Raises: ValueError: arcs of bends longer than the tube.
     Source: definition of k; the crest's energy balance with the profile's kinetic-energy factor alpha.
     """
-    start, stop = (float(v) for v in np.log(TABLE_VELOCITIES))
-    tables, errors = zip(*(_head_table(head, start, stop) for head in log_heads(scene)[:3]), strict=True)
     place = crest_end_uncertainty(scene.tube, half_widths(scene).get("hump_position", 0.0))
+    start, stop = np.log(TABLE_VELOCITIES)
     widths = _widths(scene, np.linspace(start, stop, _UNCERTAINTY_NODES), place=place)
-    return TubeHeads(
-        head=tables[0],
-        hump_head=tables[1] if len(tables) > 1 else None,
-        return_hump_head=tables[2] if len(tables) > 1 else None,
-        interpolation_error=max(errors),
-        **widths,
-    )
+    heads = _exact_heads(scene, tolerance=TABLE_ERROR, first=_FIRST_NODES)
+    return replace(heads, **widths)  # type: ignore[arg-type]
 
 
 def nominal_heads(scene: Scene) -> TubeHeads:
@@ -91,23 +89,28 @@ def nominal_heads(scene: Scene) -> TubeHeads:
     The nodes do not depend on the scene, so that the error, below 1e-4 of a head, is smooth in its values.
     Raises: ValueError: as `tube_heads`.
     """
+    return _exact_heads(scene, tolerance=math.inf, first=_NOMINAL_NODES)
+
+
+def _exact_heads(scene: Scene, *, tolerance: float, first: int) -> TubeHeads:
+    """Without uncertainties, on a number of nodes at first and on more up to an error between them."""
     start, stop = (float(v) for v in np.log(TABLE_VELOCITIES))
-    tables, errors = zip(
-        *(
-            _head_table(head, start, stop, tolerance=math.inf, first=_NOMINAL_NODES)
-            for head in log_heads(scene)[:3]
-        ),
-        strict=True,
-    )
+    found = [
+        refined_table(function=head, start=start, stop=stop, tolerance=tolerance, first=first)
+        for head in log_heads(scene)[:3]
+    ]
+    if any(np.any(np.diff(table.value) <= 0) for table, _ in found):
+        raise ValueError("the tube's head does not grow with the velocity: its loss terms are inconsistent")
+    between, *to_crest = (table for table, _ in found)
     exact = flat_table(start=start, stop=stop)
     return TubeHeads(
-        head=tables[0],
-        hump_head=tables[1] if len(tables) > 1 else None,
-        return_hump_head=tables[2] if len(tables) > 1 else None,
+        head=between,
+        hump_head=to_crest[0] if to_crest else None,
+        return_hump_head=to_crest[1] if to_crest else None,
         uncertainty=exact,
         hump_uncertainty=exact,
         fraction_uncertainty=exact,
-        interpolation_error=max(errors),
+        interpolation_error=max(error for _, error in found),
     )
 
 
@@ -123,24 +126,17 @@ def _widths(
     scene: Scene, log_velocity: FloatArray, *, place: float, by_inputs: bool = True
 ) -> dict[str, HermiteTable]:
     """Uncertainties of `TubeHeads` over even places in ln u; `place`: that of the crest's end."""
-    tube, u = to_crest_end(scene.tube), np.exp(log_velocity)
-    state = tube_state(tube=tube, liquid=scene.liquid, angular_velocity=scene.rotor.speed, velocity=u)
+    tube, u, end = scene.tube, np.exp(log_velocity), crest_span(scene.tube)[1]
+    state = tube_state(scene, u)
     parts: Mapping[str, FloatArray] = model_parts(tube=tube, state=state)
     if by_inputs:
-        parts = uncertainty_parts(
-            tube=tube,
-            liquid=scene.liquid,
-            angular_velocity=scene.rotor.speed,
-            velocity=u,
-            state=state,
-            inputs=scene.uncertainty,
-        )
-    k, upstream = state.k, state.upstream_loss(tube=tube)
+        parts = uncertainty_parts(scene, velocity=u, state=state)
+    k, upstream = state.k, state.upstream_loss(end)
     width = np.sqrt(sum((part**2 for part in parts.values()), start=np.zeros_like(k)))
     share = np.where(k > 0, upstream / np.where(k > 0, k, 1.0), 1.0)
     finest, to_crest = finest_state(tube=tube, state=state), state.kinetic_factor + upstream
-    simpler = finest.kinetic_factor + finest.upstream_loss(tube=tube) - to_crest
-    moved = np.sqrt((width * share) ** 2 + (loss_along(state.terms) * place) ** 2 + simpler**2)
+    simpler = finest.kinetic_factor + finest.upstream_loss(end) - to_crest
+    moved = np.sqrt((width * share) ** 2 + (state.along * place) ** 2 + simpler**2)
     found = {
         "uncertainty": width / (k + 1),
         "hump_uncertainty": moved / to_crest,
@@ -154,18 +150,18 @@ def _fraction_uncertainty(
     tube: Tube, state: TubeState, parts: Mapping[str, FloatArray], place: float
 ) -> FloatArray:
     """(s_j - R)/(k + 1) of each part of k with a fraction s_j before the crest's end, and of its place."""
-    total = state.k + 1
+    total, end = state.k + 1, crest_span(tube)[1]
     fraction, finest = (
-        (at.kinetic_factor + at.upstream_loss(tube=tube)) / (at.k + 1)
+        (at.kinetic_factor + at.upstream_loss(end)) / (at.k + 1)
         for at in (state, finest_state(tube=tube, state=state))
     )
-    squares = (loss_along(state.terms) * place / total) ** 2 + (finest - fraction) ** 2
+    squares = (state.along * place / total) ** 2 + (finest - fraction) ** 2
     for name, part in parts.items():
         if name == SIMPLER:
             continue
         # Which end or bend is wrong is not known: then the worse of before and behind the crest.
         lumped = name in {"ends", "bends"}
-        lever = np.maximum(fraction, 1 - fraction) if lumped else np.abs(tube.hump_position - fraction)
+        lever = np.maximum(fraction, 1 - fraction) if lumped else np.abs(end - fraction)
         squares = squares + (lever * part / total) ** 2
     return np.asarray(np.sqrt(squares))
 
@@ -180,13 +176,7 @@ def log_heads(scene: Scene) -> list[LogHead]:
 
     @lru_cache(maxsize=32)
     def state(log_velocity: bytes) -> TubeState:
-        found = tube_state(
-            tube=tube,
-            liquid=scene.liquid,
-            angular_velocity=scene.rotor.speed,
-            velocity=np.exp(np.frombuffer(log_velocity)),
-        )
-        return with_errors(tube=tube, state=found)
+        return with_errors(tube=tube, state=tube_state(scene, np.exp(np.frombuffer(log_velocity))))
 
     def between(log_velocity: FloatArray) -> FloatArray:
         return np.asarray(np.log((state(log_velocity.tobytes()).k + 1) / 2) + 2 * log_velocity)
@@ -210,25 +200,16 @@ def crest_head(
 ) -> FloatArray:
     """Head from the giving chamber to the lowest pressure at the crest, or to its arc's end, m^2/s^2."""
     kinetic = velocity**2 / 2
-    fall = (state.kinetic_factor + state.upstream_loss(tube=to_crest_end(tube))) * kinetic
+    fall = (state.kinetic_factor + state.upstream_loss(crest_span(tube)[1])) * kinetic
     if not lowest:
         return np.asarray(fall)
-    along = loss_along(state.terms) * kinetic
-    return np.asarray(fall + head_behind_crest(tube=tube, along=along, square=scene.rotor.speed**2))
+    behind = head_behind_crest(tube=tube, along=state.along * kinetic, square=scene.rotor.speed**2)
+    return np.asarray(fall + behind)
 
 
 def entrance_fraction(scene: Scene, velocity: float) -> float:
     """Fraction of the head up to the crest that is lost at the entrance, (alpha + K_ent)/(alpha + k_up)."""
     u = np.array([velocity])
-    state = tube_state(tube=scene.tube, liquid=scene.liquid, angular_velocity=scene.rotor.speed, velocity=u)
+    state = tube_state(scene, u)
     entrance = (state.kinetic_factor + state.terms.get("entrance", 0.0)) * u**2 / 2
     return float((entrance / crest_head(scene=scene, tube=scene.tube, state=state, velocity=u))[0])
-
-
-def _head_table(
-    log_head: LogHead, start: float, stop: float, *, tolerance: float = TABLE_ERROR, first: int = 129
-) -> tuple[HermiteTable, float]:
-    table, error = refined_table(function=log_head, start=start, stop=stop, tolerance=tolerance, first=first)
-    if np.any(np.diff(table.value) <= 0):
-        raise ValueError("the tube's head does not grow with the velocity: its loss terms are inconsistent")
-    return table, error

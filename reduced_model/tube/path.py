@@ -9,7 +9,6 @@ when the crest moves.  Without a crest the path stays at the port's radius.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -62,11 +61,6 @@ def _arc_fraction(tube: Tube) -> float:
 
 def _shortest(tube: Tube) -> float:
     return shortest_path(port_radius=tube.port_radius, hump_radius=tube.hump_radius, separation=math.pi)
-
-
-def to_crest_end(tube: Tube) -> Tube:
-    """The tube with its crest where the arc ends, for what the loss up to there depends on."""
-    return replace(tube, hump_position=crest_span(tube)[1], hump_shape="point")
 
 
 def crest_end_uncertainty(tube: Tube, position: float) -> float:
@@ -186,12 +180,6 @@ def share_at_radius(*, tube: Tube, radius: float, far_leg: bool) -> float:
     return 1 - inward * (1 - end) if far_leg else inward * start
 
 
-def loss_along(terms: Mapping[str, FloatArray]) -> FloatArray:
-    """The part of k that is spread evenly along the path."""
-    spread = [terms[name] for name in ("friction", "rotation", "extra", "decree") if name in terms]
-    return np.asarray(sum(spread), dtype=np.float64)
-
-
 def loss_before(*, tube: Tube, state: TubeState, at: Places) -> FloatArray:
     """Fall of pressure from the giving chamber to each place, over rho u^2/2, without the fall in radius.
 
@@ -200,7 +188,7 @@ def loss_before(*, tube: Tube, state: TubeState, at: Places) -> FloatArray:
     Source: energy balance; at the crest it is alpha and `upstream_loss`.
     """
     entrance = float(state.terms.get("entrance", np.zeros(())))
-    inside = float(state.kinetic_factor) + entrance + float(loss_along(state.terms)) * at.share
+    inside = float(state.kinetic_factor) + entrance + float(state.along) * at.share
     if "decree" not in state.terms:
         for first, second, bend in zip(*_bend_shares(tube), state.bends, strict=True):
             halves = [(at.share > share) | ((at.share == share) & at.after) for share in (first, second)]

@@ -183,13 +183,7 @@ def _collect(work: Work) -> Record | None:
     scene, speed = work.scene, work.calibration.operating_point.loss_velocity
     if not speed:
         return None
-    loss = tube_loss(
-        tube=scene.tube,
-        liquid=scene.liquid,
-        angular_velocity=scene.rotor.speed,
-        velocity=speed,
-        inputs=scene.uncertainty,
-    )
+    loss = tube_loss(scene, speed)
     reynolds = float(loss.reynolds)
     drawn = min(reynolds, _LARGEST)
     rotation = loss.rotation_reynolds * drawn / reynolds

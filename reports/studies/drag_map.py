@@ -15,8 +15,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
+from ringbalance.physics.gas.column import vented_pressure
 from ringbalance.reduced_model.calibration import Calibration
-from ringbalance.reduced_model.operating.thresholds import priming_pressure
+from ringbalance.reduced_model.operating.point import priming_pressure
 from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.reports.studies.drag_point import DragPoint, LiquidBatch, drag_point
 from ringbalance.scene.arrays import BoolArray, FloatArray
@@ -190,7 +191,7 @@ def liquid_verdicts(*, calibration: Calibration, liquids: Sequence[Liquid] | Non
             kinematic_viscosity=np.array([q.kinematic_viscosity for q in chosen]),
             density=rho,
             gas_pressure=pressure,
-            vapour_pressure=np.array([q.vapour_pressure for q in chosen]) - scene.gas.ambient_pressure,
+            vapour_pressure=np.array([q.vapour_pressure for q in chosen]) - vented_pressure(scene),
             relative_density=own,
             relative_viscosity=_viscosity_uncertainty(scene, chosen),
         )

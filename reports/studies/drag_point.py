@@ -20,10 +20,10 @@ from ringbalance.physics.tube.uncertainty import input_parts, model_parts
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.heads import TABLE_VELOCITIES
-from ringbalance.reduced_model.tube.path import head_behind_crest, loss_along, to_crest_end
+from ringbalance.reduced_model.tube.path import crest_span, head_behind_crest
 from ringbalance.reduced_model.tube.regime import SiphonCrest, TubeEnds, can_flow
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
-from ringbalance.scene.models import InputUncertainty, Liquid, Scene, Tube
+from ringbalance.scene.models import InputUncertainty, Scene, Tube
 
 _STEP: Final = 1e-5
 """Of ln u, for slopes."""
@@ -52,21 +52,21 @@ class LiquidBatch:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DragPoint:
-    """The tube's operating point, an empty tube beforehand; arrays of one shape.
+    """The operating point of a primed tube; arrays of one shape.
 
-    Where nothing flows, not even in a primed tube, every number is zero and `runs` is False.
+    Where nothing flows every number is zero and `runs` is False.
     """
 
     regime: IntArray
-    """Values of `Regime`: blocked, siphon or separated."""
+    """Values of `Regime`: siphon or separated, and blocked where the gas starts no flow in an empty tube."""
     runs: BoolArray
     """Whether a primed tube flows: only there have the numbers a meaning."""
     separated: BoolArray
-    """Whether that flow is separated; where `regime` is blocked, of the primed tube."""
+    """Whether that flow is separated."""
     separation_excess: FloatArray
     """ln of siphon velocity over separation velocity: positive where separated; without a crest -1."""
     velocity: FloatArray
-    """u, m/s; where blocked, that of a primed tube."""
+    """u, m/s."""
     velocity_uncertainty: FloatArray
     """Expanded uncertainty (95 %), m/s."""
     k: FloatArray
@@ -176,7 +176,10 @@ def _drive(law: CalibratedLaw, batch: LiquidBatch) -> _Drive:
 
 
 def _ends(law: CalibratedLaw, batch: LiquidBatch, ratio: FloatArray) -> TubeEnds[FloatArray]:
-    gas, hydrostatic = batch.gas_pressure, ratio * float(law.wall_pressure(law.max_fill_ratio / 2))
+    gas, hydrostatic = (
+        law.gas_factor * batch.gas_pressure,
+        ratio * float(law.wall_pressure(law.max_fill_ratio / 2)),
+    )
     return TubeEnds(
         upstream_gas=gas,
         downstream_gas=np.zeros_like(gas),
@@ -213,8 +216,8 @@ def _siphon_factor(_tube: Tube, state: TubeState) -> FloatArray:
 def _separation_factor(tube: Tube, state: TubeState) -> FloatArray:
     """As the head up to the lowest pressure, over u^2/2; R_Om/Re d is omega/u."""
     turns = (state.rotation_reynolds / state.reynolds / tube.bore) ** 2
-    behind = head_behind_crest(tube=tube, along=loss_along(state.terms), square=2 * turns)
-    up = state.upstream_loss(tube=to_crest_end(tube))
+    behind = head_behind_crest(tube=tube, along=state.along, square=2 * turns)
+    up = state.upstream_loss(crest_span(tube)[1])
     return np.asarray(state.kinetic_factor + up + behind, dtype=np.float64)
 
 
@@ -266,17 +269,8 @@ def _parts(
 
     nu = batch.kinematic_viscosity
 
-    def by_input(t: Tube, _liquid: Liquid, speed: float) -> FloatArray:
-        return k_of(t, nu, speed)
-
-    parts |= input_parts(
-        tube=tube,
-        liquid=scene.liquid,
-        angular_velocity=scene.rotor.speed,
-        inputs=(*stated, _EXACT_VISCOSITY),
-        k_of=by_input,
-        k=state.k,
-    )
+    at_hand = replace(scene, tube=tube, uncertainty=(*stated, _EXACT_VISCOSITY))
+    parts |= input_parts(at_hand, k_of=lambda moved: k_of(moved.tube, nu, moved.rotor.speed), k=state.k)
     if np.any(batch.relative_viscosity > 0):
         sides = [
             k_of(tube, nu * factor, scene.rotor.speed) for factor in _either_way(batch.relative_viscosity)
@@ -314,7 +308,7 @@ def _half_widths(
     ahead = np.where(separated, slope(_separation_factor), siphon)
     up = np.where(
         state.k > 0,
-        state.upstream_loss(tube=to_crest_end(tube)) / np.where(state.k > 0, state.k, 1.0),
+        state.upstream_loss(crest_span(tube)[1]) / np.where(state.k > 0, state.k, 1.0),
         1.0,
     )
     of_head = width * np.where(separated, up / _separation_factor(tube, state), 1 / (state.k + 1))

@@ -25,10 +25,9 @@ from ringbalance.reduced_model.gas_line import (
     line_ends,
     line_text,
     line_warning,
-    short_injection,
 )
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.short_injection import Fills
+from ringbalance.reduced_model.short_injection import Fills, short_injections
 from ringbalance.reduced_model.tube.path import crest_span
 from ringbalance.scene.models import Scene
 
@@ -89,8 +88,7 @@ def test_a_fast_line_moves_as_much_as_in_the_plant(
     given = replace(scene, gas=gas)
     dynamics = plant_of(given, calibrated, "gas filling", "tube inertia", LIFT)
     (end,) = line_ends(given)
-    estimate = short_injection(given, end, Fills(model=calibrated, driven=0.25, opposite=0.25))
-    assert estimate is not None
+    (estimate,) = short_injections(given, [end.line], Fills(model=calibrated, driven=0.25, opposite=0.25))
     primed, volume = estimate.shortest(0.0).time, calibrated.chamber_volume / calibrated.tube_area
     for opening in (1.02 * primed, primed + 5e-3):
         moved = (0.25 - pulse(dynamics, opening, np.array([3.0])).fill) * volume
@@ -107,8 +105,7 @@ def test_the_dead_time_is_that_of_the_plant(
     dynamics = plant_of(given, calibrated, "gas filling", "tube inertia", "valve lag", LIFT)
     fills = Fills(model=calibrated, driven=fill, opposite=0.5 - fill)
     (end,) = line_ends(given)
-    estimate = short_injection(given, end, fills)
-    assert estimate is not None
+    (estimate,) = short_injections(given, [end.line], fills)
     wanted = 0.02 * fills.steady_velocity(0.9e6)
     opening = estimate.dead_time(wanted) + 0.02
     moved = fill - pulse(dynamics, opening, np.array([3.0]), fill=fill).fill

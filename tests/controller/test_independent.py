@@ -36,12 +36,7 @@ class Second:
         self.rate = math.pi / 4 * tube.bore**2 / self.volume
         self.port = self.depth(tube.port_radius)
         log_u = np.linspace(math.log(1e-2), math.log(1e3), 4000)
-        state = tube_state(
-            tube=tube,
-            liquid=scene.liquid,
-            angular_velocity=scene.rotor.speed,
-            velocity=np.exp(log_u),
-        )
+        state = tube_state(scene, np.exp(log_u))
         self.alpha = CubicSpline(log_u, state.kinetic_factor)
 
     def half_angle(self, r: float) -> float:

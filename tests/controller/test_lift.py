@@ -13,8 +13,8 @@ from scipy.optimize import brentq
 
 from ringbalance.controller.liquid_ring.compiled_column import ends
 from ringbalance.controller.liquid_ring.compiled_lift import crest_start, crest_stop, lift_rates, shown
-from ringbalance.controller.liquid_ring.interval import Passage, pass_time
-from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, Switch, packed
+from ringbalance.controller.liquid_ring.interval import Passage, packed, pass_time
+from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, Switch
 from ringbalance.physics.tube.state import tube_state
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.gas_line import line_ends
@@ -66,7 +66,7 @@ class Column:
         """Of entrance, friction so far and the bends passed so far, with the kinetic energy, Pa."""
         scene, tube = self.scene, self.scene.tube
         speed = np.array([max(u, 1e-4)])
-        state = tube_state(tube=tube, liquid=scene.liquid, angular_velocity=scene.rotor.speed, velocity=speed)
+        state = tube_state(scene, speed)
         along = state.terms["friction"] + state.terms["rotation"]
         passed = state.terms["entrance"] + state.kinetic_factor + along * s / tube.length
         return float(passed[0]) * scene.liquid.density * u * u / 2

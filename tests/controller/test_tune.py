@@ -23,11 +23,11 @@ from ringbalance.controller.tuning.margins import loop_margins
 from ringbalance.controller.tuning.recommendation import factor_uncertainty
 from ringbalance.controller.tuning.tune import Tuning, tune, tuning_document
 from ringbalance.reduced_model.calibration import calibrated_model
-from ringbalance.reduced_model.chamber.inputs import half_widths, shifted
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.models import InputUncertainty, Scene
+from ringbalance.scene.uncertain import half_widths, shifted
 
 MEMBERS = 300
 

@@ -13,7 +13,7 @@ from ringbalance.reduced_model.selection.registry import models_used
 from ringbalance.scene import Scene, bundled_scene, load_scene
 from ringbalance.scene.accuracy import with_tolerance
 from ringbalance.scene.tube_models import FINEST_MODELS
-from ringbalance.verification.selection_studies.scenes import random_scene
+from ringbalance.verification.selection_studies.choices import random_scene
 
 pytestmark = pytest.mark.faults
 

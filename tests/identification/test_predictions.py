@@ -15,7 +15,7 @@ from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.rotor import disc_unbalance, influence
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.predict import injections
+from ringbalance.identification.predict import injections, trial_weights
 from ringbalance.identification.predict.device import Models, device_of, models_of
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
@@ -147,9 +147,9 @@ def test_flow_at_rest_obeys_the_definition_of_k(paper_scene: Scene) -> None:
     pressures = np.geomspace(1e3, 1e6, 9)
     rate = predicted(paper_scene, observations("flow", {"pressure_difference": pressures}))
     u = rate / (math.pi / 4 * paper_scene.tube.bore**2)
-    liquid = paper_scene.liquid
-    k = tube_loss(tube=paper_scene.tube, liquid=liquid, angular_velocity=0.0, velocity=u).k.value
-    np.testing.assert_allclose((k + 1) * liquid.density * u**2 / 2, pressures, rtol=1e-8)
+    still = replace(paper_scene, rotor=replace(paper_scene.rotor, speed=0.0))
+    k = tube_loss(still, u).k.value
+    np.testing.assert_allclose((k + 1) * paper_scene.liquid.density * u**2 / 2, pressures, rtol=1e-8)
 
 
 def test_pressure_of_a_turning_ring(paper_scene: Scene) -> None:
@@ -167,7 +167,7 @@ def test_the_vibration_without_weight_is_free_in_each_series(paper_scene: Scene)
         observations("trial_weight", {"unbalance": [0, 1e-4, 0, 1e-4], "angle": [0, 1, 0, 1]}),
         series=np.array(["a", "a", "b", "b"]),
     )
-    free = PREDICTED["trial_weight"].free(data)
+    free = trial_weights.free(data)
     assert np.linalg.matrix_rank(free) == 4
     alike = np.array([1, 1, 3, 3, 2, 2, -5, -5.0])
     assert np.linalg.norm(alike - free @ np.linalg.lstsq(free, alike, rcond=None)[0]) < 1e-12

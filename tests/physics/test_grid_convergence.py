@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.physics.convergence.grid import Verdict, celik_order, gci
+from ringbalance.physics.convergence.grid import Verdict, gci
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def test_a_pure_power_gives_its_order_and_limit(order: float, sizes: tuple[float
 
 
 def test_fixed_point_solves_celiks_equation() -> None:
-    p = celik_order(first_change=0.02, second_change=0.11, r21=1.4, r32=1.9)
+    p = gci(values=(1.0, 1.02, 1.13), sizes=(1.0, 1.4, 1.4 * 1.9), formal_order=4.0).observed_order
     q = np.log((1.4**p - 1) / (1.9**p - 1))
     assert p == pytest.approx(abs(np.log(0.11 / 0.02) + q) / np.log(1.4), rel=1e-10)
 

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import cast
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from fluids.fittings import bend_rounded, entrance_sharp
 from fluids.friction import friction_factor
 from hypothesis import given
 from hypothesis import strategies as st
 
+import ringbalance
 from ringbalance.physics.tube.bends import bend_loss
 from ringbalance.physics.tube.loss import TubeLoss, tube_loss
 from ringbalance.physics.tube.numbers import reynolds_number, rotation_reynolds_number
-from ringbalance.physics.tube.state import bends_before
 from ringbalance.scene.models import Bend, InputUncertainty, Liquid, Scene, Tube
 
+SCENE = cast("Scene", ringbalance.load_scene(ringbalance.bundled_scene("liquid_ring_paper")))
 WATER = Liquid(
     name="custom",
     temperature=None,
@@ -49,10 +52,17 @@ VELOCITIES = np.geomspace(0.1, 20, 1200)
 
 
 def loss(
-    tube: Tube = TUBE, nu: float = 1e-6, omega: float = OMEGA, velocity: object = VELOCITIES
+    tube: Tube = TUBE,
+    nu: float = 1e-6,
+    omega: float = OMEGA,
+    velocity: npt.ArrayLike = VELOCITIES,
+    inputs: tuple[InputUncertainty, ...] = (),
 ) -> TubeLoss:
     liquid = dataclasses.replace(WATER, kinematic_viscosity=nu)
-    return tube_loss(tube=tube, liquid=liquid, angular_velocity=omega, velocity=velocity)  # type: ignore[arg-type]
+    rotor = dataclasses.replace(SCENE.rotor, speed=omega)
+    return tube_loss(
+        dataclasses.replace(SCENE, tube=tube, liquid=liquid, rotor=rotor, uncertainty=inputs), velocity
+    )
 
 
 tubes = st.builds(
@@ -88,7 +98,7 @@ def test_both_laminar_ends_together_cost_about_2_3_with_the_plus_one() -> None:
     found = loss(dataclasses.replace(TUBE, bends=()), omega=0.0, velocity=1000 * 1e-6 / 1.5e-3)
     ends = float(found.terms["entrance"] + found.terms["exit"])
     assert ends == pytest.approx(1.3, abs=0.05)
-    assert float(found.kinetic_factor) == pytest.approx(2, abs=0.05)
+    assert float(found.state.kinetic_factor) == pytest.approx(2, abs=0.05)
 
 
 def test_head_of_a_long_laminar_tube_is_hagen_poiseuille() -> None:
@@ -161,8 +171,8 @@ def test_uncertainty_is_finite_positive_and_made_of_its_parts(tube: Tube, nu: fl
     np.testing.assert_allclose(found.k.uncertainty, combined, rtol=1e-12)
     assert not found.in_range[0]
     assert not found.in_range[-1]
-    assert np.all(found.upstream_k <= found.k.value + 1e-9)
-    assert np.all(found.upstream_k >= 0)
+    upstream = found.state.upstream_loss(tube.hump_position)
+    assert np.all((upstream >= 0) & (upstream <= found.k.value + 1e-9))
 
 
 def test_rotation_costs_far_more_than_friction_in_the_papers_tube_when_slow() -> None:
@@ -184,7 +194,7 @@ def test_a_prescribed_k_holds_at_every_velocity() -> None:
     found = loss(dataclasses.replace(TUBE, drag_coefficient=50.0))
     assert np.all(found.k.value == 50.0)
     assert set(found.terms) == {"decree"}
-    assert np.all(found.upstream_k == 25.0)
+    assert np.all(found.state.upstream_loss(0.5) == 25.0)
     assert np.all(found.k.uncertainty == 0.0)
     assert np.all(found.in_range)
 
@@ -192,13 +202,7 @@ def test_a_prescribed_k_holds_at_every_velocity() -> None:
 def test_input_uncertainty_is_the_change_of_k() -> None:
     tube = dataclasses.replace(TUBE, bends=(), length=10.0)
     inputs = (InputUncertainty(quantity="bore", half_width=0.02, relative=True),)
-    found = tube_loss(
-        tube=tube,
-        liquid=dataclasses.replace(WATER, kinematic_viscosity=1e-4),
-        angular_velocity=0.0,
-        velocity=1.0,
-        inputs=inputs,
-    )
+    found = loss(tube, nu=1e-4, omega=0.0, velocity=1.0, inputs=inputs)
     # Laminar: k is L/d * 64 nu/(u d), so 2 % of the bore is 4 % of k.
     assert float(found.uncertainty_parts["input: bore"] / found.k.value) == pytest.approx(0.04, abs=2e-3)
     assert float(found.uncertainty_parts["input: kinematic_viscosity"] / found.k.value) == pytest.approx(
@@ -207,19 +211,24 @@ def test_input_uncertainty_is_the_change_of_k() -> None:
 
 
 def test_upstream_loss_knows_where_the_hump_lies() -> None:
-    near, far = (loss(dataclasses.replace(TUBE, hump_position=s)) for s in (0.1, 0.9))
-    between = far.upstream_k - near.upstream_k
-    along = 0.8 * (near.terms["friction"] + near.terms["rotation"])
+    found = loss()
+    between = found.state.upstream_loss(0.9) - found.state.upstream_loss(0.1)
+    along = 0.8 * (found.terms["friction"] + found.terms["rotation"])
     np.testing.assert_allclose(between, along, rtol=1e-12)
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 3, 4, 5])
 def test_each_leg_has_half_of_the_bends_from_either_end(count: int) -> None:
     """What lies before the crest from one end and from the other is all of every bend."""
-    before = bends_before(count)
-    assert [one + other for one, other in zip(before, before[::-1], strict=True)] == [1.0] * count
-    assert sum(before) == count / 2
-    assert list(before) == sorted(before, reverse=True)
+    state = loss(velocity=5.0).state
+    losses = tuple(np.array(2.0**i) for i in range(count))
+
+    def before(bends: tuple[np.ndarray, ...]) -> float:
+        return float(dataclasses.replace(state, bends=bends).upstream_loss(0.0) - state.terms["entrance"])
+
+    assert before(losses) + before(losses[::-1]) == pytest.approx(2.0**count - 1)
+    whole, half = count // 2, count % 2
+    assert before(losses) == pytest.approx(2.0**whole - 1 + half * 2.0**whole / 2)
 
 
 @pytest.mark.parametrize("velocity", [0.0, -1.0, np.nan, np.inf])
@@ -247,9 +256,7 @@ def test_traps_of_the_library_are_there_and_are_kept_out_of_k() -> None:
 
 def test_the_interval_of_k_at_low_velocity_is_made_of_what_the_page_says(paper_scene: Scene) -> None:
     scene = paper_scene
-    loss = tube_loss(
-        tube=scene.tube, liquid=scene.liquid, angular_velocity=scene.rotor.speed, velocity=np.array([3.0])
-    )
+    loss = tube_loss(dataclasses.replace(scene, uncertainty=()), np.array([3.0]))
     share = {name: float(part[0] / loss.k.value[0]) for name, part in loss.uncertainty_parts.items()}
     assert float(loss.k.uncertainty[0] / loss.k.value[0]) == pytest.approx(0.23, abs=0.005)
     told = {"bends": 0.16, "rotation model": 0.11, "ends": 0.10, "rotation entry": 0.06}

@@ -5,16 +5,20 @@ from __future__ import annotations
 import cProfile
 import dataclasses
 import math
+from typing import cast
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import ringbalance
 from ringbalance.physics.tube.loss import TubeLoss, tube_loss
-from ringbalance.scene.models import Bend, Liquid, Tube
+from ringbalance.scene.models import Bend, Liquid, Scene, Tube
 
 VELOCITIES = np.geomspace(1e-5, 1e3, 1500)
+SCENE = cast("Scene", ringbalance.load_scene(ringbalance.bundled_scene("liquid_ring_paper")))
 
 
 @st.composite
@@ -48,7 +52,7 @@ viscosities = st.floats(-7, -2).map(lambda e: 10.0**e)
 speeds = st.floats(2, 5).map(lambda e: 10.0**e * 2 * math.pi / 60)
 
 
-def loss(tube: Tube, nu: float, omega: float, velocity: object = VELOCITIES) -> TubeLoss:
+def loss(tube: Tube, nu: float, omega: float, velocity: npt.ArrayLike = VELOCITIES) -> TubeLoss:
     liquid = Liquid(
         name="custom",
         temperature=None,
@@ -60,7 +64,9 @@ def loss(tube: Tube, nu: float, omega: float, velocity: object = VELOCITIES) -> 
         viscosity_uncertainty=0.02,
         source="test",
     )
-    return tube_loss(tube=tube, liquid=liquid, angular_velocity=omega, velocity=velocity)  # type: ignore[arg-type]
+    rotor = dataclasses.replace(SCENE.rotor, speed=omega)
+    scene = dataclasses.replace(SCENE, tube=tube, liquid=liquid, rotor=rotor, uncertainty=())
+    return tube_loss(scene, velocity)
 
 
 def slopes(head: np.ndarray, velocity: np.ndarray) -> np.ndarray:
@@ -73,9 +79,10 @@ def test_any_tube_has_one_velocity_for_a_head_and_no_jump(tube: Tube, nu: float,
     assert np.all(np.isfinite(found.k.value))
     assert np.all(found.k.value > -1)
     assert np.all(np.isfinite(found.k.uncertainty) & (found.k.uncertainty > 0))
-    assert np.all(np.isfinite(found.upstream_k))
+    upstream = found.state.upstream_loss(tube.hump_position)
+    assert np.all(np.isfinite(upstream))
     # The head between chambers and that up to the crest: no slower than linear in u, no faster than u^4.
-    for head in (found.k.value + 1, found.kinetic_factor + found.upstream_k):
+    for head in (found.k.value + 1, found.state.kinetic_factor + upstream):
         slope = slopes(head, found.velocity)
         assert np.min(slope) > 0.9
         assert np.max(slope) < 4.0

@@ -11,10 +11,9 @@ from scipy.linalg import solve, toeplitz
 from ringbalance.physics.tube.rotation import (
     critical_reynolds,
     curved_friction_ratio,
-    rotating_friction_ratio,
     turbulent_friction_ratio,
 )
-from ringbalance.physics.tube.rotation_table import rotation_table_covers
+from ringbalance.physics.tube.rotation_table import rotating_friction_ratio, rotation_table_covers
 
 Array = np.ndarray
 

@@ -17,13 +17,12 @@ from scipy.stats import binom
 from ringbalance.physics.gas.column import pressure_factor
 from ringbalance.reduced_model.budget import UNITS, Budget, budgets, rounded
 from ringbalance.reduced_model.calibration import calibrate
-from ringbalance.reduced_model.chamber.inputs import half_widths
 from ringbalance.reduced_model.device import device_of
 from ringbalance.reduced_model.tube.heads import log_heads
 from ringbalance.reduced_model.tube.regime import CLEARING, RELEASED
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import InputUncertainty, Scene
-from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, nominal_value, with_value
+from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, half_widths, nominal_value, with_value
 
 STATED: Final = {
     "outer_radius": 0.05e-3,

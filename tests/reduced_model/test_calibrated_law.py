@@ -9,15 +9,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ringbalance.physics.gas.column import pressure_factor
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.chamber.calibration import calibrate_chamber
-from ringbalance.reduced_model.law.building import calibrated_law, column_pressure
+from ringbalance.reduced_model.law.building import calibrated_law, column_pressure, nominal_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.operating.thresholds import priming_pressure, siphon_stall_pressure
+from ringbalance.reduced_model.operating.point import priming_pressure
+from ringbalance.reduced_model.operating.pressure_profile import hump_profile
+from ringbalance.reduced_model.selection.range_flow import range_flow
 from ringbalance.reduced_model.tube.heads import tube_heads
-from ringbalance.scene.models import Scene
+from ringbalance.scene.models import HumpGas, Scene
 
 AMBIENT = 101325.0
 
@@ -59,12 +62,7 @@ def test_siphon_obeys_the_energy_balance(law: CalibratedLaw, point_scene: Scene)
     x, p = np.array([0.1, 0.2, 0.3]), 1.2e6
     flow = law.evaluate(fill_ratio=x, gas_pressure=p)
     assert np.all(flow.regime == Regime.SIPHON)
-    loss = tube_loss(
-        tube=point_scene.tube,
-        liquid=point_scene.liquid,
-        angular_velocity=point_scene.rotor.speed,
-        velocity=flow.velocity,
-    )
+    loss = tube_loss(point_scene, flow.velocity)
     surplus = p + law.wall_pressure(x) - law.wall_pressure(0.5 - x)
     np.testing.assert_allclose((loss.k.value + 1) * 1000 * flow.velocity**2 / 2, surplus, rtol=1e-8)
 
@@ -75,15 +73,10 @@ def test_separated_flow_obeys_the_humps_balance_and_forgets_the_receiving_chambe
     flow = law.evaluate(fill_ratio=0.4, opposite_fill_ratio=[0.05, 0.1, 0.12], gas_pressure=0.6e6)
     assert np.all(flow.regime == Regime.SEPARATED)
     assert np.ptp(flow.velocity) == 0.0
-    loss = tube_loss(
-        tube=point_scene.tube,
-        liquid=point_scene.liquid,
-        angular_velocity=point_scene.rotor.speed,
-        velocity=flow.velocity,
-    )
+    loss = tube_loss(point_scene, flow.velocity)
     hump = column_pressure(scene=point_scene, radius=31.5e-3)
     margin = 0.6e6 + AMBIENT - 2339.0 + law.wall_pressure(0.4) - hump
-    head = (loss.kinetic_factor + loss.upstream_k) * 1000 * flow.velocity**2 / 2
+    head = (loss.state.kinetic_factor + loss.state.upstream_loss(0.5)) * 1000 * flow.velocity**2 / 2
     np.testing.assert_allclose(head, margin, rtol=1e-8)
 
 
@@ -118,7 +111,7 @@ def test_priming_thresholds_of_both_readings_are_0_54_mpa(
 
 
 def test_stall_by_eq_19_is_0_381_mpa_and_by_finite_elements_a_tenth_more(law: CalibratedLaw) -> None:
-    stall = siphon_stall_pressure(law)
+    stall = float(law.ends(fill_ratio=0.0).stall_pressure())
     assert stall / 0.381154e6 == pytest.approx(1.0977, abs=2e-3)
     around = law.evaluate(fill_ratio=0.0, gas_pressure=[stall * 0.999, stall * 1.001], primed=True)
     assert list(around.velocity > 0) == [
@@ -128,7 +121,7 @@ def test_stall_by_eq_19_is_0_381_mpa_and_by_finite_elements_a_tenth_more(law: Ca
 
 
 def test_straight_tube_stalls_without_a_jump(straight: CalibratedLaw) -> None:
-    stall = siphon_stall_pressure(straight)
+    stall = float(straight.ends(fill_ratio=0.0).stall_pressure())
     offsets = np.array([-1e3, 0.0, 1e-3, 1e-1, 1e1])
     flow = straight.evaluate(fill_ratio=0.0, gas_pressure=stall + offsets)
     assert list(flow.regime) == [Regime.BLOCKED, Regime.BLOCKED, *[Regime.SIPHON] * 3]
@@ -233,16 +226,44 @@ def test_more_gas_never_means_less_flow(law: CalibratedLaw, x: float, p: float, 
     assert flow.velocity[1] >= flow.velocity[0]
 
 
+@pytest.mark.parametrize("crest_gas", ["vented", "trapped"])
+def test_pressures_on_the_shaft_are_those_on_the_liquid_times_the_columns_ratio(
+    point_scene: Scene, crest_gas: HumpGas
+) -> None:
+    """Supply and surroundings alike: the same disc with both pressures as they are on the liquid flows alike,
+    separated over vapour as well, and holds alike at rest."""
+    tube = dataclasses.replace(point_scene.tube, hump_gas=crest_gas)
+    scene = dataclasses.replace(point_scene, tube=tube)
+    on_shaft = dataclasses.replace(scene, gas=dataclasses.replace(scene.gas, measured_at="shaft"))
+    ratio = pressure_factor(on_shaft)
+    gas = dataclasses.replace(
+        scene.gas,
+        pressure=ratio * scene.gas.pressure,
+        ambient_pressure=ratio * scene.gas.ambient_pressure,
+    )
+    on_liquid = dataclasses.replace(scene, gas=gas)
+    laws = [nominal_law(each, gravity=False) for each in (on_shaft, on_liquid)]
+    for p in (0.0, 0.56e6, 0.7e6, 1.5e6):
+        one, other = (
+            each.evaluate(fill_ratio=[0.1, 0.25, 0.4], gas_pressure=f * p, primed=[False, False, True])
+            for each, f in zip(laws, (1.0, ratio), strict=True)
+        )
+        np.testing.assert_allclose(one.velocity, other.velocity, rtol=1e-9)
+        assert np.array_equal(one.regime, other.regime)
+        lines = [
+            hump_profile(scene=each, law=law, fill_ratio=0.25, gas_pressure=f * p).pressure
+            for each, law, f in zip((on_shaft, on_liquid), laws, (1.0, ratio), strict=True)
+        ]
+        np.testing.assert_allclose(lines[0], lines[1], rtol=1e-9, atol=1e-3)
+    flows = [range_flow(each) for each in (on_shaft, on_liquid)]
+    np.testing.assert_allclose(flows[0].velocity, flows[1].velocity, rtol=1e-9)
+
+
 def test_uncertainty_of_a_turbulent_siphon_is_half_that_of_k_plus_1(
     law: CalibratedLaw, point_scene: Scene
 ) -> None:
     flow = law.evaluate(fill_ratio=0.25, gas_pressure=1.5e6)
-    loss = tube_loss(
-        tube=point_scene.tube,
-        liquid=point_scene.liquid,
-        angular_velocity=point_scene.rotor.speed,
-        velocity=flow.velocity,
-    )
+    loss = tube_loss(point_scene, flow.velocity)
     expected = 0.5 * float(loss.k.uncertainty / (loss.k.value + 1)) * float(flow.velocity)
     assert float(flow.uncertainty) == pytest.approx(expected, rel=0.1)
 
@@ -280,7 +301,7 @@ def test_spread_of_the_heads_never_falls_below_that_of_k(
     )
     heads = tube_heads(scene)
     u = np.geomspace(2e-5, 5e2, 20001)
-    loss = tube_loss(tube=scene.tube, liquid=scene.liquid, angular_velocity=speed, velocity=u)
+    loss = tube_loss(scene, u)
     exact = loss.k.uncertainty / (loss.k.value + 1)
     tabulated = heads.uncertainty(np.log(u))
     # Within one interval of the table, 3.7 % of the velocity: 43 places.

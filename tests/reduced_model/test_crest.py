@@ -64,7 +64,7 @@ def by_hand(scene: Scene, *, cavity: float, fill: float, gas: float, law: Calibr
     square = scene.rotor.speed**2
 
     def lowest(u: float) -> float:
-        loss = tube_loss(tube=scene.tube, liquid=scene.liquid, angular_velocity=scene.rotor.speed, velocity=u)
+        loss = tube_loss(scene, u)
         terms = {name: float(k) for name, k in loss.terms.items()}
         spread = terms["friction"] + terms["rotation"] + terms["extra"]
 
@@ -72,7 +72,7 @@ def by_hand(scene: Scene, *, cavity: float, fill: float, gas: float, law: Calibr
             """At a length of the string behind the crest's middle, behind the first bend only."""
             beyond = max(string - arc / 2, 0.0)
             radius = math.hypot(CREST, beyond)
-            lost = float(loss.kinetic_factor) + terms["entrance"] + terms["bends"] / 2
+            lost = float(loss.state.kinetic_factor) + terms["entrance"] + terms["bends"] / 2
             lost += spread * (taut / 2 + string) / taut
             column = DENSITY * square * (PORT**2 - radius**2) / 2
             return gas + float(law.wall_pressure(fill)) - column - lost * DENSITY * u * u / 2
@@ -107,13 +107,8 @@ def test_a_cavity_at_the_vented_chambers_pressure_costs_an_eighth(
     pair = [float(each.evaluate(**at).velocity) for each in (law, gas)]
     heads = []
     for u in pair:
-        loss = tube_loss(
-            tube=point_scene.tube,
-            liquid=point_scene.liquid,
-            angular_velocity=point_scene.rotor.speed,
-            velocity=u,
-        )
-        heads.append(float(loss.kinetic_factor + loss.upstream_k) * DENSITY * u * u / 2)
+        loss = tube_loss(point_scene, u)
+        heads.append(float(loss.state.kinetic_factor + loss.state.upstream_loss(0.5)) * DENSITY * u * u / 2)
     assert heads[0] - heads[1] == pytest.approx(AMBIENT - VAPOUR, rel=1e-6)
     assert pair[1] / pair[0] == pytest.approx(1 - 0.119, abs=1e-3)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ringbalance.physics.tube.loss import tube_loss
-from ringbalance.reduced_model.calibration import Calibration
+from ringbalance.reduced_model.calibration import Calibration, calibrate
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.heads import tube_heads
 from ringbalance.reports.studies.drag_map import (
@@ -48,9 +48,7 @@ def test_a_point_is_what_law_and_tube_loss_say(
     law = replace(calibration.flow_law, heads=tube_heads(scene))
     x = law.max_fill_ratio / 2
     flow = law.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=scene.gas.pressure, primed=True)
-    loss = tube_loss(
-        tube=scene.tube, liquid=scene.liquid, angular_velocity=scene.rotor.speed, velocity=flow.velocity
-    )
+    loss = tube_loss(scene, flow.velocity)
     if flow.regime != Regime.UNDECIDED:
         assert found.regime[0, 0] == flow.regime
     assert found.velocity[0, 0] == pytest.approx(float(flow.velocity), rel=1e-8)
@@ -62,6 +60,18 @@ def test_a_point_is_what_law_and_tube_loss_say(
     assert found.flow_state[0, 0] == loss.flow_state
 
 
+def test_a_point_holds_the_gas_column_as_the_law_does(calibration: Calibration) -> None:
+    gas = replace(calibration.scene.gas, measured_at="shaft")
+    on_shaft = calibrate(replace(calibration.scene, gas=gas))
+    law, (bore, viscosity) = on_shaft.flow_law, POINTS[0]
+    scene = moved(on_shaft.scene, bore, viscosity)
+    point = drag_map(calibration=on_shaft, bore=[bore], kinematic_viscosity=[viscosity]).point
+    flow = replace(law, heads=tube_heads(scene)).evaluate(
+        fill_ratio=0.25, opposite_fill_ratio=0.25, gas_pressure=scene.gas.pressure, primed=True
+    )
+    assert point.velocity[0, 0] == pytest.approx(float(flow.velocity), rel=1e-8)
+
+
 def test_stated_inputs_spread_k_as_they_do_in_tube_loss(calibration: Calibration) -> None:
     stated = tuple(
         InputUncertainty(quantity=name, half_width=0.05, relative=True)
@@ -71,15 +81,9 @@ def test_stated_inputs_spread_k_as_they_do_in_tube_loss(calibration: Calibration
     found = drag_map(
         calibration=with_scene(calibration, scene), bore=[1.2e-3], kinematic_viscosity=[2e-6]
     ).point
-    at = moved(scene, 1.2e-3, 2e-6)
-    loss = tube_loss(
-        tube=at.tube,
-        liquid=at.liquid,
-        angular_velocity=at.rotor.speed,
-        velocity=found.velocity[0, 0],
-        # The bore is a coordinate of the map.
-        inputs=stated[:3],
-    )
+    # The bore is a coordinate of the map.
+    at = replace(moved(scene, 1.2e-3, 2e-6), uncertainty=stated[:3])
+    loss = tube_loss(at, found.velocity[0, 0])
     assert found.k_uncertainty[0, 0] == pytest.approx(float(loss.k.uncertainty), rel=1e-9)
 
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from ringbalance.reduced_model.calibration import Calibration, calibrate
-from ringbalance.reduced_model.chamber.inputs import half_widths
 from ringbalance.reduced_model.selection.estimates import injection_time
 from ringbalance.scene.models import InputUncertainty, Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.scene.uncertain import half_widths
 
 FACTOR = 0.93
 WIDTH = 0.02

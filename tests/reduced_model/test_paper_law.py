@@ -16,14 +16,10 @@ from ringbalance.scene.models import Scene
 def test_law_is_eq_19(table_1_scene: Scene) -> None:
     x = np.linspace(0, 0.5, 11)
     flow = paper_law(table_1_scene).evaluate(fill_ratio=x, gas_pressure=0.7e6)
-    expected = paper.velocity_paper(
-        disc=table_1_scene.disc,
-        density=1000.0,
-        angular_velocity=table_1_scene.rotor.speed,
-        drag_coefficient=50.0,
-        gas_pressure=0.7e6,
-        fill_ratio=x,
-    )
+    disc, square = table_1_scene.disc, table_1_scene.rotor.speed**2
+    moved = paper.chamber_volume_paper(disc=disc) * (2 * x - 0.5)
+    level = 1000.0 * square * moved / (disc.axial_width * disc.central_angle)
+    expected = np.sqrt(2 / (1000.0 * 51) * (0.7e6 + level))
     np.testing.assert_allclose(flow.velocity, expected, rtol=1e-14)
     assert np.all(flow.regime == Regime.SIPHON)
     # By hand at x = 0.25, where the levels agree: sqrt(2 * 700/51) m/s.

@@ -53,17 +53,11 @@ def test_siphon_agrees_with_the_energy_balance_at_hump_and_ends(
     found = hump_profile(scene=point_scene, law=law, fill_ratio=0.1, gas_pressure=0.9e6)
     assert found.regime is Regime.SIPHON
     assert np.all(found.full)
-    loss = tube_loss(
-        tube=point_scene.tube,
-        liquid=point_scene.liquid,
-        angular_velocity=point_scene.rotor.speed,
-        velocity=found.velocity,
-    )
+    loss = tube_loss(point_scene, found.velocity)
     head = DENSITY * found.velocity**2 / 2
     start = 0.9e6 + float(law.wall_pressure(0.1))
-    expected = (
-        start - column(point_scene, 31.5e-3, 44.5e-3) - head * float(loss.kinetic_factor + loss.upstream_k)
-    )
+    before = float(loss.state.kinetic_factor + loss.state.upstream_loss(0.5))
+    expected = start - column(point_scene, 31.5e-3, 44.5e-3) - head * before
     assert found.hump_pressure == pytest.approx(expected, rel=1e-9)
     assert found.pressure[0] == pytest.approx(start, rel=1e-12)
     assert found.pressure[-1] == pytest.approx(float(law.wall_pressure(0.4)), rel=1e-7)
@@ -74,14 +68,9 @@ def test_siphon_agrees_with_the_energy_balance_at_hump_and_ends(
 
 def test_drops_at_ends_and_bends_and_the_even_slope_between(point_scene: Scene, law: CalibratedLaw) -> None:
     found = hump_profile(scene=point_scene, law=law, fill_ratio=0.1, gas_pressure=0.9e6)
-    loss = tube_loss(
-        tube=point_scene.tube,
-        liquid=point_scene.liquid,
-        angular_velocity=point_scene.rotor.speed,
-        velocity=found.velocity,
-    )
+    loss = tube_loss(point_scene, found.velocity)
     terms = {name: float(term) for name, term in loss.terms.items()}
-    alpha = float(loss.kinetic_factor)
+    alpha = float(loss.state.kinetic_factor)
     head = DENSITY * found.velocity**2 / 2
     reduced = (
         found.pressure - DENSITY * point_scene.rotor.speed**2 * (found.radius**2 - 44.5e-3**2) / 2
@@ -115,14 +104,9 @@ def test_separated_tube_is_full_again_where_the_opposite_chamber_holds_the_colum
     # The column that is left, by hand: friction and rotation of the rest of the tube, no bend, exit.
     share = found.path[empty][-1] / 0.12
     assert share > 0.75
-    loss = tube_loss(
-        tube=point_scene.tube,
-        liquid=point_scene.liquid,
-        angular_velocity=point_scene.rotor.speed,
-        velocity=found.velocity,
-    )
+    loss = tube_loss(point_scene, found.velocity)
     along = float(loss.terms["friction"] + loss.terms["rotation"]) * (1 - share)
-    lost = along + float(loss.terms["exit"]) + 1 - float(loss.kinetic_factor)
+    lost = along + float(loss.terms["exit"]) + 1 - float(loss.state.kinetic_factor)
     radius = 31.5e-3 + (44.5e-3 - 31.5e-3) * (share - 0.5) / 0.5
     held = float(law.wall_pressure(0.1)) - column(point_scene, radius, 44.5e-3)
     assert held + lost * DENSITY * found.velocity**2 / 2 == pytest.approx(VAPOUR - AMBIENT, abs=5.0)

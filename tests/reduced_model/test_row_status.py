@@ -66,6 +66,21 @@ def test_every_mark_has_a_remedy() -> None:
     assert set(REMEDIES) == set(RowStatus) - {RowStatus.OK}
 
 
+def test_both_tables_have_the_same_rings_whatever_is_modelled(table_1_scene: Scene) -> None:
+    """A tolerance that leaves gravity out closes no ring."""
+    slow = replace(table_1_scene, rotor=replace(table_1_scene.rotor, speed=50.0))
+    found = {}
+    for tolerance in (0.5, 1e-4):
+        calibration = rb.calibrate(replace(slow, tolerance=tolerance))
+        document = calibration_document(calibration)
+        rows, columns = document["chamber"]["row_status"], document["law"]["column_status"]
+        assert [s == "no_ring" for s in rows] == [s == "no_ring" for s in columns]
+        found[calibration.chamber.gravity_modelled] = rows
+    assert set(found) == {False, True}
+    assert found[False] == found[True]
+    assert "no_ring" in found[True]
+
+
 @pytest.mark.parametrize(
     ("speed", "crest", "expected"),
     [(314.0, 36e-3, RowStatus.OVER_CREST), (30.0, 31.5e-3, RowStatus.NO_RING)],

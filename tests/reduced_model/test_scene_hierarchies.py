@@ -29,7 +29,7 @@ from ringbalance.reduced_model.selection.loss_models import (
     loss_at,
     velocity_under_head,
 )
-from ringbalance.reduced_model.tube.path import to_crest_end
+from ringbalance.reduced_model.tube.path import crest_span
 from ringbalance.scene import loop_models
 from ringbalance.scene.accuracy import with_tolerance
 from ringbalance.scene.models import Scene
@@ -135,16 +135,11 @@ def test_a_broken_ring_is_a_status(table_1_scene: Scene) -> None:
 
 def test_the_top_of_k_is_the_calibrated_k(table_1_scene: Scene) -> None:
     u = np.array([0.5, 5.0, 20.0])
-    top = tube_loss(
-        tube=to_crest_end(table_1_scene.tube),
-        liquid=table_1_scene.liquid,
-        angular_velocity=table_1_scene.rotor.speed,
-        velocity=u,
-    )
+    top = tube_loss(table_1_scene, u)
     found = loss_at(table_1_scene, loss=TABLES, velocity=u)
     assert found.k == pytest.approx(top.k.value, rel=1e-12)
-    upstream = found.upstream_loss(tube=to_crest_end(table_1_scene.tube))
-    assert upstream == pytest.approx(top.upstream_k, rel=1e-12)
+    end = crest_span(table_1_scene.tube)[1]
+    assert found.upstream_loss(end) == pytest.approx(top.state.upstream_loss(end), rel=1e-12)
     assert np.all(loss_at(table_1_scene, loss=CONSTANT, velocity=u).k == 50.0)
 
 

@@ -45,21 +45,23 @@ def by_grid(
 
 
 def ring(
-    disc: models.Disc, *, tilt: float, fills: list[float], shaft: loop_models.Shaft = "horizontal"
+    scene: models.Scene,
+    disc: models.Disc,
+    *,
+    tilt: float,
+    fills: list[float],
+    shaft: loop_models.Shaft = "horizontal",
 ) -> TiltedRing:
-    return tilted_ring(
-        disc=disc,
-        density=1000.0,
-        angular_velocity=10.0,
-        gravity=100.0 * tilt,
-        shaft=shaft,
-        fill_ratio=np.array(fills),
-    )
+    """With 1000 kg/m^3 at 10 rad/s."""
+    environment = loop_models.Environment(gravity=100.0 * tilt, shaft=shaft)
+    rotor = dataclasses.replace(scene.rotor, speed=10.0)
+    turning = dataclasses.replace(scene, disc=disc, environment=environment, rotor=rotor)
+    return tilted_ring(turning, np.array(fills))
 
 
 def test_the_tilted_circle_against_a_grid(table_1_scene: models.Scene) -> None:
     disc, tilt = table_1_scene.disc, 3e-3
-    found = ring(disc, tilt=tilt, fills=[0.4])
+    found = ring(table_1_scene, disc, tilt=tilt, fills=[0.4])
     pressure, moment = by_grid(disc, fill=0.4, tilt=tilt)
     assert found.closed[0]
     assert found.wall_pressure[0] == pytest.approx(1000 * 100 / 2 * pressure, rel=2e-3)
@@ -69,7 +71,7 @@ def test_the_tilted_circle_against_a_grid(table_1_scene: models.Scene) -> None:
 def test_without_gravity_it_is_the_closed_form(table_1_scene: models.Scene) -> None:
     disc = table_1_scene.disc
     for shaft in ("horizontal", "vertical"):
-        found = ring(disc, tilt=0.0, fills=[0.1, 0.25, 0.5], shaft=shaft)
+        found = ring(table_1_scene, disc, tilt=0.0, fills=[0.1, 0.25, 0.5], shaft=shaft)
         a = surface_radius(disc=disc, fill_ratio=np.array([0.1, 0.25, 0.5]))
         alpha = half_angle(disc=disc, radius=a)
         assert found.wall_pressure == pytest.approx(1000 * 100 / 2 * (disc.outer_radius**2 - a**2), rel=1e-12)
@@ -82,7 +84,7 @@ def test_without_gravity_it_is_the_closed_form(table_1_scene: models.Scene) -> N
 def test_the_slope_of_the_moment_is_that_of_the_moment(table_1_scene: models.Scene) -> None:
     disc, x, step = table_1_scene.disc, 0.4, 1e-4
     for shaft in ("horizontal", "vertical"):
-        found = ring(disc, tilt=2e-3, fills=[x - step, x, x + step], shaft=shaft)
+        found = ring(table_1_scene, disc, tilt=2e-3, fills=[x - step, x, x + step], shaft=shaft)
         volume = chamber_volume(disc=disc)
         slope = (found.moment[2] - found.moment[0]) / (2 * step * volume)
         # Liquid is added at every angle of gravity, so means and slopes commute.
@@ -90,7 +92,7 @@ def test_the_slope_of_the_moment_is_that_of_the_moment(table_1_scene: models.Sce
 
 
 def test_an_open_ring_is_reported(table_1_scene: models.Scene) -> None:
-    assert list(ring(table_1_scene.disc, tilt=8e-3, fills=[0.05, 0.5]).closed) == [False, True]
+    assert list(ring(table_1_scene, table_1_scene.disc, tilt=8e-3, fills=[0.05, 0.5]).closed) == [False, True]
 
 
 @settings(max_examples=12, deadline=None, derandomize=True)
@@ -99,7 +101,9 @@ def test_an_open_ring_is_reported(table_1_scene: models.Scene) -> None:
     fill=st.floats(0.3, 0.6),
     small=st.floats(1e-4, 2e-3),
 )
-def test_the_mean_changes_with_the_square_of_gravity(angle: float, fill: float, small: float) -> None:
+def test_the_mean_changes_with_the_square_of_gravity(
+    table_1_scene: models.Scene, angle: float, fill: float, small: float
+) -> None:
     disc = models.Disc(
         outer_radius=0.05,
         inner_radius=0.02,
@@ -110,12 +114,14 @@ def test_the_mean_changes_with_the_square_of_gravity(angle: float, fill: float, 
         max_fill_ratio=0.6,
         initial_fill=0.3,
     )
-    still, one, two = (ring(disc, tilt=t, fills=[fill]) for t in (0.0, small / 2, small))
+    still, one, two = (ring(table_1_scene, disc, tilt=t, fills=[fill]) for t in (0.0, small / 2, small))
     first, second = one.moment - still.moment, two.moment - still.moment
     assert second[0] == pytest.approx(4 * first[0], rel=0.05, abs=1e-10 * still.moment[0])
     assert two.wall_pressure_ripple[0] == pytest.approx(2 * one.wall_pressure_ripple[0], rel=1e-2)
     wider = dataclasses.replace(disc, axial_width=0.12)
-    assert ring(wider, tilt=small, fills=[fill]).moment[0] == pytest.approx(2 * two.moment[0], rel=1e-12)
+    assert ring(table_1_scene, wider, tilt=small, fills=[fill]).moment[0] == pytest.approx(
+        2 * two.moment[0], rel=1e-12
+    )
 
 
 @pytest.mark.parametrize("shaft", ["horizontal", "vertical"])
@@ -126,7 +132,7 @@ def test_the_same_chamber_as_a_mesh_gives_the_same_ring(
     """But for its drawn arcs: R (h/2)^4/32 of the wall, over the depth of the ring."""
     disc, fills = table_1_scene.disc, [0.2, 0.4, 0.7]
     meshed = imported(disc, cells=(3, 24, 2))
-    plain, found = (ring(each, tilt=tilt, fills=fills, shaft=shaft) for each in (disc, meshed))
+    plain, found = (ring(table_1_scene, each, tilt=tilt, fills=fills, shaft=shaft) for each in (disc, meshed))
     assert np.all(plain.closed)
     assert np.all(found.closed)
     depth = disc.outer_radius - surface_radius(disc=disc, fill_ratio=fills)

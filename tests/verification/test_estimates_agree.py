@@ -20,7 +20,7 @@ from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.verification.selection_studies.chamber_models import chamber_hierarchies
-from ringbalance.verification.selection_studies.scenes import random_scene
+from ringbalance.verification.selection_studies.choices import random_scene
 from ringbalance.verification.selection_studies.study import hierarchies_of, terms_document
 
 BUNDLED = ("liquid_ring_paper", "perfluorinated_oil", "silicone_oil_100cst", "six_chamber")

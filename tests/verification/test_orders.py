@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.verification.orders import extrapolate, order_study
+from ringbalance.verification.orders import order_study
 
 
 @given(st.floats(0.5, 5), st.floats(1e-6, 1), st.floats(1.2, 3))
@@ -38,15 +38,3 @@ def test_the_lowest_of_the_two_finest_pairs_counts() -> None:
 def test_sequences_that_show_no_order_are_refused(size: list[float], error: list[float]) -> None:
     with pytest.raises(ValueError, match=r"levels|sizes|errors"):
         order_study(size=size, error=error)
-
-
-def test_extrapolation_removes_the_leading_error() -> None:
-    def value(h: float) -> float:
-        return 3.0 + 0.7 * h**2
-
-    assert extrapolate(coarse=value(0.2), fine=value(0.1), ratio=2, order=2) == pytest.approx(3.0)
-
-
-def test_extrapolation_needs_refinement() -> None:
-    with pytest.raises(ValueError, match="ratio"):
-        extrapolate(coarse=1.0, fine=1.0, ratio=1.0, order=2)

@@ -24,7 +24,7 @@ from ringbalance.verification.reference.block_chambers import imported
 from ringbalance.verification.selection_studies import study as trade_module
 from ringbalance.verification.selection_studies.chamber_elements import forget_solves
 from ringbalance.verification.selection_studies.choice import Values, choose
-from ringbalance.verification.selection_studies.choices import judge
+from ringbalance.verification.selection_studies.choices import judge, random_scene
 from ringbalance.verification.selection_studies.cost import CostModel, committed_costs
 from ringbalance.verification.selection_studies.hierarchy import ModelHierarchy
 from ringbalance.verification.selection_studies.law_models import CLOSED, REGIMES, LawModels, base_law
@@ -35,7 +35,6 @@ from ringbalance.verification.selection_studies.operation import (
     settling_hierarchy,
     time_models,
 )
-from ringbalance.verification.selection_studies.scenes import random_scene
 from ringbalance.verification.selection_studies.study import (
     held_tolerance,
     thinned,
@@ -65,12 +64,7 @@ def test_a_measured_hierarchy_of_k(scene: Scene) -> None:
     hierarchy = k_hierarchy(scene)
     found = measure(hierarchy, values=Values(hierarchy), costs=choose_costs(), clock=Clock())
     errors = {m.fidelity.name: m.error for m in found.fidelities}
-    top = tube_loss(
-        tube=scene.tube,
-        liquid=scene.liquid,
-        angular_velocity=scene.rotor.speed,
-        velocity=np.array([float(point.split()[0]) for point in hierarchy.points]),
-    ).k.value
+    top = tube_loss(scene, np.array([float(point.split()[0]) for point in hierarchy.points])).k.value
     assert errors["k = 50"] == pytest.approx(float(np.max(np.abs(51 / (top + 1) - 1))), rel=1e-2)
     assert errors["finite-element tables"] == 0.0
     assert all(m.seconds is not None and m.seconds > 0 and m.memory is not None for m in found.fidelities)

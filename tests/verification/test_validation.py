@@ -108,8 +108,8 @@ def test_points_come_in_ascending_order_with_their_walls() -> None:
 def test_the_budget_of_k_holds_bias_and_scatter_of_turbulent_friction(paper_scene: Scene) -> None:
     numbers = case_code("measured_smooth_tubes").compute(paper_scene, "light").numbers
     spread = math.hypot(numbers["turbulent_bias"], 2 * numbers["turbulent_standard_deviation"])
-    smooth = replace(paper_scene.tube, roughness=0.0)
-    loss = tube_loss(tube=smooth, liquid=paper_scene.liquid, angular_velocity=0.0, velocity=np.array([15.0]))
+    tube, rotor = replace(paper_scene.tube, roughness=0.0), replace(paper_scene.rotor, speed=0.0)
+    loss = tube_loss(replace(paper_scene, tube=tube, rotor=rotor), np.array([15.0]))
     assert loss.uncertainty_parts["friction correlation"] >= spread * loss.terms["friction"]
     assert loss.k.uncertainty >= loss.uncertainty_parts["friction correlation"]
 

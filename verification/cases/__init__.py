@@ -8,10 +8,23 @@ The folder has no `__init__.py` and is entered in no list: it is found by its ca
 from __future__ import annotations
 
 from importlib import import_module
-from types import ModuleType
+from types import MappingProxyType, ModuleType
+from typing import Final
+
+_STUDIES: Final = MappingProxyType(
+    {
+        "pressure under gravity": "reference.gravity",
+        "manufactured pressure": "reference.manufactured",
+        "choice of models": "selection_studies.choices",
+        "measurements": "validation.comparison",
+    }
+)
+"""Modules whose `study` several cases share."""
 
 
 def __getattr__(name: str) -> ModuleType:
+    if name in _STUDIES:
+        return import_module(f"ringbalance.verification.{_STUDIES[name]}")
     if not name.endswith("_code"):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return import_module(f"{__name__}.{name.removesuffix('_code')}.case")

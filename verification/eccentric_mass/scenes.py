@@ -11,7 +11,6 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.controller.judgement import settling_time
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.dimensions import DIMENSIONS
@@ -53,8 +52,11 @@ def envelope(values: npt.ArrayLike) -> FloatArray:
 
 def convergence_time(time: FloatArray, error: FloatArray, *, limit: float) -> float:
     """Instant from which on an error stays within a limit, s; infinite when the last is beyond it."""
-    found = settling_time(time=time, amplitude=error, limit=limit)
-    return math.inf if found is None else found
+    beyond = np.flatnonzero(error > limit)
+    if beyond.size == 0:
+        return float(time[0])
+    last = int(beyond[-1])
+    return math.inf if last == time.size - 1 else float(time[last + 1])
 
 
 def _places(size: int) -> IntArray:

@@ -34,13 +34,7 @@ class Running:
 @lru_cache(maxsize=256)
 def tube_curve(scene: Scene) -> TubeLoss:
     """k(u) of a scene's tube over all velocities that any scene may reach."""
-    return tube_loss(
-        tube=scene.tube,
-        liquid=scene.liquid,
-        angular_velocity=scene.rotor.speed,
-        velocity=np.geomspace(*_VELOCITIES),
-        inputs=scene.uncertainty,
-    )
+    return tube_loss(scene, np.geomspace(*_VELOCITIES))
 
 
 def running_tube(scene: Scene, *, head: float) -> Running:

@@ -231,9 +231,7 @@ def _kind(
 def _turns(scene: Scene) -> int:
     if scene.environment.shaft == "vertical":
         return 1
-    return turn_samples(
-        disc=scene.disc, angular_velocity=scene.rotor.speed, gravity=scene.environment.gravity
-    )
+    return turn_samples(scene)
 
 
 def _meshes(scene: Scene, dimension: int) -> tuple[tuple[int, ...], tuple[int, ...]]:

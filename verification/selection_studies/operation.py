@@ -184,7 +184,7 @@ def _velocity_change(scene: Scene, duration: float) -> float:
     velocity, disc = equal_velocity(scene), scene.disc
     if scene.gas.pressure <= 0:
         return 0.0
-    area = np.pi / 4 * scene.tube.bore**2
+    area = scene.tube.area
     per_fill = scene.liquid.density * scene.rotor.speed**2 / (disc.axial_width * disc.central_angle)
     return float(min(per_fill * area * velocity * duration / scene.gas.pressure, 1.0))
 

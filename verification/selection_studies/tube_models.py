@@ -114,13 +114,7 @@ def k_hierarchy(scene: Scene) -> ModelHierarchy:
 
 
 def _k_uncertainty(scene: Scene, velocities: FloatArray) -> float:
-    found = tube_loss(
-        tube=scene.tube,
-        liquid=scene.liquid,
-        angular_velocity=scene.rotor.speed,
-        velocity=velocities,
-        inputs=scene.uncertainty,
-    )
+    found = tube_loss(scene, velocities)
     return float(np.max(found.k.uncertainty / (found.k.value + 1)))
 
 

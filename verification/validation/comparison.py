@@ -1,4 +1,4 @@
-"""Measurements beside the program's predictions: statistics, verdict, scatter plot."""
+"""Measurements, bundled ones or a user's own, beside the program's predictions: statistics, verdict, plot."""
 
 # ruff: noqa: ARG001 - every study has the uniform case interface
 from __future__ import annotations
@@ -6,12 +6,17 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from types import MappingProxyType
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.identification.data.measurements import Measurements, MeasurementsError
+from ringbalance.identification.data.measurements import (
+    Measurements,
+    MeasurementsError,
+    read_measurements,
+)
 from ringbalance.scene.arrays import BoolArray, FloatArray, StringArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, as_found, figure
@@ -19,8 +24,10 @@ from ringbalance.verification.validation.kinds import Kind, measurements
 from ringbalance.verification.validation.model_bias import (
     MUTATIONS,
     ModelStatistics,
+    bias,
     model_statistics,
     statistics_numbers,
+    within,
 )
 from ringbalance.verification.validation.tube_at_rest import TUBE_AT_REST
 from ringbalance.verification.validation.tube_friction import FRICTION
@@ -39,6 +46,8 @@ KINDS: Final[Mapping[str, Kind]] = MappingProxyType(
 """Kinds of data that the program can predict."""
 PROMISED: Final = 0.93
 """Fraction of the points that both 95 % uncertainties must hold: 0.95, less the chance of a small sample."""
+_FEWEST: Final = 2
+"""Points of a user's file from which a scatter can be had."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -178,3 +187,49 @@ def data_evidence(*sets: Measurements, unit: str, mutation: str | None = None) -
         numbers=statistics_numbers(comparison.statistics),
         series=(comparison.scatter(kind_of(sets[0]).title, unit),),
     )
+
+
+def data_document(path: Path) -> dict[str, Any]:
+    """Judgement of a file of measurements, as `ringbalance verify --data FILE --json` prints it.
+
+    Raises: MeasurementsError: not such a file, or too few points; with the file's name in every line.
+    """
+    data = read_measurements(path)
+    try:
+        kind, comparison = kind_of(data), compare(data)
+        if len(data) < _FEWEST:
+            raise MeasurementsError(f"{len(data)} point, and {_FEWEST} are the fewest that can be judged")
+    except MeasurementsError as error:
+        raise MeasurementsError("\n".join(f"{path}: {line}" for line in str(error).splitlines())) from error
+    return {
+        "file": str(path),
+        "kind": data.source.kind,
+        "title": kind.title,
+        "source": data.source.source,
+        "measured": kind.measured,
+        "limit": PROMISED,
+        "verdict": comparison.verdict.value,
+        "statistics": vars(comparison.statistics),
+        "series": {name: _of_series(comparison, name) for name in np.unique(comparison.series).tolist()},
+        "points": [
+            dict(zip(("series", "measured", "predicted", "stated", "U_D"), row, strict=True))
+            for row in zip(
+                comparison.series.tolist(),
+                comparison.measured.tolist(),
+                comparison.predicted.tolist(),
+                comparison.stated.tolist(),
+                comparison.uncertainty.tolist(),
+                strict=True,
+            )
+        ],
+    }
+
+
+def _of_series(comparison: Comparison, name: str) -> Mapping[str, float]:
+    one = comparison.where(comparison.series == name)
+    held = within(one.predicted, one.measured, one.stated, one.uncertainty)
+    return {
+        "points": one.measured.size,
+        "bias": bias(one.predicted, one.measured),
+        "share_within": float(np.mean(held)),
+    }

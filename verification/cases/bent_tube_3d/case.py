@@ -104,12 +104,9 @@ def _terms(scene: Scene, length: float) -> dict[str, float]:
     """Friction, rotation and bends of the tube law, and what the bends' curvature does to the rotation."""
     bore, bend = scene.tube.bore, scene.tube.bends[0]
     tube = dataclasses.replace(scene.tube, length=length * bore, bends=(bend, bend), drag_coefficient=None)
-    loss = tube_loss(
-        tube=tube,
-        liquid=dataclasses.replace(scene.liquid, kinematic_viscosity=VISCOSITY),
-        angular_velocity=scene.rotor.speed,
-        velocity=[REYNOLDS * VISCOSITY / bore],
-    )
+    liquid = dataclasses.replace(scene.liquid, kinematic_viscosity=VISCOSITY)
+    same = dataclasses.replace(scene, tube=tube, liquid=liquid, uncertainty=())
+    loss = tube_loss(same, [REYNOLDS * VISCOSITY / bore])
     arcs = 2 * 64 / REYNOLDS * bend.angle * bend.radius / bore
     shift = bend_shift(
         reynolds=REYNOLDS,

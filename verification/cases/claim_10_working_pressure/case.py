@@ -5,7 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
-from ringbalance.reduced_model.paper.formulas import PAPER_DRAG_COEFFICIENT, stall_pressure, velocity_paper
+from ringbalance.reduced_model.paper.formulas import (
+    PAPER_DRAG_COEFFICIENT,
+    stall_pressure,
+    velocity_from_pressures,
+)
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Level, NotRunError, Series, as_found, figure
 from ringbalance.verification.paper_numbers import DENSITY, HIGHEST_PRESSURE, LOWEST_PRESSURE
@@ -23,7 +27,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         numbers={
             "by_ring": float(wall_pressure_of(scene, scene.disc.max_fill_ratio, density=DENSITY)),
             "scene_hump": scene.tube.hump_radius,
-            "velocity_high": _velocity(scene, HIGHEST_PRESSURE.value),
+            "velocity_high": _velocity(HIGHEST_PRESSURE.value),
         },
         series=(_figure(scene),),
     )
@@ -39,15 +43,11 @@ def _priming(scene: Scene, hump_radius: float) -> float:
     return hydrostatic_pressure(density=DENSITY, angular_velocity=omega, inner=hump_radius, outer=outer)
 
 
-def _velocity(scene: Scene, pressure: float) -> float:
+def _velocity(pressure: float) -> float:
+    """At equal fills, where gas alone drives."""
     return float(
-        velocity_paper(
-            disc=scene.disc,
-            density=DENSITY,
-            angular_velocity=scene.rotor.speed,
-            drag_coefficient=PAPER_DRAG_COEFFICIENT,
-            gas_pressure=pressure,
-            fill_ratio=scene.disc.max_fill_ratio / 2,
+        velocity_from_pressures(
+            density=DENSITY, drag_coefficient=PAPER_DRAG_COEFFICIENT, pressure_difference=pressure
         )
     )
 

@@ -10,11 +10,10 @@ from ringbalance.identification.criticism.review import review
 from ringbalance.identification.data.reading import read_observations
 from ringbalance.identification.data.template import template as template_of
 from ringbalance.identification.documents import fit_document
-from ringbalance.identification.fitting import Loss
+from ringbalance.identification.fitting import Loss, problem_of
 from ringbalance.identification.fitting import fit as fit_scene
 from ringbalance.identification.next_measurement import next_measurement
 from ringbalance.identification.parameters import FitError
-from ringbalance.identification.result import FitResult
 from ringbalance.identification.saving import save_result
 from ringbalance.identification.show import fit_view
 from ringbalance.scene.faults import Fault, SceneError, did_you_mean, option_error
@@ -75,12 +74,14 @@ def fit(
     observations = read_observations(data, scene=given)
     names = None if parameters is None else _names(parameters)
     try:
+        fitted = [each.name for each in problem_of(given, observations, names).parameters]
+        chosen = _fitted_name(next, fitted)
         with activity("fit", "several starts, profiles of the likelihood ..."):
             result = fit_scene(given, data=observations, parameters=names, loss=loss)
     except FitError as error:
         fault = Fault(file=given.file, table="", key="", value="", problem=str(error), allowed="")
         raise SceneError([fault]) from error
-    told, following = review(result), next_measurement(result, _fitted_name(next, result))
+    told, following = review(result), next_measurement(result, chosen)
     if json:
         document = fit_document(result, data=observations, told=told, following=following)
         print(json_format.dumps(document, allow_nan=False))
@@ -94,8 +95,7 @@ def fit(
     return DONE if told.holds else FAILED
 
 
-def _fitted_name(name: str | None, result: FitResult) -> str | None:
-    fitted = [each.name for each in result.parameters]
+def _fitted_name(name: str | None, fitted: Sequence[str]) -> str | None:
     if name is not None and name not in fitted:
         problem = f"this parameter is not fitted{did_you_mean(name, fitted)}"
         raise option_error(option="--next", value=name, problem=problem, allowed=", ".join(fitted))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,6 @@ import numpy as np
 from ringbalance.identification.balancers import exact_for, nearby
 from ringbalance.identification.criticism.review import Review
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.identifiability import Combination
 from ringbalance.identification.next_measurement import NextMeasurement
 from ringbalance.identification.result import FileResiduals, FitResult, FittedParameter, Noise
 
@@ -38,7 +37,7 @@ def fit_document(
         "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
         "data": [_file(each) for each in data],
         "parameters": [_parameter(each) for each in result.parameters],
-        "combinations": [_combination(each) for each in result.combinations],
+        "combinations": [asdict(each) for each in result.combinations],
         "correlations": {"names": names, "matrix": result.correlations.tolist()},
         "noise": [_noise(each) for each in result.noise],
         "residuals": [_residuals(each) for each in result.residuals],
@@ -55,29 +54,31 @@ def fit_document(
 
 
 def _criticism(told: Review) -> dict[str, Any]:
+    findings = [
+        {
+            "test": each.test,
+            "residuals_of": each.block,
+            "against": each.against,
+            "p_value": each.p_value,
+            "corrected_p_value": each.corrected,
+            "fails": each.fails,
+        }
+        for each in told.criticism.findings
+    ]
+    laws = [
+        {
+            "other_law": each.other,
+            "separation": each.separation,
+            "preference": each.preference,
+            "text": each.text,
+        }
+        for each in told.laws
+    ]
     return {
         "describes": told.criticism.describes,
         "text": told.criticism.text,
-        "findings": [
-            {
-                "test": each.test,
-                "residuals_of": each.block,
-                "against": each.against,
-                "p_value": each.p_value,
-                "corrected_p_value": each.corrected,
-                "fails": each.fails,
-            }
-            for each in told.criticism.findings
-        ],
-        "laws": [
-            {
-                "other_law": each.other,
-                "separation": each.separation,
-                "preference": each.preference,
-                "text": each.text,
-            }
-            for each in told.laws
-        ],
+        "findings": findings,
+        "laws": laws,
     }
 
 
@@ -120,16 +121,6 @@ def _parameter(found: FittedParameter) -> dict[str, Any]:
 
 def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
-
-
-def _combination(found: Combination) -> dict[str, Any]:
-    return {
-        "text": found.text,
-        "names": list(found.names),
-        "exponents": list(found.exponents),
-        "value": found.value,
-        "relative_uncertainty": found.relative_uncertainty,
-    }
 
 
 def _noise(found: Noise) -> dict[str, Any]:

@@ -116,6 +116,7 @@ def _fitted(
         verdict=verdict,
         text=_verdict_text(parameter, verdict, products),
         profile=found,
+        curve=tuple((parameter.value(at), rise / found.factor**2) for at, rise in found.points),
     )
 
 

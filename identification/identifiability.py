@@ -84,7 +84,7 @@ def _normalised(slopes: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]
     return norms, padded, vt
 
 
-def allowed_widths(parameters: Sequence[Parameter], t: FloatArray) -> FloatArray:
+def _allowed_widths(parameters: Sequence[Parameter], t: FloatArray) -> FloatArray:
     """Half-width (95 %) of each t above which data say less than is known beforehand, or than a factor of
     two."""
     return np.array(
@@ -103,7 +103,7 @@ def verdicts(
     null = vt[s <= DEPENDENT]
     lost = np.any(np.abs(null) > 1e-2, axis=0) if null.size else np.zeros(t.size, dtype=np.bool_)
     alone = np.linalg.norm(data_root(slopes), axis=1)
-    allowed = allowed_widths(parameters, t)
+    allowed = _allowed_widths(parameters, t)
     found = []
     for i, (parameter, profile) in enumerate(zip(parameters, profiles, strict=True)):
         reach = max(profile.high - float(t[i]), float(t[i]) - profile.low)
@@ -138,7 +138,7 @@ def combinations(
     """
     if all(verdict is Verdict.IDENTIFIED for verdict in found):
         return ()
-    factor, allowed = max(p.factor for p in profiles), allowed_widths(parameters, t)
+    factor, allowed = max(p.factor for p in profiles), _allowed_widths(parameters, t)
     weak = np.array([verdict is not Verdict.IDENTIFIED for verdict in found])
     flat = _flattened(slopes, t, allowed, [p for p, one in zip(profiles, weak, strict=True) if one])
     _, s, vt = np.linalg.svd(flat * allowed, full_matrices=False)

@@ -82,19 +82,14 @@ def student(optimum: Optimum) -> FloatArray:
 
 def _by_weights(optimum: Optimum) -> FloatArray:
     """L over C of each parameter."""
-    residuals, problem = optimum.residuals, optimum.residuals.problem
-    n, count = problem.measured.size, optimum.t.size
-    data = np.concatenate([residuals.scale[:, None] * optimum.of_prediction, residuals.linear[:n]], axis=1)
-    priors = problem.prior_slopes(optimum.t)
-    known = np.zeros((priors.shape[0] + residuals.held.shape[1], data.shape[1]))
-    known[: priors.shape[0], :count] = priors
-    known[priors.shape[0] :, data.shape[1] - residuals.held.shape[1] :] = np.eye(residuals.held.shape[1])
-    whole = covariance(np.concatenate([data, known]))
+    (data, known), count = optimum.of_all, optimum.t.size
+    group, whole = optimum.residuals.problem.group, covariance(np.concatenate([data, known]))
     added = np.zeros(count)
     for g, nu in enumerate(optimum.freedom.tolist()):
-        mine = data[problem.group == g]
-        known_to = mine.T @ mine
-        left = whole @ (known_to - known_to @ whole @ known_to) @ whole
+        mine = data[group == g]
+        rows = mine @ whole
+        # Diagonal of C (W - W C W) C by the rows' own covariance.
+        left = (rows.T @ rows) @ (np.eye(len(whole)) - mine.T @ rows)
         added += 2 / nu * np.diag(left)[:count]
     return np.asarray(np.maximum(added, 0.0) / np.diag(whole)[:count])
 

@@ -31,6 +31,8 @@ from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 
 STEP: Final = 1e-3
 """In t, of central differences; their error is STEP^2/6 times a third derivative of order one."""
+_RANK: Final = 1e-10
+"""Smallest singular value that counts, relative to the largest."""
 _JUMP: Final = 0.1
 """Part of the differences on both sides by which they may differ: beyond it there is a jump between them."""
 
@@ -68,7 +70,7 @@ def block_of(observations: Observations) -> Block:
         kind=kind,
         measured=kind.measured(observations),
         whiten=np.linalg.inv(lower),
-        free=kind.free(observations),
+        free=np.zeros((len(lower), 0)) if kind.free is None else kind.free(observations),
     )
 
 
@@ -233,8 +235,7 @@ class Residuals:
     @cached_property
     def base(self) -> FloatArray:
         """Q; directions that the data do not hold are left out."""
-        u, s, _ = np.linalg.svd(self.linear, full_matrices=False)
-        return np.asarray(u[:, s > 1e-10 * np.max(s, initial=1e-300)])
+        return basis_of(self.linear)
 
     def projected(self, columns: FloatArray) -> FloatArray:
         """Of numbers of the data, without what b and n can take up, shape (n + held, ...)."""
@@ -257,10 +258,8 @@ class Residuals:
 
         Args: `slopes`: d(residuals)/dt.
         """
-        n = self.problem.measured.size
-        u, s, _ = np.linalg.svd(slopes, full_matrices=False)
-        taken = u[:, s > 1e-10 * np.max(s, initial=1e-300)]
-        return np.asarray(np.sum(taken[:n] ** 2, axis=1) + np.sum(self.base[:n] ** 2, axis=1))
+        both = np.hstack([basis_of(slopes)[: self.scale.size], self.base[: self.scale.size]])
+        return np.asarray(np.sum(both**2, axis=1))
 
     def held_values(self, t: FloatArray) -> FloatArray:
         """Likeliest n of the held inputs at t, in their standard deviations."""
@@ -269,6 +268,12 @@ class Residuals:
         full = np.concatenate([left, np.zeros(count)])
         found = np.linalg.lstsq(self.linear, full, rcond=1e-10)[0]
         return np.asarray(found[found.size - count :])
+
+
+def basis_of(columns: FloatArray) -> FloatArray:
+    """Orthonormal basis of the space of some columns."""
+    left, size, _ = np.linalg.svd(columns, full_matrices=False)
+    return np.asarray(left[:, size > _RANK * np.max(size, initial=1e-300)])
 
 
 def held_effects(problem: Problem, t: FloatArray, changes: Sequence[tuple[Any, Any]]) -> FloatArray:

@@ -79,8 +79,9 @@ def next_measurement(result: FitResult, parameter: str | None = None) -> NextMea
     names = [each.name for each in result.parameters]
     chosen = parameter or _least_identified(result)
     result.parameter(chosen)
-    which = names.index(chosen)
-    gains = expected_gains(_information(result), parameter=which, candidates=_candidates(result))
+    which, slopes = names.index(chosen), np.concatenate(result.optimum.of_all)
+    information = slopes.T @ slopes
+    gains = expected_gains(information, parameter=which, candidates=_candidates(result))
     return NextMeasurement(parameter=chosen, gains=gains)
 
 
@@ -94,23 +95,8 @@ def _least_identified(result: FitResult) -> str:
     return result.parameters[max(range(len(result.parameters)), key=key)].name
 
 
-def _information(result: FitResult) -> FloatArray:
-    """Fisher information of parameters, of what is fitted beside them and of held inputs, with priors."""
-    best = result.optimum
-    residuals, t = best.residuals, best.t
-    data = np.hstack(
-        [residuals.scale[:, None] * best.of_prediction, residuals.linear[: residuals.scale.size]]
-    )
-    held = residuals.held.shape[1]
-    whole = data.T @ data
-    whole[: t.size, : t.size] += (s := residuals.problem.prior_slopes(t)).T @ s
-    if held:
-        whole[-held:, -held:] += np.eye(held)
-    return np.asarray(whole)
-
-
 def _candidates(result: FitResult) -> Iterator[Candidate]:
-    """Rows of every kind with derivatives in the columns of `_information`."""
+    """Rows of every kind with derivatives in the columns of `Optimum.of_all`."""
     best = result.optimum
     problem, t = best.residuals.problem, best.t
     scene, measured = problem.scene_at(t), {block.observations.kind: block for block in problem.blocks}

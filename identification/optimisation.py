@@ -30,9 +30,9 @@ _APART: Final = 1.0
 """Of t for a further start, in prior standard deviations or, without a prior, in half of ln 2."""
 _WIDE: Final = 0.35
 _STEPS: Final = 6
-_LEAST_GAIN: Final = 1e-6
-"""Of the sum of squares, below which a step to the optimum is not taken: a thousandth of a standard deviation
-of a parameter."""
+_LEAST_GAIN: Final = 1e-8
+"""Of the sum of squares, below which a step to the optimum is not taken: a ten-thousandth of a standard
+deviation of a parameter."""
 _JUMPED: Final = 0.08
 """Of the sum of squares, below which a gain that does not come on a profile is taken for lost to a jump of a
 prediction; it moves no end of an interval by more than 1 %."""
@@ -67,6 +67,17 @@ class Optimum:
     def slopes(self) -> FloatArray:
         """d(residuals)/dt."""
         return self.residuals.slopes(self.t, self.of_prediction)
+
+    @cached_property
+    def of_all(self) -> tuple[FloatArray, FloatArray]:
+        """Slopes by parameters, b and n: of the data, and of what is known beforehand, priors and n."""
+        residuals, priors = self.residuals, self.residuals.problem.prior_slopes(self.t)
+        count, held = self.residuals.problem.measured.size, self.residuals.held.shape[1]
+        data = np.hstack([residuals.scale[:, None] * self.of_prediction, residuals.linear[:count]])
+        known = np.zeros((priors.shape[0] + held, data.shape[1]))
+        known[: priors.shape[0], : self.t.size] = priors
+        known[priors.shape[0] :, data.shape[1] - held :] = np.eye(held)
+        return data, known
 
 
 def optimum(
@@ -111,15 +122,15 @@ def _first_noise(problem: Problem) -> FloatArray:
 def _from_starts(residuals: Residuals, starts: int) -> FloatArray:
     """The best of where searches from the scene and from around it come to, trust regions from the scene."""
     problem = residuals.problem
-    first, *others = start_points(problem, starts)
-    ends = [minimised(residuals, first)]
+    first, *others = _start_points(problem, starts)
+    ends = [_minimised(residuals, first)]
     for t in others:
         slopes = residuals.slopes(t, problem.quick_slopes(t))
         ends.append(searched(residuals, t, slopes, gain=_NEARBY).t)
     return min(ends, key=lambda t: float(np.sum(residuals.at(t) ** 2)))
 
 
-def start_points(problem: Problem, count: int) -> list[FloatArray]:
+def _start_points(problem: Problem, count: int) -> list[FloatArray]:
     """t of the scene, and points around it by a quasi-random sequence, within the bounds.
 
     Source: additive recurrence with the generalised golden ratio (Roberts, 2018).
@@ -142,7 +153,7 @@ def start_points(problem: Problem, count: int) -> list[FloatArray]:
     return points
 
 
-def minimised(residuals: Residuals, start: FloatArray) -> FloatArray:
+def _minimised(residuals: Residuals, start: FloatArray) -> FloatArray:
     """t near the least sum of squares that a search from a start comes to."""
     problem = residuals.problem
     found = least_squares(
@@ -150,7 +161,7 @@ def minimised(residuals: Residuals, start: FloatArray) -> FloatArray:
         _inside(problem, start),
         jac=lambda t: residuals.slopes(t, problem.quick_slopes(t)),
         bounds=problem.bounds,
-        method="dogbox",
+        method="trf",
         x_scale="jac",
         ftol=_NEARBY,
         xtol=1e-8,

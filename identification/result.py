@@ -11,6 +11,7 @@ from ringbalance.identification.identifiability import Combination, Verdict
 from ringbalance.identification.intervals import Profile
 from ringbalance.identification.optimisation import Optimum
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
+from ringbalance.scene.origins import Origin
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 
 LAMBDA_FAR: Final = 2**0.25
@@ -35,6 +36,19 @@ class FittedParameter:
     text: str
     """The verdict with its reason, in one sentence."""
     profile: Profile
+    curve: tuple[tuple[float, float], ...] = ()
+    """Values, SI, and the rise of minus two log likelihood there, over that at the ends of the interval."""
+
+    @property
+    def half_width(self) -> float | None:
+        """The larger distance from the value to an end of its interval; None: it has no end."""
+        width = max(self.interval[1] - self.value, self.value - self.interval[0])
+        return width if math.isfinite(width) else None
+
+    @property
+    def origin(self) -> Origin:
+        """Of the value in a saved scene."""
+        return "measured" if self.verdict is Verdict.IDENTIFIED else "inferred"
 
     @property
     def contradicts(self) -> bool:

@@ -17,8 +17,8 @@ from pathlib import Path, PurePath
 from typing import Any, Final
 
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.identifiability import Combination, Verdict
-from ringbalance.identification.parameters import START, Parameter
+from ringbalance.identification.identifiability import Combination
+from ringbalance.identification.parameters import START
 from ringbalance.identification.result import FitResult, FittedParameter
 from ringbalance.scene import deferred
 from ringbalance.scene.describe import usual_unit
@@ -27,7 +27,6 @@ from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.keys.schema import LIQUID_RING, ORIGIN, Schema
 from ringbalance.scene.loader import scene_from
 from ringbalance.scene.measured import MeasuredFile, MeasuredFinding
-from ringbalance.scene.origins import Origin
 from ringbalance.scene.platform.files import write_whole
 from ringbalance.scene.toml_writing import toml_bytes
 from ringbalance.scene.units import format_quantity, unit_of
@@ -47,34 +46,6 @@ _ENTRIES: Final = 2
 """Of a list, one for each mass."""
 _KEPT: Final = "the uncertainty before stays, since it is that of both masses too: {} was fitted alone"
 _CUT: Final = "the interval of {} is wider than its value, which a scene cannot state: it has the value"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Fitted:
-    """One value of a scene before and after a fit, SI; ends of 95 % intervals, None where there is none."""
-
-    path: str
-    """Such as "tube.bore", or "masses.friction_arm[0]" for an entry of a list."""
-    before: float
-    before_interval: tuple[float | None, float | None] = (None, None)
-    value: float
-    interval: tuple[float | None, float | None]
-    verdict: str
-    identified: bool
-    """By the data alone; else the value follows from what was known before and a combination."""
-    profile: tuple[tuple[float, float], ...] = ()
-    """Values, SI, and the rise of minus two log likelihood there, over that at the ends of the interval."""
-
-    @property
-    def half_width(self) -> float | None:
-        """The larger distance from the value to an end of its interval."""
-        low, high = self.interval
-        return None if low is None or high is None else max(high - self.value, self.value - low)
-
-    @property
-    def origin(self) -> Origin:
-        """Of the value in the saved scene."""
-        return "measured" if self.identified else "inferred"
 
 
 def save_result(
@@ -106,9 +77,7 @@ def save_result(
         *(MeasuredFinding(about="combination", text=_combination(each)) for each in result.combinations),
         *(MeasuredFinding(about="correlation", text=each) for each in _correlations(result)),
     ]
-    scales = result.optimum.residuals.problem.parameters
-    both = zip(result.parameters, scales, strict=True)
-    fitted = [_fitted(each, scale) for each, scale in both if each.name not in START]
+    fitted = [each for each in result.parameters if each.name not in START]
     return save_fitted(path, text=text, fitted=fitted, files=files, findings=findings)
 
 
@@ -120,21 +89,6 @@ def found_from(text: str, *, folder: Path, to: Path) -> str:
         return text
     document["disc"]["mesh"] = Path(os.path.relpath(folder / mesh, to)).as_posix()
     return toml_bytes(document).decode()
-
-
-def _fitted(parameter: FittedParameter, scale: Parameter) -> Fitted:
-    return Fitted(
-        path=parameter.path,
-        before=parameter.before,
-        before_interval=parameter.before_interval or (None, None),
-        value=parameter.value,
-        interval=parameter.interval,
-        verdict=str(parameter.verdict),
-        identified=parameter.verdict is Verdict.IDENTIFIED,
-        profile=tuple(
-            (scale.value(t), rise / parameter.profile.factor**2) for t, rise in parameter.profile.points
-        ),
-    )
 
 
 def _combination(found: Combination) -> str:
@@ -161,7 +115,7 @@ def save_fitted(
     path: Path,
     *,
     text: str,
-    fitted: Sequence[Fitted],
+    fitted: Sequence[FittedParameter],
     files: Sequence[MeasuredFile],
     findings: Sequence[MeasuredFinding] = (),
 ) -> Path:
@@ -180,7 +134,7 @@ def save_fitted(
 def fitted_scene(
     text: str,
     *,
-    fitted: Sequence[Fitted],
+    fitted: Sequence[FittedParameter],
     files: Sequence[MeasuredFile],
     findings: Sequence[MeasuredFinding] = (),
 ) -> bytes:
@@ -256,7 +210,7 @@ def _unit(here: object, path: str, dimension: str | None) -> str:
     )
 
 
-def _put_value(document: dict[str, Any], place: _Place, fitted: Fitted) -> None:
+def _put_value(document: dict[str, Any], place: _Place, fitted: FittedParameter) -> None:
     value = place.written(fitted.value)
     content = document.setdefault(place.table, {})
     if place.entry is not None:
@@ -269,10 +223,10 @@ def _put_value(document: dict[str, Any], place: _Place, fitted: Fitted) -> None:
 
 
 def _put_widths(
-    document: dict[str, Any], placed: Iterable[tuple[_Place, Fitted]]
+    document: dict[str, Any], placed: Iterable[tuple[_Place, FittedParameter]]
 ) -> Iterator[MeasuredFinding]:
     """Write the uncertainties; entries of a list share the largest. Yields: What a scene cannot state."""
-    by_key: dict[tuple[str, str], list[tuple[_Place, Fitted]]] = {}
+    by_key: dict[tuple[str, str], list[tuple[_Place, FittedParameter]]] = {}
     for place, one in placed:
         by_key.setdefault((place.table, place.key), []).append((place, one))
     for group in by_key.values():
@@ -293,12 +247,13 @@ def _put_widths(
             yield MeasuredFinding(about="uncertainty", text=_CUT.format(each[0].path))
 
 
-def _record(place: _Place, fitted: Fitted) -> dict[str, Any]:
+def _record(place: _Place, fitted: FittedParameter) -> dict[str, Any]:
     """One quantity of [measured]; ends that there are not are left out."""
+    known = fitted.before_interval or (None, None)
     numbers = {
         "before": fitted.before,
-        "before_low": fitted.before_interval[0],
-        "before_high": fitted.before_interval[1],
+        "before_low": known[0],
+        "before_high": known[1],
         "value": fitted.value,
         "low": fitted.interval[0],
         "high": fitted.interval[1],
@@ -307,7 +262,7 @@ def _record(place: _Place, fitted: Fitted) -> dict[str, Any]:
         "quantity": fitted.path,
         "unit": place.unit or _NO_UNIT,
         **{name: place.number(number) for name, number in numbers.items() if number is not None},
-        "verdict": fitted.verdict,
-        "profile": [place.number(value) for value, _ in fitted.profile],
-        "rise": [float(f"{rise:.{_RISE_DIGITS}g}") for _, rise in fitted.profile],
+        "verdict": str(fitted.verdict),
+        "profile": [place.number(value) for value, _ in fitted.curve],
+        "rise": [float(f"{rise:.{_RISE_DIGITS}g}") for _, rise in fitted.curve],
     }

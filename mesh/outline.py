@@ -14,7 +14,7 @@ _OFF_NODES: Final = 1e-7
 """Of the chamber's size: so far beside its place a plane is laid, where it meets no node."""
 
 
-def wall_pieces(geometry: ChamberGeometry) -> tuple[IntArray, ...]:
+def _wall_pieces(geometry: ChamberGeometry) -> tuple[IntArray, ...]:
     """Straight-edged pieces of the facets that bound the chamber, on all of their nodes.
 
     Returns: Nodes one after the other around each piece, pieces of as many corners together.
@@ -39,7 +39,7 @@ def outlines(geometry: ChamberGeometry, *, axis: int, place: float = 0.0) -> tup
     """
     points = geometry.points
     height = points[:, axis] - place - _OFF_NODES * float(np.ptp(points[:, axis]))
-    crossed = np.concatenate([_crossed(piece, height) for piece in wall_pieces(geometry)])
+    crossed = np.concatenate([_crossed(piece, height) for piece in _wall_pieces(geometry)])
     edges, number = np.unique(crossed, axis=0, return_inverse=True)
     low, high = height[edges].T
     share = (low / (low - high))[:, None]

@@ -71,6 +71,14 @@ def evidence_at(evidence: Any, path: str) -> Any:
     return evidence
 
 
+def found_at(evidence: Any, path: str) -> Any:
+    """The same; None where nothing is there."""
+    try:
+        return evidence_at(evidence, path)
+    except (KeyError, IndexError, TypeError):
+        return None
+
+
 def read(evidence: Any, path: str, unit: str, *, width: float | None = None, digits: int = 3) -> str:
     """The evidence's value at a place in the unit that suits it, with its half-width (95 %, SI), traced."""
     value = evidence_at(evidence, path)
@@ -86,5 +94,5 @@ def states_uncertainty(evidence: Any) -> bool:
 
 def believed(evidence: Any, value: float | None, width: float | None) -> float | None:
     """The half-width of a value; None where it is finer than inputs of which the scene says nothing."""
-    fine = width is not None and value is not None and width <= _ROUNDING * abs(value)
+    fine = value is not None and width and width <= _ROUNDING * abs(value)
     return None if fine and not states_uncertainty(evidence) else width

@@ -17,7 +17,7 @@ from ringbalance.verification.evidence import Reference
 
 
 @dataclass(frozen=True, kw_only=True)
-class Printed:
+class _Printed:
     """A printed number."""
 
     value: float
@@ -31,26 +31,26 @@ class Printed:
         return Reference(value=self.value, uncertainty=from_rounding(self.last_digit))
 
 
-CHAMBER_VOLUME: Final = Printed(value=67.7e-6, last_digit=0.1e-6)
+CHAMBER_VOLUME: Final = _Printed(value=67.7e-6, last_digit=0.1e-6)
 """Eq. 4."""
-MAX_LIQUID_VOLUME: Final = Printed(value=33.9e-6, last_digit=0.1e-6)
+MAX_LIQUID_VOLUME: Final = _Printed(value=33.9e-6, last_digit=0.1e-6)
 """Eq. 5."""
-INITIAL_LIQUID_VOLUME: Final = Printed(value=16.9e-6, last_digit=0.1e-6)
+INITIAL_LIQUID_VOLUME: Final = _Printed(value=16.9e-6, last_digit=0.1e-6)
 """Eq. 6."""
-RING_RADIUS: Final = Printed(value=34.9e-3, last_digit=0.1e-3)
+RING_RADIUS: Final = _Printed(value=34.9e-3, last_digit=0.1e-3)
 """R1'min, after Eq. 6."""
-CHAMBER_MOMENT: Final = Printed(value=1333e-6, last_digit=1e-6)
+CHAMBER_MOMENT: Final = _Printed(value=1333e-6, last_digit=1e-6)
 """After Eq. 7."""
-DISC_MOMENT: Final = Printed(value=1885e-6, last_digit=1e-6)
+DISC_MOMENT: Final = _Printed(value=1885e-6, last_digit=1e-6)
 """Eq. 8."""
-DENSE_DISC_MOMENT: Final = Printed(value=3770e-6, last_digit=10e-6)
+DENSE_DISC_MOMENT: Final = _Printed(value=3770e-6, last_digit=10e-6)
 """After Eq. 8, twice 1885 and so known to ten."""
-LOWEST_PRESSURE: Final = Printed(value=0.54e6, last_digit=0.01e6)
-HIGHEST_PRESSURE: Final = Printed(value=1.77e6, last_digit=0.01e6)
+LOWEST_PRESSURE: Final = _Printed(value=0.54e6, last_digit=0.01e6)
+HIGHEST_PRESSURE: Final = _Printed(value=1.77e6, last_digit=0.01e6)
 """Working range, after Eq. 19."""
-DEPARTURE_LOW: Final = Printed(value=0.456, last_digit=0.001)
+DEPARTURE_LOW: Final = _Printed(value=0.456, last_digit=0.001)
 """Under Fig. 4, at LOW_PRESSURE."""
-DEPARTURE_HIGH: Final = Printed(value=0.229, last_digit=0.001)
+DEPARTURE_HIGH: Final = _Printed(value=0.229, last_digit=0.001)
 """Under Fig. 4, at HIGH_PRESSURE."""
 LOW_PRESSURE: Final = 0.7e6
 HIGH_PRESSURE: Final = 1.5e6

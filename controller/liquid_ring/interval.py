@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
-from ringbalance.controller.liquid_ring.compiled_lift import stands
+from ringbalance.controller.liquid_ring.compiled_lift import resume, stands
 from ringbalance.controller.liquid_ring.compiled_march import advance, opening_within
-from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, packed, unpacked
-from ringbalance.controller.liquid_ring.records import WORKSPACE
+from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, Record, Switch
+from ringbalance.controller.liquid_ring.records import EVENTS, MOTION, WORK, WORKSPACE, P, U
+from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene.arrays import FloatArray
 
 
@@ -48,7 +51,7 @@ def pass_time(
         fills=np.clip(notes[1], lowest, highest),
         fill=stands(plant[0], state[0])[1],
         primed=bool(state["primed"][0]),
-        motion=unpacked(plant, state),
+        motion=_unpacked(plant, state),
         ran_back=float(state["ran_back"][0]),
     )
 
@@ -67,3 +70,74 @@ def longest_opening(
     plant = dynamics.kept_plant(total=total)
     states = np.concatenate([packed(plant, fill=fill, primed=primed, motion=motion)] * 2)
     return opening_within(plant[0], states, 0, 1, chamber, duration, np.zeros(WORKSPACE))
+
+
+def packed(plant: npt.NDArray[np.void], *, fill: float, primed: bool, motion: Motion) -> npt.NDArray[np.void]:
+    """Record of type `MOTION`, shape (1,), of a pair; `fill` is x of chamber 0."""
+    known, ambient, total = plant[0], float(plant["ambient_pressure"][0]), float(plant["total"][0])
+    state = np.zeros(1, dtype=MOTION)
+    volumes = [
+        max(1 - x, 1e-3) * known["chamber_volume"] + known["dead_volume"] for x in (fill, total - fill)
+    ]
+    contents = motion.contents or [ambient * volume / known["temperature"] for volume in volumes]
+    record = motion.record
+    state["state"][0, :6] = fill, motion.velocity, *(p + ambient for p in motion.gases), *contents
+    state["state"][0, WORK + record.chamber] = record.work
+    state["opens"], state["closes"] = math.inf, math.inf
+    chamber = record.chamber
+    for switch in motion.pending:
+        state["opens" if switch.opens else "closes"], chamber = switch.after, switch.chamber
+    begun, place, side = motion.lifted
+    direction = int(np.sign(motion.velocity)) or (side if place > begun else 0)
+    stop = float(known["crest_end" if side > 0 else "return_crest_end"])
+    for name, value in {
+        "length": known["first_step"],
+        "started": fill,
+        "fill_before": record.fill,
+        "least_fill": total - fill if chamber else fill,
+        "residual": known["residual"],
+        "closing_pressure": record.closing_pressure,
+        "run_dry": record.run_dry,
+        "primed": primed,
+        "valve_0": motion.valves[0],
+        "valve_1": motion.valves[1],
+        "direction": direction,
+        "front": begun,
+        "side": side,
+        "lifting": direction != 0 and side == direction and not primed and place < stop,
+        "chamber": chamber,
+        "regime_start": record.regime_start,
+        "regime_end": record.regime_end,
+        "event": EVENTS.index(record.event),
+    }.items():
+        state[name] = value
+    if state["lifting"][0]:
+        resume(known, state[0], place)
+    return state
+
+
+def _unpacked(plant: npt.NDArray[np.void], state: npt.NDArray[np.void]) -> Motion:
+    """What `packed` was made of, some time later."""
+    one, ambient = state[0], float(plant["ambient_pressure"][0])
+    y, chamber = one["state"], int(one["chamber"])
+    waiting = ((float(one["opens"]), True), (float(one["closes"]), False))
+    return Motion(
+        velocity=float(y[U]) if one["direction"] else 0.0,
+        gases=(float(y[P]) - ambient, float(y[P + 1]) - ambient),
+        contents=(float(y[P + 2]), float(y[P + 3])),
+        valves=(bool(one["valve_0"]), bool(one["valve_1"])),
+        pending=tuple(
+            Switch(after=after, chamber=chamber, opens=opens) for after, opens in waiting if after < math.inf
+        ),
+        lifted=(float(one["front"]), stands(plant[0], one)[0], int(one["side"])),
+        record=Record(
+            chamber=chamber,
+            fill=float(one["fill_before"]),
+            work=float(y[WORK + chamber]),
+            regime_start=Regime(int(one["regime_start"])),
+            regime_end=Regime(int(one["regime_end"])),
+            event=EVENTS[int(one["event"])],
+            closing_pressure=float(one["closing_pressure"]),
+            run_dry=float(one["run_dry"]),
+        ),
+    )

@@ -11,8 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.controller.liquid_ring.column import Column, Lift
-from ringbalance.controller.liquid_ring.compiled_lift import resume, stands
-from ringbalance.controller.liquid_ring.records import EVENTS, MOTION, PIECES, PLANT, WORK, P, U
+from ringbalance.controller.liquid_ring.records import PIECES, PLANT
 from ringbalance.controller.liquid_ring.transfer import Event
 from ringbalance.physics.gas.supply import (
     HEAT_CAPACITY_RATIO,
@@ -177,74 +176,3 @@ def _fill_line(plant: npt.NDArray[np.void], line: GasLine | None) -> None:
         plant["critical_ratio"] = line.critical_ratio
         plant["passing"] = line.conductance * REFERENCE_PRESSURE * warm
         plant["heat_capacity_ratio"] = 1.0 if line.process == "isothermal" else HEAT_CAPACITY_RATIO
-
-
-def packed(plant: npt.NDArray[np.void], *, fill: float, primed: bool, motion: Motion) -> npt.NDArray[np.void]:
-    """Record of type `MOTION`, shape (1,), of a pair; `fill` is x of chamber 0."""
-    known, ambient, total = plant[0], float(plant["ambient_pressure"][0]), float(plant["total"][0])
-    state = np.zeros(1, dtype=MOTION)
-    volumes = [
-        max(1 - x, 1e-3) * known["chamber_volume"] + known["dead_volume"] for x in (fill, total - fill)
-    ]
-    contents = motion.contents or [ambient * volume / known["temperature"] for volume in volumes]
-    record = motion.record
-    state["state"][0, :6] = fill, motion.velocity, *(p + ambient for p in motion.gases), *contents
-    state["state"][0, WORK + record.chamber] = record.work
-    state["opens"], state["closes"] = math.inf, math.inf
-    chamber = record.chamber
-    for switch in motion.pending:
-        state["opens" if switch.opens else "closes"], chamber = switch.after, switch.chamber
-    begun, place, side = motion.lifted
-    direction = int(np.sign(motion.velocity)) or (side if place > begun else 0)
-    stop = float(known["crest_end" if side > 0 else "return_crest_end"])
-    for name, value in {
-        "length": known["first_step"],
-        "started": fill,
-        "fill_before": record.fill,
-        "least_fill": total - fill if chamber else fill,
-        "residual": known["residual"],
-        "closing_pressure": record.closing_pressure,
-        "run_dry": record.run_dry,
-        "primed": primed,
-        "valve_0": motion.valves[0],
-        "valve_1": motion.valves[1],
-        "direction": direction,
-        "front": begun,
-        "side": side,
-        "lifting": direction != 0 and side == direction and not primed and place < stop,
-        "chamber": chamber,
-        "regime_start": record.regime_start,
-        "regime_end": record.regime_end,
-        "event": EVENTS.index(record.event),
-    }.items():
-        state[name] = value
-    if state["lifting"][0]:
-        resume(known, state[0], place)
-    return state
-
-
-def unpacked(plant: npt.NDArray[np.void], state: npt.NDArray[np.void]) -> Motion:
-    """What `packed` was made of, some time later."""
-    one, ambient = state[0], float(plant["ambient_pressure"][0])
-    y, chamber = one["state"], int(one["chamber"])
-    waiting = ((float(one["opens"]), True), (float(one["closes"]), False))
-    return Motion(
-        velocity=float(y[U]) if one["direction"] else 0.0,
-        gases=(float(y[P]) - ambient, float(y[P + 1]) - ambient),
-        contents=(float(y[P + 2]), float(y[P + 3])),
-        valves=(bool(one["valve_0"]), bool(one["valve_1"])),
-        pending=tuple(
-            Switch(after=after, chamber=chamber, opens=opens) for after, opens in waiting if after < math.inf
-        ),
-        lifted=(float(one["front"]), stands(plant[0], one)[0], int(one["side"])),
-        record=Record(
-            chamber=chamber,
-            fill=float(one["fill_before"]),
-            work=float(y[WORK + chamber]),
-            regime_start=Regime(int(one["regime_start"])),
-            regime_end=Regime(int(one["regime_end"])),
-            event=EVENTS[int(one["event"])],
-            closing_pressure=float(one["closing_pressure"]),
-            run_dry=float(one["run_dry"]),
-        ),
-    )

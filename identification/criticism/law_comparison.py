@@ -12,10 +12,9 @@ from scipy.special import chdtri, ndtri
 from ringbalance.identification.criticism.linear_fit import LinearFit
 from ringbalance.scene.arrays import FloatArray
 
-POWER: Final = 0.9
-"""Chance to see the difference that is asked for before laws count as told apart."""
 _LEVEL: Final = 0.05
-Verdict = Literal["told apart", "cannot be told apart"]
+NEEDED: Final = float((ndtri(0.9) - ndtri(_LEVEL / 2)) ** 2)
+"""Separation of laws that are told apart: 9 of 10 normal statistics show it at the 5 % level."""
 Outcome = Literal["other", "between", "fitted", "undecided"]
 _SAID: Final[Mapping[Outcome, str]] = {
     "other": "the data prefer {} to the fitted law, so that the fitted values may be wrong by more than "
@@ -38,14 +37,9 @@ class LawComparison:
     """Sum of squares of the other law's residuals, its parameters fitted too, less that of the fitted law."""
 
     @property
-    def verdict(self) -> Verdict:
-        """Whether the data could show the difference."""
-        return "told apart" if self.separation >= needed_separation() else "cannot be told apart"
-
-    @property
     def outcome(self) -> Outcome:
         """Which of both the data prefer."""
-        if self.verdict == "cannot be told apart":
+        if self.separation < NEEDED:
             return "undecided"
         if abs(self.preference) < float(chdtri(1, _LEVEL)):
             return "between"
@@ -63,11 +57,6 @@ def summaries(comparisons: Sequence[LawComparison]) -> Iterator[tuple[Outcome, s
         others = [each.other for each in comparisons if each.outcome == outcome]
         if others:
             yield outcome, sentence.format(" or ".join(filter(None, (", ".join(others[:-1]), others[-1]))))
-
-
-def needed_separation() -> float:
-    """Separation at which a difference is seen with `POWER` at the 5 % level, by a normal statistic."""
-    return float((ndtri(POWER) - ndtri(_LEVEL / 2)) ** 2)
 
 
 def compare_laws(fit: LinearFit, *, other: str, residuals: FloatArray) -> LawComparison:

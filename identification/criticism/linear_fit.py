@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final
 
 import numpy as np
 
+from ringbalance.identification.likelihood import basis_of
 from ringbalance.scene.arrays import BoolArray, FloatArray, StringArray
-
-_RANK: Final = 1e-10
-"""Smallest singular value that counts, relative to the largest."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -32,9 +29,7 @@ class LinearFit:
     @cached_property
     def _basis(self) -> FloatArray:
         """Orthonormal basis of what the parameters can do to the predictions."""
-        left, singular, _ = np.linalg.svd(self.derivatives, full_matrices=False)
-        rank = int(np.count_nonzero(singular > _RANK * singular.max(initial=0.0)))
-        return np.asarray(left[:, :rank])
+        return basis_of(self.derivatives)
 
     def beyond_parameters(self, rows: FloatArray) -> FloatArray:
         """What no change of the parameters can describe of changes of the predictions, shape (n, ...)."""

@@ -64,7 +64,7 @@ def dimension_of(unit: str) -> str | None:
     return None
 
 
-def cell_value(cell: str, unit: str, dimension: str | None) -> float:
+def _cell_value(cell: str, unit: str, dimension: str | None) -> float:
     """The number of a cell, SI. Raises: FieldError: no number, or one of a size that nobody measures."""
     if not cell:
         raise FieldError("the cell is empty", "a number in every row, or no such column")
@@ -81,7 +81,7 @@ def column_values(
     at, values, faults = table.heads.index(head), np.zeros(len(table.rows)), []
     for row, (line, cells) in enumerate(zip(table.lines, table.rows, strict=True)):
         try:
-            values[row] = cell_value(cells[at], unit, dimension)
+            values[row] = _cell_value(cells[at], unit, dimension)
         except FieldError as error:
             faults.append(table.fault(line, head, cells[at], error.problem, error.allowed))
     return values, faults

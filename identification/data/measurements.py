@@ -111,7 +111,7 @@ def parse_measurements(text: str, *, file: str) -> Measurements:
     table, faults = parse_table(text, file=file)
     if table is None:
         raise _error(faults)
-    wrong = [*faults, *source_faults(table.header, file=file), *name_faults(table), *_unit_faults(table)]
+    wrong = [*faults, *_source_faults(table.header, file=file), *name_faults(table), *_unit_faults(table)]
     heads_are_right = len(wrong) == len(faults)
     columns = dict(_columns(table, wrong)) if heads_are_right else {}
     if wrong:
@@ -128,7 +128,7 @@ def series_of(table: Table) -> StringArray:
     return np.array(texts(table, SERIES) if SERIES in table.heads else ("one",) * len(table.rows))
 
 
-def source_faults(header: Mapping[str, object], *, file: str) -> Iterator[Fault]:
+def _source_faults(header: Mapping[str, object], *, file: str) -> Iterator[Fault]:
     """What is wrong with the first lines of a data set."""
     yield from header_faults(header, known=SOURCE_KEYS, needed=_ENOUGH, file=file)
     yield from text_faults(header, [key for key in SOURCE_KEYS if key != "uncertainty"], file=file)

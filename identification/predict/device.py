@@ -17,7 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.controller.liquid_ring.compiled_march import advance, command
-from ringbalance.controller.liquid_ring.motion import Motion, packed
+from ringbalance.controller.liquid_ring.interval import packed
+from ringbalance.controller.liquid_ring.motion import Motion
 from ringbalance.controller.liquid_ring.records import WORKSPACE, X
 from ringbalance.controller.terms import known_dynamics
 from ringbalance.identification.data.observations import Observations
@@ -60,10 +61,10 @@ def models_of(scene: Scene) -> Models:
     tube = tube_models(scene)
     gravity = mean_gravity(scene) > scene.tolerance
     law = nominal_law(replace(scene, tube=replace(scene.tube, models=tube)), gravity=gravity)
-    return Models(tube=tube, gravity=gravity, velocity=primed_velocity(law, scene))
+    return Models(tube=tube, gravity=gravity, velocity=_primed_velocity(law, scene))
 
 
-def primed_velocity(law: CalibratedLaw, scene: Scene) -> float:
+def _primed_velocity(law: CalibratedLaw, scene: Scene) -> float:
     """Of a primed tube at equal fills under the scene's gas, m/s; zero where it is blocked."""
     fill = scene.disc.initial_fill
     return abs(float(law.evaluate(fill_ratio=fill, gas_pressure=scene.gas.pressure, primed=True).velocity))
@@ -84,7 +85,7 @@ class Device:
         would tell of k by that rests on a Froude number that is not known so well.
         """
         law = nominal_law(self.scene, gravity=self.models.gravity)
-        velocity = primed_velocity(law, self.scene)
+        velocity = _primed_velocity(law, self.scene)
         if velocity > 0 and self.models.velocity > 0:
             froude = law.path.froude_velocity * velocity / self.models.velocity
             law = replace(law, path=replace(law.path, froude_velocity=froude))

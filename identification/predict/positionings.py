@@ -38,14 +38,14 @@ def predict(scene: EccentricScene, observations: Observations) -> FloatArray:
     return found
 
 
-def moved_masses(observations: Observations) -> IntArray:
+def _moved_masses(observations: Observations) -> IntArray:
     """Index, 0 or 1, of the mass that each row moves."""
     return np.asarray(observations.columns.get("moved_mass", np.ones(len(observations))) - 1, dtype=np.int64)
 
 
 def informs(observations: Observations) -> tuple[str, ...]:
     """Friction of every mass that moves, and the motor."""
-    arms = (f"masses.friction_arm[{mass}]" for mass in sorted(set(moved_masses(observations).tolist())))
+    arms = (f"masses.friction_arm[{mass}]" for mass in sorted(set(_moved_masses(observations).tolist())))
     return (*arms, "motor.torque_constant", "motor.back_emf_constant")
 
 
@@ -73,7 +73,7 @@ class _Motion(NamedTuple):
 def _motions(observations: Observations) -> Iterator[tuple[_Motion, IntArray]]:
     """Every motion, and its rows in the order of their times."""
     columns, series = observations.columns, observations.series.tolist()
-    set_to = zip(series, moved_masses(observations), columns["voltage"], columns["speed"], strict=True)
+    set_to = zip(series, _moved_masses(observations), columns["voltage"], columns["speed"], strict=True)
     rows_of: dict[_Motion, list[int]] = {}
     for row, values in enumerate(set_to):
         rows_of.setdefault(_Motion(*values), []).append(row)

@@ -33,7 +33,7 @@ _MIDDLES: Final = {3: ((0.5, 0), (1, 0.5), (0, 0.5)), 4: ((0.5, 0), (1, 0.5), (0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Faceting:
+class _Faceting:
     """Volumes that the drawing may miss along each smooth edge, all counted as of one sign."""
 
     radius: FloatArray
@@ -61,7 +61,7 @@ class DrawingError:
 
 
 @lru_cache(maxsize=8)
-def faceting(geometry: ChamberGeometry) -> Faceting:
+def faceting(geometry: ChamberGeometry) -> _Faceting:
     """Estimate for the walls of a mesh."""
     facets, corners = boundary_facets(geometry), corners_of(geometry.kind)
     patches, outer = wall_patches(geometry)
@@ -79,7 +79,7 @@ def faceting(geometry: ChamberGeometry) -> Faceting:
     middle = places.mean(axis=1)
     radius = np.hypot(middle[:, 0], middle[:, 1])
     on_wall = np.all(outer[sides], axis=0)
-    return Faceting(
+    return _Faceting(
         radius=radius,
         volume=missed,
         place=middle[:, 0],

@@ -28,9 +28,9 @@ _SAFETY: Final = 1.25
 """On the change from the last level."""
 _SPARE: Final = 5
 """Potentials beyond the waves asked for: rotation mixes neighbours."""
-_OF_SURFACE: Final = 0.6
-"""Share of a wave's kinetic energy in potential flow from which it is a wave of the surface: those of a full
-ring, where both kinds are known in closed form, have 0.7 and more."""
+_OF_SURFACE: Final = 0.5
+"""Share of a wave's kinetic energy in potential flow from which it is a wave of the surface: where neighbours
+share one, no more than one of them has most of it."""
 _PERHAPS: Final = 0.35
 """The same with one level less, where a wave is only looked for again."""
 
@@ -169,8 +169,10 @@ def frequencies(system: WaveSystem, modes: int) -> tuple[FloatArray, FloatArray,
     values, potential, weights = values[chosen], potential[chosen], weights[chosen]
     errors = reduced.squared_errors
     change = np.abs(values[:, None] - before[probable > _PERHAPS]).min(axis=1)
-    # What is left out acts on a frequency by its square.
-    relative = weights[:, : errors.size] @ errors / 2 + reduced.left_out + system.faceting
+    # A field that is left out acts on a frequency by half its kinetic energy; the next level is taken to have
+    # what the last one has.
+    next_level = weights[:, reduced.levels[-2] :].sum(axis=1)
+    relative = (weights[:, : errors.size] @ errors + next_level) / 2 + reduced.left_out + system.faceting
     return values, 1 - potential, _SAFETY * change + values * relative
 
 

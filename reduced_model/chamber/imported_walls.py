@@ -20,7 +20,7 @@ _NEXT_TO_NOTHING: Final = 0.01
 
 
 @dataclass(frozen=True, kw_only=True)
-class DrawingShares:
+class _DrawingShares:
     """Relative expanded uncertainties (95 %) by facets for curved walls, and by integration."""
 
     volume: float
@@ -29,13 +29,13 @@ class DrawingShares:
     """Of the moment or of lambda, whichever is larger."""
 
 
-def drawing_shares(disc: Disc, fills: FloatArray) -> DrawingShares:
+def drawing_shares(disc: Disc, fills: FloatArray) -> _DrawingShares:
     """Shares at fill ratios above zero; zeros for the sector of the keys."""
     if disc.geometry is None:
-        return DrawingShares(volume=0.0, wall_pressure=np.zeros(fills.shape), moment=np.zeros(fills.shape))
+        return _DrawingShares(volume=0.0, wall_pressure=np.zeros(fills.shape), moment=np.zeros(fills.shape))
     table, error = chamber_table(disc.geometry), drawing_error(disc.geometry, fill_ratio=fills)
     a = np.sqrt(table.level_of(fills * table.volume))
-    return DrawingShares(
+    return _DrawingShares(
         volume=error.volume / table.volume,
         wall_pressure=error.wall_square / table.at_radius(a, 3),
         moment=np.maximum(error.moment / table.at_radius(a, 1), error.centroid / table.surface(a)[1]),

@@ -227,7 +227,7 @@ def _in_brief(case: Record) -> Record:
     return {
         "paper": paper,
         "found": value_text if quantity.get("value") is None else traced(value_text, f"{path}.value"),
-        "half_width": _width(quantity),
+        "half_width": _traced_width(quantity, path),
         "what": quantity.get("title") or "",
     }
 
@@ -241,6 +241,12 @@ def _brief_value(quantity: Record) -> str:
     if value and 0 < width < _last_place(value) / 2:
         return shown(value, quantity.get("unit") or "1", digits=_DIGITS)
     return _without_half_width(_value(quantity, width or None))
+
+
+def _traced_width(quantity: Record, path: str) -> str:
+    text = _width(quantity)
+    plain = text == MISSING or text.startswith("<") or " to " in text
+    return text if plain else traced(text, f"{path}.uncertainty")
 
 
 def _width(quantity: Record) -> str:

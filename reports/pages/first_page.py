@@ -9,7 +9,7 @@ from ringbalance.controller.loop import simulate
 from ringbalance.controller.tuning.highest_pressure import highest_pressure
 from ringbalance.controller.tuning.tune import tuning_document
 from ringbalance.reduced_model.calibration import Calibration
-from ringbalance.reports.numbers import THIN_SPACE, given, number, percent, shown
+from ringbalance.reports.numbers import MISSING, THIN_SPACE, given, number, percent, shown
 from ringbalance.reports.origins import named_with_origin
 from ringbalance.reports.pages.requirements import (
     STANDING,
@@ -23,7 +23,7 @@ from ringbalance.reports.pages.requirements import (
 from ringbalance.reports.prose import key_words
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.reports.summary import MISSED, OPEN
-from ringbalance.reports.traces import states_uncertainty, traced
+from ringbalance.reports.traces import found_at, read, states_uncertainty, traced
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.uncertain import half_widths
 from ringbalance.verification.assumptions import assumptions_of
@@ -33,7 +33,8 @@ from ringbalance.verification.runner import paper_scene
 
 _OTHER_READING: Final = "liquid_ring_paper_calibrated"
 """The paper's disc with the bore that its Fig. 7 implies under the calibrated law."""
-_RETUNED: Final = "calibrated_retuned"
+RETUNED: Final = "calibrated_retuned"
+"""Name of the run with the recommended settings."""
 _VALVE: Final = {
     OPEN: "Choose the valve before anything else is built, and put its conductance, critical ratio and lag "
     "into the scene: only a fast one can reach the limit.",
@@ -41,7 +42,7 @@ _VALVE: Final = {
     "with {valve} the last corrections are larger than the limit, whatever the gain.",
 }
 """What to do about a valve that may not, or cannot, reach the limit."""
-_LIKELY: Final = 0.95
+LIKELY: Final = 0.95
 """Fraction of runs that must settle before a gain is recommended for use."""
 _ROTOR: Final = ("rotor.influence_coefficient", "rotor.lag_angle", "rotor.initial_amplitude")
 _DOMINANT: Final = 3
@@ -157,7 +158,7 @@ def loop_sentences(evidence: Record) -> list[str]:
     told = [f"Under the calibrated law{ideal} the loop {_ending(run)}{_factor(run)}."]
     tuned = retuned(evidence)
     if tuned is not None:
-        gain, own = (shown(r, "s/m", digits=2) for r in _gains(evidence, tuned))
+        gain, own = (_gain_of(evidence, name) for name in (RETUNED, "calibrated"))
         change = _change(evidence)
         told.append(
             f"Recommended gain: {gain} (the scene has {own}){f', with {change}' if change else ''}. "
@@ -176,8 +177,14 @@ def _change(evidence: Record) -> str:
 
 def retuned(evidence: Record) -> Record | None:
     """The run with the recommended settings, if there are any."""
+    place = place_of_run(evidence, RETUNED)
+    return None if place is None else evidence["consequences"]["runs"][place]
+
+
+def place_of_run(evidence: Record, name: str) -> int | None:
+    """Position of a run among those of the consequences; None where it is not among them."""
     runs = (evidence.get("consequences") or {}).get("runs", [])
-    return next((run for run in runs if run.get("name") == _RETUNED), None)
+    return next((place for place, run in enumerate(runs) if run.get("name") == name), None)
 
 
 def _ending(run: Record) -> str:
@@ -186,10 +193,9 @@ def _ending(run: Record) -> str:
     return f"{_ENDINGS[verdict]}{when}"
 
 
-def _gains(evidence: Record, tuned: Record) -> tuple[float, float | None]:
-    runs = evidence["consequences"]["runs"]
-    own: Record = next((run for run in runs if run.get("name") == "calibrated"), {})
-    return tuned["proportional_s_per_m"], own.get("proportional_s_per_m")
+def _gain_of(evidence: Record, name: str) -> str:
+    path = f"consequences.runs.{place_of_run(evidence, name)}.proportional_s_per_m"
+    return MISSING if found_at(evidence, path) is None else read(evidence, path, "s/m", digits=2)
 
 
 def _factor(run: Record) -> str:
@@ -212,34 +218,6 @@ def _factor(run: Record) -> str:
     else:
         end = f"and leaves the rest to the next; from {limit} times on it would grow"
     return f". One injection removes {value} times a small residual, {end}"
-
-
-def chance(evidence: Record) -> list[str]:
-    """Fractions of the ensembles that have settled by the end, with the scene's gain and the recommended."""
-    ensembles = (evidence.get("consequences") or {}).get("ensembles", [])
-    found = evidence.get("summary")
-    if len(ensembles) < 3 or not found:
-        return []
-    members, until = ensembles[1]["members"], given(found["time_limit_s"], "s")
-    own, tuned = (percent(1 - e["probability"]["not_settled"]["value"]) for e in ensembles[1:])
-    line = evidence["calibration"].get("gas_line") or {"given": True}
-    return [
-        f"{'With' if line['given'] else 'For a valve that acts at once: with'} the scene’s gain {own} of "
-        f"{members} runs over the stated uncertainties and the noise have settled by {until}, with the "
-        f"recommended settings {tuned}. {_tuned(found['tuning'])}"
-    ]
-
-
-def _tuned(tuning: Record) -> str:
-    reached = (tuning["settling_time_s"] or {}).get("p95")
-    if reached is None:
-        return f"{tuning['status'][0].upper()}{tuning['status'][1:]}."
-    fraction, low, high = (percent(f) for f in (tuning["fraction_settled"], *tuning["fraction_settled_95"]))
-    return (
-        f"With the fuller models that the tolerance selects, {fraction} (95 % confidence: {low} to {high}) "
-        f"of {tuning['runs']} runs settle with the recommended settings, {percent(0.95)} of all within "
-        f"{shown(reached, 's', digits=2)}."
-    )
 
 
 def _dry(evidence: Record) -> list[str]:
@@ -314,13 +292,13 @@ def _valve_and_gain(evidence: Record, verdicts: Mapping[str, str]) -> list[str]:
     if tuned is None:
         return told
     gain = shown(tuned["proportional_s_per_m"], "s/m", digits=2)
-    if tuning.get("fraction_settled") is not None and tuning["fraction_settled"] < _LIKELY:
+    if tuning.get("fraction_settled") is not None and tuning["fraction_settled"] < LIKELY:
         reached = tuning.get("reachable_limit_m")
         lowest = f"; a limit of {shown(reached, 'm', digits=2)} is reached" if reached else ""
         share = percent(tuning["fraction_settled"])
         return [
             *told,
-            f"Do not expect settings to make this loop settle in {percent(_LIKELY)} of runs: none that were "
+            f"Do not expect settings to make this loop settle in {percent(LIKELY)} of runs: none that were "
             f"tried do; with the recommended ones {share} settle{lowest}.",
         ]
     change = _change(evidence)

@@ -13,8 +13,8 @@ from scipy.optimize import brentq
 
 from ringbalance.controller.liquid_ring.compiled_column import ends
 from ringbalance.controller.liquid_ring.compiled_lift import crest_start, crest_stop, lift_rates, shown
-from ringbalance.controller.liquid_ring.interval import Passage, pass_time
-from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, Switch, packed
+from ringbalance.controller.liquid_ring.interval import Passage, packed, pass_time
+from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, Switch
 from ringbalance.physics.tube.state import tube_state
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.gas_line import line_ends

@@ -10,7 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.identification.saving import Fitted, fitted_scene, found_from, save_fitted
+from ringbalance.identification.identifiability import Verdict
+from ringbalance.identification.intervals import Profile
+from ringbalance.identification.result import FittedParameter
+from ringbalance.identification.saving import fitted_scene, found_from, save_fitted
 from ringbalance.scene import SceneError, bundled_scene, load_scene
 from ringbalance.scene.describe import scene_table
 from ringbalance.scene.loader import scene_from
@@ -20,18 +23,22 @@ from ringbalance.scene.narrowing import eccentric_scene, liquid_ring_scene
 FILE = MeasuredFile(file="run.csv", kind="injection", rows=40, sha256="ab" * 32)
 SCENES = ("liquid_ring_paper", "perfluorinated_oil", "six_chamber", "eccentric_mass_paper", "washing_machine")
 
+PROFILE = Profile(low=0.0, high=0.0, low_bound=False, high_bound=False, factor=2.0, ends=((), ()), points=())
 
-def fitted(path: str, value: float, width: float, **more: Any) -> Fitted:
+
+def fitted(path: str, value: float, width: float, **more: Any) -> FittedParameter:
     told: dict[str, Any] = {
-        "path": path,
+        "name": path,
         "before": 1.1 * value,
         "before_interval": (value, 1.2 * value),
         "value": value,
         "interval": (value - width, value + width),
-        "verdict": "identified",
-        "identified": True,
+        "at_bound": (False, False),
+        "verdict": Verdict.IDENTIFIED,
+        "text": "",
+        "profile": PROFILE,
     }
-    return Fitted(**told | more)
+    return FittedParameter(**told | more)
 
 
 def text_of(name: str) -> str:
@@ -39,13 +46,13 @@ def text_of(name: str) -> str:
 
 
 BORE = fitted("tube.bore", 1.4e-3, 0.02e-3)
-FACTOR = fitted("disc.lambda_factor", 0.97, 0.01, before=1.0, before_interval=(None, None))
+FACTOR = fitted("disc.lambda_factor", 0.97, 0.01, before=1.0, before_interval=None)
 
 
 def test_values_uncertainties_and_origins(tmp_path: Path) -> None:
     target = tmp_path / "fitted.toml"
     lag = fitted("rotor.lag_angle", -0.01, 0.05)
-    loss = fitted("tube.extra_loss", 2.0, 0.5, verdict="practically not identified", identified=False)
+    loss = fitted("tube.extra_loss", 2.0, 0.5, verdict=Verdict.PRACTICALLY)
     save_fitted(
         target, text=text_of("liquid_ring_paper"), fitted=[BORE, FACTOR, lag, loss], files=[FILE],
         findings=[MeasuredFinding(about="combination", text="lambda^2/(k + 1)")],
@@ -121,7 +128,7 @@ def test_values_that_make_no_scene_leave_no_file(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("path", ["tube.colour", "nothing.bore", "bore", "masses.mass"])
+@pytest.mark.parametrize("path", ["tube.colour", "nothing.bore", "colour", "masses.mass"])
 def test_a_path_that_no_scene_has_is_refused(path: str) -> None:
     with pytest.raises(ValueError, match="no value"):
         fitted_scene(text_of("six_chamber"), fitted=[fitted(path, 1.0, 0.1)], files=[FILE])

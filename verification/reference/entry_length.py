@@ -41,7 +41,7 @@ _NOT_A_MODE = 0.03
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Decay:
+class _Decay:
     """The slowest disturbances that decay downstream."""
 
     rates: ComplexArray
@@ -56,7 +56,7 @@ class Decay:
         return -1 / float(self.rates[0].real)
 
 
-def slowest_decay(*, system: FlowSystem, reynolds: float, rotation_reynolds: float, count: int = 4) -> Decay:
+def slowest_decay(*, system: FlowSystem, reynolds: float, rotation_reynolds: float, count: int = 4) -> _Decay:
     """Rates per diameter of the slowest disturbances downstream of laminar developed flow, mirror-symmetric.
 
     Raises: ArithmeticError: the developed flow was not found.
@@ -78,7 +78,7 @@ def slowest_decay(*, system: FlowSystem, reynolds: float, rotation_reynolds: flo
     status = Status()
     if ordered.size == 0 or not flow.status.ok:
         status = Status(code=StatusCode.NOT_CONVERGED, text="no mode found: refine the section's mesh")
-    return Decay(rates=ordered[distinct][:count], residual=worst, status=status)
+    return _Decay(rates=ordered[distinct][:count], residual=worst, status=status)
 
 
 def _expected(reynolds: float, rotation_reynolds: float) -> float:

@@ -27,7 +27,7 @@ _STEP: Final = 0.01
 """Of the fill ratio, for the slope of the moment."""
 
 
-def mesh_error(scene: Scene, angular_cells: int) -> float:
+def _mesh_error(scene: Scene, angular_cells: int) -> float:
     """Discretisation error of a mesh, relative: an arc drawn by cells of angle h, (h/2)^4/32 R2/depth.
 
     Returns: Share of the wall pressure at a fifth of the largest fill.
@@ -55,7 +55,7 @@ def mesh_contributions(scene: Scene) -> Mapping[str, Contribution]:
     return {
         term: Contribution(
             term=term,
-            value=mesh_error(scene, angular),
+            value=_mesh_error(scene, angular),
             formula="(h/2)^4/32 R2/depth",
             source="a circle's interpolation",
         )

@@ -33,6 +33,8 @@ _STEPS: Final = 6
 _LEAST_GAIN: Final = 1e-8
 """Of the sum of squares, below which a step to the optimum is not taken: a ten-thousandth of a standard
 deviation of a parameter."""
+_ROUGH: Final = 1e-4
+"""The same of a gain that does not come: predictions by integration in time are no smoother."""
 _JUMPED: Final = 0.08
 """Of the sum of squares, below which a gain that does not come on a profile is taken for lost to a jump of a
 prediction; it moves no end of an interval by more than 1 %."""
@@ -248,7 +250,7 @@ class Search:
             if promised < gain:
                 return True
             if not self._takes(step * min(1.0, _LONGEST / float(np.max(np.abs(step))))):
-                return self.fixed is not None and promised < _JUMPED
+                return promised < (_ROUGH if self.fixed is None else _JUMPED)
         return False
 
     def _takes(self, step: FloatArray) -> bool:

@@ -43,7 +43,9 @@ def order_plot(case: Record) -> Drawing | None:
         style.logarithmic(axes, "x", ticks=sorted({float(f"{size:.3g}") for size in sequences[0]["h"]}))
         style.logarithmic(axes, "y")
 
-    last = [number(s["observed_order"][-1], digits=3) for s in sequences if s["observed_order"]]
+    orders = [s["observed_order"][-1] for s in sequences if s["observed_order"]]
+    # An error that changes its sign from mesh to mesh, or is rounding, falls at no order.
+    last = [number(order, digits=3) if order > 0 else "none" for order in orders]
     told = f"Observed at the finest pair: {', '.join(last)}" if last else "No order was observed"
     return draw(
         columns=1,

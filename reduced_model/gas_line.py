@@ -92,15 +92,12 @@ def _end(gas: Gas, name: str, place: int) -> LineEnd:
     )
 
 
-def line_answers(scene: Scene, model: BalancerModel, *, inertia: bool = True) -> tuple[LineAnswer, ...]:
-    """What the balancer's gas line can deliver, for each of `line_ends`, at equal fills of a pair.
-
-    Args: `inertia`: whether the column in the tube has its mass, or follows the pressure at once.
-    """
+def line_answers(scene: Scene, model: BalancerModel) -> tuple[LineAnswer, ...]:
+    """What the balancer's gas line can deliver, for each of `line_ends`, at equal fills of a pair."""
     fill = model.flow.max_fill_ratio / 2
     fills = Fills(model=model, driven=fill, opposite=fill)
     ends = line_ends(scene)
-    injections = short_injections(scene, [end.line for end in ends], fills, inertia=inertia)
+    injections = short_injections(scene, [end.line for end in ends], fills)
     return tuple(_answer(scene, end, fills, one) for end, one in zip_longest(ends, injections))
 
 

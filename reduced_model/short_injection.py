@@ -159,7 +159,7 @@ class _Crest:
     """From the crest's middle to its end: of the way, what does not fall back, m."""
 
 
-def _crest_of(tube: Tube, model: BalancerModel, *, inertia: bool) -> _Crest:
+def _crest_of(tube: Tube, model: BalancerModel) -> _Crest:
     """The lift of a leg that has followed the filling gas up to the crest.
 
     The column that starts from rest is taken as long as up to the crest's end.  The one that is lifted is as
@@ -168,22 +168,18 @@ def _crest_of(tube: Tube, model: BalancerModel, *, inertia: bool) -> _Crest:
     if tube.hump_radius is None or not isinstance(model.flow, CalibratedLaw):
         return _Crest()
     (start, stop), middle = crest_span(tube), crest_middle(tube)
-    ratio = middle / stop if inertia else 1.0
-    return _Crest(part=stop, way=(stop - start) * ratio * tube.length, passed=(stop - middle) * tube.length)
+    return _Crest(
+        part=stop, way=(stop - start) * middle / stop * tube.length, passed=(stop - middle) * tube.length
+    )
 
 
-def short_injections(
-    scene: Scene, lines: Sequence[GasLine], fills: Fills, *, inertia: bool = True
-) -> tuple[ShortInjection, ...]:
-    """Injections by each of several gas lines; none where the gas starts no flow.
-
-    Args: `inertia`: whether the column in the tube has its mass, or follows the pressure at once.
-    """
+def short_injections(scene: Scene, lines: Sequence[GasLine], fills: Fills) -> tuple[ShortInjection, ...]:
+    """Injections by each of several gas lines; none where the gas starts no flow."""
     edges, model = _edges_of(fills, scene.gas.pressure), fills.model
     if edges is None:
         return ()
-    crest = _crest_of(scene.tube, model, inertia=inertia)
-    mass = model.density * scene.tube.length if inertia else 0.0
+    crest = _crest_of(scene.tube, model)
+    mass = model.density * scene.tube.length
     volume = fills.gas_volume(scene)
     return tuple(
         ShortInjection(fills=fills, line=line, volume=volume, edges=edges, mass=mass, crest=crest)
@@ -201,7 +197,7 @@ class ShortInjection:
     """Of the gas, m^3."""
     edges: _Edges
     mass: float
-    """rho L, kg/m^2; zero: the column follows the pressure at once."""
+    """rho L, kg/m^2."""
     crest: _Crest
 
     def shortest(self, least: float) -> _Moved:
@@ -269,7 +265,7 @@ class ShortInjection:
         by_line, gives = self.volume * np.diff(pressure), middle * self.fills.model.tube_area * alone
         now = before
         for i in range(middle.size):
-            total = by_line[i] - gives[i] * (now.velocity if self.mass else steady[i])
+            total = by_line[i] - gives[i] * now.velocity
             slower = by_line[i] / total if total * by_line[i] > 0 else math.inf
             lasting, left = float(alone[i]) * min(slower, _SLOWEST_RISE), until - now.time
             part = 1.0 if lasting <= left else left / lasting
@@ -287,8 +283,6 @@ class ShortInjection:
     def _driven(self, gauge: FloatArray, *, primed: bool) -> tuple[FloatArray, FloatArray]:
         """Steady velocity u0, m/s, and B, m/s^2."""
         steady = np.maximum(self.fills.flow(gauge, primed=primed).velocity, 0.0)
-        if not self.mass:
-            return steady, np.zeros_like(steady)
         pressure, velocity, _ = self._losses
         # A column that spills is driven as a primed one that is as fast.
         alike = gauge if primed else np.interp(steady, velocity, pressure)
@@ -308,16 +302,14 @@ class ShortInjection:
         return p, u, np.maximum(self._push(p, p), _LEAST_PUSH) / u**2
 
     def _moved(self, before: _Moved, steady: float, push: float, time: float) -> _Moved:
-        velocity, metres = steady, steady * time
-        if self.mass:
-            _, velocities, frictions = self._losses
-            friction = float(np.interp(max(before.velocity, steady), velocities, frictions))
-            velocity, metres = ridden(velocity=before.velocity, push=push, friction=friction, time=time)
+        _, velocities, frictions = self._losses
+        friction = float(np.interp(max(before.velocity, steady), velocities, frictions))
+        velocity, metres = ridden(velocity=before.velocity, push=push, friction=friction, time=time)
         return replace(before, metres=before.metres + metres, time=before.time + time, velocity=velocity)
 
     def _braked(self, before: _Moved) -> _Moved:
         """To rest without gas."""
-        push = -self.edges.stops / (self.crest.part * self.mass) if self.mass else 0.0
+        push = -self.edges.stops / (self.crest.part * self.mass)
         return self._moved(before, 0.0, push, math.inf) if push and before.velocity else before
 
 

@@ -90,7 +90,7 @@ def section_views(evidence: Record) -> dict[str, Record | None]:
 
 
 def viewed(evidence: Record, views: Mapping[str, Record | None]) -> list[Record]:
-    """Sections that have something to show, in order and numbered. Args: `views`: by name; None: nothing."""
+    """The sections that have something to show by `section_views`, in order and numbered."""
     counts = {"report": count(1), "annex": count(1)}
     return [
         {

@@ -42,14 +42,13 @@ def _change(calibrated: BalancerModel, scene: Scene, moved: float) -> float:
     return abs(float(moment)) * scene.rotor.influence_coefficient
 
 
-@pytest.mark.parametrize("inertia", [[], ["tube inertia"]])
 def test_the_smallest_correction_is_that_of_the_plant(
-    calibrated: BalancerModel, plant: Plant, pulse: Pulse, scene: Scene, inertia: list[str]
+    calibrated: BalancerModel, plant: Plant, pulse: Pulse, scene: Scene
 ) -> None:
     """Within 10 %: the estimate takes the fills as constant while the chamber vents."""
-    for answer in line_answers(scene, calibrated, inertia=bool(inertia)):
+    for answer in line_answers(scene, calibrated):
         line = {"conductance": answer.conductance, "critical_ratio": answer.critical_ratio}
-        dynamics = plant(calibrated, "gas filling", LIFT, *inertia, **line)
+        dynamics = plant(calibrated, "gas filling", LIFT, "tube inertia", **line)
         opening = answer.shortest_opening
         assert opening is not None
         assert opening > answer.valve_lag
@@ -63,14 +62,17 @@ def test_the_smallest_correction_is_that_of_the_plant(
 def test_the_mass_of_the_column_counts_in_a_short_injection(
     calibrated: BalancerModel, plant: Plant, pulse: Pulse, scene: Scene
 ) -> None:
-    """A line that fills at once: the column is over the crest later than one that follows the pressure."""
+    """A line that fills and vents at once: the column runs on, beyond one that follows the pressure."""
     gas = replace(scene.gas, conductance=4e-7, critical_ratio=0.3, valve_lag=1e-3)
     given = replace(scene, gas=gas)
-    (answer,), (at_once,) = (line_answers(given, calibrated, inertia=mass) for mass in (True, False))
-    dynamics = plant(calibrated, "gas filling", "tube inertia", LIFT, conductance=4e-7, critical_ratio=0.3)
-    moved = 0.25 - pulse(dynamics, answer.shortest_opening, np.array([3.0])).fill
+    (answer,) = line_answers(given, calibrated)
+    line = {"conductance": 4e-7, "critical_ratio": 0.3}
+    heavy, light = (plant(calibrated, "gas filling", LIFT, *mass, **line) for mass in (["tube inertia"], []))
+    moved, at_once = (
+        0.25 - pulse(each, answer.shortest_opening, np.array([3.0])).fill for each in (heavy, light)
+    )
     assert answer.smallest_correction == pytest.approx(_change(calibrated, scene, moved), rel=0.1)
-    assert (answer.shortest_opening or 0.0) > 1.1 * (at_once.shortest_opening or 1.0)
+    assert moved > 1.1 * at_once
 
 
 @pytest.mark.parametrize("pressure", [0.7e6, 1.05e6])
@@ -129,14 +131,17 @@ def test_a_line_that_is_not_given_is_a_range(calibrated: BalancerModel, scene: S
 
 
 def test_a_fast_line_delivers_what_its_lag_lets_it(calibrated: BalancerModel, scene: Scene) -> None:
-    """As C grows the chamber fills at once, and a valve open for its lag moves u S T less half of the arc."""
-    gas = replace(scene.gas, conductance=1e-4, critical_ratio=0.3, valve_lag=2e-2)
-    (given,) = line_answers(replace(scene, gas=gas), calibrated, inertia=False)
+    """As C grows the chamber fills at once, and a valve open for its lag moves u S T less half of the arc.
+
+    The mass of the column takes its start-up time, 2 L/((k + 1) u), of it, of which 0.2 s has little.
+    """
+    gas = replace(scene.gas, conductance=1e-4, critical_ratio=0.3, valve_lag=2e-1)
+    (given,) = line_answers(replace(scene, gas=gas), calibrated)
     assert given.end == "given"
-    assert given.shortest_opening == 2e-2
+    assert given.shortest_opening == 2e-1
     u = calibrated.flow.evaluate(fill_ratio=0.25, gas_pressure=0.7e6, primed=True).velocity
     start, stop = crest_span(scene.tube)
-    way = float(u) * 2e-2 - (stop - start) / 2 * scene.tube.length
+    way = float(u) * 2e-1 - (stop - start) / 2 * scene.tube.length
     moved = way * calibrated.tube_area / calibrated.chamber_volume
     moment = calibrated.moment.pair_moment(fill_ratio=0.25 - moved, opposite_fill_ratio=0.25 + moved)
     change = abs(float(moment)) * scene.rotor.influence_coefficient
@@ -151,7 +156,8 @@ def test_a_fast_line_delivers_what_its_lag_lets_it(calibrated: BalancerModel, sc
 def test_a_pressure_on_the_axis_counts_with_its_column(
     scene: Scene, plant_of: Plant, forces: Callable[[Dynamics], Any]
 ) -> None:
-    """The spinning gas adds exp(omega^2 a^2/(2 R T)) - 1 up to the liquid, about 1 %."""
+    """The spinning gas adds exp(omega^2 a^2/(2 R T)) - 1 up to the liquid, about 1 %, to the surroundings'
+    pressure in the vented chamber too."""
     own = replace(scene, gas=replace(scene.gas, measured_at="shaft"))
     a = float(surface_radius(disc=scene.disc, fill_ratio=0.25))
     factor = math.exp((10000 * math.pi / 30 * a) ** 2 / (2 * 287.05 * scene.gas.temperature))

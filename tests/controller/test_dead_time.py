@@ -231,7 +231,7 @@ def test_what_its_runs_refute_is_not_recommended(slow: Scene, calibrated: Balanc
     assert len(found.search.tried) > 3
     limit = found.search.limit
     assert limit is not None
-    assert f"a limit of {limit * 1e6:.3g} um is reached" in found.status
+    assert f"raise controller.limit to {limit * 1e6:.3g} um" in found.status
     json.dumps(tuning_document(found), allow_nan=False)
     assert tuned(with_settings(coarse, limit=limit), calibrated).settling is not None
     # The smallest injection moves more than the scene's limit to either side.

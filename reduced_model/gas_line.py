@@ -62,6 +62,8 @@ class LineAnswer:
     """Change of the vibration by the shortest opening, m."""
     limit: float
     """Of the vibration, m."""
+    largest_correction: float
+    """The `largest_correction` at which the limit is sure to be reached, m."""
     dead_time: float | None = None
     """Valve-open time that an injection of the size of the limit loses against the steady velocity, s."""
     standing_amplitude: float | None = None
@@ -69,8 +71,8 @@ class LineAnswer:
 
     @property
     def above_limit(self) -> bool:
-        """Whether no correction as small as the controller's limit can be made."""
-        return self.smallest_correction is not None and self.smallest_correction > self.limit
+        """Whether the smallest correction is so large that the limit is not sure to be reached."""
+        return self.smallest_correction is not None and self.smallest_correction > self.largest_correction
 
 
 def line_ends(scene: Scene) -> tuple[LineEnd, ...]:
@@ -99,6 +101,16 @@ def line_answers(scene: Scene, model: BalancerModel) -> tuple[LineAnswer, ...]:
     ends = line_ends(scene)
     injections = short_injections(scene, [end.line for end in ends], fills)
     return tuple(_answer(scene, end, fills, one) for end, one in zip_longest(ends, injections))
+
+
+def largest_correction(limit: float, *, chambers: int) -> float:
+    """Smallest correction s up to which a limit of the vibration is sure to be reached, m.
+
+    A correction by s leaves |a - s| of a share a of the vibration, which is less than a from s/2 on: each of
+    two neighbouring chambers can leave s/2, and both together the vector of two such shares. Above it runs
+    may still settle, as corrections larger than s have any size.
+    """
+    return 2 * limit / _largest_standing([1.0] * chambers)
 
 
 def _vibration(scene: Scene, fills: Fills, metres: float) -> float:
@@ -168,6 +180,7 @@ def _answer(scene: Scene, end: LineEnd, fills: Fills, injection: ShortInjection 
         shortest_opening=opening,
         smallest_correction=correction,
         limit=limit,
+        largest_correction=largest_correction(limit, chambers=scene.disc.chambers),
         dead_time=dead,
         standing_amplitude=standing,
     )
@@ -183,7 +196,7 @@ def line_text(answers: tuple[LineAnswer, ...]) -> str:
 
 
 def line_warning(answers: tuple[LineAnswer, ...]) -> str:
-    """Empty where the line can deliver corrections as small as the limit."""
+    """Empty where the line can deliver corrections small enough for the limit."""
     above = [answer for answer in answers if answer.above_limit]
     if not above:
         return _standing_warning(answers[0])
@@ -191,8 +204,8 @@ def line_warning(answers: tuple[LineAnswer, ...]) -> str:
     shown = "" if above[0].end == "given" else ", and runs of a scene without a line do not show it"
     return (
         f"the smallest correction that the gas line can deliver{which}, {_sizes(above)} um, is "
-        f"above the limit of {1e6 * above[0].limit:.2g} um: no run is sure to settle{shown}; take a faster "
-        "valve, less dead volume or a higher limit"
+        f"above {1e6 * above[0].largest_correction:.2g} um: no run is sure to reach the limit of "
+        f"{1e6 * above[0].limit:.2g} um{shown}; take a faster valve, less dead volume or a higher limit"
     )
 
 
@@ -218,6 +231,7 @@ def line_document(answers: tuple[LineAnswer, ...]) -> dict[str, Any]:
     return {
         "given": answers[0].end == "given",
         "limit_m": answers[0].limit,
+        "largest_correction_m": answers[0].largest_correction,
         "ends": [
             {
                 "end": answer.end,

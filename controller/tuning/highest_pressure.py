@@ -17,17 +17,17 @@ _FARTHEST: Final = 2.0
 
 
 def highest_pressure(scene: Scene, model: BalancerModel) -> float | None:
-    """Gas pressure up to which the valve can make a correction as small as the limit, gauge, Pa.
+    """Gauge gas pressure up to which the valve's smallest correction leaves the limit sure, Pa.
 
     The worse end counts where the scene gives no gas line; within 1 %.
-    Returns: None: the smallest correction is above the limit already at the scene's pressure, or still below
-        it at twice that pressure.
+    Returns: None: the smallest correction is too large already at the scene's pressure, or still
+        small enough at twice that pressure.
     """
 
     @cache
     def above(pressure: float) -> float:
         answers = line_answers(with_value(scene=scene, quantity="pressure", value=pressure), model)
-        return max((a.smallest_correction or 0.0) / a.limit for a in answers) - 1
+        return max((a.smallest_correction or 0.0) / a.largest_correction for a in answers) - 1
 
     low, high = scene.gas.pressure, _FARTHEST * scene.gas.pressure
     if low <= 0 or above(low) > 0 or above(high) <= 0:

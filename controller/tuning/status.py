@@ -6,6 +6,7 @@ from ringbalance.controller.liquid_ring.reach import BEYOND_CAPACITY, RUNS_BACK
 from ringbalance.controller.tuning.loop_factor import LoopFactor
 from ringbalance.controller.tuning.search import LIMITS, VALVES, Candidate, Search
 from ringbalance.controller.tuning.settling import SettlingTimes
+from ringbalance.reduced_model.gas_line import largest_correction
 from ringbalance.scene.models import Scene
 
 
@@ -18,6 +19,12 @@ def over_capacity(scene: Scene, beyond: float) -> str:
         f"capacity exceeded: with the liquid at its best {beyond * um:.4g} um remain of {start * um:.4g} um, "
         f"limit {limit * um:.4g} um: {BEYOND_CAPACITY}"
     )
+
+
+def valves_reach(scene: Scene, *, zone: float, smallest: float) -> bool:
+    """Whether valve-open times of these effects, m, leave the limit sure to be reached."""
+    limit = scene.controller.limit
+    return zone <= limit and smallest <= largest_correction(limit, chambers=scene.disc.chambers)
 
 
 def status_of(
@@ -43,7 +50,7 @@ def status_of(
     reached = settling.quantiles["p95"]
     if reached is not None:
         return f"tuned{also}: 95 % of the runs settle within {reached:.3g} s"
-    if max(zone, smallest / 2) > limit and not settling.out_of_capacity:
+    if not valves_reach(scene, zone=zone, smallest=smallest) and not settling.out_of_capacity:
         return (
             f"the valve is too slow for the limit of {limit * um:.4g} um: the shortest valve-open time moves "
             f"the vibration by {smallest * um:.4g} um, and up to {zone * um:.4g} um none transfers liquid: "

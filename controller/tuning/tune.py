@@ -34,7 +34,7 @@ from ringbalance.controller.tuning.settling import (
     SettlingTimes,
     settling_times,
 )
-from ringbalance.controller.tuning.status import over_capacity, status_of
+from ringbalance.controller.tuning.status import over_capacity, status_of, valves_reach
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.gas_line import LineAnswer, line_answers, line_document
 from ringbalance.reduced_model.law.model import BalancerModel
@@ -144,7 +144,7 @@ def _judged(
     lines = line_answers(tuned, model)
     beyond = _beyond_capacity(scene, model)
     settles = settling is not None and settling.quantiles["p95"] is not None
-    reaches = settles or max(zone, smallest / 2) <= settings.limit
+    reaches = settles or valves_reach(tuned, zone=zone, smallest=smallest)
     within = flows and loop.stays and reaches and beyond <= settings.limit
     # The law-based algorithm asks for the time in which the law moves the whole residual.
     gain = (1.0 / loop.rate if settings.kind == "law_based" else settings.proportional) if flows else None
@@ -166,7 +166,7 @@ def _judged(
         change="" if best is None else best.change,
         search=found,
         beyond_capacity=beyond,
-        reachable=within and _line_reaches(lines),
+        reachable=within and _line_reaches(lines, settles=settles),
         gas_line=lines,
         settling=settling,
         models_used=run_models(scene=tuned, model=model),
@@ -181,12 +181,12 @@ def _beyond_capacity(scene: Scene, model: BalancerModel) -> float:
     return unreachable_vibration(plant=plant, state=state, rotor=scene.rotor)
 
 
-def _line_reaches(lines: tuple[LineAnswer, ...]) -> bool | None:
-    """Whether a given line can; of a default range: True when all can, None when that is not sure."""
+def _line_reaches(lines: tuple[LineAnswer, ...], *, settles: bool) -> bool | None:
+    """Whether a given line can, which its runs show; of a default range: None when not all are sure to."""
     above = [answer.above_limit for answer in lines]
     if not any(above):
         return True
-    return False if all(answer.end == "given" for answer in lines) else None
+    return settles if all(answer.end == "given" for answer in lines) else None
 
 
 def _silent(_: str) -> None:

@@ -20,6 +20,7 @@ def _view(_own: Record, evidence: Record) -> Record:
         "standing": _standing(evidence),
         "assumed": _origins(evidence),
         "credibility": _credibility(evidence),
+        "fitted": bool(evidence["scene"].get("measured")),
     }
 
 

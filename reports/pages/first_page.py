@@ -12,6 +12,7 @@ from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reports.numbers import MISSING, THIN_SPACE, given, number, percent, shown
 from ringbalance.reports.origins import named_with_origin
 from ringbalance.reports.pages.requirements import (
+    SMALLEST,
     STANDING,
     Requirement,
     decision,
@@ -20,6 +21,7 @@ from ringbalance.reports.pages.requirements import (
     requirement_table,
     requirements,
 )
+from ringbalance.reports.pages.within_reach import LIKELY
 from ringbalance.reports.prose import key_words
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.reports.summary import MISSED, OPEN
@@ -38,12 +40,10 @@ RETUNED: Final = "calibrated_retuned"
 _VALVE: Final = {
     OPEN: "Choose the valve before anything else is built, and put its conductance, critical ratio and lag "
     "into the scene: only a fast one can reach the limit.",
-    MISSED: "Find a valve and gas line whose smallest correction is within the limit, or raise the limit: "
-    "with {valve} the last corrections are larger than the limit, whatever the gain.",
+    MISSED: "Find a valve and gas line that can give smaller corrections, or raise the limit: "
+    "with {valve} no run is sure to reach it, whatever the gain.",
 }
 """What to do about a valve that may not, or cannot, reach the limit."""
-LIKELY: Final = 0.95
-"""Fraction of runs that must settle before a gain is recommended for use."""
 _ROTOR: Final = ("rotor.influence_coefficient", "rotor.lag_angle", "rotor.initial_amplitude")
 _DOMINANT: Final = 3
 _MAIN: Final = {
@@ -136,13 +136,21 @@ def _view(found: Record, evidence: Record) -> Record:
         "bars": requirement_figure(rows),
         "actions": _actions(evidence, rows),
         "dominant": dominant(evidence),
-        "unmeasured": _NO_MEASUREMENT,
+        "unmeasured": f"{_measured(evidence)} {_OF_PARTS}",
         "rests": [*_bore(found, evidence), *_exact(evidence), *_borrowed(evidence)],
     }
 
 
-_NO_MEASUREMENT: Final = (
-    "No comparison with measurements of this device exists. Verdicts on the paper compare a model with "
+def _measured(evidence: Record) -> str:
+    found = evidence["scene"].get("measured")
+    if not found:
+        return "No comparison with measurements of this device exists."
+    rows = sum(each["rows"] for each in found["files"])
+    return f"Fitted to {rows} measurements of this device (annex); no others are compared with the result."
+
+
+_OF_PARTS: Final = (
+    "Verdicts on the paper compare a model with "
     "a model; only parts of the model, the friction of a straight pipe among them, are compared with "
     "measurements."
 )
@@ -285,7 +293,7 @@ def _crest(evidence: Record) -> str:
 def _valve_and_gain(evidence: Record, verdicts: Mapping[str, str]) -> list[str]:
     """The valve first: a gain holds for the valve that it was found with, and only where runs settle."""
     line = evidence["calibration"].get("gas_line") or {"given": True}
-    valve = _VALVE.get(verdicts.get("Smallest correction that the valve can give", ""))
+    valve = _VALVE.get(verdicts.get(SMALLEST, ""))
     valve_named = "the scene’s valve" if line["given"] else "any valve of the default range"
     told = [valve.format(valve=valve_named)] if valve else []
     tuned, tuning = retuned(evidence), (evidence.get("summary") or {}).get("tuning") or {}

@@ -35,7 +35,7 @@ def _show(_own: Record, evidence: Record) -> Record | None:
     if any(len(each["profile"]) > 2 for each in found["quantities"]):
         parts.append(("figure", _profiles(found)))
     if found["findings"]:
-        parts.append(("items", [_sentence(each["text"]) for each in found["findings"]]))
+        parts.append(("items", [_sentence(each["text"], found) for each in found["findings"]]))
     return {"parts": parts}
 
 
@@ -55,8 +55,12 @@ def _lead(found: Record) -> str:
     )
 
 
-def _sentence(text: str) -> str:
-    return f"{text[0].upper()}{text[1:]}."
+def _sentence(text: str, found: Record) -> str:
+    """A finding, with the quantities' usual names in place of keys that are no words."""
+    for each in found["quantities"]:
+        if "_" in each["quantity"]:
+            text = text.replace(each["quantity"], usual_name(each["quantity"]))
+    return f"{text[0].upper()}{text[1:]}.".replace(" -", " \N{MINUS SIGN}")
 
 
 def _files(found: Record) -> Table:
@@ -150,7 +154,8 @@ def _profiles(found: Record) -> Drawing:
         for place, each in enumerate(drawn):
             axes.plot(*_curve(each), label=usual_name(each["quantity"]), **style.line(place))
         axes.axhline(1.0, color=style.MUTED, linewidth=1)
-        axes.set(xlim=(-2, 2), ylim=(0, _FAR))
+        highest = max(float(np.max(each["rise"])) for each in drawn)
+        axes.set(xlim=(-2, 2), ylim=(0, min(1.5 * max(highest, 1.0), _FAR)))
 
     return draw(
         name="fitted-profiles",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from ringbalance.controller.tuning.loop_factor import STAYING_DEVIATIONS
@@ -12,15 +12,22 @@ from ringbalance.reports.figures.operation import requirement_bars
 from ringbalance.reports.figures.style import Drawing
 from ringbalance.reports.numbers import given, number, percent, shown
 from ringbalance.reports.origins import resting
+from ringbalance.reports.pages.within_reach import (
+    LIKELY,
+    ideal_valve,
+    line_verdict,
+    settles,
+    tuning_of,
+    what_enlarges,
+)
 from ringbalance.reports.section import Record, Table
 from ringbalance.reports.summary import MET, MISSED, OPEN, UNASKED, above, below, worst
 from ringbalance.reports.traces import evidence_at, read, traced, untraced
 from ringbalance.scene import Scene
 
 STANDING: Final = "Vibration up to which the scene’s valve-open times transfer no liquid"
+SMALLEST: Final = "Smallest correction that the valve can give"
 _NONE: Final = "the scene asks for none"
-_LIKELY: Final = 0.95
-"""Fraction of runs that must settle in time, the confidence of every interval in the report."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,7 +82,9 @@ def _grade(scene: Scene) -> float | None:
 def requirements(evidence: Record) -> list[Requirement]:
     """The requirements in the order in which a designer meets them."""
     every = (_capacity, _gas_pressure, _scene_gain, _recommended_gain, _settling, _residual_row)
-    return [row for make in (*every, _smallest, _standing, _grade_row) if (row := make(evidence)) is not None]
+    return [
+        row for make in (*every, smallest_row, _standing, _grade_row) if (row := make(evidence)) is not None
+    ]
 
 
 def requirement_table(rows: Iterable[Requirement]) -> Table:
@@ -179,11 +188,11 @@ def _gas_pressure(evidence: Record) -> Requirement | None:
 
 
 def _at_most(evidence: Record, summary: Record) -> str:
-    """The pressure from which the valve's smallest correction is above the limit."""
+    """The pressure from which the valve's smallest correction is too large for the limit."""
     path = "summary.highest_gas_pressure_Pa"
     if summary.get("highest_gas_pressure_Pa") is None:
         return ""
-    return f"; at most {read(evidence, path, 'Pa', digits=2)} for corrections as small as the limit"
+    return f"; at most {read(evidence, path, 'Pa', digits=2)} for the valve’s smallest correction"
 
 
 def _scene_gain(evidence: Record) -> Requirement | None:
@@ -213,12 +222,8 @@ def _staying(run: Record, path: str) -> str:
     return traced(number(run[key], digits=3), f"{path}.{key}")
 
 
-def _tuning(evidence: Record) -> Record:
-    return (evidence.get("summary") or {}).get("tuning") or {}
-
-
 def _recommended_gain(evidence: Record) -> Requirement | None:
-    tuning, run = _tuning(evidence), evidence["closed_loop"].get("calibrated")
+    tuning, run = tuning_of(evidence), evidence["closed_loop"].get("calibrated")
     if tuning.get("gain") is None or run is None or tuning.get("loop_factor") is None:
         return None
     width = tuning["loop_factor"] * (tuning.get("margins") or {}).get("gain_uncertainty", 0.0)
@@ -238,24 +243,24 @@ def _recommended_gain(evidence: Record) -> Requirement | None:
 
 
 def _settling(evidence: Record) -> Requirement | None:
-    tuning = _tuning(evidence)
+    tuning = tuning_of(evidence)
     if not tuning.get("runs") or tuning.get("fraction_settled") is None:
         return None
     times = tuning.get("settling_time_s") or {}
     wanted = (evidence["summary"].get("requirement") or {}).get("settling_time_s")
     low, high = tuning["fraction_settled_95"]
     late = wanted is not None and (times.get("p95") or math.inf) > wanted
-    judged = MISSED if late or high < _LIKELY else (MET if low >= _LIKELY else OPEN)
+    judged = MISSED if late or high < LIKELY else (MET if low >= LIKELY else OPEN)
     until = evidence["summary"]["time_limit_s"] if wanted is None else wanted
     # Runs that do not settle at all are judged, whether or not a time is required.
     unasked = wanted is None and times.get("p95") is not None
     return Requirement(
         name="Settling time with the recommended settings",
-        wanted=_NONE if unasked else f"at most {given(until, 's')} in {percent(_LIKELY)} of runs",
+        wanted=_NONE if unasked else f"at most {given(until, 's')} in {percent(LIKELY)} of runs",
         result=f"{_times(evidence, times)}settled: "
         f"{traced(percent(tuning['fraction_settled']), 'summary.tuning.fraction_settled')} of "
         f"{tuning['runs']} runs, with 95 % confidence {percent(low)} to {percent(high)}"
-        f"{_ideal_valve(evidence)}",
+        f"{ideal_valve(evidence)}",
         verdict=UNASKED if unasked else judged,
         rests=resting(evidence, "tube.bore", "rotor.influence_coefficient", "controller.period"),
         required=wanted,
@@ -271,12 +276,12 @@ def _times(evidence: Record, times: Record) -> str:
     if times.get("p50") is not None:
         told.append(f"median {read(evidence, f'{path}.p50', 's', digits=2)}")
     if times.get("p95") is not None:
-        told.append(f"{percent(_LIKELY)} of runs within {read(evidence, f'{path}.p95', 's', digits=2)}")
+        told.append(f"{percent(LIKELY)} of runs within {read(evidence, f'{path}.p95', 's', digits=2)}")
     return f"{', '.join(told)}; " if told else ""
 
 
 def _residual_row(evidence: Record) -> Requirement | None:
-    tuning, run = _tuning(evidence), evidence["closed_loop"].get("calibrated") or {}
+    tuning, run = tuning_of(evidence), evidence["closed_loop"].get("calibrated") or {}
     path = "summary.tuning.stationary_deviation_m" if tuning.get("stationary_deviation_m") else ""
     if not path and run.get("stationary_deviation_m"):
         path = "closed_loop.calibrated.stationary_deviation_m"
@@ -287,12 +292,12 @@ def _residual_row(evidence: Record) -> Requirement | None:
     moment = read(evidence, "summary.requirement.residual_moment_kg_m", "kg m", digits=2)
     gain = "the recommended settings" if tuning.get("stationary_deviation_m") else "the scene’s gain"
     alone = below((noise,), limit)
-    verdict = worst(alone, _line_verdict(evidence), _settles(evidence))
+    verdict = worst(alone, line_verdict(evidence), settles(evidence))
     return Requirement(
         name="Residual vibration (zero to peak)",
         wanted=f"at most {given(limit, 'm')}, an unbalance of {moment}",
         result=f"{shown(noise, 'm', digits=2)}: {STAYING_DEVIATIONS:g} standard deviations of what noise "
-        f"keeps up with {gain}{_steps(evidence)}",
+        f"keeps up with {gain}{what_enlarges(evidence)}",
         verdict=verdict,
         rests=resting(evidence, "sensor.amplitude_noise", "rotor.influence_coefficient"),
         # Where more than noise decides, a bar of the noise would show less than is there.
@@ -303,22 +308,19 @@ def _residual_row(evidence: Record) -> Requirement | None:
     )
 
 
-def _steps(evidence: Record) -> str:
-    """What makes the residual larger than noise does."""
-    steps = {MISSED: "is", OPEN: "may be"}.get(_line_verdict(evidence))
-    told = [f"the smallest correction {steps} larger than the limit"] if steps else []
-    if _settles(evidence) != MET:
-        told.append("too few runs settle")
-    return "; ".join([_ideal_valve(evidence), *told])
-
-
-def _ideal_valve(evidence: Record) -> str:
-    line = evidence["calibration"].get("gas_line") or {"given": True}
-    return "" if line["given"] else "; for a valve that acts at once"
-
-
-def _smallest(evidence: Record) -> Requirement | None:
-    return _of_line(evidence, "smallest_correction_m", "Smallest correction that the valve can give")
+def smallest_row(evidence: Record) -> Requirement | None:
+    """The valve's smallest correction; where runs with this valve reach the limit, nothing is asked of it."""
+    row = _of_line(evidence, "smallest_correction_m", SMALLEST, bound="largest_correction_m")
+    if row is None:
+        return None
+    verdict = line_verdict(evidence)
+    shown_by_runs = "; the runs settle with it" if verdict == MET != row.verdict else ""
+    return replace(
+        row,
+        wanted=f"{row.wanted} for the limit to be sure",
+        result=f"{row.result}{shown_by_runs}",
+        verdict=UNASKED if shown_by_runs else row.verdict,
+    )
 
 
 def _standing(evidence: Record) -> Requirement | None:
@@ -326,7 +328,7 @@ def _standing(evidence: Record) -> Requirement | None:
     return _of_line(evidence, "standing_amplitude_m", STANDING)
 
 
-def _of_line(evidence: Record, key: str, name: str) -> Requirement | None:
+def _of_line(evidence: Record, key: str, name: str, *, bound: str = "limit_m") -> Requirement | None:
     line = evidence["calibration"].get("gas_line")
     if not line or any(end.get(key) is None for end in line["ends"]):
         return None
@@ -337,11 +339,11 @@ def _of_line(evidence: Record, key: str, name: str) -> Requirement | None:
     least, most = (line["ends"][i][key] for i in (ends[0], ends[-1]))
     return Requirement(
         name=name,
-        wanted=f"at most {given(line['limit_m'], 'm')}",
+        wanted=f"at most {given(line[bound], 'm', digits=2)}",
         result=_valves(low, high, len(ends)) if most else "none",
-        verdict=below((least, most), line["limit_m"]),
+        verdict=below((least, most), line[bound]),
         rests="" if line["given"] else "a default range of valves: the scene describes none",
-        required=line["limit_m"],
+        required=line[bound],
         reached=least,
         low=least,
         high=most,
@@ -354,24 +356,6 @@ def _valves(low: str, high: str, valves: int) -> str:
     return low if valves == 1 else f"{low} (fast valve) to {high} (slow valve)"
 
 
-def _line_verdict(evidence: Record) -> str:
-    """Whether the gas line's smallest correction leaves the limit within reach; met without one."""
-    line = evidence["calibration"].get("gas_line")
-    if not line or any(end.get("smallest_correction_m") is None for end in line["ends"]):
-        return MET
-    return below((end["smallest_correction_m"] for end in line["ends"]), line["limit_m"])
-
-
-def _settles(evidence: Record) -> str:
-    """Whether runs with the recommended settings settle, late or not; met where no runs were made."""
-    tuning = _tuning(evidence)
-    if not tuning.get("runs") or tuning.get("fraction_settled") is None:
-        return MET
-    if tuning["fraction_settled_95"][1] < _LIKELY:
-        return MISSED
-    return MET if tuning["fraction_settled"] >= _LIKELY else OPEN
-
-
 def _grade_row(evidence: Record) -> Requirement | None:
     wanted = (evidence.get("summary") or {}).get("requirement") or {}
     reached, bound = wanted.get("grade_at_residual_m_s"), wanted.get("grade_m_s")
@@ -380,7 +364,7 @@ def _grade_row(evidence: Record) -> Requirement | None:
     path = "summary.requirement.grade_at_residual_m_s"
     verdict = UNASKED
     if bound is not None:
-        verdict = worst(below((reached,), bound), _line_verdict(evidence), _settles(evidence))
+        verdict = worst(below((reached,), bound), line_verdict(evidence), settles(evidence))
     return Requirement(
         name="Balance quality grade (ISO 21940-11) where the residual is met",
         wanted=_NONE if bound is None else f"at most G {number(1e3 * bound, digits=3)}",

@@ -151,12 +151,14 @@ def test_the_same_scene_gives_the_same_document(scene: Scene, found: Tuning) -> 
     json.dumps(tuning_document(found), allow_nan=False)
 
 
-def test_a_slow_gas_line_puts_the_limit_out_of_reach(scene: Scene, found: Tuning) -> None:
+def test_what_runs_reach_with_a_slow_gas_line_is_within_reach(scene: Scene, found: Tuning) -> None:
     # Nothing is known of the scene's own line: the default range leaves it open.
     assert found.reachable is None
     given = replace(scene, gas=replace(scene.gas, conductance=2e-9, critical_ratio=0.3, valve_lag=0.005))
     answer = tuned(given)
-    assert answer.reachable is (not answer.gas_line[0].above_limit)
+    # The smallest correction leaves the limit unsure; the runs settle all the same, and they decide.
+    assert answer.gas_line[0].above_limit
+    assert answer.reachable is answer.succeeded is True
     assert [line.end for line in answer.gas_line] == ["given"]
 
 

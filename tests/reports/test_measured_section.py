@@ -63,6 +63,18 @@ def test_the_annex_of_a_fitted_scene_has_it(fitted: dict[str, Any]) -> None:
     assert 'id="figure-fitted-profiles"' in section
 
 
+def test_the_report_says_what_it_was_fitted_to(fitted: dict[str, Any]) -> None:
+    page = render(fitted)["report.html"]
+    assert "Fitted to 31 measurements of this device" in page
+    assert "No comparison with measurements of this device exists" not in page
+
+
+def test_findings_name_quantities_as_tables_do(fitted: dict[str, Any]) -> None:
+    finding = {"about": "correlation", "text": "the errors of disc.lambda_factor (correlation -0.50)"}
+    fitted["scene"]["measured"]["findings"] = [finding]
+    assert "measured factor on λ (correlation −0.50)" in render(fitted)["annex.html"]
+
+
 def test_without_measurements_there_is_no_section(evidence: dict[str, Any]) -> None:
     assert SECTION.view(evidence) is None
     assert 'id="measured"' not in render(evidence)["annex.html"]

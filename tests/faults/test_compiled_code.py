@@ -102,7 +102,7 @@ damages = {
     "not to be read": lambda path: path.chmod(0),
     "longer": lambda path: path.write_bytes(path.read_bytes() + b"x"),
     "text": lambda path: path.write_text("not a cache"),
-    "link to nothing": lambda path: (path.unlink(), path.symlink_to("nothing")),
+    "link to nothing": lambda path: (path.unlink(), path.symlink_to("nothing for " + path.stem)),
     "no checksum": lambda path: path.write_bytes(path.read_bytes()[32:]),
 }
 number = random.Random(12)

@@ -240,7 +240,9 @@ def _chamber_table(calibration: Calibration) -> Table:
 
 
 def _off(found: float, reference: float) -> str:
-    return f"{100 * (found / reference - 1):+.1f}" if reference else ""
+    """Percent, a zero without sign."""
+    shown = f"{100 * (found / reference - 1):+.1f}" if reference else ""
+    return "0.0" if shown in ("+0.0", "-0.0") else shown
 
 
 def _tube_table(calibration: Calibration) -> Table:

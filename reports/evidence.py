@@ -113,6 +113,7 @@ def scene_record(scene: AnyScene, text: str, rows: list[Record]) -> Record:
         "text": text,
         "origins": dict(scene.origins),
         "measured": asdict(scene.measured) if scene.measured.files else None,
+        "states_uncertainty": bool(scene.uncertainty),
         "table": rows,
     }
 

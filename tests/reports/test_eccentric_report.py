@@ -98,6 +98,17 @@ def test_an_unmet_requirement_is_not_called_met(evidence: Record) -> None:
     assert "0 of 1 requirements are met; not met: patience." in page
 
 
+def test_a_result_that_not_all_drawn_runs_come_to_reads_as_one_sentence(evidence: Record) -> None:
+    changed = json.loads(json.dumps(evidence))
+    row = {**changed["requirements"][0], "quantity": "settling time", "unit": "s", "achieved": 2.32}
+    row.update(verdict="cannot be told", reached=0.38, lost=["masses.friction_arm"], achieved_interval=None)
+    changed["requirements"] = [row, {**row, "quantity": "patience", "reached": 1.0}]
+    page = re.sub(r"<[^>]*>", "", render(changed)["report.html"])
+    assert "2.32\u202fs with the scene’s values" in page
+    assert "none: of the runs with drawn inputs 38\u202f% get there, the others never do" in page
+    assert "none: with an input at the end of its own interval the run never gets there" in page
+
+
 def test_what_a_requirement_depends_on_is_named_with_what_to_do(evidence: Record) -> None:
     changed = json.loads(json.dumps(evidence))
     row = changed["requirements"][1]

@@ -21,11 +21,10 @@ from ringbalance.identification.identifiability import Verdict
 from ringbalance.identification.likelihood import Block, Problem, block_of, held_effects
 from ringbalance.identification.result import FitResult
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
-from ringbalance.scene.units import format_quantity
+from ringbalance.scene.units import DIMENSIONS, format_quantity
 
 ASSUMED_NOISE: Final = 0.01
 """Standard deviation of a kind that was not measured, relative to the largest that is predicted."""

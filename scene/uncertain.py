@@ -9,7 +9,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, Final
 
-from ringbalance.scene.chamber_file.stretching import STRETCHED, stretched
+from ringbalance.scene.chamber_file.record import STRETCHED, stretched
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.keys.schema import LIQUID_RING
 from ringbalance.scene.models import Scene

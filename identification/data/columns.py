@@ -10,9 +10,8 @@ import numpy as np
 
 from ringbalance.identification.data.tables import Table, data_fault
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.faults import Fault, did_you_mean, toml_text
-from ringbalance.scene.units import FieldError, parse_number, parse_quantity
+from ringbalance.scene.units import DIMENSIONS, FieldError, parse_number, parse_quantity
 
 _HEAD: Final = re.compile(r"([A-Za-z][A-Za-z0-9_ ]*?)(?: ?\[([^][]+)\])?")
 _SIZES: Final = (1e-15, 1e15)

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+import os
+import stat
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from types import MappingProxyType
+from typing import Any, Final, get_args
 
 import numpy as np
 
 from ringbalance.scene.arrays import IntArray
+from ringbalance.scene.chamber_file.abaqus_file import read_abaqus
 from ringbalance.scene.chamber_file.assembly import Body, assembled, drawing_nodes
-from ringbalance.scene.chamber_file.contents import MeshFileError
-from ringbalance.scene.chamber_file.keys import MeshKeys
+from ringbalance.scene.chamber_file.contents import Contents, MeshFileError, unreadable
+from ringbalance.scene.chamber_file.gmsh_file import read_gmsh
+from ringbalance.scene.chamber_file.keys import MeshKeys, MeshUnit
 from ringbalance.scene.chamber_file.names import boundaries_of
 from ringbalance.scene.chamber_file.placing import (
     Placed,
@@ -23,21 +28,29 @@ from ringbalance.scene.chamber_file.placing import (
     port_findings,
     port_radius,
 )
-from ringbalance.scene.chamber_file.reading import content_of, contents_of, is_step
 from ringbalance.scene.chamber_file.record import ChamberGeometry
-from ringbalance.scene.chamber_file.scale import scale_findings
 from ringbalance.scene.chamber_file.shape import oriented
-from ringbalance.scene.chamber_file.step_file import STEP_UNIT
+from ringbalance.scene.chamber_file.step_file import STEP_ENDINGS, STEP_UNIT, meshed_step
 from ringbalance.scene.chamber_file.topology import facets_of, topology_findings
-from ringbalance.scene.dimensions import DIMENSIONS
+from ringbalance.scene.chamber_file.vtu_file import read_vtu
 from ringbalance.scene.faults import Fault
 from ringbalance.scene.keys.declaration import keys_of
 from ringbalance.scene.keys.derivations import even_number_of_chambers
 from ringbalance.scene.keys.reading import Reading
-from ringbalance.scene.rules.check import Finding, written
+from ringbalance.scene.rules.check import Finding, failed_checks, written
+from ringbalance.scene.rules.shape import SIZE_CHECKS
 from ringbalance.scene.uncertain import SHAPE
+from ringbalance.scene.units import DIMENSIONS
 
 _PORT: Final = "tube.port_radius"
+_LARGEST_FILE: Final = 2**28
+_READERS: Final[Mapping[str, Callable[[bytes], Contents]]] = MappingProxyType(
+    {".msh": read_gmsh, ".inp": read_abaqus, ".vtu": read_vtu}
+)
+FORMATS: Final = "a mesh of Gmsh 2.2 or 4.1 (.msh), Abaqus (.inp) or VTK (.vtu), or a solid (.step, .stp)"
+_LARGEST, _SMALLEST = 5.0, 1e-3
+"""Outer radii, m, beyond which no balancing disc is built."""
+_LENGTHS: Final = ("outer_radius", "inner_radius", "axial_width")
 
 
 def with_chamber(reading: Reading) -> tuple[Reading, tuple[Fault, ...]]:
@@ -80,7 +93,7 @@ def _unit_faults(reading: Reading) -> Iterator[Fault]:
     path = "disc.mesh_unit"
     if not reading.known("disc.mesh"):
         return
-    step = is_step(Path(reading.values["disc.mesh"]))
+    step = _is_step(Path(reading.values["disc.mesh"]))
     if step and reading.given(path):
         yield reading.fault(path, problem="a STEP file has its own unit", allowed="leave the key out")
     elif not step and reading.lacks(path):
@@ -100,9 +113,9 @@ def _chamber(reading: Reading) -> tuple[ChamberGeometry, Placed]:
     """The mesh of a scene. Raises: MeshFileError: with all that is wrong with it."""
     name = reading.values["disc.mesh"]
     path = Path(reading.file).parent / name
-    content = content_of(path)
-    unit = STEP_UNIT if is_step(path) else reading.values["disc.mesh_unit"]
-    contents = contents_of(path, content, tolerance=reading.values["accuracy.tolerance"])
+    content = _content_of(path)
+    unit = STEP_UNIT if _is_step(path) else reading.values["disc.mesh_unit"]
+    contents = _contents_of(path, content, tolerance=reading.values["accuracy.tolerance"])
     body = assembled(contents, scale=float(DIMENSIONS["length"].units[unit].factor))
     body, misshapen = oriented(body)
     facets = facets_of(body)
@@ -118,7 +131,7 @@ def _chamber(reading: Reading) -> tuple[ChamberGeometry, Placed]:
     ]
     if everything:
         raise MeshFileError(everything)
-    size = reading.values["accuracy.tolerance"] if is_step(path) else 0.0
+    size = reading.values["accuracy.tolerance"] if _is_step(path) else 0.0
     return _record(name, content, body, boundaries, found, (unit, axis, middle, size)), found
 
 
@@ -134,7 +147,7 @@ def _unfitting(
     if chambers is not None:
         yield from opening_findings(body, found.points, chambers=chambers)
     port, own = reading.values.get(_PORT), port_radius(found.points, boundaries)
-    wrong = tuple(scale_findings(reading, found.dimensions, unit=unit, port=own))
+    wrong = tuple(_scale_findings(reading, found.dimensions, unit=unit, port=own))
     if wrong:
         yield from wrong
         return
@@ -176,3 +189,84 @@ def _record(
         cells=cells,
         boundaries=arrays,
     )
+
+
+def _is_step(path: Path) -> bool:
+    """Whether a file is a solid that is yet to be meshed, and has its own unit."""
+    return path.suffix.lower() in STEP_ENDINGS
+
+
+def _content_of(path: Path) -> bytes:
+    """The bytes of a mesh file. Raises: MeshFileError: it cannot be read, or is larger than any mesh."""
+    if path.suffix.lower() not in (*_READERS, *STEP_ENDINGS):
+        raise unreadable(f"a name that ends with {path.suffix[:20] or 'no .ending'} is not read", FORMATS)
+    try:
+        # Without blocking: a pipe that nobody writes to must not hold the program.
+        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+        with os.fdopen(handle, "rb") as stream:
+            kind = os.fstat(stream.fileno())
+            if not stat.S_ISREG(kind.st_mode):
+                raise unreadable("this is a folder or a device, not a file", FORMATS)
+            content = stream.read(_LARGEST_FILE + 1)
+    except FileNotFoundError as error:
+        raise unreadable(f"there is no file {path}", "a path from the folder of the scene file") from error
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise unreadable(f"the file cannot be read: {reason}") from error
+    if len(content) > _LARGEST_FILE:
+        raise unreadable("the file is too large to be checked", f"up to {_LARGEST_FILE // 2**20} MiB")
+    if not content.strip():
+        raise unreadable("the file is empty", FORMATS)
+    return content
+
+
+def _contents_of(path: Path, content: bytes, *, tolerance: float) -> Contents:
+    """What a mesh file's bytes hold; a solid is meshed. Raises: MeshFileError.
+
+    Args: `tolerance`: of the scene, from which the size of a solid's cells follows.
+    """
+    if _is_step(path):
+        return meshed_step(content, tolerance=tolerance)
+    return _READERS[path.suffix.lower()](content)
+
+
+def _scale_findings(
+    reading: Reading, dimensions: Mapping[str, float], *, unit: str, port: float | None
+) -> Iterator[Finding]:
+    """Lengths of the scene that no chamber of this size has, and the units in which they would fit.
+
+    A length that fits no unit is an error of its own, not one of scale.
+    Args: `dimensions`: of the mesh in `unit`, SI. `port`: radius of its boundary of that name, m.
+    """
+
+    def misfit(other: str) -> str | None:
+        units = DIMENSIONS["length"].units
+        return _misfit(reading, dimensions, factor=float(units[other].factor / units[unit].factor), port=port)
+
+    reason = misfit(unit)
+    fitting = [name for name in get_args(MeshUnit) if misfit(name) is None]
+    inner, outer = dimensions["inner_radius"], dimensions["outer_radius"]
+    if reason is None or (not fitting and _SMALLEST <= outer <= _LARGEST):
+        return
+    problem = f'in "{unit}" the chamber reaches from {written(inner, "mm")} to {written(outer, "mm")}: '
+    allowed = " or ".join(f'mesh_unit = "{name}"' for name in fitting)
+    if not reading.given("disc.mesh_unit"):
+        allowed = " or ".join(f'a STEP file in "{name}"' for name in fitting)
+    yield Finding(
+        problem=f"{problem}wrong scale; {reason}",
+        allowed=allowed or f"an outer radius of {_SMALLEST:g} m to {_LARGEST:g} m",
+    )
+
+
+def _misfit(
+    reading: Reading, dimensions: Mapping[str, float], *, factor: float, port: float | None
+) -> str | None:
+    """Why a chamber so many times as large cannot be; None where it can."""
+    sized = {key: value * (factor if key in _LENGTHS else 1.0) for key, value in dimensions.items()}
+    if not _SMALLEST <= sized["outer_radius"] <= _LARGEST:
+        return "no disc is of that size"
+    values = {f"disc.{key}": value for key, value in sized.items()}
+    if reading.lacks("tube.port_radius"):
+        values["tube.port_radius"] = sized["outer_radius"] if port is None else factor * port
+    fault = next(failed_checks(reading.adding(values), SIZE_CHECKS), None)
+    return None if fault is None else f"[{fault.table}] {fault.key} = {fault.value}: {fault.problem}"

@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Final
 
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.eccentric_parameters import (
-    eccentric_parameter,
-    eccentric_shifted,
-    eccentric_widths,
-    fitted_names,
-)
 from ringbalance.identification.model_errors import MODEL_ERRORS, model_errors, with_model_error
-from ringbalance.identification.parameters import FitError, Parameter, scene_parameter
+from ringbalance.identification.parameters import FitError, Parameter, scene_parameter, unknown_name
 from ringbalance.identification.predict.device import Models, models_of
 from ringbalance.identification.predict.kinds import PREDICTED
+from ringbalance.scene.eccentric_models import EccentricScene
+from ringbalance.scene.keys.eccentric_schema import ECCENTRIC_MASS
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.uncertain import (
     NORMAL_95,
     UNCERTAIN_QUANTITIES,
     eccentric_value,
+    eccentric_with,
     half_widths,
     nominal_value,
     shifted,
@@ -29,6 +28,8 @@ from ringbalance.scene.uncertain import (
 
 _LITTLE: Final = 1e-4
 """Of a quantity, or in SI units where it is zero."""
+_REACH: Final = 30.0
+"""Factor up to which a value is looked for."""
 
 
 def models_for(scene: AnyScene) -> Models | None:
@@ -42,7 +43,7 @@ def parameters_for(scene: AnyScene, names: Sequence[str]) -> tuple[Parameter, ..
         raise FitError("name at least one parameter, and each once")
     if isinstance(scene, Scene):
         return tuple(scene_parameter(scene, name) for name in names)
-    return tuple(eccentric_parameter(scene, name) for name in names)
+    return tuple(_eccentric_parameter(scene, name) for name in names)
 
 
 def informed(scene: AnyScene, data: Sequence[Observations]) -> list[str]:
@@ -61,7 +62,7 @@ def held_for(scene: AnyScene, fitted: Sequence[str]) -> dict[str, float]:
 
 def _widths(scene: AnyScene) -> Mapping[str, float]:
     """Expanded uncertainties (95 %), SI."""
-    return half_widths(scene) if isinstance(scene, Scene) else eccentric_widths(scene)
+    return half_widths(scene) if isinstance(scene, Scene) else _eccentric_widths(scene)
 
 
 def _values(scene: AnyScene) -> dict[str, float]:
@@ -81,7 +82,7 @@ def both_sides(scene: AnyScene, name: str, change: float) -> tuple[AnyScene, Any
 
 def _changed(scene: AnyScene, name: str, change: float) -> AnyScene:
     if not isinstance(scene, Scene):
-        return eccentric_shifted(scene, name, change)
+        return _eccentric_shifted(scene, name, change)
     if name in MODEL_ERRORS:
         return with_model_error(scene, name, change)
     return shifted(scene=scene, quantity=name, change=change)
@@ -97,3 +98,57 @@ def exact_for(scene: AnyScene, fitted: Sequence[str]) -> list[str]:
     """Quantities that are neither fitted nor stated as uncertain."""
     known = {*_widths(scene), *fitted}
     return [name for name in _values(scene) if name not in known]
+
+
+def fitted_names(scene: EccentricScene) -> tuple[str, ...]:
+    """All that can be fitted."""
+    found: list[str] = []
+    for table, content in ECCENTRIC_MASS.tables.items():
+        for key in (name for name, declared in content.keys.items() if declared.uncertain):
+            value = getattr(getattr(scene, table), key)
+            found += (
+                [f"{table}.{key}[{i}]" for i in (0, 1)] if isinstance(value, tuple) else [f"{table}.{key}"]
+            )
+    return tuple(found)
+
+
+def _eccentric_parameter(scene: EccentricScene, name: str) -> Parameter:
+    """A quantity by its path, such as "rotor.damping"; a list's entries by "masses.friction_arm[0]".
+
+    Raises: FitError: no such quantity, or a value that is zero.
+    """
+    if name not in fitted_names(scene):
+        raise unknown_name(name, fitted_names(scene))
+    start, is_angle = eccentric_value(scene, name), name == "imbalance.phase"
+    if start <= 0 and not is_angle:
+        raise FitError(f"{name} is zero: give a value above zero to fit it")
+    width = _eccentric_widths(scene).get(name)
+    low, high = (start - math.pi, start + math.pi) if is_angle else (start / _REACH, start * _REACH)
+    return Parameter(
+        name=name,
+        symbol=name,
+        start=start,
+        lowest=low,
+        highest=high,
+        prior=width / NORMAL_95 if width else None,
+        scale=1.0 if is_angle else None,
+        change=partial(eccentric_with, name=name),
+    )
+
+
+def _eccentric_widths(scene: EccentricScene) -> dict[str, float]:
+    """Expanded uncertainties (95 %) that the scene states, SI."""
+    stated = {each.quantity: each for each in scene.uncertainty}
+    widths = {
+        name: stated[path].absolute(eccentric_value(scene, name))
+        for name in fitted_names(scene)
+        if (path := name.split("[")[0]) in stated
+    }
+    return {name: width for name, width in widths.items() if width > 0}
+
+
+def _eccentric_shifted(scene: EccentricScene, name: str, change: float) -> EccentricScene:
+    """The scene with one value changed, as far as a machine can have it."""
+    value = eccentric_value(scene, name)
+    moved = value + change if name == "imbalance.phase" else max(value + change, 0.1 * value)
+    return eccentric_with(scene, moved, name=name)

@@ -9,7 +9,7 @@ from functools import partial
 from types import MappingProxyType
 from typing import Any, Final, Literal
 
-from ringbalance.identification.data.columns import dimension_of, split_head
+from ringbalance.identification.data.tables import dimension_of, split_head
 from ringbalance.scene.faults import did_you_mean
 from ringbalance.scene.units import DIMENSIONS, FieldError
 

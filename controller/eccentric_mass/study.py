@@ -26,11 +26,7 @@ from ringbalance.controller.eccentric_mass.uncertainty import (
     lost,
     moved_runs,
 )
-from ringbalance.controller.tuning.eccentric import (
-    EccentricTuning,
-    eccentric_tuning_document,
-    tune_eccentric,
-)
+from ringbalance.controller.tuning.eccentric import EccentricTuning, eccentric_tuning_document, tune_eccentric
 from ringbalance.scene.eccentric_models import EccentricScene
 
 _AT_LEAST: Final = "at least"

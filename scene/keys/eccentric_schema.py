@@ -7,14 +7,7 @@ from types import MappingProxyType
 from ringbalance.scene import eccentric_control_models as control
 from ringbalance.scene import eccentric_models as machine
 from ringbalance.scene.keys.declaration import needed
-from ringbalance.scene.keys.schema import (
-    RUN,
-    Schema,
-    table_of,
-    top_keys,
-    uncertainty_by_table,
-    with_origins,
-)
+from ringbalance.scene.keys.schema import RUN, Schema, table_of, top_keys, uncertainty_by_table, with_origins
 
 _ECCENTRIC = {
     "rotor": table_of(machine.EccentricRotor, "the rotor on its bearing, and its speed"),

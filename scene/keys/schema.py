@@ -9,15 +9,7 @@ from typing import Any, Literal, get_args
 
 from ringbalance.scene import loop_models, models
 from ringbalance.scene.chamber_file.keys import MeshKeys
-from ringbalance.scene.keys.declaration import (
-    Entries,
-    Key,
-    Presence,
-    derived,
-    keys_of,
-    standard,
-    unused,
-)
+from ringbalance.scene.keys.declaration import Entries, Key, Presence, derived, keys_of, standard, unused
 from ringbalance.scene.keys.fields import Bounds, Reader, choice, half_width, share, text
 from ringbalance.scene.measured import Measured
 from ringbalance.scene.origins import Origin

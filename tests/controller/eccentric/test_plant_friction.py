@@ -24,8 +24,7 @@ from ringbalance.controller.eccentric_mass.plant.friction import (
     angular_accelerations,
     motions,
 )
-from ringbalance.controller.eccentric_mass.plant.held import held_step
-from ringbalance.controller.eccentric_mass.plant.integrate import plant_step
+from ringbalance.controller.eccentric_mass.plant.integrate import held_step, plant_step
 from ringbalance.controller.eccentric_mass.plant.open_loop import run_steps
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
 from ringbalance.controller.eccentric_mass.plant.plant import (

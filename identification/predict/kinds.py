@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import cmath
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -17,8 +17,10 @@ from ringbalance.controller.eccentric_mass.plant.parameters import plant_paramet
 from ringbalance.controller.eccentric_mass.plant.whirl import steady_whirl
 from ringbalance.controller.rotor import influence
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.predict import injections, positionings
 from ringbalance.identification.predict.device import Device, Models, device_of
+from ringbalance.identification.predict.injections import INJECTION
+from ringbalance.identification.predict.positionings import POSITIONING
+from ringbalance.identification.predict.predicted import PredictedKind, always, numbers
 from ringbalance.identification.predict.vibration import parts, spread_out, vector_covariance, vectors
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.tube.state import tube_state
@@ -27,7 +29,6 @@ from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.tube_models import FINEST_MODELS
-from ringbalance.scene.uncertain import NORMAL_95
 
 _ROUNDS: Final = 12
 _STEP: Final = 1e-4
@@ -36,55 +37,9 @@ _DONE: Final = 1e-6
 """Change of ln u after which the next one, its square, is round-off."""
 
 
-def _never(_scene: Any, _observations: Observations) -> str:
-    return ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class PredictedKind:
-    """How one kind of data is predicted; a vibration counts as its real and its imaginary part."""
-
-    predict: Callable[[Any, Observations, Any], FloatArray]
-    """Scene, observations and models to what was measured."""
-    measured: Callable[[Observations], FloatArray]
-    covariance: Callable[[Observations], FloatArray]
-    """Of the errors of `measured`; unit where the noise is to be estimated."""
-    noise_given: Callable[[Observations], bool]
-    column: Callable[[Observations], str]
-    """The measured column whose noise it is."""
-    informs: Callable[[Observations], tuple[str, ...]]
-    """Parameters that are fitted to such data where the user names none."""
-    free: Callable[[Observations], FloatArray] | None = None
-    """Effect of unknowns that are no parameters, such as the vibration without trial weight, one column
-    each."""
-    too_long: Callable[[Any, Observations], str] = _never
-    """Scene and observations to why predictions would take too long; empty where they do not."""
-
-
-def _always(*names: str) -> Callable[[Observations], tuple[str, ...]]:
-    return lambda _: names
-
-
 def _by_scene_alone(predict: Callable[[Any, Observations], FloatArray]) -> Callable[..., FloatArray]:
     """A prediction that takes no models."""
     return lambda scene, observations, _: predict(scene, observations)
-
-
-def _scalar_covariance(observations: Observations, column: str) -> FloatArray:
-    """Of errors that are independent from row to row, shape (n, n); unit where their noise is not given."""
-    given = observations.uncertainty.get(column)
-    return np.diag(np.ones(len(observations)) if given is None else (given / NORMAL_95) ** 2)
-
-
-def _numbers(column: Callable[[Observations], str], **declared: Any) -> PredictedKind:
-    """One measured number a row, its errors independent from row to row."""
-    return PredictedKind(
-        measured=lambda observations: observations.columns[column(observations)],
-        covariance=lambda observations: _scalar_covariance(observations, column(observations)),
-        noise_given=lambda observations: column(observations) in observations.uncertainty,
-        column=column,
-        **declared,
-    )
 
 
 def _vibrations(predict: Callable[[Any, Observations], FloatArray], **declared: Any) -> PredictedKind:
@@ -221,39 +176,25 @@ PREDICTED: Final[Mapping[str, PredictedKind]] = MappingProxyType(
     {
         "trial_weight": _vibrations(
             _trial_changes,
-            informs=_always("influence_coefficient", "lag_angle"),
+            informs=always("influence_coefficient", "lag_angle"),
             free=_effect_of_starts,
         ),
-        "trial_amplitude": _numbers(
+        "trial_amplitude": numbers(
             lambda _: "amplitude",
             predict=_by_scene_alone(_trial_amplitudes),
-            informs=_always("influence_coefficient", "initial_amplitude", "initial_phase"),
+            informs=always("influence_coefficient", "initial_amplitude", "initial_phase"),
         ),
-        "injection": PredictedKind(
-            predict=injections.predict,
-            measured=injections.measured,
-            covariance=injections.covariance,
-            noise_given=injections.noise_given,
-            column=lambda _: "amplitude_after",
-            informs=_always("lambda_factor", "bore", "extra_loss"),
-        ),
-        "transfer": _numbers(
-            _transferred_column, predict=_transferred, informs=_always("bore", "extra_loss")
-        ),
-        "flow": _numbers(lambda _: "flow_rate", predict=_flow_rates, informs=_always("bore", "extra_loss")),
-        "pressure": _numbers(
-            lambda _: "pressure", predict=_by_scene_alone(_pressures), informs=_always("density")
+        "injection": INJECTION,
+        "transfer": numbers(_transferred_column, predict=_transferred, informs=always("bore", "extra_loss")),
+        "flow": numbers(lambda _: "flow_rate", predict=_flow_rates, informs=always("bore", "extra_loss")),
+        "pressure": numbers(
+            lambda _: "pressure", predict=_by_scene_alone(_pressures), informs=always("density")
         ),
         "run_up": _vibrations(
             _steady_whirls,
-            informs=_always("rotor.stiffness", "rotor.damping", "imbalance.mass", "imbalance.phase"),
+            informs=always("rotor.stiffness", "rotor.damping", "imbalance.mass", "imbalance.phase"),
         ),
-        "positioning": _numbers(
-            lambda _: "angle",
-            predict=_by_scene_alone(positionings.predict),
-            informs=positionings.informs,
-            too_long=positionings.too_long,
-        ),
+        "positioning": POSITIONING,
     }
 )
 

@@ -15,7 +15,6 @@ from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.rotor import disc_unbalance, influence
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.predict import injections
 from ringbalance.identification.predict.device import Models, device_of, models_of
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
@@ -197,14 +196,13 @@ def chain(shared: bool) -> Observations:
 def test_errors_of_readings_that_serve_twice(shared: bool) -> None:
     """Against many draws of the readings' errors."""
     data = chain(shared)
-    assert bool(injections.shared_readings(data)) is shared
     random = np.random.default_rng(5)
     if shared:
         errors = random.standard_normal((200_000, 4))
         changes = errors[:, 1:] - errors[:, :-1]
     else:
         changes = np.diff(random.standard_normal((200_000, 3, 2)), axis=2)[:, :, 0]
-    np.testing.assert_allclose(injections.covariance(data)[:3, :3], np.cov(changes.T), atol=0.03)
+    np.testing.assert_allclose(PREDICTED["injection"].covariance(data)[:3, :3], np.cov(changes.T), atol=0.03)
 
 
 def test_a_stated_noise_of_amplitude_and_phase() -> None:

@@ -25,7 +25,7 @@ from ringbalance.scene.describe import usual_unit
 from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.keys.schema import LIQUID_RING, ORIGIN, Schema
 from ringbalance.scene.loader import scene_from
-from ringbalance.scene.measured import MeasuredFile, MeasuredFinding
+from ringbalance.scene.origins import MeasuredFile, MeasuredFinding
 from ringbalance.scene.platform.files import write_whole
 from ringbalance.scene.toml_writing import toml_bytes
 from ringbalance.scene.units import DIMENSIONS, format_quantity, unit_of

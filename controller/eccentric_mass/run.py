@@ -9,10 +9,9 @@ import numpy as np
 
 from ringbalance.controller.eccentric_mass.estimation.imbalance_model import euler_step_limit
 from ringbalance.controller.eccentric_mass.plant.open_loop import Progress
-from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters, steady_whirl
 from ringbalance.controller.eccentric_mass.plant.speed import profile_arrays
 from ringbalance.controller.eccentric_mass.plant.substep_limit import check_substeps
-from ringbalance.controller.eccentric_mass.plant.whirl import steady_whirl
 from ringbalance.controller.eccentric_mass.remedies import expected_deviation, remedies_of
 from ringbalance.controller.eccentric_mass.run_loop import Record, recorded, sample_count
 from ringbalance.controller.eccentric_mass.run_record import (
@@ -26,7 +25,6 @@ from ringbalance.controller.eccentric_mass.strategy.plan import RELEASED, STAGE_
 from ringbalance.controller.eccentric_mass.strategy.records import StrategySettings
 from ringbalance.controller.eccentric_mass.strategy.settings import believed_whirl, strategy_settings
 from ringbalance.controller.eccentric_mass.strategy.targets import Targets, target_angles
-from ringbalance.controller.judgement import settling_time
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.eccentric_models import EccentricScene
 
@@ -129,7 +127,7 @@ def _facts(
         amplitude=amplitude,
         left=_left(record, amplitude, scene.supervisor.limit),
         innovation=innovation,
-        settling_time=settling_time(time=time, amplitude=amplitude, limit=scene.supervisor.limit),
+        settling_time=_settling_time(time=time, amplitude=amplitude, limit=scene.supervisor.limit),
         deviation=float(np.sqrt(np.max(np.linalg.eigvalsh(record.imbalance_covariance[-1])))),
         imbalance=float(np.hypot(*record.imbalance[-1])),
         saturation=float(np.count_nonzero(at_limit)) * scene.sensor.step,
@@ -178,3 +176,12 @@ def _unbalanced(scene: EccentricScene, speed: float) -> float:
     if speed == 0:
         return 0.0
     return abs(steady_whirl(plant_parameters(scene), speed, scene.masses.initial_angle))
+
+
+def _settling_time(*, time: FloatArray, amplitude: FloatArray, limit: float) -> float | None:
+    """Recorded instant from which on the amplitude is not above the limit to the end; None: it ends above."""
+    above = np.flatnonzero(amplitude > limit)
+    if above.size == 0:
+        return float(time[0])
+    last = int(above[-1])
+    return None if last == time.size - 1 else float(time[last + 1])

@@ -13,8 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
-from ringbalance.controller.eccentric_mass.plant.whirl import steady_whirl
+from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters, steady_whirl
 from ringbalance.controller.rotor import influence
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.predict.device import Device, Models, device_of

@@ -13,9 +13,12 @@ import numpy as np
 
 from ringbalance.controller.eccentric_mass.plant.friction import LOCKED, STUCK
 from ringbalance.controller.eccentric_mass.plant.integrate import plant_step, substeps
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import (
+    PlantParameters,
+    plant_parameters,
+    steady_whirl,
+)
 from ringbalance.controller.eccentric_mass.plant.plant import rest_state
-from ringbalance.controller.eccentric_mass.plant.whirl import steady_whirl
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.predict.predicted import numbers
 from ringbalance.scene.arrays import FloatArray, IntArray

@@ -15,8 +15,9 @@ import numpy as np
 
 from ringbalance.scene.arrays import IntArray
 from ringbalance.scene.chamber_file.abaqus_file import read_abaqus
-from ringbalance.scene.chamber_file.assembly import Body, assembled, drawing_nodes
+from ringbalance.scene.chamber_file.assembly import Body, assembled
 from ringbalance.scene.chamber_file.contents import Contents, MeshFileError, unreadable
+from ringbalance.scene.chamber_file.elements import dimension
 from ringbalance.scene.chamber_file.gmsh_file import read_gmsh
 from ringbalance.scene.chamber_file.keys import MeshKeys, MeshUnit
 from ringbalance.scene.chamber_file.names import boundaries_of
@@ -123,7 +124,7 @@ def _chamber(reading: Reading) -> tuple[ChamberGeometry, Placed]:
     axis, middle = reading.values["disc.mesh_axis"], reading.values.get("disc.mesh_middle")
     found, misplaced = placed(body, boundaries, facets.nodes[facets.outer], axis=axis, middle=middle)
     everything = [
-        *topology_findings(body, facets, drawing_nodes=drawing_nodes(contents)),
+        *topology_findings(body, facets, drawing_nodes=_drawing_nodes(contents)),
         *misshapen,
         *misnamed,
         *misplaced,
@@ -270,3 +271,9 @@ def _misfit(
         values["tube.port_radius"] = sized["outer_radius"] if port is None else factor * port
     fault = next(failed_checks(reading.adding(values), SIZE_CHECKS), None)
     return None if fault is None else f"[{fault.table}] {fault.key} = {fault.value}: {fault.problem}"
+
+
+def _drawing_nodes(contents: Contents) -> IntArray:
+    """Numbers of nodes that points and lines of the drawing have, such as centres of arcs."""
+    lower = [block.nodes.ravel() for block in contents.blocks if dimension(block.kind) < 2]
+    return np.concatenate([np.empty(0, dtype=np.int64), *lower])

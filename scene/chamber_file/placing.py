@@ -12,7 +12,7 @@ import numpy as np
 
 from ringbalance.scene.arrays import FloatArray, IntArray, clipped
 from ringbalance.scene.chamber_file.assembly import Body
-from ringbalance.scene.chamber_file.facets import corners_of, edges_of
+from ringbalance.scene.chamber_file.elements import corners_of, edges_of
 from ringbalance.scene.chamber_file.keys import Axis
 from ringbalance.scene.chamber_file.names import PORT
 from ringbalance.scene.chamber_file.record import OUTER_WALL
@@ -67,10 +67,10 @@ def placed(
         "plate_thickness": 0.0,
     }
     found = [*_about_axis(body, inner, outer, extent, where), *_walls(points, boundaries)]
-    return Placed(points=points, dimensions=rounded(dimensions)), tuple(found)
+    return Placed(points=points, dimensions=_rounded(dimensions)), tuple(found)
 
 
-def rounded(dimensions: Mapping[str, float]) -> dict[str, float]:
+def _rounded(dimensions: Mapping[str, float]) -> dict[str, float]:
     """Dimensions to as many digits as a file's rounding leaves."""
     return {key: float(f"{value:.{_DIGITS}g}") for key, value in dimensions.items()}
 

@@ -11,8 +11,7 @@ from ringbalance.scene import loop_models, models
 from ringbalance.scene.chamber_file.keys import MeshKeys
 from ringbalance.scene.keys.declaration import Entries, Key, Presence, derived, keys_of, standard, unused
 from ringbalance.scene.keys.fields import Bounds, Reader, choice, half_width, share, text
-from ringbalance.scene.measured import Measured
-from ringbalance.scene.origins import Origin
+from ringbalance.scene.origins import Measured, Origin
 
 Balancer = Literal["liquid_ring", "eccentric_mass"]
 BALANCERS: tuple[str, ...] = get_args(Balancer)

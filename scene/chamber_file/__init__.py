@@ -2,5 +2,6 @@
 
 `loading` goes through it all.  A format is a reader of its own that gives `contents.Contents`, entered in
 `loading`; a name of a boundary stands in `names.MEANINGS`; what can be wrong with cells as a whole is
-`topology`, with one cell `shape`, with its place about the shaft `placing`.
+`topology`, with one cell `shape`, with its place about the shaft `placing`, with the scene's other keys
+`fitting`.
 """

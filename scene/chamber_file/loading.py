@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final, get_args
+from typing import Any, Final
 
 import numpy as np
 
@@ -18,15 +18,13 @@ from ringbalance.scene.chamber_file.abaqus_file import read_abaqus
 from ringbalance.scene.chamber_file.assembly import Body, assembled
 from ringbalance.scene.chamber_file.contents import Contents, MeshFileError, unreadable
 from ringbalance.scene.chamber_file.elements import dimension
+from ringbalance.scene.chamber_file.fitting import PORT_RADIUS, unfitting
 from ringbalance.scene.chamber_file.gmsh_file import read_gmsh
-from ringbalance.scene.chamber_file.keys import MeshKeys, MeshUnit
+from ringbalance.scene.chamber_file.keys import MeshKeys
 from ringbalance.scene.chamber_file.names import boundaries_of
 from ringbalance.scene.chamber_file.placing import (
     Placed,
-    covered_findings,
-    opening_findings,
     placed,
-    port_findings,
     port_radius,
 )
 from ringbalance.scene.chamber_file.record import ChamberGeometry
@@ -36,22 +34,16 @@ from ringbalance.scene.chamber_file.topology import facets_of, topology_findings
 from ringbalance.scene.chamber_file.vtu_file import read_vtu
 from ringbalance.scene.faults import Fault
 from ringbalance.scene.keys.declaration import keys_of
-from ringbalance.scene.keys.derivations import even_number_of_chambers
 from ringbalance.scene.keys.reading import Reading
-from ringbalance.scene.rules.check import Finding, failed_checks, written
-from ringbalance.scene.rules.shape import SIZE_CHECKS
+from ringbalance.scene.rules.check import Finding
 from ringbalance.scene.uncertain import SHAPE
 from ringbalance.scene.units import DIMENSIONS
 
-_PORT: Final = "tube.port_radius"
 _LARGEST_FILE: Final = 2**28
 _READERS: Final[Mapping[str, Callable[[bytes], Contents]]] = MappingProxyType(
     {".msh": read_gmsh, ".inp": read_abaqus, ".vtu": read_vtu}
 )
 FORMATS: Final = "a mesh of Gmsh 2.2 or 4.1 (.msh), Abaqus (.inp) or VTK (.vtu), or a solid (.step, .stp)"
-_LARGEST, _SMALLEST = 5.0, 1e-3
-"""Outer radii, m, beyond which no balancing disc is built."""
-_LENGTHS: Final = ("outer_radius", "inner_radius", "axial_width")
 
 
 def with_chamber(reading: Reading) -> tuple[Reading, tuple[Fault, ...]]:
@@ -105,8 +97,8 @@ def _unit_faults(reading: Reading) -> Iterator[Fault]:
 def _following(reading: Reading, geometry: ChamberGeometry, found: Placed) -> Reading:
     values: dict[str, Any] = {f"disc.{key}": value for key, value in found.dimensions.items()}
     port = port_radius(found.points, geometry.boundaries)
-    if port is not None and reading.lacks(_PORT):
-        values[_PORT] = port
+    if port is not None and reading.lacks(PORT_RADIUS):
+        values[PORT_RADIUS] = port
     return reading.following({**values, "disc.geometry": geometry})
 
 
@@ -128,42 +120,12 @@ def _chamber(reading: Reading) -> tuple[ChamberGeometry, Placed]:
         *misshapen,
         *misnamed,
         *misplaced,
-        *_unfitting(reading, body, found, boundaries, unit),
+        *unfitting(reading, body, found, boundaries, unit),
     ]
     if everything:
         raise MeshFileError(everything)
     size = reading.values["accuracy.tolerance"] if _is_step(path) else 0.0
     return _record(name, content, body, boundaries, found, (unit, axis, middle, size)), found
-
-
-def _unfitting(
-    reading: Reading, body: Body, found: Placed, boundaries: dict[str, IntArray], unit: str
-) -> Iterator[Finding]:
-    """What does not fit between the mesh and other keys of the scene."""
-    extent = found.dimensions["central_angle"]
-    if reading.lacks("disc.chambers") and even_number_of_chambers(extent) is None:
-        problem = f"chambers is needed: the mesh takes {written(extent, 'deg')}, no even part of 360 deg"
-        yield Finding(problem=problem, allowed="chambers in [disc]")
-    chambers = reading.values.get("disc.chambers") or even_number_of_chambers(extent)
-    if chambers is not None:
-        yield from opening_findings(body, found.points, chambers=chambers)
-    port, own = reading.values.get(_PORT), port_radius(found.points, boundaries)
-    wrong = tuple(_scale_findings(reading, found.dimensions, unit=unit, port=own))
-    if wrong:
-        yield from wrong
-        return
-    if port is not None:
-        yield from port_findings(found.points, boundaries, found.dimensions, port=port)
-    radii = {
-        "port_radius": port or own,
-        "inlet_radius": reading.values.get("gas.inlet_radius"),
-    }
-    yield from covered_findings(
-        body,
-        found.points,
-        radii={name: value for name, value in radii.items() if value is not None},
-        fill=reading.values.get("disc.max_fill_ratio", 0.5),
-    )
 
 
 def _record(
@@ -229,48 +191,6 @@ def _contents_of(path: Path, content: bytes, *, tolerance: float) -> Contents:
     if _is_step(path):
         return meshed_step(content, tolerance=tolerance)
     return _READERS[path.suffix.lower()](content)
-
-
-def _scale_findings(
-    reading: Reading, dimensions: Mapping[str, float], *, unit: str, port: float | None
-) -> Iterator[Finding]:
-    """Lengths of the scene that no chamber of this size has, and the units in which they would fit.
-
-    A length that fits no unit is an error of its own, not one of scale.
-    Args: `dimensions`: of the mesh in `unit`, SI. `port`: radius of its boundary of that name, m.
-    """
-
-    def misfit(other: str) -> str | None:
-        units = DIMENSIONS["length"].units
-        return _misfit(reading, dimensions, factor=float(units[other].factor / units[unit].factor), port=port)
-
-    reason = misfit(unit)
-    fitting = [name for name in get_args(MeshUnit) if misfit(name) is None]
-    inner, outer = dimensions["inner_radius"], dimensions["outer_radius"]
-    if reason is None or (not fitting and _SMALLEST <= outer <= _LARGEST):
-        return
-    problem = f'in "{unit}" the chamber reaches from {written(inner, "mm")} to {written(outer, "mm")}: '
-    allowed = " or ".join(f'mesh_unit = "{name}"' for name in fitting)
-    if not reading.given("disc.mesh_unit"):
-        allowed = " or ".join(f'a STEP file in "{name}"' for name in fitting)
-    yield Finding(
-        problem=f"{problem}wrong scale; {reason}",
-        allowed=allowed or f"an outer radius of {_SMALLEST:g} m to {_LARGEST:g} m",
-    )
-
-
-def _misfit(
-    reading: Reading, dimensions: Mapping[str, float], *, factor: float, port: float | None
-) -> str | None:
-    """Why a chamber so many times as large cannot be; None where it can."""
-    sized = {key: value * (factor if key in _LENGTHS else 1.0) for key, value in dimensions.items()}
-    if not _SMALLEST <= sized["outer_radius"] <= _LARGEST:
-        return "no disc is of that size"
-    values = {f"disc.{key}": value for key, value in sized.items()}
-    if reading.lacks("tube.port_radius"):
-        values["tube.port_radius"] = sized["outer_radius"] if port is None else factor * port
-    fault = next(failed_checks(reading.adding(values), SIZE_CHECKS), None)
-    return None if fault is None else f"[{fault.table}] {fault.key} = {fault.value}: {fault.problem}"
 
 
 def _drawing_nodes(contents: Contents) -> IntArray:

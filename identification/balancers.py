@@ -8,10 +8,13 @@ from dataclasses import replace
 from functools import partial
 from typing import Final
 
+import numpy as np
+
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.parameters import FitError, Parameter, scene_parameter, unknown_name
 from ringbalance.identification.predict.device import Models, models_of
 from ringbalance.identification.predict.kinds import PREDICTED
+from ringbalance.identification.result import FitResult
 from ringbalance.physics.tube.uncertainty import MODEL_CAUSES
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.keys.eccentric_schema import ECCENTRIC_MASS
@@ -107,16 +110,27 @@ def _changed(scene: AnyScene, name: str, change: float) -> AnyScene:
     return shifted(scene=scene, quantity=name, change=change)
 
 
-def nearby(scene: AnyScene, name: str) -> AnyScene:
+def _nearby(scene: AnyScene, name: str) -> AnyScene:
     """The scene with one of its quantities a little lower, or a little above zero."""
     value = _values(scene)[name]
     return _changed(scene, name, -_LITTLE * abs(value) if value else _LITTLE)
 
 
-def exact_for(scene: AnyScene, fitted: Sequence[str]) -> list[str]:
+def _exact_for(scene: AnyScene, fitted: Sequence[str]) -> list[str]:
     """Quantities that are neither fitted nor stated as uncertain."""
     known = {*_widths(scene), *fitted}
     return [name for name in _values(scene) if name not in known]
+
+
+def exact_inputs(result: FitResult) -> list[str]:
+    """Quantities that the predictions depend on, and that are neither fitted nor stated as uncertain."""
+    problem, t = result.optimum.residuals.problem, result.optimum.t
+    fitted, predicted = [parameter.name for parameter in result.parameters], problem.at(t)
+    return [
+        name
+        for name in _exact_for(problem.scene, fitted)
+        if np.any(replace(problem, scene=_nearby(problem.scene, name)).at(t) != predicted)
+    ]
 
 
 def fitted_names(scene: EccentricScene) -> tuple[str, ...]:

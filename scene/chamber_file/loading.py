@@ -22,11 +22,7 @@ from ringbalance.scene.chamber_file.fitting import PORT_RADIUS, unfitting
 from ringbalance.scene.chamber_file.gmsh_file import read_gmsh
 from ringbalance.scene.chamber_file.keys import MeshKeys
 from ringbalance.scene.chamber_file.names import boundaries_of
-from ringbalance.scene.chamber_file.placing import (
-    Placed,
-    placed,
-    port_radius,
-)
+from ringbalance.scene.chamber_file.placing import Placed, placed, port_radius
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.chamber_file.shape import oriented
 from ringbalance.scene.chamber_file.step_file import STEP_ENDINGS, STEP_UNIT, meshed_step

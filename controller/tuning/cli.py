@@ -24,8 +24,7 @@ from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.narrowing import checked_law
-from ringbalance.scene.platform.progress import activity
-from ringbalance.scene.platform.terminal import results_console
+from ringbalance.scene.platform.terminal import activity, results_console
 
 TUNED = 0
 NOT_TUNED = 1

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.uncertainty import DRAWS
+from ringbalance.controller.eccentric_mass.study import DRAWS
 from ringbalance.reports import summary
 from ringbalance.reports.figures.eccentric import (
     DEVIATIONS,

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +11,7 @@ from typing import Any
 import pytest
 from check_traces import traces, untrue
 
-from ringbalance.reports import eccentric_evidence
+from ringbalance.reports import evidence as evidence_module
 from ringbalance.reports.eccentric_evidence import parameters
 from ringbalance.reports.figures.eccentric import sampled_poles
 from ringbalance.reports.pages.eccentric_scene import SECTIONS
@@ -23,12 +21,6 @@ from ringbalance.scene import bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.eccentric_models import EccentricScene
 
 Record = dict[str, Any]
-
-
-@contextmanager
-def no_cases(*_: Any, **__: Any) -> Iterator[Iterator[Any]]:
-    """In place of the paper's claims, which have tests of their own."""
-    yield iter(())
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +39,8 @@ def scene() -> EccentricScene:
 def folder(scene: EccentricScene, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("report")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(eccentric_evidence, "cases_under_way", no_cases)
+        # The claims of its paper have tests of their own.
+        patch.setattr(evidence_module, "load_cases", tuple)
         write_report(scene, out, scene_text='name = "small"\n')
     return out
 

@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 from closed_loop_plain import Plain, plain_run
 
-from ringbalance.controller.ensemble.compiled_transfer import linear_fill
 from ringbalance.controller.ensemble.monte_carlo import (
     ensemble_transfer,
     simulate_ensemble,
@@ -19,6 +18,7 @@ from ringbalance.controller.ensemble.monte_carlo import (
 )
 from ringbalance.controller.ensemble.run import ensemble_plan
 from ringbalance.controller.ensemble.samples import members_alike
+from ringbalance.controller.ensemble.transfer import linear_fill
 from ringbalance.controller.liquid_ring.closed_form import closed_form, has_closed_form
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Drive

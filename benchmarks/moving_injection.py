@@ -25,9 +25,8 @@ from ringbalance.controller.compilation.compiled import in_place
 from ringbalance.controller.ensemble.compiled_motion import begin
 from ringbalance.controller.ensemble.transfer import RELATIVE_ERROR
 from ringbalance.controller.formulas.gas_flow import flow_shape
-from ringbalance.controller.liquid_ring.column import lift_of
 from ringbalance.controller.liquid_ring.compiled_march import advance, command
-from ringbalance.controller.liquid_ring.motion import Dynamics
+from ringbalance.controller.liquid_ring.motion import Dynamics, lift_of
 from ringbalance.controller.liquid_ring.records import MOTION, WORKSPACE
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.calibration import calibrate

@@ -17,9 +17,9 @@ import cmath
 import math
 from dataclasses import dataclass, replace
 
+from ringbalance.controller.eccentric_mass.plant.parameters import influence as rotor_influence
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
 from ringbalance.controller.eccentric_mass.plant.speed import profile_arrays, speed_at
-from ringbalance.controller.eccentric_mass.plant.whirl import influence as rotor_influence
 from ringbalance.controller.rotor import influence, initial_unbalance, wrapped
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.scene.eccentric_models import EccentricRotor, EccentricScene, SpeedPoint

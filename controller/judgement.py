@@ -1,4 +1,4 @@
-"""Overshoots, misadjustments and settling, from what was sampled and what was true."""
+"""Overshoots and misadjustments, from what was sampled."""
 
 from __future__ import annotations
 
@@ -7,12 +7,9 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Final
 
-import numpy as np
-
 from ringbalance.controller.algorithms.algorithm import Measurement, usable
 from ringbalance.controller.formulas.stopping import has_risen, has_turned
 from ringbalance.controller.simulation import Sample
-from ringbalance.scene.arrays import FloatArray
 
 ROUND_OFF: Final = 1e-9
 """Relative to the initial amplitude: a smaller rise is arithmetic."""
@@ -38,7 +35,7 @@ def rose(before: Measurement, after: Measurement, *, floor: float) -> bool:
     return has_risen(before.amplitude, after.amplitude, floor)
 
 
-def turned(before: Measurement, after: Measurement, *, limit: float) -> bool:
+def _turned(before: Measurement, after: Measurement, *, limit: float) -> bool:
     """Whether the residual turned by more than 90 degrees and is still above the limit.
 
     Args: `before`: earlier sample. `after`: later sample. `limit`: m.
@@ -54,7 +51,7 @@ def overshoots(samples: Sequence[Sample], *, limit: float) -> int:
     Returns: The number.
     """
     seen = [s.measurement for s in samples if usable(s.measurement, needs_phase=True)]
-    return sum(turned(a, b, limit=limit) for a, b in pairwise(seen) if a is not None and b is not None)
+    return sum(_turned(a, b, limit=limit) for a, b in pairwise(seen) if a is not None and b is not None)
 
 
 def misadjustments(samples: Sequence[Sample], *, floor: float) -> int:
@@ -70,12 +67,3 @@ def misadjustments(samples: Sequence[Sample], *, floor: float) -> int:
             before, operated = sample.measurement, False
         operated = operated or bool(sample.command.valves)
     return count
-
-
-def settling_time(*, time: FloatArray, amplitude: FloatArray, limit: float) -> float | None:
-    """Recorded instant from which on the amplitude is not above the limit to the end; None: it ends above."""
-    above = np.flatnonzero(amplitude > limit)
-    if above.size == 0:
-        return float(time[0])
-    last = int(above[-1])
-    return None if last == time.size - 1 else float(time[last + 1])

@@ -19,8 +19,7 @@ from ringbalance.controller.liquid_ring.plant import Advance, DiscState, LiquidR
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Integrator
 from ringbalance.controller.outcome import VERDICTS, Facts, outcome_of, status_text
-from ringbalance.controller.rotor import chamber_letters, disc_unbalance, vibration
-from ringbalance.controller.sensor import Sensor, noisy_sensor
+from ringbalance.controller.rotor import Sensor, chamber_letters, disc_unbalance, noisy_sensor, vibration
 from ringbalance.controller.simulation import Injection, Outcome, Sample, Simulation
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor

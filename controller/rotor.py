@@ -1,4 +1,4 @@
-"""Frames and signs of the closed loop: chamber directions, the disc's unbalance, and the rotor's response.
+"""Frames and signs of the closed loop: chamber directions, the disc's unbalance, rotor's response and sensor.
 
 Chamber A lies at angle 0, angles grow with the rotation, letters go counter-clockwise, and the opposite of
 chamber i is i + n/2.  Vectors are complex numbers in the frame of the disc; amplitudes are zero-to-peak.
@@ -6,18 +6,24 @@ chamber i is i + n/2.  Vectors are complex numbers in the frame of the disc; amp
 
 from __future__ import annotations
 
+import cmath
 import math
+from collections.abc import Callable
 from string import ascii_uppercase
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
+from ringbalance.controller.algorithms.algorithm import Measurement
 from ringbalance.reduced_model.law.model import MomentCurve
+from ringbalance.scene import loop_models
 from ringbalance.scene.arrays import ComplexArray
 from ringbalance.scene.loop_models import Rotor
 
 MAX_CHAMBERS: Final = len(ascii_uppercase)
+Sensor = Callable[[float, complex], Measurement | None]
+"""Takes the time (s) and the vibration (m, complex); None is a dropped sample."""
 
 
 def chamber_letters(chambers: int) -> tuple[str, ...]:
@@ -91,3 +97,21 @@ def vibration(*, rotor: Rotor, moment: npt.ArrayLike) -> ComplexArray:
 def wrapped(angle: float) -> float:
     """The same angle, rad, within (-pi, pi]."""
     return math.atan2(math.sin(angle), math.cos(angle))
+
+
+def noisy_sensor(*, sensor: loop_models.Sensor, seed: int) -> Sensor:
+    """A sensor with independent Gaussian noise on amplitude and phase from numpy's default generator.
+
+    An amplitude that noise would make negative is folded back, as a rectifying instrument shows it.
+    """
+    random = np.random.default_rng(seed)
+
+    def measure(time: float, vibration: complex) -> Measurement:
+        amplitude_noise, phase_noise = random.standard_normal(2)
+        return Measurement(
+            time=time,
+            amplitude=abs(abs(vibration) + sensor.amplitude_noise * float(amplitude_noise)),
+            phase=cmath.phase(vibration) + sensor.phase_noise * float(phase_noise),
+        )
+
+    return measure

@@ -19,8 +19,7 @@ from ringbalance.identification.show import fit_view
 from ringbalance.scene.faults import Fault, SceneError, did_you_mean, option_error
 from ringbalance.scene.loader import read_scene
 from ringbalance.scene.platform.files import check_file
-from ringbalance.scene.platform.progress import activity
-from ringbalance.scene.platform.terminal import messages_console, results_console
+from ringbalance.scene.platform.terminal import activity, messages_console, results_console
 
 DONE, FAILED = 0, 1
 _USAGE = (

@@ -11,7 +11,7 @@ from ringbalance.identification.balancers import both_sides, held_for, informed,
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.identifiability import Combination, Verdict, combinations, verdicts
-from ringbalance.identification.intervals import Profile, covariance, profile, student
+from ringbalance.identification.intervals import Profile, covariance, profiles
 from ringbalance.identification.likelihood import Problem, block_of, held_effects
 from ringbalance.identification.optimisation import Optimum, optimum
 from ringbalance.identification.parameters import FitError, Parameter
@@ -77,10 +77,10 @@ def problem_of(
 def _result(best: Optimum, held: dict[str, float], loss: str) -> FitResult:
     problem, spread = best.residuals.problem, covariance(best.slopes)
     data = best.slopes[: best.slopes.shape[0] - int(np.count_nonzero(problem.with_prior))]
-    profiles = [profile(best, i, float(f), spread) for i, f in enumerate(student(best))]
-    found = verdicts(problem.parameters, best.t, data, profiles)
-    products = combinations(problem.parameters, best.t, data, found, profiles)
-    each = zip(problem.parameters, best.t.tolist(), profiles, found, strict=True)
+    intervals = profiles(best, spread)
+    found = verdicts(problem.parameters, best.t, data, intervals)
+    products = combinations(problem.parameters, best.t, data, found, intervals)
+    each = zip(problem.parameters, best.t.tolist(), intervals, found, strict=True)
     size = np.sqrt(np.diag(spread))
     return FitResult(
         parameters=tuple(_fitted(*one, products) for one in each),

@@ -26,7 +26,8 @@ import numpy as np
 
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.parameters import Parameter
-from ringbalance.identification.predict.kinds import PREDICTED, PredictedKind
+from ringbalance.identification.predict.kinds import PREDICTED
+from ringbalance.identification.predict.predicted import PredictedKind
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 
 STEP: Final = 1e-3

@@ -22,10 +22,8 @@ from ringbalance.scene import liquid_ring_scene, load_scene, read_scene
 from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.faults import option_error
-from ringbalance.scene.platform.clock import since_start
 from ringbalance.scene.platform.files import staged
-from ringbalance.scene.platform.progress import activity
-from ringbalance.scene.platform.terminal import messages_console
+from ringbalance.scene.platform.terminal import activity, messages_console, since_start
 
 DONE: Final = 0
 NOT_SOUND: Final = 1

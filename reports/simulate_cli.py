@@ -24,8 +24,7 @@ from ringbalance.scene.loader import load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene, checked_law
 from ringbalance.scene.platform.files import check_file, write_whole
-from ringbalance.scene.platform.progress import Activity, activity
-from ringbalance.scene.platform.terminal import results_console
+from ringbalance.scene.platform.terminal import Activity, activity, results_console
 
 SETTLED: Final = 0
 NOT_SETTLED: Final = 1

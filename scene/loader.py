@@ -18,12 +18,12 @@ from ringbalance.scene.keys.completion import completed, missing_faults
 from ringbalance.scene.keys.declaration import keys_of
 from ringbalance.scene.keys.reading import Reading, read_document
 from ringbalance.scene.keys.schema import BALANCERS, LIQUID_RING, ORIGIN, Schema
+from ringbalance.scene.liquids import with_liquid
 from ringbalance.scene.models import InputUncertainty
 from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.origins import ShownOrigin
 from ringbalance.scene.rules import shape, working
 from ringbalance.scene.rules.check import failed_checks
-from ringbalance.scene.working_liquid import with_liquid
 
 _LARGEST_FILE = 2**20
 _DECIDE_NOTHING = ("requirement.", "measured.", "rotor.mass", "liquid.source")

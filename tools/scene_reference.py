@@ -12,12 +12,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from ringbalance.scene import known_liquids, write_whole
-from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.faults import toml_text
 from ringbalance.scene.keys.declaration import Entries, Key
 from ringbalance.scene.keys.eccentric_schema import ECCENTRIC_MASS
 from ringbalance.scene.keys.schema import LIQUID_RING, ORIGIN, Schema
-from ringbalance.scene.units import unit_names
+from ringbalance.scene.units import DIMENSIONS, unit_names
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "scene-file.md"
 BLOCK = re.compile(r"<!-- table: (\w+) -->\n.*?<!-- end -->", re.DOTALL)

@@ -17,9 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.controller.rotor import chamber_letters
+from ringbalance.identification.balancers import model_errors, with_model_error
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.fitting import fit
-from ringbalance.identification.model_errors import model_errors, with_model_error
 from ringbalance.identification.predict.device import Models, models_of
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult

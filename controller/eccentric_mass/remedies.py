@@ -15,9 +15,8 @@ from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import (
     start_estimate,
 )
 from ringbalance.controller.eccentric_mass.estimation.imbalance_model import ProcessNoise
-from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import influence, plant_parameters
 from ringbalance.controller.eccentric_mass.plant.substep_limit import longest_run
-from ringbalance.controller.eccentric_mass.plant.whirl import influence
 from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, Remedy, RunFacts
 from ringbalance.controller.eccentric_mass.sampled_loops import recommended_gains
 from ringbalance.controller.eccentric_mass.strategy.plan import Stage

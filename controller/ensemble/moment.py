@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from ringbalance.controller.formulas.path_piece import piece_rise
+from ringbalance.controller.formulas.paths import piece_rise
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 

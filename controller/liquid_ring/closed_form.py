@@ -6,7 +6,7 @@ from typing import Protocol, cast, runtime_checkable
 
 import numpy as np
 
-from ringbalance.controller.formulas.linear_path import linear_course
+from ringbalance.controller.formulas.paths import linear_course
 from ringbalance.controller.liquid_ring.transfer import Drive, Event, Transfer, checked_instants, still
 from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
 from ringbalance.scene.arrays import FloatArray

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.formulas.path_piece import piece_part, piece_rise
+from ringbalance.controller.formulas.paths import piece_part, piece_rise
 from ringbalance.controller.liquid_ring.closed_form import boundary_event
 from ringbalance.controller.liquid_ring.pair_path import FlowPaths, UntabulatedError, flow_paths
 from ringbalance.controller.liquid_ring.transfer import (

@@ -24,8 +24,7 @@ from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.narrowing import checked_law
-from ringbalance.scene.platform.progress import activity
-from ringbalance.scene.platform.terminal import results_console
+from ringbalance.scene.platform.terminal import activity, results_console
 
 TUNED = 0
 NOT_TUNED = 1
@@ -140,7 +139,7 @@ def _rows(tuning: Tuning) -> dict[str, str]:
 def _tried(tuning: Tuning) -> dict[str, str]:
     rows = tuning.search.tried if tuning.search else ()
     return {
-        f"tried {place}": f"{row.change}: {row.settled:.0%} of {row.runs} short runs"
+        f"tried {place}": f"{row.change}: {round(row.settled * row.runs)} of {row.runs} runs"
         for place, row in enumerate(rows, start=1)
     }
 

@@ -20,9 +20,9 @@ from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, advised, recommended_gains
 from ringbalance.controller.eccentric_mass.strategy.plan import STAGE_NAMES, Stage
 from ringbalance.controller.eccentric_mass.strategy.settings import strategy_settings
-from ringbalance.controller.eccentric_mass.uncertainty import drawn_plant
 from ringbalance.controller.tuning.settling import QUANTILES, Progress, SettlingTimes, summary
 from ringbalance.scene.eccentric_models import EccentricScene
+from ringbalance.scene.uncertain import eccentric_drawn
 
 RUNS: Final = 40
 FIRST_RUNS: Final = 16
@@ -110,7 +110,7 @@ def eccentric_settling(scene: EccentricScene, *, runs: int, told: Progress) -> E
 def _one_run(scene: EccentricScene, number: int, *, spans: tuple[float, float]) -> EccentricRun:
     seed = scene.run.seed + number
     random = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(0,)))
-    settings, plant = strategy_settings(scene), drawn_plant(scene, random)
+    settings, plant = strategy_settings(scene), eccentric_drawn(scene, random)
     for span in dict.fromkeys(spans):
         limited = replace(plant, run=replace(plant.run, time_limit=span))
         run = simulate_eccentric(limited, seed=seed, settings=settings)
@@ -161,7 +161,7 @@ def _of_runs(settling: EccentricSettling | None) -> str:
     if slow is not None:
         return f"95 % of {times.runs} runs settle within {slow:.3g} s"
     return (
-        f"{times.settled.value:.1%} of {times.runs} runs settle within {settling.span:.4g} s: 95 % is not "
+        f"{times.told(times.settled.value)} settle within {settling.span:.4g} s: 95 % is not "
         f"reached; most of the others: {settling.advice}"
     )
 

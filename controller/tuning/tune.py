@@ -21,19 +21,9 @@ from ringbalance.controller.tuning.loop_factor import (
     with_driving_gas,
 )
 from ringbalance.controller.tuning.margins import Margins, loop_margins
-from ringbalance.controller.tuning.recommendation import (
-    Contribution,
-    FactorUncertainty,
-    factor_uncertainty,
-)
+from ringbalance.controller.tuning.recommendation import Contribution, FactorUncertainty, factor_uncertainty
 from ringbalance.controller.tuning.search import Candidate, Search, recommended, search, with_ways_out
-from ringbalance.controller.tuning.settling import (
-    MEMBERS,
-    RUNS,
-    Progress,
-    SettlingTimes,
-    settling_times,
-)
+from ringbalance.controller.tuning.settling import MEMBERS, RUNS, Progress, SettlingTimes, settling_times
 from ringbalance.controller.tuning.status import over_capacity, status_of, valves_reach
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.gas_line import LineAnswer, line_answers, line_document

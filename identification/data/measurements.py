@@ -14,23 +14,21 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.identification.data.columns import (
-    column_values,
-    dimension_of,
-    head_fault,
-    name_faults,
-    split_head,
-    texts,
-)
 from ringbalance.identification.data.tables import (
     Table,
+    column_values,
     data_fault,
     decoded,
+    dimension_of,
     file_name,
+    head_fault,
     header_faults,
     in_order,
+    name_faults,
     parse_table,
     read_content,
+    split_head,
+    texts,
 )
 from ringbalance.scene.arrays import BoolArray, FloatArray, StringArray
 from ringbalance.scene.faults import Fault, toml_text

@@ -11,27 +11,25 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.identification.data.columns import (
-    check_unit,
-    column_values,
-    head_fault,
-    name_faults,
-    split_head,
-    texts,
-)
 from ringbalance.identification.data.kinds import AMPLITUDES, KINDS, Column, DataKind, unknown_kind
 from ringbalance.identification.data.measurements import SOURCE_KEYS, series_of, text_faults
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.data.stated import stated_uncertainty
 from ringbalance.identification.data.tables import (
     Table,
+    check_unit,
+    column_values,
     data_fault,
     decoded,
     file_name,
+    head_fault,
     header_faults,
     in_order,
+    name_faults,
     parse_table,
     read_content,
+    split_head,
+    texts,
 )
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import Fault, SceneError, did_you_mean, toml_text

@@ -13,10 +13,14 @@ import numpy as np
 
 from ringbalance.controller.eccentric_mass.plant.friction import LOCKED, STUCK
 from ringbalance.controller.eccentric_mass.plant.integrate import plant_step, substeps
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import (
+    PlantParameters,
+    plant_parameters,
+    steady_whirl,
+)
 from ringbalance.controller.eccentric_mass.plant.plant import rest_state
-from ringbalance.controller.eccentric_mass.plant.whirl import steady_whirl
 from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.predict.predicted import numbers
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.eccentric_models import EccentricScene
 
@@ -26,7 +30,7 @@ _MOST_SUBSTEPS: Final = 20_000
 """Of one call of the plant, some 0.02 s: a signal, such as that of Ctrl-C, acts only between calls."""
 
 
-def predict(scene: EccentricScene, observations: Observations) -> FloatArray:
+def _predict(scene: EccentricScene, observations: Observations, _: object) -> FloatArray:
     """Angles moved, rad, shape (n,), by the plant's equations of motion.
 
     Rows of one series, mass, voltage and speed are one motion.
@@ -43,13 +47,13 @@ def _moved_masses(observations: Observations) -> IntArray:
     return np.asarray(observations.columns.get("moved_mass", np.ones(len(observations))) - 1, dtype=np.int64)
 
 
-def informs(observations: Observations) -> tuple[str, ...]:
+def _informs(observations: Observations) -> tuple[str, ...]:
     """Friction of every mass that moves, and the motor."""
     arms = (f"masses.friction_arm[{mass}]" for mass in sorted(set(_moved_masses(observations).tolist())))
     return (*arms, "motor.torque_constant", "motor.back_emf_constant")
 
 
-def too_long(scene: EccentricScene, observations: Observations) -> str:
+def _too_long(scene: EccentricScene, observations: Observations) -> str:
     """Why these motions would take too long to integrate, as a fit does some hundred times; else empty."""
     plant, times = plant_parameters(scene), observations.columns["time"]
     motions = _motions(observations)
@@ -97,3 +101,6 @@ def _moved(
         now = time
         found[place] = state[4 + mass] - angles[mass]
     return found
+
+
+POSITIONING: Final = numbers(lambda _: "angle", predict=_predict, informs=_informs, too_long=_too_long)

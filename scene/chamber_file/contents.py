@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.rules.check import Finding
-
-_MOST_SHOWN = 4
-"""Entities that one message lists; more are counted."""
 
 
 class MeshFileError(Exception):
@@ -74,20 +71,3 @@ def whole(values: FloatArray, what: str) -> IntArray:
     if not exact.all():
         raise unreadable(f"{what} has a fraction where a whole number belongs: the file is damaged")
     return found
-
-
-def shown(labels: Sequence[str]) -> str:
-    """A few labels, and the number of the others."""
-    few = ", ".join(labels[:_MOST_SHOWN])
-    more = len(labels) - _MOST_SHOWN
-    return f"{few} and {more} more" if more > 0 else few
-
-
-def grouped(
-    kind: str, numbers: IntArray, nodes: IntArray, groups: IntArray, names: dict[int, str]
-) -> Iterator[Elements]:
-    """Elements of one kind by the group that each belongs to; group 0, or one without entry, is no name."""
-    for group in np.unique(groups).tolist():
-        inside = groups == group
-        named = (names[group],) if group in names else ()
-        yield Elements(kind=kind, numbers=numbers[inside], nodes=nodes[inside], names=named)

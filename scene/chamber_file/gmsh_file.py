@@ -18,7 +18,6 @@ from ringbalance.scene.chamber_file.contents import (
     Contents,
     Elements,
     MeshFileError,
-    grouped,
     numbers_in,
     unreadable,
     whole,
@@ -251,7 +250,7 @@ def _named_2(kind: int, tags: int, rows: IntArray, names: Names) -> Iterator[Ele
     groups = np.abs(rows[:, 1]) if tags else np.zeros(len(rows), dtype=np.int64)
     named = {group: _name(names, dimension, group) for group in set(groups.tolist()) if group}
     whole_block = _block(kind, rows[:, 0], rows[:, 1 + tags :], ())
-    yield from grouped(whole_block.kind, whole_block.numbers, whole_block.nodes, groups, named)
+    yield from _grouped(whole_block.kind, whole_block.numbers, whole_block.nodes, groups, named)
 
 
 def _dimension(kind: int) -> int:
@@ -283,3 +282,13 @@ def _contents(numbers: IntArray, places: FloatArray, blocks: list[Elements], nam
     used = {name for block in blocks for name in block.names}
     other = tuple(name for name in names.values() if name not in used)
     return Contents(node_numbers=numbers, coordinates=places, blocks=tuple(blocks), other_names=other)
+
+
+def _grouped(
+    kind: str, numbers: IntArray, nodes: IntArray, groups: IntArray, names: dict[int, str]
+) -> Iterator[Elements]:
+    """Elements of one kind by the group that each belongs to; group 0, or one without entry, is no name."""
+    for group in np.unique(groups).tolist():
+        inside = groups == group
+        named = (names[group],) if group in names else ()
+        yield Elements(kind=kind, numbers=numbers[inside], nodes=nodes[inside], names=named)

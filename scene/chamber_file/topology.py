@@ -13,8 +13,7 @@ from scipy.spatial import cKDTree
 
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.chamber_file.assembly import Body
-from ringbalance.scene.chamber_file.elements import CORNERS
-from ringbalance.scene.chamber_file.facets import corners_of, edges_of, key_of, repeats, sides_of
+from ringbalance.scene.chamber_file.elements import CORNERS, corners_of, edges_of, key_of, repeats, sides_of
 from ringbalance.scene.rules.check import Finding
 
 _SAME: Final = 1e-7

@@ -21,13 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.scene.chamber_file.contents import (
-    Contents,
-    Elements,
-    numbers_in,
-    unreadable,
-    whole,
-)
+from ringbalance.scene.chamber_file.contents import Contents, Elements, numbers_in, unreadable, whole
 from ringbalance.scene.chamber_file.elements import NODES, VTK_KINDS
 from ringbalance.scene.chamber_file.names import KNOWN_NAMES
 

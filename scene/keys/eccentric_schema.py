@@ -2,19 +2,10 @@
 
 from __future__ import annotations
 
-from types import MappingProxyType
-
 from ringbalance.scene import eccentric_control_models as control
 from ringbalance.scene import eccentric_models as machine
 from ringbalance.scene.keys.declaration import needed
-from ringbalance.scene.keys.schema import (
-    RUN,
-    Schema,
-    table_of,
-    top_keys,
-    uncertainty_by_table,
-    with_origins,
-)
+from ringbalance.scene.keys.schema import schema_of, table_of
 
 _ECCENTRIC = {
     "rotor": table_of(machine.EccentricRotor, "the rotor on its bearing, and its speed"),
@@ -28,9 +19,9 @@ _ECCENTRIC = {
     "fine_tuning": table_of(control.FineTuning, "the search by trial for a smaller vibration"),
     "supervisor": table_of(control.Supervisor, "the order of the stages, and when each ends"),
 }
-ECCENTRIC_MASS = Schema(
-    top=MappingProxyType(top_keys(needed('"eccentric_mass" for eccentric masses'))),
-    tables=with_origins({**_ECCENTRIC, "uncertainty": uncertainty_by_table(_ECCENTRIC), **RUN}),
+ECCENTRIC_MASS = schema_of(
+    _ECCENTRIC,
+    balancer=needed('"eccentric_mass" for eccentric masses'),
     scene=machine.EccentricScene,
 )
 """A scene whose balancer is two eccentric masses."""

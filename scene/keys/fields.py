@@ -10,9 +10,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, get_args
 
-from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.faults import did_you_mean
-from ringbalance.scene.units import FieldError, parse_quantity, unit_names
+from ringbalance.scene.units import DIMENSIONS, FieldError, parse_quantity, unit_names
 
 _LARGEST_NUMBER = 1e9
 _LONGEST_NAME = 200

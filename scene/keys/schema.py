@@ -9,18 +9,9 @@ from typing import Any, Literal, get_args
 
 from ringbalance.scene import loop_models, models
 from ringbalance.scene.chamber_file.keys import MeshKeys
-from ringbalance.scene.keys.declaration import (
-    Entries,
-    Key,
-    Presence,
-    derived,
-    keys_of,
-    standard,
-    unused,
-)
+from ringbalance.scene.keys.declaration import Entries, Key, Presence, derived, keys_of, standard, unused
 from ringbalance.scene.keys.fields import Bounds, Reader, choice, half_width, share, text
-from ringbalance.scene.measured import Measured
-from ringbalance.scene.origins import Origin
+from ringbalance.scene.origins import Measured, Origin
 
 Balancer = Literal["liquid_ring", "eccentric_mass"]
 BALANCERS: tuple[str, ...] = get_args(Balancer)
@@ -95,14 +86,6 @@ def _rotor() -> Table:
     )
 
 
-def top_keys(balancer: Presence) -> dict[str, Key]:
-    """Keys before the first table. Args: `balancer`: how that key may be absent."""
-    return {
-        "name": Key(takes=text(), presence=derived("the file's name", "title of the scene")),
-        "balancer": Key(takes=choice(Balancer), presence=balancer),
-    }
-
-
 def _half_width_of(table: str, key: Key) -> Key:
     rule = "that of the known liquid" if table == "liquid" else "exact"
     dimension = key.takes.dimension if isinstance(key.takes, Reader) else None
@@ -122,7 +105,7 @@ def _uncertainty(tables: Mapping[str, Table]) -> Table:
     return Table(text=_UNCERTAINTY, keys=keys)
 
 
-def uncertainty_by_table(tables: Mapping[str, Table]) -> Table:
+def _uncertainty_by_table(tables: Mapping[str, Table]) -> Table:
     """[uncertainty] with a table of half-widths for each table, where tables share names of keys."""
     keys = {
         table: {name: _half_width_of(table, key) for name, key in content.keys.items() if key.uncertain}
@@ -141,13 +124,6 @@ def uncertainty_by_table(tables: Mapping[str, Table]) -> Table:
     )
 
 
-def with_origins(tables: Mapping[str, Table]) -> Mapping[str, Table]:
-    """The tables, each with the key that says where its values come from."""
-    return MappingProxyType(
-        {name: replace(table, keys={**table.keys, ORIGIN: _origins(table)}) for name, table in tables.items()}
-    )
-
-
 def _origins(table: Table) -> Key:
     meaning = unused("given", "where the value comes from")
     each = Key(takes=choice(Origin), presence=meaning)
@@ -161,13 +137,42 @@ _TOLERANCE = Key(
     takes=share(Bounds(above=0, below=1), example=0.01),
     presence=standard("1 %", "relative bound on discretisation and left-out terms, against the top model"),
 )
-RUN = {
+_RUN = {
     "run": table_of(loop_models.RunSettings, "a simulation's seed and end"),
     "accuracy": Table(text="what is asked of the result", keys={"tolerance": _TOLERANCE}),
     "measured": table_of(
         Measured, "the measurements that `ringbalance fit` has fitted the scene to; `fit --save` writes it"
     ),
 }
+
+
+def schema_of(
+    tables: Mapping[str, Table],
+    *,
+    balancer: Presence,
+    scene: Callable[..., Any],
+    uncertainty: Table | None = None,
+) -> Schema:
+    """The schema of a kind of balancer, with what every scene file has.
+
+    Args: `balancer`: how that key may be absent. `uncertainty`: that table, by default with a table of
+    half-widths for each table, where tables share names of keys.
+    """
+    whole = {**tables, "uncertainty": uncertainty or _uncertainty_by_table(tables), **_RUN}
+    return Schema(
+        top=MappingProxyType(
+            {
+                "name": Key(takes=text(), presence=derived("the file's name", "title of the scene")),
+                "balancer": Key(takes=choice(Balancer), presence=balancer),
+            }
+        ),
+        tables=MappingProxyType(
+            {n: replace(each, keys={**each.keys, ORIGIN: _origins(each)}) for n, each in whole.items()}
+        ),
+        scene=scene,
+    )
+
+
 _LIQUID_RING = {
     "disc": _disc(),
     "liquid": table_of(models.Liquid, "the balancing liquid"),
@@ -181,9 +186,10 @@ _LIQUID_RING = {
         loop_models.Requirement, "what is required of the balancer; reports compare it with what is reached"
     ),
 }
-LIQUID_RING = Schema(
-    top=MappingProxyType(top_keys(standard("liquid_ring", "kind of balancer"))),
-    tables=with_origins({**_LIQUID_RING, "uncertainty": _uncertainty(_LIQUID_RING), **RUN}),
+LIQUID_RING = schema_of(
+    _LIQUID_RING,
+    balancer=standard("liquid_ring", "kind of balancer"),
+    uncertainty=_uncertainty(_LIQUID_RING),
     scene=models.Scene,
 )
 """A scene whose balancer is a liquid ring."""

@@ -13,8 +13,7 @@ from ringbalance.cli import main
 from ringbalance.controller.compare import compare
 from ringbalance.controller.compare_cli import tuned_text
 from ringbalance.controller.compare_rotor import own_scene, rotor_of, scene_on
-from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
-from ringbalance.controller.eccentric_mass.plant.whirl import influence, steady_whirl
+from ringbalance.controller.eccentric_mass.plant.parameters import influence, plant_parameters, steady_whirl
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene import (

@@ -12,9 +12,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from ringbalance.controller.liquid_ring.column import Column, column_of
 from ringbalance.controller.liquid_ring.interval import Passage, pass_time
-from ringbalance.controller.liquid_ring.motion import Dynamics, Motion
+from ringbalance.controller.liquid_ring.motion import Column, Dynamics, Motion, column_of
 from ringbalance.controller.liquid_ring.plant import LiquidRing, initial_state
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Event
@@ -239,19 +238,14 @@ def test_an_operation_with_all_terms_against_scipy(
 # --- how an operation's tail runs on ---
 
 
-def test_a_stretch_may_be_cut_anywhere(calibrated: BalancerModel, plant: Plant, pulse: Pulse) -> None:
+def test_a_stretch_may_be_cut_anywhere(
+    calibrated: BalancerModel, plant: Plant, pulse: Pulse, resumed: Callable[..., Passage]
+) -> None:
     own = plant(calibrated, "tube inertia", "gas filling", "valve lag", valve_lag=0.007, **PIPED)
     whole = pulse(own, 0.05, np.array([0.4]))
     for cut in (0.003, 0.03, 0.0572, 0.08):
         first = pulse(own, 0.05, np.array([cut]))
-        second = pass_time(
-            own,
-            fill=first.fill,
-            total=0.5,
-            primed=first.primed,
-            motion=first.motion,
-            instants=np.array([0.4 - cut]),
-        )
+        second = resumed(own, first, 0.4 - cut)
         assert second.fill == pytest.approx(whole.fill, abs=1e-9)
         assert second.motion.record.work == pytest.approx(whole.motion.record.work, rel=1e-6)
 

@@ -35,7 +35,7 @@ from ringbalance.controller.ensemble.transfer import pair_transfer
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Drive
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.sensor import Sensor
+from ringbalance.controller.rotor import Sensor
 from ringbalance.controller.simulation import Outcome
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.model import BalancerModel

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ringbalance.controller.ensemble.compiled_transfer import gas_off, gas_on
-from ringbalance.controller.ensemble.transfer import pair_transfer
+from ringbalance.controller.ensemble.transfer import gas_off, gas_on, pair_transfer
 from ringbalance.controller.liquid_ring.pair_path import flow_paths
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Drive

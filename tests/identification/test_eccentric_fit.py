@@ -13,9 +13,9 @@ import pytest
 
 from ringbalance.cli import main
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
+from ringbalance.identification.balancers import fitted_names
 from ringbalance.identification.criticism.review import review
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.eccentric_parameters import fitted_names
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.identifiability import Verdict
 from ringbalance.identification.next_measurement import next_measurement, offered_rows, words_of

@@ -12,10 +12,10 @@ from scipy.stats import t as student_t
 from synthetic_rigs import covered, fitted, measured, observations, rig
 
 from ringbalance.controller.rotor import influence
+from ringbalance.identification.balancers import model_errors, with_model_error
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.fitting import fit, problem_of
 from ringbalance.identification.likelihood import Block, Problem
-from ringbalance.identification.model_errors import model_errors, with_model_error
 from ringbalance.identification.parameters import FitError
 from ringbalance.identification.predict.device import Models, models_of
 from ringbalance.identification.predict.kinds import PREDICTED

@@ -15,7 +15,6 @@ from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.rotor import disc_unbalance, influence
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.predict import injections, trial_weights
 from ringbalance.identification.predict.device import Models, device_of, models_of
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
@@ -167,7 +166,9 @@ def test_the_vibration_without_weight_is_free_in_each_series(paper_scene: Scene)
         observations("trial_weight", {"unbalance": [0, 1e-4, 0, 1e-4], "angle": [0, 1, 0, 1]}),
         series=np.array(["a", "a", "b", "b"]),
     )
-    free = trial_weights.free(data)
+    effect = PREDICTED["trial_weight"].free
+    assert effect is not None
+    free = effect(data)
     assert np.linalg.matrix_rank(free) == 4
     alike = np.array([1, 1, 3, 3, 2, 2, -5, -5.0])
     assert np.linalg.norm(alike - free @ np.linalg.lstsq(free, alike, rcond=None)[0]) < 1e-12
@@ -195,14 +196,13 @@ def chain(shared: bool) -> Observations:
 def test_errors_of_readings_that_serve_twice(shared: bool) -> None:
     """Against many draws of the readings' errors."""
     data = chain(shared)
-    assert bool(injections.shared_readings(data)) is shared
     random = np.random.default_rng(5)
     if shared:
         errors = random.standard_normal((200_000, 4))
         changes = errors[:, 1:] - errors[:, :-1]
     else:
         changes = np.diff(random.standard_normal((200_000, 3, 2)), axis=2)[:, :, 0]
-    np.testing.assert_allclose(injections.covariance(data)[:3, :3], np.cov(changes.T), atol=0.03)
+    np.testing.assert_allclose(PREDICTED["injection"].covariance(data)[:3, :3], np.cov(changes.T), atol=0.03)
 
 
 def test_a_stated_noise_of_amplitude_and_phase() -> None:

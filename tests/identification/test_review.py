@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ringbalance.identification.criticism.other_laws import LAMINAR, UNBROKEN, power_of
-from ringbalance.identification.criticism.review import review
+from ringbalance.identification.criticism.review import LAMINAR, UNBROKEN, power_of, review
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.next_measurement import next_measurement, offered_rows, words_of

@@ -16,8 +16,7 @@ import numpy as np
 import pytest
 from synthetic_rigs import observations
 
-from ringbalance.identification.criticism.at_solution import ORDER
-from ringbalance.identification.criticism.review import review
+from ringbalance.identification.criticism.review import ORDER, review
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.identifiability import Verdict

@@ -27,8 +27,7 @@ from ringbalance.mesh.geometry import (
     wall_square,
 )
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.chamber_file.record import CellKind, ChamberGeometry
-from ringbalance.scene.chamber_file.stretching import STRETCHED, stretched
+from ringbalance.scene.chamber_file.record import STRETCHED, CellKind, ChamberGeometry, stretched
 from ringbalance.scene.models import Disc
 from ringbalance.verification.reference.block_chambers import block_chamber, disc_chamber
 

@@ -11,9 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ringbalance.scene import known_liquids, liquid_at
-from ringbalance.scene.liquids import find_liquid
+from ringbalance.scene.liquids import find_liquid, water_properties
 from ringbalance.scene.units import FieldError
-from ringbalance.scene.water import water_properties
 
 
 def _rows() -> list[dict[str, str]]:

@@ -16,8 +16,7 @@ from ringbalance.scene import load_scene
 from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.platform.files import check_file, write_whole
-from ringbalance.scene.platform.progress import activity
-from ringbalance.scene.platform.terminal import messages_console, results_console
+from ringbalance.scene.platform.terminal import activity, messages_console, results_console
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.selection_studies.choice import Choice
 from ringbalance.verification.selection_studies.measure import Measured, Trade

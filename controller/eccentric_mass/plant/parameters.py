@@ -1,8 +1,13 @@
-"""The plant's constants, gathered from a scene into plain numbers that compiled functions take."""
+"""The plant's constants, gathered from a scene into plain numbers that compiled functions take.
+
+With masses at rest on the track they give the steady whirl in closed form.
+"""
 
 from __future__ import annotations
 
+import cmath
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from ringbalance.scene.eccentric_models import EccentricScene, Motor
@@ -77,3 +82,31 @@ def plant_parameters(scene: EccentricScene) -> PlantParameters:
 def _reflected_inertia(motor: Motor) -> float:
     first, second, third = motor.teeth
     return (motor.motor_inertia + motor.gear_inertia * (first / second) ** 2) * (third / first) ** 2
+
+
+def moment_vector(parameters: PlantParameters, angles: Sequence[float]) -> complex:
+    """Unbalance of rotor and eccentric masses, U exp(j phi_m) + b sum exp(j phi_i), kg m, rotor-fixed."""
+    masses = sum(cmath.exp(1j * angle) for angle in angles)
+    return parameters.unbalance * cmath.exp(1j * parameters.phase) + parameters.moment * masses
+
+
+def influence(parameters: PlantParameters, speed: float) -> complex:
+    """Steady vibration per unbalance.
+
+    alpha = W^2 / (K_B - M W^2 + j C_B W).
+    Returns: m/(kg m), complex: the lag is minus its phase.
+    Raises: ValueError: no damping, at the critical speed.
+    """
+    stiffness = complex(parameters.stiffness - parameters.mass * speed**2, parameters.damping * speed)
+    if stiffness == 0:
+        raise ValueError("a rotor without damping has no steady whirl at its critical speed")
+    return speed**2 / stiffness
+
+
+def steady_whirl(parameters: PlantParameters, speed: float, angles: Sequence[float]) -> complex:
+    """Displacement x + j y in the rotor's frame at constant speed, masses at rest on the track.
+
+    Returns: m, complex; its magnitude is the zero-to-peak vibration.
+    Raises: ValueError: no damping, at the critical speed.
+    """
+    return influence(parameters, speed) * moment_vector(parameters, angles)

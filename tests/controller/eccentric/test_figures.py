@@ -10,8 +10,11 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
-from ringbalance.controller.eccentric_mass.plant.whirl import steady_whirl
+from ringbalance.controller.eccentric_mass.plant.parameters import (
+    PlantParameters,
+    plant_parameters,
+    steady_whirl,
+)
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.strategy.lqr_law import friction_torque
 from ringbalance.controller.eccentric_mass.strategy.settings import drive_law

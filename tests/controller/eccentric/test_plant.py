@@ -14,7 +14,12 @@ from scipy.integrate import solve_ivp
 from ringbalance.controller.eccentric_mass.plant import integrate
 from ringbalance.controller.eccentric_mass.plant.friction import LOCKED, SLIDING, STUCK
 from ringbalance.controller.eccentric_mass.plant.open_loop import run_plant, run_steps
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import (
+    PlantParameters,
+    influence,
+    plant_parameters,
+    steady_whirl,
+)
 from ringbalance.controller.eccentric_mass.plant.plant import (
     drive_of,
     electrical_energy,
@@ -22,7 +27,6 @@ from ringbalance.controller.eccentric_mass.plant.plant import (
     stuck_flags,
 )
 from ringbalance.controller.eccentric_mass.plant.speed import profile_arrays, speed_at, turned
-from ringbalance.controller.eccentric_mass.plant.whirl import influence, steady_whirl
 from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.eccentric_models import SpeedPoint

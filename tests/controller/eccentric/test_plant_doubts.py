@@ -11,8 +11,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from ringbalance.controller.eccentric_mass.plant.open_loop import PlantRun, run_plant
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
-from ringbalance.controller.eccentric_mass.plant.whirl import steady_whirl
+from ringbalance.controller.eccentric_mass.plant.parameters import (
+    PlantParameters,
+    plant_parameters,
+    steady_whirl,
+)
 from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray
 from ringbalance.scene.eccentric_models import SpeedPoint

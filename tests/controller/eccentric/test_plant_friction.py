@@ -24,10 +24,13 @@ from ringbalance.controller.eccentric_mass.plant.friction import (
     angular_accelerations,
     motions,
 )
-from ringbalance.controller.eccentric_mass.plant.held import held_step
-from ringbalance.controller.eccentric_mass.plant.integrate import plant_step
+from ringbalance.controller.eccentric_mass.plant.integrate import held_step, plant_step
 from ringbalance.controller.eccentric_mass.plant.open_loop import run_steps
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import (
+    PlantParameters,
+    plant_parameters,
+    steady_whirl,
+)
 from ringbalance.controller.eccentric_mass.plant.plant import (
     Drive,
     drive_of,
@@ -35,7 +38,6 @@ from ringbalance.controller.eccentric_mass.plant.plant import (
     stuck_flags,
     write_derivative,
 )
-from ringbalance.controller.eccentric_mass.plant.whirl import steady_whirl
 from ringbalance.scene import bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.arrays import FloatArray, IntArray
 

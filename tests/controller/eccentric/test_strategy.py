@@ -15,8 +15,7 @@ from rich.console import Console
 
 import ringbalance
 from ringbalance.controller.eccentric_mass.document import eccentric_document, thinned
-from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
-from ringbalance.controller.eccentric_mass.plant.whirl import moment_vector
+from ringbalance.controller.eccentric_mass.plant.parameters import moment_vector, plant_parameters
 from ringbalance.controller.eccentric_mass.remedies import expected_deviation
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, EccentricRun

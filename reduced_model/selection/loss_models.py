@@ -30,8 +30,6 @@ MODELS: Final = {
 }
 LOSSES: Final = tuple(MODELS)
 """In order of increasing cost."""
-FORMULAS: Final = {CONSTANT: 1, CORRELATIONS: 20, ROTATING: 60, TABLES: 260}
-"""Formulas per call, as counted work; the tables' look-ups among them."""
 _MOST_STEPS: Final = 60
 _ROUND_OFF: Final = 1e-14
 

@@ -21,7 +21,7 @@ from ringbalance.reduced_model.chamber.terms import MEAN
 from ringbalance.reduced_model.chamber.values import paper_closed_forms
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.paper_law import paper_law
-from ringbalance.reduced_model.selection.loss_models import CONSTANT, FORMULAS, LOSSES, loss_at, with_loss
+from ringbalance.reduced_model.selection.loss_models import CONSTANT, LOSSES, loss_at, with_loss
 from ringbalance.reduced_model.selection.range_flow import SHARES, equal_velocity
 from ringbalance.reduced_model.selection.tube_terms import (
     CREST,
@@ -44,6 +44,8 @@ SIPHON: Final = "always a full siphon"
 REGIMES: Final = "four regimes over the siphon crest"
 LEVELS: Final = {EQ_12: 4, CLOSED: 30, QUADRATURE: 200}
 """Models of a chamber's level with their counted formulas at one fill, in order of increasing cost."""
+_FORMULAS: Final = dict(zip(LOSSES, (1, 20, 60, 260), strict=True))
+"""Counted formulas of a loss at one velocity; the look-ups of tables among them."""
 _LEVEL_NODES: Final = 21
 _STEPS: Final = ((tuple(LEVELS), LEVEL_STEPS), (LOSSES, tuple(LOSS_STEPS)), ((SIPHON, REGIMES), (CREST,)))
 """Models of each part of a law, and the term that each model after the first adds."""
@@ -190,7 +192,7 @@ class LawBook:
         tables = 3 if models.regimes == REGIMES else 1
         counted = {
             "formula": float(_LEVEL_NODES * LEVELS[models.level]),
-            "table": float(tables * FORMULAS[models.loss]),
+            "table": float(tables * _FORMULAS[models.loss]),
         }
         return Fidelity(
             name="; ".join(short),
@@ -229,7 +231,7 @@ def k_hierarchy(scene: Scene) -> ModelHierarchy:
                 name=loss,
                 models={"loss of the tube": loss},
                 leaves_out=frozenset(tuple(LOSS_STEPS)[i:]),
-                work={"formula": float(FORMULAS[loss])},
+                work={"formula": float(_FORMULAS[loss])},
                 solve=partial(solve, loss=loss),
             )
             for i, loss in enumerate(LOSSES)

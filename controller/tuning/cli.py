@@ -139,7 +139,7 @@ def _rows(tuning: Tuning) -> dict[str, str]:
 def _tried(tuning: Tuning) -> dict[str, str]:
     rows = tuning.search.tried if tuning.search else ()
     return {
-        f"tried {place}": f"{row.change}: {row.settled:.0%} of {row.runs} short runs"
+        f"tried {place}": f"{row.change}: {round(row.settled * row.runs)} of {row.runs} runs"
         for place, row in enumerate(rows, start=1)
     }
 

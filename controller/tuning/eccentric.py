@@ -161,7 +161,7 @@ def _of_runs(settling: EccentricSettling | None) -> str:
     if slow is not None:
         return f"95 % of {times.runs} runs settle within {slow:.3g} s"
     return (
-        f"{times.settled.value:.1%} of {times.runs} runs settle within {settling.span:.4g} s: 95 % is not "
+        f"{times.told(times.settled.value)} settle within {settling.span:.4g} s: 95 % is not "
         f"reached; most of the others: {settling.advice}"
     )
 

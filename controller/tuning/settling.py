@@ -67,14 +67,18 @@ class SettlingTimes:
         """Whether the disc's capacity alone keeps 95 % from settling, and little else does."""
         return self.beyond_capacity > TOO_MANY and self.explained_by(self.beyond_capacity)
 
+    def told(self, fraction: float) -> str:
+        """A fraction of the runs as their number, which claims nothing finer."""
+        return f"{round(fraction * self.runs)} of {self.runs} runs"
+
     def rows(self, limit: float) -> dict[str, str]:
         """As a person reads them; `limit` is the time that each run had, s."""
-        times = ", ".join(
-            f"{name[1:]} % within {f'{time:.3g} s' if time is not None else 'not reached'}"
+        times = (
+            f"{name[1:]} % of runs {f'within {time:.3g} s' if time is not None else 'not reached'}"
             for name, time in self.quantiles.items()
         )
-        fraction = f"{self.settled.value:.2%} of {self.runs} runs within {limit:.4g} s"
-        return {"settling time": times, "settled": fraction}
+        settled = f"{self.told(self.settled.value)} within {limit:.4g} s"
+        return {"settling time": ", ".join(times), "settled": settled}
 
 
 def settling_times(

@@ -143,7 +143,6 @@ def neglected_in_injections(used: Sequence[ModelUsed]) -> _Neglected:
     known = {r.term: r.estimated_contribution for r in rows if r.estimated_contribution is not None}
     unknown = tuple(row.term for row in rows if row.estimated_contribution is None)
     bound = float(sum(known.values()))
-    names = f" ({', '.join(known)})" if known else ""
     # Without their numbers in the scene these two are a default range.
     ranges = [term for term in unknown if term in (FILLING, LAG)]
     others = [term for term in unknown if term not in ranges]
@@ -153,10 +152,17 @@ def neglected_in_injections(used: Sequence[ModelUsed]) -> _Neglected:
         terms=tuple(known),
         bound=bound,
         unknown=unknown,
-        text=(
-            f"neglected terms{names} change the liquid moved by the shortest injection that matters by at "
-            f"most {percent(bound)}{more}"
-        ),
+        text=f"{_change(known, bound, unknown)}{more}",
+    )
+
+
+def _change(terms: Collection[str], bound: float, unknown: Collection[str]) -> str:
+    if not terms:
+        told = " that the scene gives numbers for" if unknown else ""
+        return f"no term of an injection{told} is neglected"
+    return (
+        f"neglected terms ({', '.join(terms)}) change the liquid moved by the shortest injection that "
+        f"matters by {f'at most {percent(bound)}' if bound else 'nothing'}"
     )
 
 

@@ -238,19 +238,14 @@ def test_an_operation_with_all_terms_against_scipy(
 # --- how an operation's tail runs on ---
 
 
-def test_a_stretch_may_be_cut_anywhere(calibrated: BalancerModel, plant: Plant, pulse: Pulse) -> None:
+def test_a_stretch_may_be_cut_anywhere(
+    calibrated: BalancerModel, plant: Plant, pulse: Pulse, resumed: Callable[..., Passage]
+) -> None:
     own = plant(calibrated, "tube inertia", "gas filling", "valve lag", valve_lag=0.007, **PIPED)
     whole = pulse(own, 0.05, np.array([0.4]))
     for cut in (0.003, 0.03, 0.0572, 0.08):
         first = pulse(own, 0.05, np.array([cut]))
-        second = pass_time(
-            own,
-            fill=first.fill,
-            total=0.5,
-            primed=first.primed,
-            motion=first.motion,
-            instants=np.array([0.4 - cut]),
-        )
+        second = resumed(own, first, 0.4 - cut)
         assert second.fill == pytest.approx(whole.fill, abs=1e-9)
         assert second.motion.record.work == pytest.approx(whole.motion.record.work, rel=1e-6)
 

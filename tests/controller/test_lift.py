@@ -13,8 +13,8 @@ from scipy.optimize import brentq
 
 from ringbalance.controller.liquid_ring.compiled_column import ends
 from ringbalance.controller.liquid_ring.compiled_lift import crest_start, crest_stop, lift_rates, shown
-from ringbalance.controller.liquid_ring.interval import Passage, packed, pass_time
-from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, Switch
+from ringbalance.controller.liquid_ring.interval import Passage, packed
+from ringbalance.controller.liquid_ring.motion import Dynamics, Motion
 from ringbalance.physics.tube.state import tube_state
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.gas_line import line_ends
@@ -194,32 +194,25 @@ def test_a_primed_tube_lifts_nothing(
 
 @pytest.mark.parametrize("inertia", [[], [INERTIA]])
 def test_a_lift_goes_on_where_an_interval_ends(
-    inertia: list[str], scene: Scene, calibrated: BalancerModel, plant_of: Callable[..., Dynamics]
+    inertia: list[str],
+    scene: Scene,
+    calibrated: BalancerModel,
+    plant_of: Callable[..., Dynamics],
+    pulse: Pulse,
+    resumed: Callable[..., Passage],
 ) -> None:
     """Within the error of a single run's steps, before the middle of the crest and beyond it."""
     own = plant_of(scene, calibrated, LIFT, *inertia)
-    valve = (Switch(after=0.0, chamber=0, opens=True), Switch(after=0.02, chamber=0, opens=False))
-    whole = pass_time(
-        own, fill=0.25, total=0.5, primed=False, motion=Motion(pending=valve), instants=np.array([0.5])
-    )
+    whole = pulse(own, 0.02, np.array([0.5]))
     middle = sum(crest_span(scene.tube)) / 2
     passed = set()
     for until in (1e-3, 2e-3, 3e-3, 4e-3):
-        first = pass_time(
-            own, fill=0.25, total=0.5, primed=False, motion=Motion(pending=valve), instants=np.array([until])
-        )
+        first = pulse(own, 0.02, np.array([until]))
         begun, place, _ = first.motion.lifted
         if place > begun:
             assert (place > middle) is (first.fill < 0.25)
             passed.add(place > middle)
-        second = pass_time(
-            own,
-            fill=first.fill,
-            total=0.5,
-            primed=first.primed,
-            motion=first.motion,
-            instants=np.array([0.5 - until]),
-        )
+        second = resumed(own, first, 0.5 - until)
         assert second.fill == pytest.approx(whole.fill, abs=1e-9)
     assert passed == {False, True}
 

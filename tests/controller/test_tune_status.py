@@ -40,6 +40,19 @@ def largest_amplitude(scene: Scene) -> float:
     return 1218.6 * (1 - residual / 0.25) * 0.0108e-6
 
 
+@pytest.mark.parametrize(("count", "runs"), [(200, 200), (199, 200), (1999, 2000), (19, 20)])
+def test_a_fraction_of_the_runs_is_printed_no_finer_than_their_number(count: int, runs: int) -> None:
+    times = SettlingTimes(
+        runs=runs,
+        settled=binomial_share(count=count, of=runs),
+        quantiles={"p50": 1.0, "p95": None},
+    )
+    assert times.rows(60.0) == {
+        "settling time": "50 % of runs within 1 s, 95 % of runs not reached",
+        "settled": f"{count} of {runs} runs within 60 s",
+    }
+
+
 def test_runs_that_need_more_moment_than_the_disc_has_are_counted_and_named(scene: Scene) -> None:
     stated = InputUncertainty(quantity="influence_coefficient", half_width=0.1, relative=True)
     near = replace(with_amplitude(scene, 0.98 * largest_amplitude(scene)), uncertainty=(stated,))

@@ -69,11 +69,6 @@ class Combination:
     """Expanded (95 %), by the data alone: of its logarithm."""
 
 
-def rank(slopes: FloatArray) -> int:
-    """Number of independent directions that the data see. Args: `slopes`: J, without priors."""
-    return int(np.count_nonzero(_normalised(slopes)[1] > DEPENDENT))
-
-
 def _normalised(slopes: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Norms of the columns, singular values of the columns of norm one, and right singular vectors."""
     norms = np.linalg.norm(slopes, axis=0)

@@ -22,8 +22,11 @@ from ringbalance.controller.eccentric_mass.run_record import (
 )
 from ringbalance.controller.eccentric_mass.run_status import outcome_of, status_text, warnings_of
 from ringbalance.controller.eccentric_mass.strategy.plan import RELEASED, STAGE_NAMES, Cause, Findings, Stage
-from ringbalance.controller.eccentric_mass.strategy.records import StrategySettings
-from ringbalance.controller.eccentric_mass.strategy.settings import believed_whirl, strategy_settings
+from ringbalance.controller.eccentric_mass.strategy.settings import (
+    StrategySettings,
+    believed_whirl,
+    strategy_settings,
+)
 from ringbalance.controller.eccentric_mass.strategy.targets import Targets, target_angles
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.eccentric_models import EccentricScene

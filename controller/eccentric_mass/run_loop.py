@@ -15,11 +15,8 @@ from ringbalance.controller.eccentric_mass.plant.parameters import PlantParamete
 from ringbalance.controller.eccentric_mass.plant.plant import electrical_energy, rest_state, stuck_flags
 from ringbalance.controller.eccentric_mass.plant.speed import profile_arrays, speed_at, turned
 from ringbalance.controller.eccentric_mass.strategy.plan import RELEASED, Cause, Findings
-from ringbalance.controller.eccentric_mass.strategy.records import (
-    EccentricMeasurement,
-    StrategySettings,
-    StrategyState,
-)
+from ringbalance.controller.eccentric_mass.strategy.records import EccentricMeasurement, StrategyState
+from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.strategy.step import strategy_start, strategy_step
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.eccentric_models import EccentricScene

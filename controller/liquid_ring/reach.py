@@ -40,7 +40,7 @@ def largest_pair_moment(*, plant: LiquidRing, state: DiscState) -> complex:
     return complex(moment)
 
 
-def unreachable_moment(*, plant: LiquidRing, state: DiscState, wanted: complex) -> float:
+def _unreachable_moment(*, plant: LiquidRing, state: DiscState, wanted: complex) -> float:
     """Distance of a moment from the nearest one that the disc can form, kg m; zero within reach.
 
     The moments within reach fill a polygon whose corners have every pair fully to one side or the other.
@@ -62,7 +62,7 @@ def unreachable_moment(*, plant: LiquidRing, state: DiscState, wanted: complex) 
 def unreachable_vibration(*, plant: LiquidRing, state: DiscState, rotor: Rotor) -> float:
     """Vibration that remains with the liquid at its best, m; zero within capacity."""
     wanted = -initial_unbalance(rotor=rotor)
-    return unreachable_moment(plant=plant, state=state, wanted=wanted) * rotor.influence_coefficient
+    return _unreachable_moment(plant=plant, state=state, wanted=wanted) * rotor.influence_coefficient
 
 
 def least_driven_fill(*, law: FlowLaw, total: float, gas_pressure: float) -> float:

@@ -14,8 +14,14 @@ import numpy as np
 from ringbalance.controller.rotor import chamber_directions, chamber_letters, influence
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.predict.device import Device, Models, device_of
-from ringbalance.identification.predict.predicted import PredictedKind, always
-from ringbalance.identification.predict.vibration import parts, spread_out, vector_covariance, vectors
+from ringbalance.identification.predict.predicted import (
+    PredictedKind,
+    always,
+    parts,
+    spread_out,
+    vector_covariance,
+    vectors,
+)
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.models import Scene
 

@@ -19,8 +19,15 @@ from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.predict.device import Device, Models, device_of
 from ringbalance.identification.predict.injections import INJECTION
 from ringbalance.identification.predict.positionings import POSITIONING
-from ringbalance.identification.predict.predicted import PredictedKind, always, numbers
-from ringbalance.identification.predict.vibration import parts, spread_out, vector_covariance, vectors
+from ringbalance.identification.predict.predicted import (
+    PredictedKind,
+    always,
+    numbers,
+    parts,
+    spread_out,
+    vector_covariance,
+    vectors,
+)
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.tube.state import tube_state
 from ringbalance.physics.tube.uncertainty import with_errors

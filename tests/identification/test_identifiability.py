@@ -12,7 +12,7 @@ from synthetic_rigs import READINGS, observations
 
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.fitting import fit
-from ringbalance.identification.identifiability import Verdict, power_text, rank
+from ringbalance.identification.identifiability import DEPENDENT, Verdict, power_text
 from ringbalance.identification.predict.device import models_of
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
@@ -54,6 +54,12 @@ def pressures(scene: Scene, *, speeds: npt.ArrayLike | None = None) -> Observati
 def weights(scene: Scene) -> Observations:
     columns: dict[str, npt.ArrayLike] = {"unbalance": [0, 1e-4, 1e-4, 2e-4, 2e-4], "angle": [0, 1, 3, 5, 2]}
     return noisy("trial_weight", scene, columns)
+
+
+def rank(slopes: FloatArray) -> int:
+    """Number of independent directions among the columns that are not zero, each of norm one."""
+    norms = np.linalg.norm(slopes, axis=0)
+    return int(np.linalg.matrix_rank(slopes[:, norms > 0] / norms[norms > 0], tol=DEPENDENT))
 
 
 def verdicts(result: FitResult) -> dict[str, Verdict]:

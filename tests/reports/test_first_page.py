@@ -396,6 +396,5 @@ def test_a_scene_without_uncertainties_says_so(evidence: Record) -> None:
 def test_settling_beyond_stability_is_called_chance(evidence: Record) -> None:
     run = evidence["closed_loop"]["calibrated"]
     run.update(loop_factor=2.3, settled=True, verdict="settled")
-    assert untraced(loop_sentences(evidence)[0]).endswith(
-        "so that it grows; that this run settles is chance."
-    )
+    told = untraced(loop_sentences(evidence)[0])
+    assert told.endswith("so that it grows; that this run settles is chance.")

@@ -84,7 +84,7 @@ def _reflected_inertia(motor: Motor) -> float:
     return (motor.motor_inertia + motor.gear_inertia * (first / second) ** 2) * (third / first) ** 2
 
 
-def moment_vector(parameters: PlantParameters, angles: Sequence[float]) -> complex:
+def _moment_vector(parameters: PlantParameters, angles: Sequence[float]) -> complex:
     """Unbalance of rotor and eccentric masses, U exp(j phi_m) + b sum exp(j phi_i), kg m, rotor-fixed."""
     masses = sum(cmath.exp(1j * angle) for angle in angles)
     return parameters.unbalance * cmath.exp(1j * parameters.phase) + parameters.moment * masses
@@ -109,4 +109,4 @@ def steady_whirl(parameters: PlantParameters, speed: float, angles: Sequence[flo
     Returns: m, complex; its magnitude is the zero-to-peak vibration.
     Raises: ValueError: no damping, at the critical speed.
     """
-    return influence(parameters, speed) * moment_vector(parameters, angles)
+    return influence(parameters, speed) * _moment_vector(parameters, angles)

@@ -38,15 +38,14 @@ from ringbalance.controller.eccentric_mass.strategy.lqr_law import (
 from ringbalance.controller.eccentric_mass.strategy.plan import Facts, Plan, first_plan
 from ringbalance.controller.eccentric_mass.strategy.records import (
     Beliefs,
-    DriveLaw,
     EccentricMeasurement,
     Motion,
     Pair,
     Smoothed,
-    StrategySettings,
     StrategyState,
     Whirl,
 )
+from ringbalance.controller.eccentric_mass.strategy.settings import DriveLaw, StrategySettings
 from ringbalance.controller.eccentric_mass.strategy.supervisor import (
     CHECK,
     FAILED,

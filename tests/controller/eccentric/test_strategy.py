@@ -14,8 +14,13 @@ import pytest
 from rich.console import Console
 
 import ringbalance
-from ringbalance.controller.eccentric_mass.document import eccentric_document, thinned
-from ringbalance.controller.eccentric_mass.plant.parameters import moment_vector, plant_parameters
+from ringbalance.controller.eccentric_mass.document import eccentric_document
+from ringbalance.controller.eccentric_mass.plant.parameters import (
+    PlantParameters,
+    influence,
+    plant_parameters,
+    steady_whirl,
+)
 from ringbalance.controller.eccentric_mass.remedies import expected_deviation
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, EccentricRun
@@ -61,9 +66,14 @@ def test_it_settles_through_all_stages(run: EccentricRun) -> None:
     assert run.drive_off[-1]
 
 
+def unbalance_left(run: EccentricRun, plant: PlantParameters) -> float:
+    """That of rotor and masses together at the end, kg m."""
+    speed = float(run.speed[-1])
+    return abs(steady_whirl(plant, speed, run.mass_angle[:, -1].tolist()) / influence(plant, speed))
+
+
 def test_the_masses_undo_the_imbalance(run: EccentricRun, scene: EccentricScene) -> None:
-    left = abs(moment_vector(plant_parameters(scene), run.mass_angle[:, -1].tolist()))
-    assert left < 2e-3 * plant_parameters(scene).unbalance
+    assert unbalance_left(run, plant_parameters(scene)) < 2e-3 * plant_parameters(scene).unbalance
 
 
 def test_estimates_are_as_good_as_they_claim(run: EccentricRun, scene: EccentricScene) -> None:
@@ -132,7 +142,6 @@ def test_document_has_the_promised_keys(run: EccentricRun) -> None:
     assert found["stages"][0].keys() == {"name", "start_s", "end_s"}
     assert found["stages"][-1]["end_s"] == found["time_s"][-1]
     assert max(found["amplitude_m"]) == run.worst_amplitude
-    assert thinned(run, rows=10).size < 40
 
 
 def test_the_command_takes_either_balancer(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -229,7 +238,7 @@ def test_a_saturated_rotor_keeps_what_two_masses_cannot_undo(scene: EccentricSce
     assert found.targets is not None
     assert found.targets.saturated
     parameters = plant_parameters(changed(scene, "imbalance", mass=0.5))
-    left = abs(moment_vector(parameters, found.mass_angle[:, -1].tolist()))
+    left = unbalance_left(found, parameters)
     assert left == pytest.approx(found.targets.residual, rel=0.01)
 
 

@@ -13,8 +13,7 @@ import numpy as np
 
 from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.controller.eccentric_mass.strategy.lqr_law import friction_torque, regulator_torque
-from ringbalance.controller.eccentric_mass.strategy.records import DriveLaw
-from ringbalance.controller.eccentric_mass.strategy.settings import drive_law
+from ringbalance.controller.eccentric_mass.strategy.settings import DriveLaw, drive_law
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.verification.eccentric_mass.scenes import changed

@@ -17,7 +17,6 @@ import cmath
 import math
 from dataclasses import dataclass, replace
 
-from ringbalance.controller.eccentric_mass.plant.parameters import influence as rotor_influence
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
 from ringbalance.controller.eccentric_mass.plant.speed import profile_arrays, speed_at
 from ringbalance.controller.rotor import influence, initial_unbalance, wrapped
@@ -57,6 +56,13 @@ class OneRotor:
         """Vibration before balancing, m zero-to-peak."""
         return abs(self.influence * self.unbalance)
 
+    def scene(self, scene: AnyScene) -> AnyScene:
+        """Put a scene's balancer on another scene's rotor, at constant speed and in its own steady vibration.
+
+        Raises: SceneError: the rotor cannot be this scene's.
+        """
+        return _liquid_on(self, scene) if isinstance(scene, Scene) else _driven_on(self, scene)
+
 
 def rotor_of(scene: AnyScene) -> OneRotor:
     """Take the rotor out of a scene; of eccentric masses the speed counts at which their strategy starts.
@@ -95,7 +101,7 @@ def _driven_rotor(scene: EccentricScene) -> OneRotor:
     return OneRotor(
         source=scene.source,
         speed=speed,
-        influence=rotor_influence(parameters, speed),
+        influence=parameters.influence(speed),
         unbalance=cmath.rect(imbalance.mass * imbalance.radius, imbalance.phase),
         mass=parameters.mass,
         noise=scene.sensor.position_noise,
@@ -113,14 +119,6 @@ def own_scene(scene: AnyScene) -> AnyScene:
         return scene
     speed, _ = speed_at(*profile_arrays(scene.rotor), scene.supervisor.start)
     return _steady_start(scene, speed)
-
-
-def scene_on(rotor: OneRotor, scene: AnyScene) -> AnyScene:
-    """Put a scene's balancer on another scene's rotor, at constant speed and in its own steady vibration.
-
-    Raises: SceneError: the rotor cannot be this scene's.
-    """
-    return _liquid_on(rotor, scene) if isinstance(scene, Scene) else _driven_on(rotor, scene)
 
 
 def _liquid_on(rotor: OneRotor, scene: Scene) -> Scene:

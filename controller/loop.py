@@ -18,7 +18,7 @@ from ringbalance.controller.liquid_ring.closed_form import closed_form, has_clos
 from ringbalance.controller.liquid_ring.plant import Advance, DiscState, LiquidRing, initial_state, longest
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Integrator
-from ringbalance.controller.outcome import VERDICTS, Facts, outcome_of, status_text
+from ringbalance.controller.outcome import VERDICTS, Facts
 from ringbalance.controller.rotor import Sensor, chamber_letters, disc_unbalance, noisy_sensor, vibration
 from ringbalance.controller.simulation import Injection, Outcome, Sample, Simulation
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
@@ -328,7 +328,7 @@ def _record(run: _Run, cause: Cause, *, integrator: str, used: tuple[ModelUsed, 
     time, fills = np.concatenate(run.times), np.concatenate(run.fills, axis=1)
     seen = np.concatenate(run.vibrations)
     facts = _facts(run, cause, np.abs(seen))
-    outcome = outcome_of(facts)
+    outcome = facts.outcome
     settled = outcome is Outcome.SETTLED
     return Simulation(
         scene=run.scene,
@@ -341,7 +341,7 @@ def _record(run: _Run, cause: Cause, *, integrator: str, used: tuple[ModelUsed, 
         settling_time=facts.settling_time if settled else None,
         hold_time=run.scene.controller.hold_time,
         loop=run.loop,
-        status=status_text(facts, outcome),
+        status=facts.status,
         time=time,
         amplitude=np.abs(seen),
         phase=np.angle(seen),

@@ -12,7 +12,7 @@ from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.identifiability import Combination, Verdict, combinations, verdicts
 from ringbalance.identification.intervals import Profile, covariance, profiles
-from ringbalance.identification.likelihood import Problem, block_of, held_effects
+from ringbalance.identification.likelihood import Problem, block_of
 from ringbalance.identification.optimisation import Optimum, optimum
 from ringbalance.identification.parameters import FitError, Parameter
 from ringbalance.identification.predict.kinds import PREDICTED, rows_of
@@ -47,7 +47,7 @@ def fit(
     held = held_for(scene, names)
     nothing = np.zeros((problem.measured.size, 0))
     first = optimum(problem, nothing, loss=loss, starts=starts)
-    effects = held_effects(problem, first.t, [both_sides(scene, name, sd) for name, sd in held.items()])
+    effects = problem.held_effects(first.t, [both_sides(scene, name, sd) for name, sd in held.items()])
     counts = np.linalg.norm(first.residuals.scale[:, None] * effects, axis=0) > _NO_EFFECT
     best = optimum(problem, effects[:, counts], loss=loss, starts=starts, before=first)
     kept = {name: sd for (name, sd), one in zip(held.items(), counts, strict=True) if one}

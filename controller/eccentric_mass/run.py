@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.estimation.imbalance_model import euler_step_limit
 from ringbalance.controller.eccentric_mass.plant.open_loop import Progress
-from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters, steady_whirl
+from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
 from ringbalance.controller.eccentric_mass.plant.speed import profile_arrays
 from ringbalance.controller.eccentric_mass.plant.substep_limit import check_substeps
 from ringbalance.controller.eccentric_mass.remedies import expected_deviation, remedies_of
@@ -136,7 +135,7 @@ def _facts(
         saturation=float(np.count_nonzero(at_limit)) * scene.sensor.step,
         hold=int(record.hold[-1]),
         least_gap=float(np.min(_separations(angles))),
-        euler_limit=float(euler_step_limit(model=believed_whirl(scene), angular_velocity=fastest)),
+        euler_limit=float(believed_whirl(scene).euler_step_limit(angular_velocity=fastest)),
         predicted=expected_deviation(scene, speed=slowest) if cause is Cause.IMBALANCE_UNCERTAIN else 0.0,
     )
 
@@ -178,7 +177,7 @@ def _targets(scene: EccentricScene, record: Record) -> Targets | None:
 def _unbalanced(scene: EccentricScene, speed: float) -> float:
     if speed == 0:
         return 0.0
-    return abs(steady_whirl(plant_parameters(scene), speed, scene.masses.initial_angle))
+    return abs(plant_parameters(scene).steady_whirl(speed, scene.masses.initial_angle))
 
 
 def _settling_time(*, time: FloatArray, amplitude: FloatArray, limit: float) -> float | None:

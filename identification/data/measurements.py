@@ -16,19 +16,15 @@ import numpy as np
 
 from ringbalance.identification.data.tables import (
     Table,
-    column_values,
     data_fault,
     decoded,
     dimension_of,
     file_name,
-    head_fault,
     header_faults,
     in_order,
-    name_faults,
     parse_table,
     read_content,
     split_head,
-    texts,
 )
 from ringbalance.scene.arrays import BoolArray, FloatArray, StringArray
 from ringbalance.scene.faults import Fault, toml_text
@@ -109,7 +105,7 @@ def parse_measurements(text: str, *, file: str) -> Measurements:
     table, faults = parse_table(text, file=file)
     if table is None:
         raise _error(faults)
-    wrong = [*faults, *_source_faults(table.header, file=file), *name_faults(table), *_unit_faults(table)]
+    wrong = [*faults, *_source_faults(table.header, file=file), *table.name_faults(), *_unit_faults(table)]
     heads_are_right = len(wrong) == len(faults)
     columns = dict(_columns(table, wrong)) if heads_are_right else {}
     if wrong:
@@ -123,7 +119,7 @@ def parse_measurements(text: str, *, file: str) -> Measurements:
 
 def series_of(table: Table) -> StringArray:
     """The column of series, or one series for all rows."""
-    return np.array(texts(table, SERIES) if SERIES in table.heads else ("one",) * len(table.rows))
+    return np.array(table.texts(SERIES) if SERIES in table.heads else ("one",) * len(table.rows))
 
 
 def _source_faults(header: Mapping[str, object], *, file: str) -> Iterator[Fault]:
@@ -148,14 +144,14 @@ def _unit_faults(table: Table) -> Iterator[Fault]:
     for head in table.heads:
         _, unit = split_head(head) or ("", "")
         if unit and dimension_of(unit) is None:
-            yield head_fault(table, head, "the unit is not known; docs/scene-file.md has them")
+            yield table.head_fault(head, "the unit is not known; docs/scene-file.md has them")
 
 
 def _columns(table: Table, wrong: list[Fault]) -> Iterator[tuple[str, FloatArray]]:
     for head in table.heads:
         name, unit = split_head(head) or ("", "")
         if name != SERIES:
-            values, faults = column_values(table, head, unit, dimension_of(unit) if unit else None)
+            values, faults = table.values(head, unit, dimension_of(unit) if unit else None)
             wrong += faults
             yield name, values
 

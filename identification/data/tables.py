@@ -57,6 +57,37 @@ class Table:
             self.file, f'line {line}, column "{head}"', problem, value=toml_text(cell), allowed=allowed
         )
 
+    def name_faults(self, known: Collection[str] = ()) -> Iterator[Fault]:
+        """Heads that are no name with a unit, and names that stand twice. Args: `known`: names to suggest."""
+        names = [split_head(head) for head in self.heads]
+        for head, name in zip(self.heads, names, strict=True):
+            if name is None or not _NAME.fullmatch(name[0]):
+                problem = 'it is not a name with its unit in brackets, such as "pressure [kPa]"'
+                yield self.head_fault(head, problem + did_you_mean(name[0] if name else head, known))
+        once = [name[0] for name in names if name is not None]
+        for twice in sorted({each for each in once if once.count(each) > 1}):
+            yield data_fault(self.file, f"line {self.head_line}", f'the column "{twice}" stands twice')
+
+    def head_fault(self, head: str, problem: str, allowed: str = "") -> Fault:
+        """One error of the name or the unit of a column."""
+        place = f"line {self.head_line}, column {toml_text(head)}"
+        return data_fault(self.file, place, problem, allowed=allowed)
+
+    def values(self, head: str, unit: str, dimension: str | None) -> tuple[FloatArray, list[Fault]]:
+        """The numbers of a column, SI, and the errors of its cells; 0 stands for a cell with an error."""
+        at, values, faults = self.heads.index(head), np.zeros(len(self.rows)), []
+        for row, (line, cells) in enumerate(zip(self.lines, self.rows, strict=True)):
+            try:
+                values[row] = _cell_value(cells[at], unit, dimension)
+            except FieldError as error:
+                faults.append(self.fault(line, head, cells[at], error.problem, error.allowed))
+        return values, faults
+
+    def texts(self, head: str) -> tuple[str, ...]:
+        """The cells of a column of text."""
+        at = self.heads.index(head)
+        return tuple(cells[at] for cells in self.rows)
+
 
 def data_fault(file: str, place: str, problem: str, *, value: str = "", allowed: str = "") -> Fault:
     """One error of a file of measurements. Args: `place`: such as 'line 3' or 'kind'; may be empty."""
@@ -246,24 +277,6 @@ def split_head(head: str) -> tuple[str, str] | None:
     return match[1].strip(), "" if unit == _NO_UNIT else unit
 
 
-def name_faults(table: Table, known: Collection[str] = ()) -> Iterator[Fault]:
-    """Heads that are no name with a unit, and names that stand twice. Args: `known`: names to suggest."""
-    names = [split_head(head) for head in table.heads]
-    for head, name in zip(table.heads, names, strict=True):
-        if name is None or not _NAME.fullmatch(name[0]):
-            problem = 'it is not a name with its unit in brackets, such as "pressure [kPa]"'
-            yield head_fault(table, head, problem + did_you_mean(name[0] if name else head, known))
-    once = [name[0] for name in names if name is not None]
-    for twice in sorted({each for each in once if once.count(each) > 1}):
-        yield data_fault(table.file, f"line {table.head_line}", f'the column "{twice}" stands twice')
-
-
-def head_fault(table: Table, head: str, problem: str, allowed: str = "") -> Fault:
-    """One error of the name or the unit of a column."""
-    place = f"line {table.head_line}, column {toml_text(head)}"
-    return data_fault(table.file, place, problem, allowed=allowed)
-
-
 def check_unit(unit: str, dimension: str) -> None:
     """Raises: FieldError: no unit of that dimension; the error has those that are."""
     parse_quantity(f"1 {unit}", dimension)
@@ -288,22 +301,3 @@ def _cell_value(cell: str, unit: str, dimension: str | None) -> float:
     if value and not _SIZES[0] <= abs(value) <= _SIZES[1]:
         raise FieldError("no measurement has a number of this size", "0, or 1e-15 to 1e15")
     return value if dimension is None else parse_quantity(f"{cell} {unit}", dimension)
-
-
-def column_values(
-    table: Table, head: str, unit: str, dimension: str | None
-) -> tuple[FloatArray, list[Fault]]:
-    """The numbers of a column, SI, and the errors of its cells; 0 stands for a cell with an error."""
-    at, values, faults = table.heads.index(head), np.zeros(len(table.rows)), []
-    for row, (line, cells) in enumerate(zip(table.lines, table.rows, strict=True)):
-        try:
-            values[row] = _cell_value(cells[at], unit, dimension)
-        except FieldError as error:
-            faults.append(table.fault(line, head, cells[at], error.problem, error.allowed))
-    return values, faults
-
-
-def texts(table: Table, head: str) -> tuple[str, ...]:
-    """The cells of a column of text."""
-    at = table.heads.index(head)
-    return tuple(cells[at] for cells in table.rows)

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters, steady_whirl
+from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
 from ringbalance.controller.rotor import influence
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.predict.device import Device, Models, device_of
@@ -175,7 +175,7 @@ def _steady_whirls(scene: EccentricScene, observations: Observations) -> FloatAr
     """
     plant, angles = plant_parameters(scene), scene.masses.initial_angle
     speeds = observations.columns["speed"].tolist()
-    return parts(np.array([steady_whirl(plant, speed, angles) for speed in speeds], dtype=np.complex128))
+    return parts(np.array([plant.steady_whirl(speed, angles) for speed in speeds], dtype=np.complex128))
 
 
 PREDICTED: Final[Mapping[str, PredictedKind]] = MappingProxyType(

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
 from ringbalance.controller.eccentric_mass.plant.speed import profile_arrays, speed_at
-from ringbalance.controller.rotor import influence, initial_unbalance, wrapped
+from ringbalance.controller.rotor import wrapped
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.scene.eccentric_models import EccentricRotor, EccentricScene, SpeedPoint
 from ringbalance.scene.faults import Fault, SceneError
@@ -80,8 +80,8 @@ def _liquid_rotor(scene: Scene) -> OneRotor:
     return OneRotor(
         source=scene.source,
         speed=rotor.speed,
-        influence=influence(coefficient=rotor.influence_coefficient, lag_angle=rotor.lag_angle),
-        unbalance=initial_unbalance(rotor=rotor),
+        influence=rotor.influence,
+        unbalance=rotor.initial_unbalance,
         mass=None,
         noise=scene.sensor.amplitude_noise,
         limit=scene.controller.limit,

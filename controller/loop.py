@@ -19,7 +19,7 @@ from ringbalance.controller.liquid_ring.plant import Advance, DiscState, LiquidR
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Integrator
 from ringbalance.controller.outcome import VERDICTS, Facts
-from ringbalance.controller.rotor import Sensor, chamber_letters, disc_unbalance, noisy_sensor, vibration
+from ringbalance.controller.rotor import Sensor, chamber_letters, disc_unbalance, noisy_sensor
 from ringbalance.controller.simulation import Injection, Outcome, Sample, Simulation
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor
@@ -200,7 +200,7 @@ class _Run:
         fills = self.state.fills()
         if self.seen is None or self.seen[0] != fills:
             moment = disc_unbalance(moment=self.plant.model.moment, fill_ratio=fills)
-            self.seen = fills, complex(vibration(rotor=self.scene.rotor, moment=moment))
+            self.seen = fills, complex(self.scene.rotor.vibration(moment))
         return self.seen[1]
 
     @property
@@ -311,7 +311,7 @@ class _Run:
 
     def _keep(self, time: FloatArray, fill_ratio: FloatArray) -> None:
         moment = disc_unbalance(moment=self.plant.model.moment, fill_ratio=fill_ratio)
-        seen = vibration(rotor=self.scene.rotor, moment=moment)
+        seen = self.scene.rotor.vibration(moment)
         self.times.append(time)
         self.fills.append(fill_ratio)
         self.vibrations.append(seen)

@@ -21,7 +21,6 @@ from ringbalance.controller.liquid_ring.reach import (
     unreachable_vibration,
 )
 from ringbalance.controller.liquid_ring.transfer import Event
-from ringbalance.controller.rotor import initial_unbalance
 from ringbalance.controller.simulation import Injection, Outcome, Sample, Verdict
 from ringbalance.controller.tuning.dead_time import standing_remedy
 from ringbalance.controller.tuning.loop_factor import STAYING_DEVIATIONS, LoopFactor
@@ -263,7 +262,7 @@ def _stalled(facts: Facts) -> str:
 
 
 def _capacity(facts: Facts) -> str:
-    needed = abs(initial_unbalance(rotor=facts.scene.rotor)) / GRAM_MILLIMETRE
+    needed = abs(facts.scene.rotor.initial_unbalance) / GRAM_MILLIMETRE
     pair = abs(largest_pair_moment(plant=facts.plant, state=facts.state)) / GRAM_MILLIMETRE
     return (
         f"{_not_settled(facts)}; capacity exceeded: the unbalance is {needed:.4g} g mm, one pair of chambers "

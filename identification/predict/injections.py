@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.rotor import chamber_directions, chamber_letters, influence
+from ringbalance.controller.rotor import chamber_directions, chamber_letters
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.predict.device import Device, Models, device_of
 from ringbalance.identification.predict.predicted import (
@@ -41,7 +41,7 @@ def _predict(scene: Scene, observations: Observations, models: Models) -> FloatA
     moved = law.pair_vector(fill_ratio=after, opposite_fill_ratio=total - after) - law.pair_vector(
         fill_ratio=before, opposite_fill_ratio=total - before
     )
-    k = influence(coefficient=scene.rotor.influence_coefficient, lag_angle=scene.rotor.lag_angle)
+    k = scene.rotor.influence
     return parts(k * scene.disc.moment_factor * moved * chamber_directions(scene.disc.chambers)[pair])
 
 

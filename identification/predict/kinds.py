@@ -14,7 +14,6 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
-from ringbalance.controller.rotor import influence
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.predict.device import Device, Models, device_of
 from ringbalance.identification.predict.injections import INJECTION
@@ -84,7 +83,7 @@ def _trial_amplitudes(scene: Scene, observations: Observations) -> FloatArray:
 
 
 def _change(scene: Scene, observations: Observations) -> ComplexArray:
-    k = influence(coefficient=scene.rotor.influence_coefficient, lag_angle=scene.rotor.lag_angle)
+    k = scene.rotor.influence
     unbalance = observations.columns["unbalance"] * np.exp(1j * observations.columns["angle"])
     return np.asarray(k * unbalance, dtype=np.complex128)
 

@@ -61,18 +61,18 @@ class Block:
         """Whether its noise is estimated from the residuals."""
         return not self.kind.noise_given(self.observations)
 
-
-def block_of(observations: Observations) -> Block:
-    """A data set with its whitening."""
-    kind = PREDICTED[observations.kind]
-    lower = np.linalg.cholesky(kind.covariance(observations))
-    return Block(
-        observations=observations,
-        kind=kind,
-        measured=kind.measured(observations),
-        whiten=np.linalg.inv(lower),
-        free=np.zeros((len(lower), 0)) if kind.free is None else kind.free(observations),
-    )
+    @classmethod
+    def of(cls, observations: Observations) -> Block:
+        """A data set with its whitening."""
+        kind = PREDICTED[observations.kind]
+        lower = np.linalg.cholesky(kind.covariance(observations))
+        return cls(
+            observations=observations,
+            kind=kind,
+            measured=kind.measured(observations),
+            whiten=np.linalg.inv(lower),
+            free=np.zeros((len(lower), 0)) if kind.free is None else kind.free(observations),
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -17,7 +17,8 @@ from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import (
 from ringbalance.controller.eccentric_mass.estimation.imbalance_model import ProcessNoise
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
 from ringbalance.controller.eccentric_mass.plant.substep_limit import longest_run
-from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, Remedy, RunFacts
+from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, Remedy
+from ringbalance.controller.eccentric_mass.run_status import RunFacts
 from ringbalance.controller.eccentric_mass.sampled_loops import recommended_gains
 from ringbalance.controller.eccentric_mass.strategy.plan import Stage
 from ringbalance.controller.eccentric_mass.strategy.settings import (
@@ -206,8 +207,9 @@ def _stall_remedy(scene: EccentricScene, *, margin: float = _MARGIN) -> Remedy |
     return _remedy(scene, *changes) if changes else None
 
 
-def remedies_of(facts: RunFacts, outcome: EccentricOutcome) -> tuple[Remedy, ...]:
+def remedies_of(facts: RunFacts) -> tuple[Remedy, ...]:
     """What would mend the run, the likeliest first.  An unstable loop comes before all else."""
+    outcome = facts.outcome
     if outcome in {EccentricOutcome.SETTLED, EccentricOutcome.LOCKED}:
         return ()
     own = _REMEDIES[outcome](facts) if outcome in _REMEDIES else ()

@@ -11,15 +11,10 @@ from ringbalance.controller.eccentric_mass.plant.open_loop import Progress
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
 from ringbalance.controller.eccentric_mass.plant.speed import profile_arrays
 from ringbalance.controller.eccentric_mass.plant.substep_limit import check_substeps
-from ringbalance.controller.eccentric_mass.remedies import expected_deviation, remedies_of
+from ringbalance.controller.eccentric_mass.remedies import expected_deviation, found_beforehand, remedies_of
 from ringbalance.controller.eccentric_mass.run_loop import Record, recorded, sample_count
-from ringbalance.controller.eccentric_mass.run_record import (
-    EccentricEstimates,
-    EccentricRun,
-    RunFacts,
-    StageSpan,
-)
-from ringbalance.controller.eccentric_mass.run_status import outcome_of, status_text, warnings_of
+from ringbalance.controller.eccentric_mass.run_record import EccentricEstimates, EccentricRun, StageSpan
+from ringbalance.controller.eccentric_mass.run_status import RunFacts
 from ringbalance.controller.eccentric_mass.strategy.plan import RELEASED, STAGE_NAMES, Cause, Findings, Stage
 from ringbalance.controller.eccentric_mass.strategy.settings import (
     StrategySettings,
@@ -57,8 +52,8 @@ def simulate_eccentric(
     speed = np.interp(time, times, speeds)
     whirl = record.state[:, 0] + 1j * record.state[:, 1]
     facts = _facts(scene, record, cause, findings, innovation, speed, np.abs(whirl))
-    outcome = outcome_of(facts)
-    remedies = remedies_of(facts, outcome)
+    outcome = facts.outcome
+    remedies = remedies_of(facts)
     settled = facts.settling_time is not None and outcome.value in {"settled", "locked"}
     return EccentricRun(
         balancer="eccentric_mass",
@@ -66,8 +61,8 @@ def simulate_eccentric(
         outcome=outcome,
         settled=settled,
         settling_time=facts.settling_time if settled else None,
-        status=status_text(facts, outcome, remedies),
-        warnings=warnings_of(facts),
+        status=facts.status(remedies),
+        warnings=(*found_beforehand(scene), *facts.warnings),
         remedies=remedies,
         innovation=innovation,
         limit=scene.supervisor.limit,

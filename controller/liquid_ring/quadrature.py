@@ -9,7 +9,6 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.formulas.paths import piece_part, piece_rise
-from ringbalance.controller.liquid_ring.closed_form import boundary_event
 from ringbalance.controller.liquid_ring.pair_path import FlowPaths, UntabulatedError, flow_paths
 from ringbalance.controller.liquid_ring.transfer import Drive, Event, Transfer, checked_instants
 from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
@@ -139,4 +138,4 @@ def _event(drive: Drive, way: _Way, duration: float) -> Event:
     if duration < way.duration:
         return Event.NONE
     ended = way.end in {drive.lowest, drive.highest}
-    return boundary_event(drive, way.end) if ended else Event.STALLED
+    return drive.boundary_event(way.end) if ended else Event.STALLED

@@ -112,6 +112,12 @@ class Drive:
             primed=bool(after.primed) and event is not Event.EMPTY,
         )
 
+    def boundary_event(self, fill: float) -> Event:
+        """EMPTY or FULL: which event it is to reach `drive.lowest` or `drive.highest`."""
+        if fill == self.lowest:
+            return Event.EMPTY if self.lowest == 0 else Event.FULL
+        return Event.EMPTY if self.highest == self.total else Event.FULL
+
 
 @dataclass(frozen=True, kw_only=True)
 class Transfer:

@@ -25,7 +25,6 @@ from ringbalance.identification.predict.predicted import (
     parts,
     spread_out,
     vector_covariance,
-    vectors,
 )
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.tube.state import tube_state
@@ -51,7 +50,7 @@ def _vibrations(predict: Callable[[Any, Observations], FloatArray], **declared: 
     """One measured vibration a row."""
     return PredictedKind(
         predict=_by_scene_alone(predict),
-        measured=lambda observations: parts(vectors(observations)),
+        measured=lambda observations: parts(observations.vectors()),
         covariance=lambda observations: spread_out(
             vector_covariance(observations, given="amplitude" in observations.uncertainty)
         ),
@@ -202,8 +201,3 @@ PREDICTED: Final[Mapping[str, PredictedKind]] = MappingProxyType(
         "positioning": POSITIONING,
     }
 )
-
-
-def rows_of(observations: Observations, values: FloatArray) -> FloatArray:
-    """Values of `measured`, one row of numbers for each row of the file, shape (n, 1) or (n, 2)."""
-    return np.reshape(values, (-1, len(observations))).T

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ringbalance.controller.liquid_ring.closed_form import boundary_event
 from ringbalance.controller.liquid_ring.transfer import Drive, Event, Integrator, Transfer, checked_instants
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene.arrays import FloatArray
@@ -36,7 +35,7 @@ def _solve(drive: Drive, t: FloatArray, tolerance: float) -> Transfer:
     if u0 == 0:
         return drive.still(t, flow=before)
     if t[-1] == 0 or drive.fill == end:
-        event = boundary_event(drive, end) if drive.fill == end else Event.NONE
+        event = drive.boundary_event(end) if drive.fill == end else Event.NONE
         return _unmoved(drive, t, regime, event)
 
     primed = drive.primed or bool(before.primed)
@@ -113,5 +112,5 @@ def _event(drive: Drive, end: float, hit: list[bool], *, finished_: bool) -> Eve
     if not finished_:
         return Event.UNFINISHED
     if hit[0]:
-        return boundary_event(drive, end)
+        return drive.boundary_event(end)
     return Event.STALLED if hit[1] else Event.NONE

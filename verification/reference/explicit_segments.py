@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ringbalance.controller.liquid_ring.closed_form import boundary_event
 from ringbalance.controller.liquid_ring.transfer import Drive, Event, Integrator, Transfer, checked_instants
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.paper_law import PaperLaw
@@ -61,4 +60,4 @@ def _march(drive: Drive, t: FloatArray, segments: int) -> Transfer:
 
 def _event(drive: Drive, fill: float, velocity: float) -> Event:
     end = drive.lowest if velocity > 0 else drive.highest
-    return boundary_event(drive, end) if fill == end else Event.NONE
+    return drive.boundary_event(end) if fill == end else Event.NONE

@@ -24,6 +24,7 @@ from ringbalance.reduced_model.chamber.range import (
     range_fills,
 )
 from ringbalance.reduced_model.chamber.terms import (
+    MEAN,
     PLATES,
     RIPPLE,
     SLOSHING,
@@ -44,7 +45,9 @@ from ringbalance.reduced_model.selection.range_flow import (
     steady,
 )
 from ringbalance.reduced_model.selection.tube_terms import (
+    CREST,
     PART_TERMS,
+    TUBE_LOSS,
     crest_contribution,
     loss_effect,
     without,
@@ -60,12 +63,9 @@ from ringbalance.scene.accuracy import FINEST
 from ringbalance.scene.models import Scene
 from ringbalance.scene.tube_models import TubeModels
 
-GRAVITY: Final = "gravity, mean over a turn"
 RIPPLE_AND_SLOSHING: Final = "gravity ripple at 1x and sloshing"
 SURFACE_TENSION: Final = "surface tension"
 WALL_FRICTION: Final = "friction at the walls of a chamber"
-CREST: Final = "priming over the siphon crest"
-TUBE_LOSS: Final = "loss of the tube"
 INERTIA: Final = "tube inertia"
 FILLING: Final = "gas filling"
 LAG: Final = "valve lag"
@@ -152,7 +152,7 @@ def _chamber(scene: Scene) -> dict[str, TermEstimate]:
         scene,
         (PLATES, pressure[PLATES], "1 - V/(B theta (R2^2 - R1^2)/2)", None),
         (
-            GRAVITY,
+            MEAN,
             mean_gravity(scene),
             "free surface |r + g/omega^2| = b against a concentric one, at the worst fill of the range",
             None,

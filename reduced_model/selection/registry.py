@@ -14,19 +14,16 @@ from typing import Final, Literal
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.physics.gas.supply import HEAT_CAPACITY_RATIO
 from ringbalance.reduced_model.chamber.range import mean_gravity
-from ringbalance.reduced_model.chamber.terms import PLATES
+from ringbalance.reduced_model.chamber.terms import MEAN, PLATES
 from ringbalance.reduced_model.chamber.values import by_closed_form
 from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.reduced_model.selection.estimates import (
-    CREST,
     FILLING,
-    GRAVITY,
     HELD,
     INERTIA,
     LAG,
     RIPPLE_AND_SLOSHING,
     SURFACE_TENSION,
-    TUBE_LOSS,
     WALL_FRICTION,
     TermEstimate,
     percent,
@@ -35,10 +32,12 @@ from ringbalance.reduced_model.selection.estimates import (
 from ringbalance.reduced_model.selection.range_flow import steady
 from ringbalance.reduced_model.selection.tube_terms import (
     BENDS,
+    CREST,
     ENDS,
     PART_TERMS,
     ROTATION,
     ROUGHNESS,
+    TUBE_LOSS,
     loss_effect,
     tube_models,
 )
@@ -252,7 +251,7 @@ def _filling(term: Term, scene: Scene, estimate: TermEstimate) -> Selection:
 TERMS: Final = (
     Term(name=PLATES, part="chamber", models=("flat strips", "exact geometry"), select=_plates),
     Term(
-        name=GRAVITY,
+        name=MEAN,
         part="chamber",
         models=(LEFT_OUT, "quasi-static, free surface found, mean over a turn"),
         select=_gravity,

@@ -35,14 +35,10 @@ class CostModel:
             raise ValueError(f"the cost model knows no work of kind {unknown[0]!r}: fit it again")
         return float(sum(self.seconds[kind] * count for kind, count in work.items()))
 
-    def of_fidelity(self, fidelity: Fidelity, *, points: int) -> float:
-        """Cost of a model at a number of points, the tables that it needs included, s."""
-        return self.cost(fidelity.fixed_work) + points * self.cost(fidelity.work)
-
     def ranked(self, hierarchy: ModelHierarchy) -> list[Fidelity]:
         """Models of a hierarchy, cheapest over all its points first; equal ones as they stand."""
         points = len(hierarchy.points)
-        return sorted(hierarchy.fidelities, key=lambda fidelity: self.of_fidelity(fidelity, points=points))
+        return sorted(hierarchy.fidelities, key=lambda fidelity: self.cost(fidelity.counted(points)))
 
 
 @lru_cache(maxsize=1)

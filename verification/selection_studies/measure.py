@@ -1,5 +1,4 @@
-"""Every model of a hierarchy measured: its error against the finest, its counted cost, its time and
-memory."""
+"""Every model of a hierarchy measured: its error against the finest, its counted cost, time and memory."""
 
 from __future__ import annotations
 
@@ -13,11 +12,10 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.verification.selection_studies.choice import Values
 from ringbalance.verification.selection_studies.cost import CostModel
-from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy, Work
+from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy, Values, Work
 
-QUICK: Final = 0.1
+_QUICK: Final = 0.1
 """s, below which a run is repeated."""
 FLOOR: Final = 3e-8
 """Relative error below which grid convergence, tables and rounding rule: smaller ones count as equal."""
@@ -33,7 +31,7 @@ class Clock:
     """Whether memory is traced, too."""
     _known: dict[frozenset[tuple[str, float]], float] = field(default_factory=dict)
 
-    def seconds_of(self, fidelity: Fidelity, points: Sequence[int]) -> float:
+    def seconds_of(self, fidelity: Fidelity, points: int) -> float:
         """Processor time of a model over points, with the tables it needs first, s.
 
         Each part is the median of several runs, or of the points' single runs where these take long.
@@ -44,7 +42,7 @@ class Clock:
         if fidelity.fresh is None or self.repeats > 1:
             return before + self._over(fidelity, points)
         # Such a model answers two quantities at once: a light study times it with the first of them.
-        counted = {**fidelity.work, "points": float(len(points))}
+        counted = {**fidelity.work, "points": float(points)}
         return before + self._remembered(counted, partial(self._over, fidelity, points))
 
     def _remembered(self, counted: Work, taken: Callable[[], float]) -> float:
@@ -53,18 +51,18 @@ class Clock:
             self._known[key] = taken()
         return self._known[key]
 
-    def _over(self, fidelity: Fidelity, points: Sequence[int]) -> float:
-        work = fidelity.fresh or fidelity.solve
-        each = [_once(partial(work, points[0]))]
-        if self.repeats > 1 or each[0] < QUICK:
-            each += [_once(partial(work, point)) for point in points[1:]]
-        if max(each) < QUICK:
-            each += [_once(partial(work, point)) for _ in range(self.repeats - 1) for point in points]
-        return median(each) * len(points)
+    def _over(self, fidelity: Fidelity, points: int) -> float:
+        runs = [partial(fidelity.fresh or fidelity.solve, point) for point in range(points)]
+        each = [_once(runs[0])]
+        if self.repeats > 1 or each[0] < _QUICK:
+            each += map(_once, runs[1:])
+        if max(each) < _QUICK:
+            each += map(_once, runs * (self.repeats - 1))
+        return median(each) * points
 
     def _median(self, work: Callable[[], object]) -> float:
         times = [_once(work)]
-        while len(times) < self.repeats and times[0] < QUICK:
+        while len(times) < self.repeats and times[0] < _QUICK:
             times.append(_once(work))
         return median(times)
 
@@ -72,10 +70,9 @@ class Clock:
         """Peak of memory that Python and NumPy allocate at one point, bytes; None where it is not traced."""
         if not self.memory:
             return None
-        work = fidelity.fresh or fidelity.solve
         tracemalloc.start()
         try:
-            work(0)
+            (fidelity.fresh or fidelity.solve)(0)
             return float(tracemalloc.get_traced_memory()[1])
         finally:
             tracemalloc.stop()
@@ -94,8 +91,10 @@ class Measured:
     fidelity: Fidelity
     error: float
     """Largest relative error against the finest model over the hierarchy's points."""
+    counted: Work
+    """Over all points."""
     cost: float
-    """Counted work over all points by the committed cost model, s of its machine."""
+    """Of that by the committed cost model, s of its machine."""
     on_front: bool
     """Whether no other model is both cheaper and nearer."""
     seconds: float | None
@@ -113,11 +112,6 @@ class Trade:
     knee: str | None
     """Name of the model at the front's trade-off point; None for a model hierarchy without points."""
 
-    @property
-    def front(self) -> tuple[Measured, ...]:
-        """Models on the Pareto front, cheapest first."""
-        return tuple(sorted((m for m in self.fidelities if m.on_front), key=lambda m: m.cost))
-
 
 def measure(hierarchy: ModelHierarchy, *, values: Values, costs: CostModel, clock: Clock | None) -> Trade:
     """Measure a model hierarchy; one without points has no models to measure, without a clock no times.
@@ -126,29 +120,27 @@ def measure(hierarchy: ModelHierarchy, *, values: Values, costs: CostModel, cloc
         between the front's ends, both axes logarithmic, errors below the finest model's own uncertainty
         counted as that.
     """
-    if not hierarchy.points:
+    points = len(hierarchy.points)
+    if not points:
         return Trade(hierarchy=hierarchy, fidelities=(), knee=None)
-    points = tuple(range(len(hierarchy.points)))
-    errors = [values.error(fidelity, hierarchy.top, points) for fidelity in hierarchy.fidelities]
-    spent = [costs.of_fidelity(fidelity, points=len(points)) for fidelity in hierarchy.fidelities]
+    errors = [values.error(fidelity) for fidelity in hierarchy.fidelities]
+    counted = [fidelity.counted(points) for fidelity in hierarchy.fidelities]
+    spent = [costs.cost(work) for work in counted]
     front = pareto_front(spent, [max(error, FLOOR) for error in errors])
     held = [max(error, hierarchy.top_uncertainty, FLOOR) for error in errors]
-    known = pareto_front(spent, held)
-    return Trade(
-        hierarchy=hierarchy,
-        fidelities=tuple(
-            Measured(
-                fidelity=fidelity,
-                error=error,
-                cost=cost,
-                on_front=i in front,
-                seconds=clock.seconds_of(fidelity, points) if clock else None,
-                memory=clock.memory_of(fidelity) if clock else None,
-            )
-            for i, (fidelity, error, cost) in enumerate(zip(hierarchy.fidelities, errors, spent, strict=True))
-        ),
-        knee=hierarchy.fidelities[knee([spent[i] for i in known], [held[i] for i in known], known)].name,
+    found = tuple(
+        Measured(
+            fidelity=fidelity,
+            error=errors[i],
+            counted=counted[i],
+            cost=spent[i],
+            on_front=i in front,
+            seconds=clock.seconds_of(fidelity, points) if clock else None,
+            memory=clock.memory_of(fidelity) if clock else None,
+        )
+        for i, fidelity in enumerate(hierarchy.fidelities)
     )
+    return Trade(hierarchy=hierarchy, fidelities=found, knee=found[knee(spent, held)].fidelity.name)
 
 
 def pareto_front(costs: Sequence[float], errors: Sequence[float]) -> list[int]:
@@ -161,33 +153,14 @@ def pareto_front(costs: Sequence[float], errors: Sequence[float]) -> list[int]:
     return found
 
 
-def knee(costs: Sequence[float], errors: Sequence[float], places: Sequence[int]) -> int:
-    """The one of `places` on a front that lies farthest below the chord between its ends, logarithmically.
+def knee(costs: Sequence[float], errors: Sequence[float]) -> int:
+    """Place of the entry of the front that lies farthest below the chord between its ends, logarithmically.
 
     Of a front of one or two it is the last.
     """
-    if len(places) < 3:
-        return places[-1]
-    x, y = (np.log(np.maximum(np.asarray(v, dtype=np.float64), 1e-300)) for v in (costs, errors))
+    front = pareto_front(costs, errors)
+    if len(front) < 3:
+        return front[-1]
+    x, y = (np.log(np.maximum(np.asarray(v, dtype=np.float64)[front], 1e-300)) for v in (costs, errors))
     x, y = (x - x[0]) / (x[-1] - x[0]), (y - y[-1]) / (y[0] - y[-1])
-    return places[int(np.argmax(1 - x - y))]
-
-
-def works_and_seconds(trades: Sequence[Trade]) -> tuple[list[Work], list[float]]:
-    """Counted work over all points, and s, of all timed models, to fit a cost model to."""
-    works: list[Work] = []
-    seconds: list[float] = []
-    for trade in trades:
-        count = len(trade.hierarchy.points)
-        for found in trade.fidelities:
-            if found.seconds is not None:
-                kinds = {*found.fidelity.work, *found.fidelity.fixed_work}
-                works.append(
-                    {
-                        kind: count * found.fidelity.work.get(kind, 0.0)
-                        + found.fidelity.fixed_work.get(kind, 0.0)
-                        for kind in kinds
-                    }
-                )
-                seconds.append(found.seconds)
-    return works, seconds
+    return front[int(np.argmax(1 - x - y))]

@@ -18,7 +18,7 @@ import math
 from dataclasses import dataclass, replace
 
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
-from ringbalance.controller.eccentric_mass.plant.speed import profile_arrays, speed_at
+from ringbalance.controller.eccentric_mass.plant.speed import speed_at
 from ringbalance.controller.rotor import wrapped
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.scene.eccentric_models import EccentricRotor, EccentricScene, SpeedPoint
@@ -89,7 +89,7 @@ def _liquid_rotor(scene: Scene) -> OneRotor:
 
 
 def _driven_rotor(scene: EccentricScene) -> OneRotor:
-    speed, _ = speed_at(*profile_arrays(scene.rotor), scene.supervisor.start)
+    speed, _ = speed_at(*scene.rotor.profile, scene.supervisor.start)
     if speed <= 0:
         problem = "the rotor does not turn forwards when balancing starts"
         raise _refusal(scene, "rotor", "speed_profile", problem, "a speed above 0 rpm at that time")
@@ -117,7 +117,7 @@ def own_scene(scene: AnyScene) -> AnyScene:
     """
     if isinstance(scene, Scene):
         return scene
-    speed, _ = speed_at(*profile_arrays(scene.rotor), scene.supervisor.start)
+    speed, _ = speed_at(*scene.rotor.profile, scene.supervisor.start)
     return _steady_start(scene, speed)
 
 

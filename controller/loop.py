@@ -12,8 +12,8 @@ import numpy as np
 from ringbalance.controller.algorithms.algorithm import Command, Controller, Measurement, usable
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.checks import check_fit, check_settings
-from ringbalance.controller.formulas.stopping import Cause, has_held, stop_cause
-from ringbalance.controller.judgement import misadjustments, noise_floor, overshoots, rose
+from ringbalance.controller.formulas.stopping import Cause, has_held, has_risen, stop_cause
+from ringbalance.controller.judgement import misadjustments, noise_floor, overshoots
 from ringbalance.controller.liquid_ring.closed_form import closed_form, has_closed_form
 from ringbalance.controller.liquid_ring.plant import Advance, DiscState, LiquidRing, initial_state, longest
 from ringbalance.controller.liquid_ring.quadrature import quadrature
@@ -216,7 +216,7 @@ class _Run:
         if measurement is None or not usable(measurement, needs_phase=False):
             return
         if self.last_usable is not None and self.operated:
-            higher = rose(self.last_usable, measurement, floor=self.floor)
+            higher = has_risen(self.last_usable.amplitude, measurement.amplitude, self.floor)
             self.rises = self.rises + 1 if higher else 0
         self.last_usable, self.operated = measurement, False
 
@@ -227,7 +227,9 @@ class _Run:
                 self._held and self.loop.stays and not self.to_time_limit,
                 self.rises,
                 self.controller.rises_tolerated,
-                first is not None and last is not None and rose(first, last, floor=self.floor),
+                first is not None
+                and last is not None
+                and has_risen(first.amplitude, last.amplitude, self.floor),
                 self.idle,
                 IDLE_OPERATIONS + self.plant.chambers,
                 command.resting and self.exact and self.state.rests and not (self.cut or self.to_time_limit),

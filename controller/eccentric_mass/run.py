@@ -9,10 +9,9 @@ import numpy as np
 
 from ringbalance.controller.eccentric_mass.plant.open_loop import Progress
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
-from ringbalance.controller.eccentric_mass.plant.speed import profile_arrays
 from ringbalance.controller.eccentric_mass.plant.substep_limit import check_substeps
 from ringbalance.controller.eccentric_mass.remedies import expected_deviation, found_beforehand, remedies_of
-from ringbalance.controller.eccentric_mass.run_loop import Record, recorded, sample_count
+from ringbalance.controller.eccentric_mass.run_loop import Record, recorded
 from ringbalance.controller.eccentric_mass.run_record import EccentricEstimates, EccentricRun, StageSpan
 from ringbalance.controller.eccentric_mass.run_status import RunFacts
 from ringbalance.controller.eccentric_mass.strategy.plan import RELEASED, STAGE_NAMES, Cause, Findings, Stage
@@ -47,7 +46,7 @@ def simulate_eccentric(
         scene, seed, progress or _silent, settings or strategy_settings(scene)
     )
     cause = Cause(int(record.cause[-1]))
-    times, speeds = profile_arrays(scene.rotor)
+    times, speeds = scene.rotor.profile
     time: FloatArray = np.arange(len(record.state), dtype=np.float64) * scene.sensor.step
     speed = np.interp(time, times, speeds)
     whirl = record.state[:, 0] + 1j * record.state[:, 1]
@@ -119,7 +118,7 @@ def _facts(
         stage=Stage(int(record.stage[-1])),
         findings=findings,
         time=float(time[-1]),
-        diverged=len(time) < sample_count(scene),
+        diverged=len(time) < scene.samples,
         speed=speed,
         amplitude=amplitude,
         left=_left(record, amplitude, scene.supervisor.limit),

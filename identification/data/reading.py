@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.identification.data.kinds import AMPLITUDES, KINDS, Column, DataKind, unknown_kind
-from ringbalance.identification.data.measurements import SOURCE_KEYS, series_of, text_faults
+from ringbalance.identification.data.measurements import SOURCE_KEYS
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.data.stated import stated_uncertainty
 from ringbalance.identification.data.tables import (
@@ -21,7 +21,6 @@ from ringbalance.identification.data.tables import (
     data_fault,
     decoded,
     file_name,
-    header_faults,
     in_order,
     parse_table,
     read_content,
@@ -118,7 +117,7 @@ def _observations(
         file=table.file,
         source=str(table.header["source"]),
         lines=np.array(table.lines, dtype=np.int64),
-        series=series_of(table),
+        series=table.series,
         chamber=np.array(letters, dtype=np.str_),
         columns=_zero_to_peak(used, kind, factor),
         uncertainty=_zero_to_peak(uncertainty, kind, factor),
@@ -145,8 +144,8 @@ def _header_faults(table: Table, kind: DataKind) -> list[Fault]:
     convention = (AMPLITUDE,) if kind.has_amplitudes else ()
     texts_only = [key for key in SOURCE_KEYS if key != "uncertainty"]
     faults = [
-        *header_faults(table.header, known=(*SOURCE_KEYS, *convention), needed=_NEEDED, file=table.file),
-        *text_faults(table.header, texts_only, file=table.file),
+        *table.header_faults(known=(*SOURCE_KEYS, *convention), needed=_NEEDED),
+        *table.text_faults(texts_only),
     ]
     if not str(table.header.get("source", "-")).strip():
         faults.append(data_fault(table.file, "source", "it is empty", allowed="rig, run and date"))

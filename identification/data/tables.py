@@ -17,7 +17,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import FloatArray, StringArray
 from ringbalance.scene.faults import Fault, did_you_mean, toml_text
 from ringbalance.scene.units import DIMENSIONS, FieldError, parse_number, parse_quantity
 
@@ -25,6 +25,7 @@ LARGEST_FILE: Final = 8 * 2**20
 MOST_ROWS: Final = 2000
 """A row is a measurement; more of them are a recording, which is averaged or thinned out first. A fit
 holds the covariance of every pair of rows: more would take gigabytes."""
+SERIES: Final = "series"
 _MARK: Final = "#"
 _SEPARATORS: Final = ";\t,"
 _SETS_A_KEY: Final = re.compile(r'"?#\s*\w+\s*=')
@@ -82,6 +83,29 @@ class Table:
             except FieldError as error:
                 faults.append(self.fault(line, head, cells[at], error.problem, error.allowed))
         return values, faults
+
+    @property
+    def series(self) -> StringArray:
+        """The column of series, or one series for all rows."""
+        return np.array(self.texts(SERIES) if SERIES in self.heads else ("one",) * len(self.rows))
+
+    def header_faults(self, *, known: Collection[str], needed: Collection[str]) -> Iterator[Fault]:
+        """Keys of the header that are not known, and those that are missing."""
+        for key in self.header:
+            if key not in known:
+                problem = f"this key of the first lines is not known{did_you_mean(key, known)}"
+                yield data_fault(self.file, toml_text(key), problem, allowed=", ".join(known))
+        for key in needed:
+            if key not in self.header:
+                problem = f'the key "{key}" is missing in the first lines, marked #'
+                yield data_fault(self.file, "", problem)
+
+    def text_faults(self, keys: Iterable[str]) -> Iterator[Fault]:
+        """Values of keys of the header that must be text, and are not."""
+        for key in keys:
+            value = self.header.get(key, "")
+            if not isinstance(value, str):
+                yield data_fault(self.file, key, "it is not text", value=toml_text(value), allowed='"..."')
 
     def texts(self, head: str) -> tuple[str, ...]:
         """The cells of a column of text."""
@@ -253,19 +277,6 @@ def _rows(
 def in_order(faults: Iterable[Fault]) -> list[Fault]:
     """Errors of one file in the order of its lines, those of the whole file first."""
     return sorted(faults, key=lambda fault: int(found[1]) if (found := _LINE.match(fault.key)) else 0)
-
-
-def header_faults(
-    header: Mapping[str, object], *, known: Collection[str], needed: Collection[str], file: str
-) -> Iterator[Fault]:
-    """Keys of a header that are not known, and those that are missing."""
-    for key in header:
-        if key not in known:
-            problem = f"this key of the first lines is not known{did_you_mean(key, known)}"
-            yield data_fault(file, toml_text(key), problem, allowed=", ".join(known))
-    for key in needed:
-        if key not in header:
-            yield data_fault(file, "", f'the key "{key}" is missing in the first lines, marked #')
 
 
 def split_head(head: str) -> tuple[str, str] | None:

@@ -24,7 +24,7 @@ from ringbalance.controller.eccentric_mass.plant.plant import (
     rest_state,
     stuck_flags,
 )
-from ringbalance.controller.eccentric_mass.plant.speed import profile_arrays, speed_at, turned
+from ringbalance.controller.eccentric_mass.plant.speed import speed_at, turned
 from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.eccentric_models import SpeedPoint
@@ -281,7 +281,7 @@ def test_motor_equations_by_shaft_and_gear(parameters: PlantParameters) -> None:
 
 
 def test_speed_profile(scene: EccentricScene) -> None:
-    times, speeds = profile_arrays(scene.rotor)
+    times, speeds = scene.rotor.profile
     low, high = 100 * RPM, 230 * RPM
     assert speed_at(times, speeds, 60.0) == pytest.approx((low, 0.0))
     assert speed_at(times, speeds, 120.0) == pytest.approx((low, RPM))

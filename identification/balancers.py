@@ -12,7 +12,7 @@ import numpy as np
 
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.parameters import FitError, Parameter, scene_parameter, unknown_name
-from ringbalance.identification.predict.device import Models, models_of
+from ringbalance.identification.predict.device import Models
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.physics.tube.uncertainty import MODEL_CAUSES
@@ -56,7 +56,7 @@ The time L/2u in which the flow passes that half is taken for their expanded unc
 
 def models_for(scene: AnyScene) -> Models | None:
     """Models that predictions take; None where there is but one."""
-    return models_of(scene) if isinstance(scene, Scene) else None
+    return Models.of(scene) if isinstance(scene, Scene) else None
 
 
 def parameters_for(scene: AnyScene, names: Sequence[str]) -> tuple[Parameter, ...]:

@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from ringbalance.identification.predict.device import device_of, models_of
+from ringbalance.identification.predict.device import Models, device_of
 from ringbalance.scene.faults import did_you_mean
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import (
@@ -157,7 +157,7 @@ def _loss_scale(scene: Scene, name: str) -> tuple[float, float]:
         return 0.0, 1.0
     here = scene.tube.extra_loss
     speeds = [
-        models_of(with_value(scene=scene, quantity=name, value=here + step)).velocity
+        Models.of(with_value(scene=scene, quantity=name, value=here + step)).velocity
         for step in (0.0, _LOSS_STEP)
     ]
     if speeds[1] <= 0 or speeds[0] <= speeds[1]:
@@ -170,7 +170,7 @@ def _loss_scale(scene: Scene, name: str) -> tuple[float, float]:
 def _driving_head(scene: Scene) -> float:
     """H at equal fills, m^2/s^2."""
     fill = scene.disc.initial_fill
-    ends = device_of(scene, models_of(scene)).law.ends(
+    ends = device_of(scene, Models.of(scene)).law.ends(
         fill_ratio=fill, opposite_fill_ratio=fill, gas_pressure=scene.gas.pressure
     )
     return float(ends.driving_pressure()) / scene.liquid.density

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -292,11 +292,6 @@ def initial_state(*, disc: Disc) -> DiscState:
     """All chambers at the scene's initial fill, no tube primed."""
     pair = PairState(fill=disc.initial_fill, total=2 * disc.initial_fill)
     return DiscState(pairs=(pair,) * (disc.chambers // 2))
-
-
-def longest(operations: Sequence[Operation]) -> Operation:
-    """The operation of a command that was given the most gas."""
-    return max(operations, key=lambda operation: operation.duration)
 
 
 def _run_dry(transfer: Transfer, before: float, duration: float) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from ringbalance.controller.document import simulation_document
-from ringbalance.controller.gas_use import gas_use
+from ringbalance.controller.gas_use import GasUse
 from ringbalance.controller.liquid_ring.interval import Passage
 from ringbalance.controller.liquid_ring.motion import Dynamics
 from ringbalance.controller.liquid_ring.plant import LiquidRing, initial_state
@@ -199,7 +199,7 @@ def test_a_chamber_run_dry_passes_gas(model: BalancerModel, scene: Scene) -> Non
     assert operation.event is Event.EMPTY
     emptied = float(advance.instants[np.argmax(advance.fill_ratio[0] == 0)])
     assert operation.run_dry == pytest.approx(4.0 - emptied, abs=2e-3)
-    found = gas_use(scene=scene, model=model, operations=advance.operations)
+    found = GasUse.of(scene=scene, model=model, operations=advance.operations)
     # A choked nozzle of 1.5 mm at 0.801 MPa and 20 degC passes 3.34 g/s of air at the most, 1.2929 kg/m^3.
     grams = 0.0404 * math.pi / 4 * 1.5e-3**2 * 801325.0 / math.sqrt(293.15)
     assert found.passed_through == pytest.approx(grams * operation.run_dry / 1.2929, rel=2e-3)
@@ -208,11 +208,11 @@ def test_a_chamber_run_dry_passes_gas(model: BalancerModel, scene: Scene) -> Non
     (brief,) = ring.advance(
         initial_state(disc=scene.disc), gas_times={0: 0.1}, duration=0.1, points=1
     ).operations
-    assert gas_use(scene=scene, model=model, operations=[brief]).warning == ""
+    assert GasUse.of(scene=scene, model=model, operations=[brief]).warning == ""
     residual = found.residual_fill_ratio
     assert 0 < residual < 0.2
     low = replace(brief, fill_after=0.9 * residual)
-    assert "below a fill ratio of" in gas_use(scene=scene, model=model, operations=[low]).warning
+    assert "below a fill ratio of" in GasUse.of(scene=scene, model=model, operations=[low]).warning
     # The supply adds its gauge pressure to the ambient gas that was there.
     content = 0.7e6 * model.chamber_volume / AMBIENT * 273.15 / scene.gas.temperature
     assert found.normal_volume == pytest.approx(content + found.passed_through)

@@ -13,7 +13,7 @@ from ringbalance.identification.criticism.review import LAMINAR, UNBROKEN, power
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.next_measurement import next_measurement, offered_rows, words_of
-from ringbalance.identification.predict.device import Models, device_of, models_of
+from ringbalance.identification.predict.device import Models, device_of
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.identification.saving import save_result
@@ -67,7 +67,7 @@ def true(paper_scene: Scene) -> Scene:
 
 @pytest.fixture(scope="module")
 def found(paper_scene: Scene, true: Scene) -> FitResult:
-    data = transfers(true, models_of(paper_scene), seed=0)
+    data = transfers(true, Models.of(paper_scene), seed=0)
     return fit(paper_scene, data=[data], parameters=["bore", "extra_loss"])
 
 
@@ -89,7 +89,7 @@ def test_a_disc_with_another_law_is_found_out(
     paper_scene: Scene, true: Scene, exponent: float, preferred: str
 ) -> None:
     """Data of a disc whose loss follows the velocity: the fit fails, and that law is the better one."""
-    models = models_of(paper_scene)
+    models = Models.of(paper_scene)
     velocity = float(
         device_of(paper_scene, models).law.evaluate(fill_ratio=0.25, gas_pressure=0.7e6).velocity
     )
@@ -120,12 +120,12 @@ def test_the_expected_gain_is_that_of_fits_made_again(paper_scene: Scene, true: 
 
     Noise is given, so that an interval depends on the draw through curvature alone: within 5 %.
     """
-    data = some(transfers(true, models_of(paper_scene), seed=0, share=0.02), [0, 6, 13, 19])
+    data = some(transfers(true, Models.of(paper_scene), seed=0, share=0.02), [0, 6, 13, 19])
     first = fit(paper_scene, data=[data], parameters=["bore"])
     told = next_measurement(first, "bore")
     offered = offered_rows(first.scene, "transfer", data)
     chosen = next(g for g in told.gains if g.candidate == words_of(offered, row))
-    volume = PREDICTED["transfer"].predict(first.scene, offered, models_of(paper_scene))
+    volume = PREDICTED["transfer"].predict(first.scene, offered, Models.of(paper_scene))
     more = replace(some(offered, [row], volume=volume[[row]]), file="more.csv")
     again = fit(paper_scene, data=[data, more], parameters=["bore"])
     widths = [r.parameters[0].profile.high - r.parameters[0].profile.low for r in (first, again)]

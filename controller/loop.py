@@ -15,7 +15,7 @@ from ringbalance.controller.checks import check_fit, check_settings
 from ringbalance.controller.formulas.stopping import Cause, has_held, has_risen, stop_cause
 from ringbalance.controller.judgement import misadjustments, noise_floor, overshoots
 from ringbalance.controller.liquid_ring.closed_form import closed_form, has_closed_form
-from ringbalance.controller.liquid_ring.plant import Advance, DiscState, LiquidRing, initial_state
+from ringbalance.controller.liquid_ring.plant import Advance, DiscState, LiquidRing
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Integrator
 from ringbalance.controller.outcome import VERDICTS, Facts
@@ -107,7 +107,7 @@ def simulate(
         controller=used_controller,
         sensor=sensor or noisy_sensor(sensor=scene.sensor, seed=scene.run.seed),
         exact=sensor is None and scene.sensor.amplitude_noise == scene.sensor.phase_noise == 0,
-        state=initial_state(disc=scene.disc),
+        state=DiscState.initial(disc=scene.disc),
     )
     cause = run.go(progress or _silent)
     name = getattr(quasi_steady, "__name__", "custom") if dynamics is None else RUNGE_KUTTA

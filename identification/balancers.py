@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.parameters import FitError, Parameter, scene_parameter, unknown_name
+from ringbalance.identification.parameters import FitError, Parameter, unknown_name
 from ringbalance.identification.predict.device import Models
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
@@ -64,7 +64,7 @@ def parameters_for(scene: AnyScene, names: Sequence[str]) -> tuple[Parameter, ..
     if not names or len(set(names)) < len(names):
         raise FitError("name at least one parameter, and each once")
     if isinstance(scene, Scene):
-        return tuple(scene_parameter(scene, name) for name in names)
+        return tuple(Parameter.of(scene, name) for name in names)
     return tuple(_eccentric_parameter(scene, name) for name in names)
 
 

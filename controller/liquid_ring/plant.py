@@ -55,6 +55,12 @@ class DiscState:
         """Whether no liquid can move until a valve is commanded to open."""
         return not any(pair.primed for pair in self.pairs) and all(p.motion.rests for p in self.pairs)
 
+    @classmethod
+    def initial(cls, *, disc: Disc) -> DiscState:
+        """All chambers at the scene's initial fill, no tube primed."""
+        pair = PairState(fill=disc.initial_fill, total=2 * disc.initial_fill)
+        return cls(pairs=(pair,) * (disc.chambers // 2))
+
 
 @dataclass(frozen=True, kw_only=True)
 class Operation:
@@ -286,12 +292,6 @@ class _Path:
     fill: FloatArray
     operation: Operation | None
     drift: float
-
-
-def initial_state(*, disc: Disc) -> DiscState:
-    """All chambers at the scene's initial fill, no tube primed."""
-    pair = PairState(fill=disc.initial_fill, total=2 * disc.initial_fill)
-    return DiscState(pairs=(pair,) * (disc.chambers // 2))
 
 
 def _run_dry(transfer: Transfer, before: float, duration: float) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 from ringbalance.controller.algorithms.by_name import law_based_of
 from ringbalance.controller.ensemble.monte_carlo import Probability, simulate_ensemble
 from ringbalance.controller.ensemble.samples import Members, MemberUncertainty
-from ringbalance.controller.liquid_ring.plant import initial_state
+from ringbalance.controller.liquid_ring.plant import DiscState
 from ringbalance.controller.liquid_ring.reach import unreachable_vibration
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Outcome, Simulation
@@ -162,7 +162,7 @@ def _beyond_capacity(
     scene: Scene, model: BalancerModel, widths: MemberUncertainty, *, runs: int
 ) -> tuple[float, float]:
     """Of the drawn runs, the fraction whose unbalance is beyond the liquid, and beyond it under this gas."""
-    ring, state = law_based_of(scene, model).ring, initial_state(disc=scene.disc)
+    ring, state = law_based_of(scene, model).ring, DiscState.initial(disc=scene.disc)
     drawn = Members.drawn(scene, uncertainty_95=widths, seed=scene.run.seed, block=0)
     driven = with_driving_gas(scene, model)
     residual = np.interp(drawn.velocity_factor[:runs], *residual_by_velocity(driven, law=model.flow))

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pytest
 from synthetic_rigs import READINGS, observations
 
-from ringbalance.controller.liquid_ring.plant import LiquidRing, initial_state
+from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.rotor import disc_unbalance
 from ringbalance.controller.terms import dynamics_of
@@ -62,7 +62,7 @@ def test_injections_are_those_of_the_closed_loop(paper_scene: Scene) -> None:
         integrator=quadrature,
         dynamics=dynamics_of(scene=scene, model=model, modelled=[INERTIA, HELD]),
     )
-    state, before, expected = initial_state(disc=scene.disc), 0j, []
+    state, before, expected = DiscState.initial(disc=scene.disc), 0j, []
     k = scene.rotor.influence
     for chamber, time in ((0, 0.2), (2, 0.1), (3, 0.15)):
         state = plant.advance(state, gas_times={chamber: time}, duration=3.0, points=1).state

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ringbalance.identification.criticism.review import LAMINAR, UNBROKEN, power_of, review
+from ringbalance.identification.criticism.review import LAMINAR, UNBROKEN, Review, power_of
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.next_measurement import next_measurement, offered_rows, words_of
@@ -72,14 +72,14 @@ def found(paper_scene: Scene, true: Scene) -> FitResult:
 
 
 def test_a_right_law_is_not_criticised(found: FitResult) -> None:
-    told = review(found)
+    told = Review.of(found)
     assert told.criticism.describes
     assert {f.against for f in told.criticism.findings} >= {"pressure", "fill ratio", "valve-open time"}
     assert told.sentences[0].startswith("no pattern")
 
 
 def test_other_laws_are_told_apart_by_these_data(found: FitResult) -> None:
-    verdicts = {each.other: each for each in review(found).laws}
+    verdicts = {each.other: each for each in Review.of(found).laws}
     assert verdicts[LAMINAR].text.startswith("the data prefer the fitted law to laminar flow")
     assert verdicts[UNBROKEN].text.startswith("the data prefer the fitted law to a column that never")
 
@@ -95,7 +95,7 @@ def test_a_disc_with_another_law_is_found_out(
     )
     other = replace(models, other=lambda law: power_of(law, velocity, exponent))
     data = transfers(true, other, seed=1, known=False)
-    told = review(fit(paper_scene, data=[data], parameters=["bore", "extra_loss"]))
+    told = Review.of(fit(paper_scene, data=[data], parameters=["bore", "extra_loss"]))
     assert not told.criticism.describes
     assert "residuals of transfer.csv" in told.criticism.text
     law = next(each for each in told.laws if each.other == preferred)
@@ -145,7 +145,7 @@ def test_the_saved_scene_is_the_fitted_one(found: FitResult, tmp_path: Path) -> 
     data = [b.observations for b in found.optimum.residuals.problem.blocks]
     text = bundled_scene("liquid_ring_paper").read_text(encoding="utf-8")
     save_result(
-        target, text=text, result=found, data=data, folder=target.parent, said=review(found).sentences
+        target, text=text, result=found, data=data, folder=target.parent, said=Review.of(found).sentences
     )
     scene = liquid_ring_scene(load_scene(target))
     assert scene.tube.bore == pytest.approx(found.parameter("bore").value, rel=1e-8)

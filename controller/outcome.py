@@ -312,7 +312,7 @@ def _too_short(facts: Facts) -> str:
         last = _longest(facts)
         return (
             f"{_not_settled(facts)}; {last.operation.duration * 1e3:.4g} ms of gas into chamber "
-            f"{last.chamber} are over before its pressure has pushed any liquid over: "
+            f"{last.chamber} end before the pressure has moved any liquid: "
             f"{_standing(facts) or _pushed(facts)}"
         )
     return (

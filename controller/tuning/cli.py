@@ -82,7 +82,8 @@ def _eccentric_masses(scene: EccentricScene, *, json: bool) -> int:
 def _show(tuning: Tuning, console: Console) -> None:
     console.print(Text(tuning.status, style=f"bold {'green' if tuning.succeeded else 'yellow'}"))
     warning = line_warning(tuning.gas_line)
-    if warning:
+    # Runs that settle with the scene's own line have shown what its smallest correction left open.
+    if warning and not tuning.reachable:
         console.print(Text(warning, style="yellow"))
     table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
     table.add_column(style="dim")
@@ -94,7 +95,7 @@ def _show(tuning: Tuning, console: Console) -> None:
     for name in ("part", "relative", "from"):
         parts.add_column(name)
     for part in tuning.contributions:
-        parts.add_row(part.name, f"{part.uncertainty:.2%}", part.source)
+        parts.add_row(part.name, f"{100 * part.uncertainty:.2g} %", part.source)
     console.print(parts)
 
 
@@ -130,7 +131,7 @@ def _rows(tuning: Tuning) -> dict[str, str]:
             f"{low * 1e3:.3g} to {high * 1e3:.3g} ms; no injection moves liquid up to "
             f"{tuning.dead_zone * _UM:.3g} um"
         )
-    rows["smallest correction of the valve"] = f"{tuning.smallest_correction * _UM:.4g} um"
+    rows["smallest correction, ideal valve"] = f"{tuning.smallest_correction * _UM:.4g} um"
     rows["gas line"] = line_text(tuning.gas_line)
     rows["neglected"] = neglected_in_injections(tuning.models_used).text
     return rows | _settling(tuning) | _tried(tuning)

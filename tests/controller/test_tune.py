@@ -16,6 +16,7 @@ from ringbalance.cli import main
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
 from ringbalance.controller.loop import simulate
+from ringbalance.controller.tuning.cli import _show
 from ringbalance.controller.tuning.eccentric import FIRST_RUNS, eccentric_settling, tune_eccentric
 from ringbalance.controller.tuning.loop_factor import vibration_rates
 from ringbalance.controller.tuning.margins import loop_margins
@@ -26,6 +27,7 @@ from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.models import InputUncertainty, Scene
+from ringbalance.scene.platform.terminal import results_console
 from ringbalance.scene.uncertain import eccentric_drawn, half_widths, shifted
 
 MEMBERS = 300
@@ -213,6 +215,15 @@ def test_the_command_prints_one_document(capsys: pytest.CaptureFixture[str]) -> 
     assert set(answer["settling_time_s"]) == {"p50", "p95"}
     assert main(["tune", scene, "--law", "paper"]) == 0
     assert "recommended gain" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("reachable", "warned"), [(True, False), (None, True), (False, True)])
+def test_a_line_whose_runs_settle_is_not_warned_of(
+    scene: Scene, reachable: bool | None, warned: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = replace(tune(scene, paper_model(scene), members=8), reachable=reachable)
+    _show(found, results_console())
+    assert ("no run is sure to reach the limit" in " ".join(capsys.readouterr().out.split())) is warned
 
 
 def test_bad_input_is_exit_code_two(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

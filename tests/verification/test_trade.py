@@ -186,7 +186,12 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert json.loads((tmp_path / "trade.json").read_text()) == printed
     assert json.loads(costs.read_text())["seconds"]["formula"] > 0
     assert main(["trade", path]) == 0
-    assert "trade-off point: fluids" in capsys.readouterr().out
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "trade-off point: fluids" in shown
+    assert "0e+00 left out" not in shown
+    assert "estimated contribution" in shown
+    # A model that is its own reference was compared with nothing.
+    assert "checked: 0.0e+00" not in shown
 
 
 def test_a_scene_that_cannot_be_used_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -35,7 +35,7 @@ class Choice:
     fidelity: Fidelity
     """Kept after the check."""
     reference: Fidelity | None
-    """The model it was checked against; None where nothing left out is worth a check."""
+    """The model it was checked against; None where nothing left out needs a check."""
     measured: float | None
     """Largest relative difference from the reference at the check points."""
     cost: float
@@ -142,6 +142,10 @@ def _tried(
     return reference, tried
 
 
+def _number(value: float | None) -> str:
+    return "unknown" if value is None else f"{value:.1e}" if value else "0"
+
+
 def _reasons(
     hierarchy: ModelHierarchy,
     tolerance: float,
@@ -153,12 +157,13 @@ def _reasons(
     for term, c in hierarchy.contributions.items():
         # What the models differ in by more than their meshes.
         if any(term in fidelity.leaves_out for fidelity in hierarchy.fidelities):
-            worth = "unknown" if c.value is None else f"{c.value:.1e}"
             state = "left out" if term in kept.leaves_out else "in"
-            yield f"{term}: {state}; worth {worth} by {c.formula} ({c.source})"
-    off = "0" if measured is None else f"{measured:.1e}"
+            yield f"{term}: {state}; estimated contribution {_number(c.value)} by {c.formula} ({c.source})"
+    off = _number(measured or 0.0)
     if reference is None:
-        yield "nothing that is left out is worth a check"
+        yield "nothing that is left out needs a check"
+    elif kept.name == first.name == reference.name:
+        yield "it leaves out nothing that a finer model would have to check"
     elif kept.name == first.name:
         yield f"checked: {off} from “{reference.name}” at {len(hierarchy.check)} points"
     elif kept.leaves_out < first.leaves_out or kept.name == reference.name:

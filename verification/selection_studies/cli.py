@@ -128,7 +128,8 @@ def _trade(trade: Trade, choices: Sequence[Choice], asked: float) -> Iterator[Re
     ranked = sorted(trade.fidelities, key=lambda m: m.cost)
     yield _table("model|>error|>cost|>time|>memory", (_row(found, hierarchy) for found in ranked))
     yield Padding(Text(f"trade-off point: {trade.knee}"), (0, 0, 0, 2))
-    yield _table(">tolerance|models|>cost|check", map(_chosen, choices[:-1]))
+    if rows := list(map(_chosen, choices[:-1])):
+        yield _table(">tolerance|models|>cost|check", rows)
     own = tolerance_text(asked, lambda tolerance: f"{tolerance:.0e}")
     yield Padding(Text(f"at {own}:", style="dim"), (0, 0, 0, 2))
     for reason in choices[-1].reasons:
@@ -154,7 +155,8 @@ def _seconds(value: float) -> str:
 
 def _chosen(choice: Choice) -> tuple[Text | str, ...]:
     check = "nothing to check"
-    if choice.reference is not None:
-        word = "refined" if choice.climbed else "held"
-        check = f"{word}, {choice.measured or 0.0:.0e} left out"
+    if choice.reference is not None and choice.reference.name == choice.fidelity.name:
+        check = "refined to the finest needed" if choice.climbed else "nothing finer needed"
+    elif choice.reference is not None:
+        check = f"{'refined' if choice.climbed else 'held'}, off by {choice.measured or 0.0:.0e}"
     return f"{choice.tolerance:.0e}", Text(choice.fidelity.name), _seconds(choice.cost), check

@@ -12,17 +12,22 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from ringbalance.identification.data.measurements import MeasurementsError, parse_measurements
+from ringbalance.identification.data.measurements import Measurements, MeasurementsError
 from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import NORMAL_95
 from ringbalance.verification.catalogue import case_code, load_case
+from ringbalance.verification.navier_stokes.rotating_section import (
+    DuctMesh,
+    friction_ratio,
+    solve_section_without_inertia,
+)
 from ringbalance.verification.validation import tube_at_rest
 from ringbalance.verification.validation.comparison import KINDS, compare
 from ringbalance.verification.validation.kinds import measurements
 from ringbalance.verification.validation.model_bias import ModelStatistics, model_statistics
-from ringbalance.verification.validation.tube_friction import friction_points
+from ringbalance.verification.validation.tube_friction import friction_points, laminar_ratio
 from ringbalance.verification.validation.wave_frequency import tank_frequency
 
 _DATA = files("ringbalance.verification.validation") / "data"
@@ -105,6 +110,14 @@ def test_points_come_in_ascending_order_with_their_walls() -> None:
     assert np.all(rough[~smooth] > plain[~smooth])
 
 
+def test_laminar_friction_of_ducts_against_finite_elements() -> None:
+    for aspect in (1.0, 2.9, 8.0):
+        system = DuctMesh(aspect_ratio=aspect).system()
+        found = friction_ratio(solve_section_without_inertia(system=system, rotation_reynolds=0.0))
+        assert float(laminar_ratio(np.array([aspect]))[0]) == pytest.approx(found, rel=1e-4)
+    assert laminar_ratio(np.array([0.0, 1e4])) == pytest.approx([1.0, 1.5], rel=1e-3)
+
+
 def test_the_budget_of_k_holds_bias_and_scatter_of_turbulent_friction(paper_scene: Scene) -> None:
     numbers = case_code("measured_smooth_tubes").compute(paper_scene, "light").numbers
     spread = math.hypot(numbers["turbulent_bias"], 2 * numbers["turbulent_standard_deviation"])
@@ -135,7 +148,7 @@ _HEAD = '# kind = "friction"\n# source = "me"\n# uncertainty = 0.02\n'
 
 def test_units_of_a_file_become_si() -> None:
     head = _HEAD.replace("friction", "vessel")
-    data = parse_measurements(head + "time [ms],pressure [bar],series\n250,2,a\n500,3,b\n", file="x.csv")
+    data = Measurements.parsed(head + "time [ms],pressure [bar],series\n250,2,a\n500,3,b\n", file="x.csv")
     assert data.columns["time"] == pytest.approx([0.25, 0.5])
     assert data.columns["pressure"] == pytest.approx([2e5, 3e5])
     assert list(data.series) == ["a", "b"]
@@ -145,12 +158,12 @@ def test_units_of_a_file_become_si() -> None:
 def test_all_errors_of_a_file_are_reported_together_with_row_and_column() -> None:
     text = '# kind = 3\n# sorce = "me"\n# uncertainty = 2\nreynolds,friction factor,x [furlong]\n1,2,3\n'
     with pytest.raises(MeasurementsError) as error:
-        parse_measurements(text, file="bad.csv")
+        Measurements.parsed(text, file="bad.csv")
     lines = str(error.value).splitlines()
     assert all(line.startswith("bad.csv: ") for line in lines)
     assert len(lines) == 6
     with pytest.raises(MeasurementsError) as error:
-        parse_measurements(_HEAD + "reynolds,friction_factor\n100,nan\n\n200\n300,x\n", file="bad.csv")
+        Measurements.parsed(_HEAD + "reynolds,friction_factor\n100,nan\n\n200\n300,x\n", file="bad.csv")
     assert [line.split(": ")[1] for line in str(error.value).splitlines()] == [
         'line 5, column "friction_factor" = "nan"',
         "line 7",
@@ -175,14 +188,14 @@ def test_all_errors_of_a_file_are_reported_together_with_row_and_column() -> Non
 )
 def test_what_cannot_be_predicted_is_refused_by_name(text: str, named: str) -> None:
     with pytest.raises(MeasurementsError, match=named):
-        compare(parse_measurements(text, file="x.csv"))
+        compare(Measurements.parsed(text, file="x.csv"))
 
 
 def test_a_comparison_is_confirmed_by_its_own_predictions_and_refuted_by_others() -> None:
     data = measurements("stanton_pannell_1914")
     found = compare(data)
     rows = "".join(f"{r},{f}\n" for r, f in zip(data.columns["reynolds"], found.predicted, strict=True))
-    own = compare(parse_measurements(_HEAD + "reynolds,friction_factor\n" + rows, file="own.csv"))
+    own = compare(Measurements.parsed(_HEAD + "reynolds,friction_factor\n" + rows, file="own.csv"))
     assert own.statistics.bias == pytest.approx(0, abs=1e-12)
     assert (found.verdict, own.verdict) == ("confirmed", "confirmed")
     assert compare(data, mutation="ten_per_cent_high").verdict == "refuted"
@@ -230,7 +243,7 @@ def test_adiabatic_venting_of_a_choked_vessel_is_the_closed_form() -> None:
         "conductance [l/(s*bar)]"
     )
     text = _HEAD.replace("friction", "vessel") + f"{columns}\n1,4,10,1,293.15,1,1\n"
-    found = compare(parse_measurements(text, file="x.csv"))
+    found = compare(Measurements.parsed(text, file="x.csv"))
     adiabatic = 5 * (2.5 ** (1 / 7) - 1)
     assert found.predicted[0] == pytest.approx((adiabatic + math.log(2.5)) / 2, rel=1e-5)
     assert found.stated[0] ** 2 - (0.1 * found.predicted[0]) ** 2 == pytest.approx(
@@ -249,4 +262,4 @@ def test_the_page_on_measurements_lists_the_kinds_and_its_example_can_be_read() 
     page = measurement_tables.PAGE.read_text(encoding="utf-8")
     assert measurement_tables.fresh(page, "kinds", measurement_tables.kind_table()) == page
     example = page.split("```")[1]
-    assert len(compare(parse_measurements(example, file="example")).measured) == 3
+    assert len(compare(Measurements.parsed(example, file="example")).measured) == 3

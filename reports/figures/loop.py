@@ -27,7 +27,19 @@ _LAWS: Final[dict[str, dict[str, Any]]] = {
 }
 
 
-def early_time(runs: Record) -> float:
+def loop_figures(evidence: Record) -> Record:
+    """By the names that the templates have for them; None where the law was not run."""
+    runs, limit = evidence["closed_loop"], evidence["limit_m"]
+    found = runs.get("calibrated")
+    return {
+        "amplitude": _amplitude(runs, limit) if runs else None,
+        "early_amplitude": _early_amplitude(runs, limit) if runs else None,
+        "regimes": _regimes(found) if found else None,
+        "fill_ratios": _fill_ratios(found, _early_time(runs)) if found else None,
+    }
+
+
+def _early_time(runs: Record) -> float:
     """Time by which most of the gas has been spent under the calibrated law: where the loop does its work.
 
     Args: `runs`: simulation documents by law, SI.
@@ -41,7 +53,7 @@ def early_time(runs: Record) -> float:
     return float(min(run["time_s"][-1], 1.4 * (last["time_s"] + last["duration_s"])))
 
 
-def amplitude(runs: Record, limit: float) -> Drawing:
+def _amplitude(runs: Record, limit: float) -> Drawing:
     """Vibration amplitude at the controller's samples, m, under the laws that were run."""
     # Samples at rest repeat one value: the first of them say enough.
     marks = {"linewidth": 1.2, "marker": "o", "markersize": 3, "markevery": slice(0, _MARKED)}
@@ -86,9 +98,9 @@ def _still_from(runs: Sequence[Record]) -> tuple[float, float]:
     return (room, end) if 0 < room < _CROPPED * end else (end, end)
 
 
-def early_amplitude(runs: Record, limit: float) -> Drawing:
+def _early_amplitude(runs: Record, limit: float) -> Drawing:
     """Vibration amplitude within the first operations, m, liquid flowing, under the laws that were run."""
-    until = early_time(runs)
+    until = _early_time(runs)
 
     def curve(run: Record, line: dict[str, Any]) -> style.Curve:
         time, values = np.asarray(run["time_s"]), np.asarray(run["amplitude_m"])
@@ -109,7 +121,7 @@ def early_amplitude(runs: Record, limit: float) -> Drawing:
     )
 
 
-def regimes(run: Record) -> Drawing | None:
+def _regimes(run: Record) -> Drawing | None:
     """The regime of the tube in every gas operation under the calibrated law, by chamber and time.
 
     Args: `run`: a simulation document, SI.
@@ -164,7 +176,7 @@ def regimes(run: Record) -> Drawing | None:
     )
 
 
-def fill_ratios(run: Record, until: float) -> Drawing:
+def _fill_ratios(run: Record, until: float) -> Drawing:
     """Fill ratio of every chamber against time under the calibrated law.
 
     Args: `run`: a simulation document, SI. `until`: end of the time axis, s.
@@ -190,7 +202,7 @@ def fill_ratios(run: Record, until: float) -> Drawing:
 def run_figures(run: Record) -> list[Drawing]:
     """Amplitude with its limit, valve-open times, fills, and the path of the residual vector."""
     times = [_valve_open_times(run)] if run["injections"] else []
-    return [_run_amplitude(run), *times, fill_ratios(run, early_time({"run": run})), residual_polar(run)]
+    return [_run_amplitude(run), *times, _fill_ratios(run, _early_time({"run": run})), residual_polar(run)]
 
 
 def _run_amplitude(run: Record) -> Drawing:

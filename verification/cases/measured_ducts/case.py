@@ -9,7 +9,7 @@ import numpy as np
 
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, as_found
-from ringbalance.verification.validation.model_bias import MUTATIONS, ModelStatistics, statistics_numbers
+from ringbalance.verification.validation.model_bias import MUTATIONS, ModelStatistics
 from ringbalance.verification.validation.tube_friction import FrictionPoints, friction_points
 
 _LAMINAR: Final = 1800.0
@@ -34,7 +34,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     return Evidence(
         found=as_found(share_within=whole.share_within, laminar=abs(laminar.bias)),
         numbers={
-            **statistics_numbers(whole),
+            **whole.numbers(),
             "laminar_points": float(laminar.points),
             "laminar_bias": laminar.bias,
             "turbulent_points": float(turbulent.points),

@@ -10,7 +10,7 @@ import numpy as np
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, Series, as_found
-from ringbalance.verification.validation.model_bias import MUTATIONS, statistics_numbers
+from ringbalance.verification.validation.model_bias import MUTATIONS
 from ringbalance.verification.validation.tube_friction import FrictionPoints, friction_points
 
 _FULLY_ROUGH: Final = 70.0
@@ -26,7 +26,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     return Evidence(
         found=as_found(share_within=statistics.share_within, fully_rough=abs(rough.bias)),
         numbers={
-            **statistics_numbers(statistics),
+            **statistics.numbers(),
             "worst": float(np.max(deviation)),
             "rough_points": float(rough.points),
             "rough_bias": rough.bias,

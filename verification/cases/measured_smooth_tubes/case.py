@@ -6,7 +6,7 @@ from typing import Final
 
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, as_found
-from ringbalance.verification.validation.model_bias import MUTATIONS, statistics_numbers
+from ringbalance.verification.validation.model_bias import MUTATIONS
 from ringbalance.verification.validation.tube_friction import FrictionPoints, friction_points, joined
 
 _LAMINAR: Final = 1800.0
@@ -24,7 +24,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     parts = {name: points.where(chosen) for name, chosen in flow.items()}
     statistics = {name: part.statistics(factor * part.predicted()) for name, part in parts.items()}
     turbulent, whole = parts["turbulent"], points.statistics(factor * points.predicted())
-    numbers = statistics_numbers(whole)
+    numbers = whole.numbers()
     for name, one in statistics.items():
         numbers |= {f"{name}_{key}": float(value) for key, value in vars(one).items()}
     return Evidence(

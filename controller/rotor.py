@@ -19,7 +19,6 @@ from ringbalance.controller.algorithms.algorithm import Measurement
 from ringbalance.reduced_model.law.model import MomentCurve
 from ringbalance.scene import loop_models
 from ringbalance.scene.arrays import ComplexArray
-from ringbalance.scene.loop_models import Rotor
 
 MAX_CHAMBERS: Final = len(ascii_uppercase)
 Sensor = Callable[[float, complex], Measurement | None]
@@ -64,34 +63,6 @@ def disc_unbalance(*, moment: MomentCurve, fill_ratio: npt.ArrayLike) -> Complex
     directions = chamber_directions(x.shape[0])[:half]
     pair = moment.pair_vector(fill_ratio=x[:half], opposite_fill_ratio=x[half:])
     return np.asarray(np.tensordot(directions, pair, axes=1), dtype=np.complex128)
-
-
-def influence(*, coefficient: float, lag_angle: float) -> complex:
-    """Vibration per unbalance as a vector, K = kappa exp(-j lag), m/(kg m).
-
-    Source: Eq. 23 of the liquid-ring paper; the sign of the lag is a convention of this program.
-    """
-    return complex(coefficient * np.exp(-1j * lag_angle))
-
-
-def initial_vibration(*, rotor: Rotor) -> complex:
-    """Vibration with every pair level, V0 = v0 exp(j theta0), m zero-to-peak."""
-    return complex(rotor.initial_amplitude * np.exp(1j * rotor.initial_phase))
-
-
-def initial_unbalance(*, rotor: Rotor) -> complex:
-    """Moment that the initial vibration answers to, V0/K, kg m; the disc cancels it with its negative."""
-    k = influence(coefficient=rotor.influence_coefficient, lag_angle=rotor.lag_angle)
-    return initial_vibration(rotor=rotor) / k
-
-
-def vibration(*, rotor: Rotor, moment: npt.ArrayLike) -> ComplexArray:
-    """Vibration of the rotor with the disc's moment U, V1 = V0 + K U, m zero-to-peak.
-
-    Source: Eq. 23 of the liquid-ring paper.
-    """
-    k = influence(coefficient=rotor.influence_coefficient, lag_angle=rotor.lag_angle)
-    return np.asarray(initial_vibration(rotor=rotor) + k * np.asarray(moment), dtype=np.complex128)
 
 
 def wrapped(angle: float) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 from ringbalance.controller.liquid_ring.motion import Dynamics, column_of, lift_of
-from ringbalance.physics.gas.supply import VENTED, gas_line
+from ringbalance.physics.gas import VENTED, gas_line
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.selection.estimates import FILLING, HELD, INERTIA, LAG, term_estimates
@@ -73,7 +73,7 @@ def _check(scene: Scene, model: BalancerModel, asked: Collection[str]) -> None:
     for term in asked:
         if term not in IN_INJECTIONS:
             raise ValueError(f"no term {term!r}; there are {', '.join(IN_INJECTIONS)}")
-        unknown = term not in (INERTIA, HELD) and term_estimates(scene)[term].contribution is None
+        unknown = term not in (INERTIA, HELD) and term_estimates(scene)[term].value is None
         no_crest = term == HELD and isinstance(model.flow, PaperLaw)
         if unknown or no_crest or not can_carry(scene, model):
             raise ValueError(f"{term} cannot be modelled: the scene or the law gives no numbers for it")

@@ -17,7 +17,7 @@ from ringbalance.identification.balancers import both_sides
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.identifiability import Verdict
-from ringbalance.identification.likelihood import Block, Problem, block_of, held_effects
+from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.result import FitResult
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.eccentric_models import EccentricScene
@@ -101,9 +101,9 @@ def _candidates(result: FitResult) -> Iterator[Candidate]:
     scene, measured = problem.scene_at(t), {block.observations.kind: block for block in problem.blocks}
     of_kinds = {kind: measured[kind].observations if kind in measured else None for kind in _grids(scene)}
     offered = [offered_rows(scene, kind, before) for kind, before in of_kinds.items()]
-    asked = replace(problem, blocks=tuple(block_of(each) for each in offered if len(each)))
+    asked = replace(problem, blocks=tuple(Block.of(each) for each in offered if len(each)))
     changed = [(problem.scene, both_sides(problem.scene, n, sd)[1]) for n, sd in result.held.items()]
-    by_parameters, by_held = asked.quick_slopes(t), held_effects(asked, t, changed)
+    by_parameters, by_held = asked.quick_slopes(t), asked.held_effects(t, changed)
     at = 0
     for block in asked.blocks:
         mine, count = slice(at, at + block.measured.size), len(block.observations)

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.scene.chamber_file.record import STRETCHED, stretched
+from ringbalance.scene.chamber_file.record import STRETCHED
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.keys.schema import LIQUID_RING
 from ringbalance.scene.models import InputUncertainty, Scene
@@ -62,7 +62,7 @@ def with_value(*, scene: Scene, quantity: str, value: float) -> Scene:
         if quantity not in STRETCHED:
             raise ValueError(f"the mesh of a chamber has no {quantity} of its own")
         dimensions = {each: getattr(disc, each) for each in STRETCHED}
-        changed["geometry"] = stretched(geometry, dimensions=dimensions, quantity=quantity, value=value)
+        changed["geometry"] = geometry.stretched(dimensions=dimensions, quantity=quantity, value=value)
     return replace(scene, **{table: replace(getattr(scene, table), **changed)})
 
 

@@ -47,6 +47,11 @@ class Dimension:
         """The name without its article."""
         return self.name.split(" ", 1)[1]
 
+    @property
+    def unit_names(self) -> str:
+        """The units with commas between, as a message shows them."""
+        return ", ".join(self.units)
+
 
 def _dimensions() -> Mapping[str, Dimension]:
     data = resources.files("ringbalance.scene") / "data" / "units.csv"
@@ -116,11 +121,6 @@ class FieldError(ValueError):
         self.problem = problem
         self.allowed = allowed
         super().__init__(f"{problem}; allowed: {allowed}")
-
-
-def unit_names(dimension: str) -> str:
-    """The units of a dimension with commas between, as a message shows them."""
-    return ", ".join(DIMENSIONS[dimension].units)
 
 
 def parse_quantity(text: object, dimension: str) -> float:

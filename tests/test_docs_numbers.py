@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ringbalance.controller.eccentric_mass.estimation.imbalance_model import euler_step_limit
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
 from ringbalance.controller.eccentric_mass.strategy.settings import believed_whirl
 from ringbalance.physics.sloshing.modes import resonant_fills
@@ -71,7 +70,7 @@ def test_critical_speeds(rotor: EccentricScene) -> None:
 
 def test_what_wrong_assumptions_do(rotor: EccentricScene) -> None:
     limits = [
-        1e3 * float(euler_step_limit(model=believed_whirl(rotor), angular_velocity=speed * RPM))
+        1e3 * float(believed_whirl(rotor).euler_step_limit(angular_velocity=speed * RPM))
         for speed in (100, 230)
     ]
     page = "eccentric-masses.md"

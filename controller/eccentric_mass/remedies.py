@@ -15,9 +15,10 @@ from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import (
     start_estimate,
 )
 from ringbalance.controller.eccentric_mass.estimation.imbalance_model import ProcessNoise
-from ringbalance.controller.eccentric_mass.plant.parameters import influence, plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
 from ringbalance.controller.eccentric_mass.plant.substep_limit import longest_run
-from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, Remedy, RunFacts
+from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, Remedy
+from ringbalance.controller.eccentric_mass.run_status import RunFacts
 from ringbalance.controller.eccentric_mass.sampled_loops import recommended_gains
 from ringbalance.controller.eccentric_mass.strategy.plan import Stage
 from ringbalance.controller.eccentric_mass.strategy.settings import (
@@ -131,7 +132,7 @@ def _weak_drive(scene: EccentricScene) -> list[str]:
 def _gates(scene: EccentricScene, speed: float) -> list[str]:
     found, plant = [], plant_parameters(scene)
     deviation = expected_deviation(scene, speed=speed)
-    reach = abs(influence(plant, speed)) if plant.damping > 0 else math.inf
+    reach = abs(plant.influence(speed)) if plant.damping > 0 else math.inf
     needed = 2 * deviation * reach > 0.1 * scene.supervisor.limit
     if needed and deviation > scene.imbalance_filter.gate * plant.unbalance:
         remedy = _imbalance_remedy(scene, deviation=deviation, imbalance=plant.unbalance, reach=reach)
@@ -206,8 +207,9 @@ def _stall_remedy(scene: EccentricScene, *, margin: float = _MARGIN) -> Remedy |
     return _remedy(scene, *changes) if changes else None
 
 
-def remedies_of(facts: RunFacts, outcome: EccentricOutcome) -> tuple[Remedy, ...]:
+def remedies_of(facts: RunFacts) -> tuple[Remedy, ...]:
     """What would mend the run, the likeliest first.  An unstable loop comes before all else."""
+    outcome = facts.outcome
     if outcome in {EccentricOutcome.SETTLED, EccentricOutcome.LOCKED}:
         return ()
     own = _REMEDIES[outcome](facts) if outcome in _REMEDIES else ()
@@ -320,7 +322,7 @@ def _tuning_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
 
 
 def _imbalance_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
-    reach = abs(influence(plant_parameters(facts.scene), float(facts.speed[-1])))
+    reach = abs(plant_parameters(facts.scene).influence(float(facts.speed[-1])))
     told = (facts.deviation, facts.imbalance, reach)
     return (_imbalance_remedy(facts.scene, deviation=told[0], imbalance=told[1], reach=told[2]),)
 

@@ -7,20 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.estimation.imbalance_model import euler_step_limit
 from ringbalance.controller.eccentric_mass.plant.open_loop import Progress
-from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters, steady_whirl
-from ringbalance.controller.eccentric_mass.plant.speed import profile_arrays
+from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
 from ringbalance.controller.eccentric_mass.plant.substep_limit import check_substeps
-from ringbalance.controller.eccentric_mass.remedies import expected_deviation, remedies_of
-from ringbalance.controller.eccentric_mass.run_loop import Record, recorded, sample_count
-from ringbalance.controller.eccentric_mass.run_record import (
-    EccentricEstimates,
-    EccentricRun,
-    RunFacts,
-    StageSpan,
-)
-from ringbalance.controller.eccentric_mass.run_status import outcome_of, status_text, warnings_of
+from ringbalance.controller.eccentric_mass.remedies import expected_deviation, found_beforehand, remedies_of
+from ringbalance.controller.eccentric_mass.run_loop import Record, recorded
+from ringbalance.controller.eccentric_mass.run_record import EccentricEstimates, EccentricRun, StageSpan
+from ringbalance.controller.eccentric_mass.run_status import RunFacts
 from ringbalance.controller.eccentric_mass.strategy.plan import RELEASED, STAGE_NAMES, Cause, Findings, Stage
 from ringbalance.controller.eccentric_mass.strategy.settings import (
     StrategySettings,
@@ -53,13 +46,13 @@ def simulate_eccentric(
         scene, seed, progress or _silent, settings or strategy_settings(scene)
     )
     cause = Cause(int(record.cause[-1]))
-    times, speeds = profile_arrays(scene.rotor)
+    times, speeds = scene.rotor.profile
     time: FloatArray = np.arange(len(record.state), dtype=np.float64) * scene.sensor.step
     speed = np.interp(time, times, speeds)
     whirl = record.state[:, 0] + 1j * record.state[:, 1]
     facts = _facts(scene, record, cause, findings, innovation, speed, np.abs(whirl))
-    outcome = outcome_of(facts)
-    remedies = remedies_of(facts, outcome)
+    outcome = facts.outcome
+    remedies = remedies_of(facts)
     settled = facts.settling_time is not None and outcome.value in {"settled", "locked"}
     return EccentricRun(
         balancer="eccentric_mass",
@@ -67,8 +60,8 @@ def simulate_eccentric(
         outcome=outcome,
         settled=settled,
         settling_time=facts.settling_time if settled else None,
-        status=status_text(facts, outcome, remedies),
-        warnings=warnings_of(facts),
+        status=facts.status(remedies),
+        warnings=(*found_beforehand(scene), *facts.warnings),
         remedies=remedies,
         innovation=innovation,
         limit=scene.supervisor.limit,
@@ -125,7 +118,7 @@ def _facts(
         stage=Stage(int(record.stage[-1])),
         findings=findings,
         time=float(time[-1]),
-        diverged=len(time) < sample_count(scene),
+        diverged=len(time) < scene.samples,
         speed=speed,
         amplitude=amplitude,
         left=_left(record, amplitude, scene.supervisor.limit),
@@ -136,7 +129,7 @@ def _facts(
         saturation=float(np.count_nonzero(at_limit)) * scene.sensor.step,
         hold=int(record.hold[-1]),
         least_gap=float(np.min(_separations(angles))),
-        euler_limit=float(euler_step_limit(model=believed_whirl(scene), angular_velocity=fastest)),
+        euler_limit=float(believed_whirl(scene).euler_step_limit(angular_velocity=fastest)),
         predicted=expected_deviation(scene, speed=slowest) if cause is Cause.IMBALANCE_UNCERTAIN else 0.0,
     )
 
@@ -178,7 +171,7 @@ def _targets(scene: EccentricScene, record: Record) -> Targets | None:
 def _unbalanced(scene: EccentricScene, speed: float) -> float:
     if speed == 0:
         return 0.0
-    return abs(steady_whirl(plant_parameters(scene), speed, scene.masses.initial_angle))
+    return abs(plant_parameters(scene).steady_whirl(speed, scene.masses.initial_angle))
 
 
 def _settling_time(*, time: FloatArray, amplitude: FloatArray, limit: float) -> float | None:

@@ -13,7 +13,7 @@ from ringbalance.controller.eccentric_mass.plant.integrate import plant_step
 from ringbalance.controller.eccentric_mass.plant.open_loop import Progress, run_plant, stretches
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
 from ringbalance.controller.eccentric_mass.plant.plant import electrical_energy, rest_state, stuck_flags
-from ringbalance.controller.eccentric_mass.plant.speed import profile_arrays, speed_at, turned
+from ringbalance.controller.eccentric_mass.plant.speed import speed_at, turned
 from ringbalance.controller.eccentric_mass.strategy.plan import RELEASED, Cause, Findings
 from ringbalance.controller.eccentric_mass.strategy.records import EccentricMeasurement, StrategyState
 from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
@@ -76,11 +76,6 @@ class Record(NamedTuple):
     """m^2, shape (n, 2)."""
 
 
-def sample_count(scene: EccentricScene) -> int:
-    """Samples of a run that does not diverge."""
-    return round(scene.run.time_limit / scene.sensor.step) + 1
-
-
 def recorded(
     scene: EccentricScene, seed: int | None, progress: Progress, settings: StrategySettings
 ) -> tuple[Record, Findings, float | None]:
@@ -88,7 +83,7 @@ def recorded(
 
     Returns: Last, the mean square of the imbalance filter's normalised innovations; None without any.
     """
-    samples = sample_count(scene)
+    samples = scene.samples
     if scene.supervisor.strategy == "locked":
         return _locked(scene, _empty_record(samples), progress), Findings(False, 0.0, np.inf, 0, 0), None
     numbers = np.random.default_rng(scene.run.seed if seed is None else seed)
@@ -108,7 +103,7 @@ def _driven(
 ) -> tuple[Record, Findings, float | None]:
     parameters, record = plant_parameters(scene), _empty_record(len(numbers))
     state, stuck = rest_state(scene.masses.initial_angle), stuck_flags(STUCK)
-    profile, sensor = _Profile(*profile_arrays(scene.rotor)), scene.sensor
+    profile, sensor = _Profile(*scene.rotor.profile), scene.sensor
     noise = _SensorNoise(
         sensor.position_noise, sensor.velocity_noise, sensor.encoder_noise, sensor.encoder_rate_noise
     )

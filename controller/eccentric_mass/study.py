@@ -16,7 +16,6 @@ import numpy as np
 from ringbalance.controller.eccentric_mass.document import eccentric_document
 from ringbalance.controller.eccentric_mass.plant.open_loop import Progress
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
-from ringbalance.controller.eccentric_mass.plant.speed import steady_until
 from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.sampled_loops import GAIN_MARGIN, RecommendedGains
@@ -164,7 +163,7 @@ def _of_run(scene: EccentricScene, run: EccentricRun) -> Sequence[Requirement]:
 
 def _deadline(scene: EccentricScene) -> tuple[float, str]:
     """Time by which the rotor must be balanced, s, and what sets it."""
-    change = steady_until(scene)
+    change = scene.steady_until
     if change is not None:
         return change, "the speed begins to change"
     return scene.run.time_limit, "run.time_limit, the end of the run"

@@ -19,7 +19,7 @@ from ringbalance.controller.ensemble.transfer import PairTransfer
 from ringbalance.controller.judgement import noise_floor
 from ringbalance.controller.liquid_ring.records import MOTION, WORKSPACE
 from ringbalance.controller.loop import DRIFT_POINTS, GAS_POINTS, IDLE_OPERATIONS, TAIL_POINTS
-from ringbalance.controller.rotor import chamber_directions, initial_vibration
+from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.operating.residual import residual_by_velocity
@@ -135,7 +135,7 @@ def ensemble_plan(*, scene: Scene, model: BalancerModel, transfer: PairTransfer)
 
 def _loop(scene: Scene) -> dict[str, float]:
     """Rotor, sensor, clock and bounds."""
-    start, sensor = initial_vibration(rotor=scene.rotor), scene.sensor
+    start, sensor = scene.rotor.initial_vibration, scene.sensor
     return {
         "initial_fill": scene.disc.initial_fill,
         "start_real": start.real,

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.controller.ensemble.compiled_records import DRY, OFF, ON, PATH_NODES, SHARED, Record
 from ringbalance.controller.formulas.paths import linear_course, piece_part, piece_rise
-from ringbalance.controller.liquid_ring.closed_form import LinearSquaredVelocity, boundary_event
+from ringbalance.controller.liquid_ring.closed_form import LinearSquaredVelocity
 from ringbalance.controller.liquid_ring.motion import Dynamics
 from ringbalance.controller.liquid_ring.pair_path import UntabulatedError, flow_paths
 from ringbalance.controller.liquid_ring.records import PLANT
@@ -73,8 +73,8 @@ def pair_transfer(
     shared = np.zeros(1, dtype=SHARED)
     for name in ("gas_pressure", "exchange_rate", "total", "lowest", "highest"):
         shared[name] = getattr(drive, name)
-    shared["lowest_empties"] = boundary_event(drive, drive.lowest) is Event.EMPTY
-    shared["highest_empties"] = boundary_event(drive, drive.highest) is Event.EMPTY
+    shared["lowest_empties"] = drive.boundary_event(drive.lowest) is Event.EMPTY
+    shared["highest_empties"] = drive.boundary_event(drive.highest) is Event.EMPTY
     if dynamics is not None:
         shared["moving"] = True
         return PairTransfer(shared=shared, plant=dynamics.plant(total=total, relative_error=RELATIVE_ERROR))

@@ -9,16 +9,8 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.formulas.paths import piece_part, piece_rise
-from ringbalance.controller.liquid_ring.closed_form import boundary_event
 from ringbalance.controller.liquid_ring.pair_path import FlowPaths, UntabulatedError, flow_paths
-from ringbalance.controller.liquid_ring.transfer import (
-    Drive,
-    Event,
-    Transfer,
-    checked_instants,
-    finished,
-    still,
-)
+from ringbalance.controller.liquid_ring.transfer import Drive, Event, Transfer, checked_instants
 from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
 from ringbalance.scene.arrays import FloatArray
 
@@ -66,15 +58,14 @@ def quadrature(drive: Drive, instants: FloatArray) -> Transfer:
     t = checked_instants(instants)
     before = drive.flow(drive.fill, primed=drive.primed)
     if float(before.velocity) == 0:
-        return still(drive, t, flow=before)
+        return drive.still(t, flow=before)
     try:
         way = _course(drive, t)
         event = _event(drive, way, float(t[-1]))
     except UntabulatedError:
         way = _Way(fill=np.full(t.shape, drive.fill), end=drive.fill, duration=0.0, primed=drive.primed)
         event = Event.UNFINISHED
-    return finished(
-        drive,
+    return drive.finished(
         t,
         way.fill,
         regime_start=Regime(int(before.regime)),
@@ -147,4 +138,4 @@ def _event(drive: Drive, way: _Way, duration: float) -> Event:
     if duration < way.duration:
         return Event.NONE
     ended = way.end in {drive.lowest, drive.highest}
-    return boundary_event(drive, way.end) if ended else Event.STALLED
+    return drive.boundary_event(way.end) if ended else Event.STALLED

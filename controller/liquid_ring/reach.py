@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
-from ringbalance.controller.rotor import chamber_directions, initial_unbalance
+from ringbalance.controller.rotor import chamber_directions
 from ringbalance.reduced_model.law.flow_law import FlowLaw
 from ringbalance.reduced_model.short_injection import least_pressure
 from ringbalance.scene.arrays import BoolArray, FloatArray
@@ -61,7 +61,7 @@ def _unreachable_moment(*, plant: LiquidRing, state: DiscState, wanted: complex)
 
 def unreachable_vibration(*, plant: LiquidRing, state: DiscState, rotor: Rotor) -> float:
     """Vibration that remains with the liquid at its best, m; zero within capacity."""
-    wanted = -initial_unbalance(rotor=rotor)
+    wanted = -rotor.initial_unbalance
     return _unreachable_moment(plant=plant, state=state, wanted=wanted) * rotor.influence_coefficient
 
 

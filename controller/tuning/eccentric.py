@@ -14,7 +14,6 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from ringbalance.controller.eccentric_mass.plant.speed import steady_until
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, advised, recommended_gains
@@ -89,7 +88,7 @@ def eccentric_settling(scene: EccentricScene, *, runs: int, told: Progress) -> E
 
     Few runs first, and more where these leave it open that 95 % settle.
     """
-    span = steady_until(scene) or scene.run.time_limit
+    span = scene.steady_until or scene.run.time_limit
     done: list[EccentricRun] = []
     # A mass that is balanced rests: what has settled by an early end is still so later.
     short = span

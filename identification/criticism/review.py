@@ -18,7 +18,6 @@ from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.predict.device import device_of
-from ringbalance.identification.predict.kinds import rows_of
 from ringbalance.identification.result import FitResult
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.tables.fit import table_from_samples
@@ -234,7 +233,7 @@ def _rotation(result: FitResult) -> FloatArray:
     for block in problem.blocks:
         size, rows = block.measured.size, len(block.observations)
         if size == 2 * rows:
-            along = rows_of(block.observations, predicted[at : at + size])
+            along = block.observations.rows_of(predicted[at : at + size])
             angle = np.arctan2(along[:, 1], along[:, 0])
             i = at + np.arange(rows)
             turn[i, i] = turn[i + rows, i + rows] = np.cos(angle)

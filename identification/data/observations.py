@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ringbalance.scene.arrays import FloatArray, IntArray, StringArray
+import numpy as np
+
+from ringbalance.scene.arrays import ComplexArray, FloatArray, IntArray, StringArray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,3 +33,14 @@ class Observations:
 
     def __len__(self) -> int:
         return int(self.lines.size)
+
+    def rows_of(self, values: FloatArray) -> FloatArray:
+        """Values of `measured`, one row of numbers for each row of the file, shape (n, 1) or (n, 2)."""
+        return np.reshape(values, (-1, len(self))).T
+
+    def vectors(self, *, when: str = "") -> ComplexArray:
+        """a exp(j phase) of each row, m zero to peak. Args: `when`: "", "_before" or "_after"."""
+        columns = self.columns
+        return np.asarray(
+            columns[f"amplitude{when}"] * np.exp(1j * columns[f"phase{when}"]), dtype=np.complex128
+        )

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.rotor import chamber_directions, chamber_letters, influence
+from ringbalance.controller.rotor import chamber_directions, chamber_letters
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.predict.device import Device, Models, device_of
 from ringbalance.identification.predict.predicted import (
@@ -20,7 +20,6 @@ from ringbalance.identification.predict.predicted import (
     parts,
     spread_out,
     vector_covariance,
-    vectors,
 )
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.models import Scene
@@ -28,7 +27,7 @@ from ringbalance.scene.models import Scene
 
 def _measured(observations: Observations) -> FloatArray:
     """Changes of the vibration, real and then imaginary parts, m, shape (2 n,)."""
-    return parts(vectors(observations, when="_after") - vectors(observations, when="_before"))
+    return parts(observations.vectors(when="_after") - observations.vectors(when="_before"))
 
 
 def _predict(scene: Scene, observations: Observations, models: Models) -> FloatArray:
@@ -41,7 +40,7 @@ def _predict(scene: Scene, observations: Observations, models: Models) -> FloatA
     moved = law.pair_vector(fill_ratio=after, opposite_fill_ratio=total - after) - law.pair_vector(
         fill_ratio=before, opposite_fill_ratio=total - before
     )
-    k = influence(coefficient=scene.rotor.influence_coefficient, lag_angle=scene.rotor.lag_angle)
+    k = scene.rotor.influence
     return parts(k * scene.disc.moment_factor * moved * chamber_directions(scene.disc.chambers)[pair])
 
 
@@ -109,7 +108,7 @@ def _noise_given(observations: Observations) -> bool:
 
 def _shared_readings(observations: Observations) -> list[tuple[int, int]]:
     """Rows whose vibration before is that after the row above in their series, digit for digit."""
-    before, after = (vectors(observations, when=when) for when in ("_before", "_after"))
+    before, after = (observations.vectors(when=when) for when in ("_before", "_after"))
     last: dict[str, int] = {}
     found = []
     for i, series in enumerate(observations.series.tolist()):

@@ -13,8 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters, steady_whirl
-from ringbalance.controller.rotor import influence
+from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.predict.device import Device, Models, device_of
 from ringbalance.identification.predict.injections import INJECTION
@@ -26,7 +25,6 @@ from ringbalance.identification.predict.predicted import (
     parts,
     spread_out,
     vector_covariance,
-    vectors,
 )
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.tube.state import tube_state
@@ -52,7 +50,7 @@ def _vibrations(predict: Callable[[Any, Observations], FloatArray], **declared: 
     """One measured vibration a row."""
     return PredictedKind(
         predict=_by_scene_alone(predict),
-        measured=lambda observations: parts(vectors(observations)),
+        measured=lambda observations: parts(observations.vectors()),
         covariance=lambda observations: spread_out(
             vector_covariance(observations, given="amplitude" in observations.uncertainty)
         ),
@@ -84,7 +82,7 @@ def _trial_amplitudes(scene: Scene, observations: Observations) -> FloatArray:
 
 
 def _change(scene: Scene, observations: Observations) -> ComplexArray:
-    k = influence(coefficient=scene.rotor.influence_coefficient, lag_angle=scene.rotor.lag_angle)
+    k = scene.rotor.influence
     unbalance = observations.columns["unbalance"] * np.exp(1j * observations.columns["angle"])
     return np.asarray(k * unbalance, dtype=np.complex128)
 
@@ -175,7 +173,7 @@ def _steady_whirls(scene: EccentricScene, observations: Observations) -> FloatAr
     """
     plant, angles = plant_parameters(scene), scene.masses.initial_angle
     speeds = observations.columns["speed"].tolist()
-    return parts(np.array([steady_whirl(plant, speed, angles) for speed in speeds], dtype=np.complex128))
+    return parts(np.array([plant.steady_whirl(speed, angles) for speed in speeds], dtype=np.complex128))
 
 
 PREDICTED: Final[Mapping[str, PredictedKind]] = MappingProxyType(
@@ -203,8 +201,3 @@ PREDICTED: Final[Mapping[str, PredictedKind]] = MappingProxyType(
         "positioning": POSITIONING,
     }
 )
-
-
-def rows_of(observations: Observations, values: FloatArray) -> FloatArray:
-    """Values of `measured`, one row of numbers for each row of the file, shape (n, 1) or (n, 2)."""
-    return np.reshape(values, (-1, len(observations))).T

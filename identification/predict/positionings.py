@@ -13,11 +13,7 @@ import numpy as np
 
 from ringbalance.controller.eccentric_mass.plant.friction import LOCKED, STUCK
 from ringbalance.controller.eccentric_mass.plant.integrate import plant_step, substeps
-from ringbalance.controller.eccentric_mass.plant.parameters import (
-    PlantParameters,
-    plant_parameters,
-    steady_whirl,
-)
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
 from ringbalance.controller.eccentric_mass.plant.plant import rest_state
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.predict.predicted import numbers
@@ -91,7 +87,7 @@ def _moved(
     """Angle moved at rising times, rad."""
     speed, mass = float(motion.speed), motion.mass
     state, flags = rest_state(angles), np.where(np.arange(2) == mass, STUCK, LOCKED)
-    whirl = steady_whirl(plant, speed, angles) if speed else 0j
+    whirl = plant.steady_whirl(speed, angles) if speed else 0j
     state[0], state[1] = whirl.real, whirl.imag
     command, found, now = motion.voltage * (np.arange(2) == mass), np.empty(times.size), 0.0
     for place, time in enumerate(times.tolist()):

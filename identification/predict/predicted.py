@@ -60,12 +60,6 @@ def numbers(column: Callable[[Observations], str], **declared: Any) -> Predicted
     )
 
 
-def vectors(observations: Observations, *, when: str = "") -> ComplexArray:
-    """a exp(j phase) of each row, m zero to peak. Args: `when`: "", "_before" or "_after"."""
-    columns = observations.columns
-    return np.asarray(columns[f"amplitude{when}"] * np.exp(1j * columns[f"phase{when}"]), dtype=np.complex128)
-
-
 def parts(vector: ComplexArray) -> FloatArray:
     """Real parts, then imaginary parts, shape (2 n,)."""
     return np.concatenate([vector.real, vector.imag])

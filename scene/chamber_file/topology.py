@@ -40,20 +40,20 @@ class Facets:
     shared: BoolArray
     """Keys in rising order that more than two cells have."""
 
-
-def facets_of(body: Body) -> Facets:
-    """The sides of all cells of a body."""
-    nodes, corners = sides_of(body.cells, body.kind), corners_of(body.kind)
-    keys = key_of(nodes[:, :corners], len(body.points))
-    counts = repeats(keys)
-    return Facets(
-        nodes=nodes,
-        corners=corners,
-        cells=np.repeat(np.arange(len(body.cells)), len(nodes) // len(body.cells)),
-        keys=keys,
-        outer=np.flatnonzero(counts == 1),
-        shared=counts > 2,
-    )
+    @classmethod
+    def of(cls, body: Body) -> Facets:
+        """The sides of all cells of a body."""
+        nodes, corners = sides_of(body.cells, body.kind), corners_of(body.kind)
+        keys = key_of(nodes[:, :corners], len(body.points))
+        counts = repeats(keys)
+        return cls(
+            nodes=nodes,
+            corners=corners,
+            cells=np.repeat(np.arange(len(body.cells)), len(nodes) // len(body.cells)),
+            keys=keys,
+            outer=np.flatnonzero(counts == 1),
+            shared=counts > 2,
+        )
 
 
 def topology_findings(body: Body, facets: Facets, *, drawing_nodes: IntArray) -> Iterator[Finding]:

@@ -16,14 +16,7 @@ from ringbalance.controller.liquid_ring.reach import (
     starting_pressure,
     unreachable_vibration,
 )
-from ringbalance.controller.rotor import (
-    chamber_directions,
-    chamber_letters,
-    disc_unbalance,
-    influence,
-    vibration,
-    wrapped,
-)
+from ringbalance.controller.rotor import chamber_directions, chamber_letters, disc_unbalance, wrapped
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene
@@ -83,15 +76,15 @@ def test_many_states_at_once_equal_one_by_one(model: BalancerModel) -> None:
 
 def test_the_vibration_lags_behind_the_unbalance(scene: Scene) -> None:
     still = replace(scene.rotor, initial_amplitude=0.0)
-    seen = complex(vibration(rotor=still, moment=1e-4 * cmath.exp(0.3j)))
+    seen = complex(still.vibration(1e-4 * cmath.exp(0.3j)))
     assert cmath.phase(seen) == pytest.approx(0.3 - math.radians(17), abs=1e-12)
     assert abs(seen) == pytest.approx(0.0108e-4, rel=1e-12)
 
 
 def test_the_opposite_moment_cancels_the_initial_vibration(scene: Scene) -> None:
-    k = influence(coefficient=scene.rotor.influence_coefficient, lag_angle=scene.rotor.lag_angle)
+    k = scene.rotor.influence
     initial = 10e-6 * cmath.exp(0.5j * math.pi)
-    assert abs(complex(vibration(rotor=scene.rotor, moment=-initial / k))) < 1e-20
+    assert abs(complex(scene.rotor.vibration(-initial / k))) < 1e-20
 
 
 @pytest.mark.parametrize("turns", [-3, 0, 2])

@@ -11,7 +11,6 @@ from scipy.optimize import least_squares
 from scipy.stats import t as student_t
 from synthetic_rigs import covered, fitted, measured, observations, rig
 
-from ringbalance.controller.rotor import influence
 from ringbalance.identification.balancers import model_errors, with_model_error
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.fitting import fit, problem_of
@@ -43,9 +42,7 @@ def stated(scene: Scene, **half_widths: float) -> Scene:
 def weighed(scene: Scene, *, seed: int = 1) -> tuple[Observations, ComplexArray]:
     """Trial weights on a rotor that is 4 % softer than the scene says, and the vibrations."""
     random = np.random.default_rng(seed)
-    k = 1.04 * influence(
-        coefficient=scene.rotor.influence_coefficient, lag_angle=scene.rotor.lag_angle + 0.02
-    )
+    k = 1.04 * replace(scene.rotor, lag_angle=scene.rotor.lag_angle + 0.02).influence
     noise = NOISE * (random.standard_normal(UNBALANCE.size) + 1j * random.standard_normal(UNBALANCE.size))
     seen = START + k * UNBALANCE * np.exp(1j * ANGLE) + noise
     return by_vibration(seen), seen

@@ -12,7 +12,7 @@ from synthetic_rigs import READINGS, observations
 
 from ringbalance.controller.liquid_ring.plant import LiquidRing, initial_state
 from ringbalance.controller.liquid_ring.quadrature import quadrature
-from ringbalance.controller.rotor import disc_unbalance, influence
+from ringbalance.controller.rotor import disc_unbalance
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.predict.device import Models, device_of, models_of
@@ -63,7 +63,7 @@ def test_injections_are_those_of_the_closed_loop(paper_scene: Scene) -> None:
         dynamics=dynamics_of(scene=scene, model=model, modelled=[INERTIA, HELD]),
     )
     state, before, expected = initial_state(disc=scene.disc), 0j, []
-    k = influence(coefficient=scene.rotor.influence_coefficient, lag_angle=scene.rotor.lag_angle)
+    k = scene.rotor.influence
     for chamber, time in ((0, 0.2), (2, 0.1), (3, 0.15)):
         state = plant.advance(state, gas_times={chamber: time}, duration=3.0, points=1).state
         after = complex(k * disc_unbalance(moment=model.moment, fill_ratio=np.array(state.fills())))
@@ -172,7 +172,7 @@ def test_the_vibration_without_weight_is_free_in_each_series(paper_scene: Scene)
     assert np.linalg.matrix_rank(free) == 4
     alike = np.array([1, 1, 3, 3, 2, 2, -5, -5.0])
     assert np.linalg.norm(alike - free @ np.linalg.lstsq(free, alike, rcond=None)[0]) < 1e-12
-    k = influence(coefficient=paper_scene.rotor.influence_coefficient, lag_angle=paper_scene.rotor.lag_angle)
+    k = paper_scene.rotor.influence
     found = predicted(paper_scene, data)
     assert found[1] + 1j * found[5] == pytest.approx(k * 1e-4 * np.exp(1j))
 

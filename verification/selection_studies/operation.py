@@ -27,7 +27,6 @@ from ringbalance.reduced_model.selection.estimates import (
 )
 from ringbalance.reduced_model.selection.loss_models import CONSTANT
 from ringbalance.reduced_model.selection.range_flow import equal_velocity
-from ringbalance.reduced_model.selection.registry import IN_INJECTIONS
 from ringbalance.reduced_model.selection.tube_terms import flow_contributions
 from ringbalance.reduced_model.time_scales import first_gas_time
 from ringbalance.scene.arrays import FloatArray
@@ -44,12 +43,6 @@ _CLOSED_FORM: Final = "closed form in time"
 _SEGMENTS: Final = (4, 16)
 """Of Eq. 20."""
 EXPLICIT: Final = tuple(f"{count} explicit segments" for count in _SEGMENTS)
-_SOURCES: Final = {
-    INERTIA: "rho L du/dt",
-    FILLING: "ISO 6358-1",
-    LAG: "definition",
-    HELD: "lift to the crest",
-}
 
 
 def courses(scene: Scene) -> tuple[Course, ...]:
@@ -98,20 +91,18 @@ def gas_times(scene: Scene) -> tuple[float, float]:
 
 def _operation_contributions(scene: Scene) -> Mapping[str, Contribution]:
     """What the ways through time leave out, and what their laws do, relative to the mass moved."""
-    change, found = _velocity_change(scene, max(gas_times(scene))), injection_estimates(scene)
-    change_over = "change of the velocity over an operation / (2 n)"
-    segments = (
-        (name, change / (2 * count), change_over, "Euler's step, first order")
+    change = _velocity_change(scene, max(gas_times(scene)))
+    segments = {
+        name: Contribution(
+            term=name,
+            value=change / (2 * count),
+            formula="change of the velocity over an operation / (2 n)",
+            source="Euler's step, first order",
+            rough=True,
+        )
         for count, name in zip(_SEGMENTS, EXPLICIT, strict=True)
-    )
-    terms = ((t, found[t].contribution, found[t].formula, _SOURCES[t]) for t in IN_INJECTIONS)
-    return {
-        **flow_contributions(scene),
-        **{
-            term: Contribution(term=term, value=value, formula=formula, source=source, rough=True)
-            for term, value, formula, source in (*segments, *terms)
-        },
     }
+    return {**flow_contributions(scene), **segments, **injection_estimates(scene)}
 
 
 def _velocity_change(scene: Scene, duration: float) -> float:

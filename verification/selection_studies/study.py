@@ -159,8 +159,13 @@ def tolerance_text(tolerance: float, say: Callable[[float], str]) -> str:
 def terms_document(scene: Scene) -> list[Record]:
     """Estimated contribution of every physical term of a scene, as plain numbers and texts."""
     return [
-        {"term": e.term, "estimated_contribution": e.contribution, "above": e.above, "why": e.reason}
-        for e in term_estimates(scene).values()
+        {
+            "term": c.term,
+            "estimated_contribution": c.value,
+            "above": c.above(scene.tolerance),
+            "why": c.reason(scene.tolerance),
+        }
+        for c in term_estimates(scene).values()
     ]
 
 
@@ -175,7 +180,10 @@ def _quantity(trade: Trade, choices: Sequence[Choice]) -> Record:
         "top": hierarchy.top.name,
         "top_uncertainty": hierarchy.top_uncertainty,
         "top_uncertainty_from": hierarchy.top_uncertainty_from,
-        "contributions": [asdict(c) for c in hierarchy.contributions.values()],
+        "contributions": [
+            {"term": c.term, "value": c.value, "formula": c.formula, "source": c.source}
+            for c in hierarchy.contributions.values()
+        ],
         "rungs": [_fidelity(found) for found in trade.fidelities],
         "knee": trade.knee,
         "choices": [_choice_document(choice) for choice in choices],

@@ -9,7 +9,6 @@ import numpy as np
 
 from ringbalance.controller.eccentric_mass.plant.integrate import LONGEST, fastest_rate
 from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
-from ringbalance.controller.eccentric_mass.plant.speed import profile_arrays
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.units import format_quantity
@@ -51,8 +50,8 @@ def longest_run(scene: EccentricScene) -> float:
 
 def _substeps(scene: EccentricScene) -> float:
     parameters, step = plant_parameters(scene), scene.sensor.step
-    times, speeds = profile_arrays(scene.rotor)
-    samples = round(scene.run.time_limit / step) + 1
+    times, speeds = scene.rotor.profile
+    samples = scene.samples
     # Not at every sample: close enough for a limit, and cheap.
     at = np.linspace(0.0, scene.run.time_limit, min(samples, 10_000))
     rates = np.abs(np.interp(at, times, speeds)) + fastest_rate(parameters, 0.0)

@@ -10,11 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from ringbalance.controller.eccentric_mass.plant.parameters import (
-    PlantParameters,
-    plant_parameters,
-    steady_whirl,
-)
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.strategy.lqr_law import friction_torque
 from ringbalance.controller.eccentric_mass.strategy.settings import drive_law
@@ -69,7 +65,7 @@ def test_figure_six_grows_only_with_what_compensation_leaves(scene: EccentricSce
 def test_figure_seven_balances_both_imbalances(scene: EccentricScene) -> None:
     found = figure_seven(scene, time_limit=20.0)
     plant = plant_parameters(scene)
-    expected = abs(steady_whirl(plant, 100 * RPM, (0.0, math.pi)))
+    expected = abs(plant.steady_whirl(100 * RPM, (0.0, math.pi)))
     assert found.before == pytest.approx((expected, expected))
     assert max(found.after) < 2e-3 * expected
     for run in found.runs:
@@ -80,7 +76,7 @@ def test_figure_eight_is_mended_by_fine_tuning(scene: EccentricScene) -> None:
     found = figure_eight(scene, time_limit=200.0)
     plant = plant_parameters(scene)
     # Both masses 10 degrees on turn the correction by 10 degrees: 2 sin 5 deg of the imbalance is left.
-    expected = 2 * math.sin(math.radians(5)) * abs(steady_whirl(plant, 100 * RPM, (0.0, math.pi)))
+    expected = 2 * math.sin(math.radians(5)) * abs(plant.steady_whirl(100 * RPM, (0.0, math.pi)))
     assert found.positioned == pytest.approx((expected, expected), rel=0.02)
     assert max(found.after) < scene.supervisor.limit
     for run in found.runs:
@@ -114,7 +110,7 @@ def fixed_frame_peak(plant: PlantParameters) -> tuple[float, float]:
         force = plant.unbalance * complex(speed**2, -RPM) * cmath.exp(1j * (turn + plant.phase))
         return [q[1], (force - plant.damping * q[1] - plant.stiffness * q[0]) / plant.mass]
 
-    whirl = steady_whirl(plant, first, (0.0, math.pi))
+    whirl = plant.steady_whirl(first, (0.0, math.pi))
     begin = [whirl, 1j * first * whirl]
     grid = np.linspace(28, 38, 20001)
     found = solve_ivp(slope, (0, 38), begin, t_eval=grid, rtol=1e-10, atol=1e-13, method="DOP853")

@@ -17,9 +17,7 @@ import ringbalance
 from ringbalance.controller.eccentric_mass.document import eccentric_document
 from ringbalance.controller.eccentric_mass.plant.parameters import (
     PlantParameters,
-    influence,
     plant_parameters,
-    steady_whirl,
 )
 from ringbalance.controller.eccentric_mass.remedies import expected_deviation
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
@@ -69,7 +67,7 @@ def test_it_settles_through_all_stages(run: EccentricRun) -> None:
 def unbalance_left(run: EccentricRun, plant: PlantParameters) -> float:
     """That of rotor and masses together at the end, kg m."""
     speed = float(run.speed[-1])
-    return abs(steady_whirl(plant, speed, run.mass_angle[:, -1].tolist()) / influence(plant, speed))
+    return abs(plant.steady_whirl(speed, run.mass_angle[:, -1].tolist()) / plant.influence(speed))
 
 
 def test_the_masses_undo_the_imbalance(run: EccentricRun, scene: EccentricScene) -> None:

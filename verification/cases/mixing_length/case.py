@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Callable
 from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 from scipy.integrate import quad
+from scipy.optimize import brentq
 
 from ringbalance.physics.tube.friction import friction_factor
 from ringbalance.scene.arrays import FloatArray
@@ -34,7 +34,6 @@ _HIGH: Final = 1e5
 _SMOOTH: Final = {"light": 5, "heavy": 1}
 _SAND: Final = {"light": 40, "heavy": 8}
 """Every which measured point is taken, of smooth tubes and of sand."""
-_CELLS: Final = {"light": 48, "heavy": 128}
 _FULLY_ROUGH: Final = 70.0
 """ks+ above which the wall is fully rough."""
 _BETWEEN: Final = (3.0, 40.0)
@@ -44,11 +43,11 @@ _SHOWN: Final = 126.0
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    closure, cells = _CLOSURES[defect], _CELLS[level]
+    closure = _CLOSURES[defect]
 
     def by_length(reynolds: FloatArray, roughness: FloatArray) -> FloatArray:
         flows = (
-            mixing_length_flow(reynolds=re, relative_roughness=e, closure=closure, cells=cells)
+            mixing_length_flow(reynolds=re, relative_roughness=e, closure=closure)
             for re, e in zip(reynolds, roughness, strict=True)
         )
         return np.array([flow.friction_factor for flow in flows])
@@ -65,7 +64,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     between = (grain > _BETWEEN[0]) & (grain < _BETWEEN[1])
     return Evidence(
         found=as_found(
-            quadrature=_quadrature_gap(closure, cells),
+            quadrature=_quadrature_gap(closure),
             smooth=np.max(np.abs(apart[even >= _HIGH])),
             between=np.mean(np.abs(wall[between])),
         ),
@@ -82,19 +81,18 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     )
 
 
-def _quadrature_gap(closure: MixingLength, cells: int) -> float:
-    """Friction factor at Re = 1e5 against the integral of the slope 2 tau/(1 + sqrt(1 + 4 l^2 tau))."""
-    flow = mixing_length_flow(reynolds=_HIGH, closure=closure, cells=cells)
+def _quadrature_gap(closure: MixingLength) -> float:
+    """Friction factor at Re = 1e5 against an integral of slopes that are roots of (1 + l^2 s) s = tau."""
+    flow = mixing_length_flow(reynolds=_HIGH, closure=closure)
     radius = flow.friction_reynolds
 
     def flux(y: float) -> float:
         squared = float(mixing_length(wall_distance=y, radius=radius, closure=closure)) ** 2
         tau = 1 - y / radius
-        return 2 * tau / (1 + math.sqrt(1 + 4 * squared * tau)) * (radius - y) ** 2
+        return float(brentq(lambda s: (1 + squared * s) * s - tau, 0.0, 1.0, xtol=1e-15)) * tau**2
 
     cuts = [0.0, 5.0, 30.0, 200.0, radius]
-    parts = (float(quad(flux, a, b, epsrel=1e-10)[0]) for a, b in itertools.pairwise(cuts))
-    bulk = sum(parts) / radius**2
+    bulk = sum(float(quad(flux, a, b, epsrel=1e-9)[0]) for a, b in itertools.pairwise(cuts))
     return abs(flow.friction_factor / (8 / bulk**2) - 1)
 
 

@@ -37,6 +37,19 @@ class Lift:
     entrance: float
     """Fraction of the loss up to the crest's end that is lost at the entrance."""
 
+    @classmethod
+    def of(cls, scene: Scene, *, law: FlowLaw) -> Lift | None:
+        """What liquid meets on its way up to the crest; None without one, or under a law that has none."""
+        tube = scene.tube
+        if tube.hump_radius is None or not isinstance(law, CalibratedLaw) or law.path.crest is None:
+            return None
+        half = law.max_fill_ratio / 2
+        flow = law.evaluate(fill_ratio=half, gas_pressure=scene.gas.pressure, primed=True)
+        straight = (
+            0.0 if tube.hump_shape == "arc" else 2 * tube.hump_radius / (tube.port_radius + tube.hump_radius)
+        )
+        return cls(straight=straight, entrance=entrance_fraction(scene, float(flow.velocity) or 1.0))
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Column:
@@ -61,25 +74,12 @@ class Column:
     gas_factor: float = 1.0
     """Gas pressure on the liquid over the one at the place of measurement."""
 
-
-def column_of(*, law: FlowLaw, tube: Tube, gas_off: float = 0.0) -> Column | None:
-    """The column that a flow law describes; None for a law that gives velocities and no forces."""
-    if isinstance(law, CalibratedLaw):
-        return _calibrated(law, tube, gas_off)
-    return _paper(law, tube, gas_off) if isinstance(law, PaperLaw) else None
-
-
-def lift_of(scene: Scene, *, law: FlowLaw) -> Lift | None:
-    """What liquid meets on its way up to the crest; None without a crest, or under a law that has none."""
-    tube = scene.tube
-    if tube.hump_radius is None or not isinstance(law, CalibratedLaw) or law.path.crest is None:
-        return None
-    half = law.max_fill_ratio / 2
-    flow = law.evaluate(fill_ratio=half, gas_pressure=scene.gas.pressure, primed=True)
-    straight = (
-        0.0 if tube.hump_shape == "arc" else 2 * tube.hump_radius / (tube.port_radius + tube.hump_radius)
-    )
-    return Lift(straight=straight, entrance=entrance_fraction(scene, float(flow.velocity) or 1.0))
+    @classmethod
+    def of(cls, *, law: FlowLaw, tube: Tube, gas_off: float = 0.0) -> Column | None:
+        """The column that a flow law describes; None for a law that gives velocities and no forces."""
+        if isinstance(law, CalibratedLaw):
+            return _calibrated(law, tube, gas_off)
+        return _paper(law, tube, gas_off) if isinstance(law, PaperLaw) else None
 
 
 def _calibrated(law: CalibratedLaw, tube: Tube, gas_off: float) -> Column:

@@ -30,16 +30,9 @@ from ringbalance.verification.navier_stokes.meshes import (
     tensor_patch,
     with_midpoints,
 )
-from ringbalance.verification.navier_stokes.newton import (
-    Coefficients,
-    Dirichlet,
-    FlowSolution,
-    FlowSystem,
-    NewtonSettings,
-    flow_system,
-    solve_flow,
-)
+from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, solve_flow
 from ringbalance.verification.navier_stokes.space import taylor_hood
+from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem, flow_system
 from ringbalance.verification.navier_stokes.time_march import March, march_flow
 
 POISEUILLE_GRADIENT = 32.0

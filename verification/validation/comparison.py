@@ -12,11 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.identification.data.measurements import (
-    Measurements,
-    MeasurementsError,
-    read_measurements,
-)
+from ringbalance.identification.data.measurements import Measurements, MeasurementsError, read_measurements
 from ringbalance.scene.arrays import BoolArray, FloatArray, StringArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, as_found, figure

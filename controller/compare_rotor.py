@@ -17,7 +17,7 @@ import cmath
 import math
 from dataclasses import dataclass, replace
 
-from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.plant.speed import speed_at
 from ringbalance.controller.rotor import wrapped
 from ringbalance.reduced_model.chamber.gravity import check_ring
@@ -63,16 +63,18 @@ class OneRotor:
         """
         return _liquid_on(self, scene) if isinstance(scene, Scene) else _driven_on(self, scene)
 
+    @classmethod
+    def of(cls, scene: AnyScene) -> OneRotor:
+        """Take the rotor out of a scene; of eccentric masses the speed counts at which their strategy starts.
 
-def rotor_of(scene: AnyScene) -> OneRotor:
-    """Take the rotor out of a scene; of eccentric masses the speed counts at which their strategy starts.
-
-    Raises: SceneError: the rotor stands still, turns backwards, or does not vibrate at all.
-    """
-    found = _liquid_rotor(scene) if isinstance(scene, Scene) else _driven_rotor(scene)
-    if found.amplitude == 0:
-        raise _refusal(scene, "rotor", "", "it does not vibrate: there is nothing to compare", "an unbalance")
-    return found
+        Raises: SceneError: the rotor stands still, turns backwards, or does not vibrate at all.
+        """
+        found = _liquid_rotor(scene) if isinstance(scene, Scene) else _driven_rotor(scene)
+        if found.amplitude == 0:
+            raise _refusal(
+                scene, "rotor", "", "it does not vibrate: there is nothing to compare", "an unbalance"
+            )
+        return found
 
 
 def _liquid_rotor(scene: Scene) -> OneRotor:
@@ -93,7 +95,7 @@ def _driven_rotor(scene: EccentricScene) -> OneRotor:
     if speed <= 0:
         problem = "the rotor does not turn forwards when balancing starts"
         raise _refusal(scene, "rotor", "speed_profile", problem, "a speed above 0 rpm at that time")
-    parameters = plant_parameters(scene)
+    parameters = PlantParameters.of(scene)
     if parameters.damping == 0:
         problem = "without damping the vibration before balancing never becomes steady"
         raise _refusal(scene, "rotor", "damping", problem, "a damping coefficient above 0 N*s/m")

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Final
 
-from ringbalance.controller.algorithms.algorithm import usable
 from ringbalance.controller.formulas.stopping import has_risen, has_turned
 from ringbalance.controller.simulation import Sample
 
@@ -31,7 +30,7 @@ def overshoots(samples: Sequence[Sample], *, limit: float) -> int:
 
     Args: `samples`: of one run, in order. `limit`: m.
     """
-    seen = [m for s in samples if (m := s.measurement) is not None and usable(m, needs_phase=True)]
+    seen = [m for s in samples if (m := s.measurement) is not None and m.usable(needs_phase=True)]
     return sum(b.amplitude > limit and has_turned(a.phase, b.phase) for a, b in pairwise(seen))
 
 
@@ -42,7 +41,7 @@ def misadjustments(samples: Sequence[Sample], *, floor: float) -> int:
     """
     count, before, operated = 0, math.inf, False
     for sample in samples:
-        if sample.measurement is not None and usable(sample.measurement, needs_phase=False):
+        if sample.measurement is not None and sample.measurement.usable(needs_phase=False):
             count += operated and has_risen(before, sample.measurement.amplitude, floor)
             before, operated = sample.measurement.amplitude, False
         operated = operated or bool(sample.command.valves)

@@ -9,13 +9,13 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.algorithms.algorithm import Command, Controller, Measurement, usable
+from ringbalance.controller.algorithms.algorithm import Command, Controller, Measurement
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.checks import check_fit, check_settings
 from ringbalance.controller.formulas.stopping import Cause, has_held, has_risen, stop_cause
 from ringbalance.controller.judgement import misadjustments, noise_floor, overshoots
 from ringbalance.controller.liquid_ring.closed_form import closed_form, has_closed_form
-from ringbalance.controller.liquid_ring.plant import Advance, DiscState, LiquidRing, initial_state, longest
+from ringbalance.controller.liquid_ring.plant import Advance, DiscState, LiquidRing
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Integrator
 from ringbalance.controller.outcome import VERDICTS, Facts
@@ -107,7 +107,7 @@ def simulate(
         controller=used_controller,
         sensor=sensor or noisy_sensor(sensor=scene.sensor, seed=scene.run.seed),
         exact=sensor is None and scene.sensor.amplitude_noise == scene.sensor.phase_noise == 0,
-        state=initial_state(disc=scene.disc),
+        state=DiscState.initial(disc=scene.disc),
     )
     cause = run.go(progress or _silent)
     name = getattr(quasi_steady, "__name__", "custom") if dynamics is None else RUNGE_KUTTA
@@ -213,7 +213,7 @@ class _Run:
 
     def _watch(self, measurement: Measurement | None) -> None:
         """Count the rises in a row; a sample without a usable amplitude is passed over."""
-        if measurement is None or not usable(measurement, needs_phase=False):
+        if measurement is None or not measurement.usable(needs_phase=False):
             return
         if self.last_usable is not None and self.operated:
             higher = has_risen(self.last_usable.amplitude, measurement.amplitude, self.floor)
@@ -266,7 +266,7 @@ class _Run:
         change = abs(self._vibration() - before)
         # Noise keeps opening the other valve a little; what counts is the one that should do the work.
         done = [injection.operation for injection in self.injections[-len(advance.operations) :]]
-        working = longest(done).moved or change > self.scene.controller.limit
+        working = max(done, key=lambda one: one.duration).moved or change > self.scene.controller.limit
         self.idle = 0 if working else self.idle + 1
         if self.plant.dynamics is None:
             self._wait()

@@ -11,8 +11,8 @@ from typing import Final
 import numpy as np
 
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.parameters import FitError, Parameter, scene_parameter, unknown_name
-from ringbalance.identification.predict.device import Models, models_of
+from ringbalance.identification.parameters import FitError, Parameter, unknown_name
+from ringbalance.identification.predict.device import Models
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.physics.tube.uncertainty import MODEL_CAUSES
@@ -56,7 +56,7 @@ The time L/2u in which the flow passes that half is taken for their expanded unc
 
 def models_for(scene: AnyScene) -> Models | None:
     """Models that predictions take; None where there is but one."""
-    return models_of(scene) if isinstance(scene, Scene) else None
+    return Models.of(scene) if isinstance(scene, Scene) else None
 
 
 def parameters_for(scene: AnyScene, names: Sequence[str]) -> tuple[Parameter, ...]:
@@ -64,7 +64,7 @@ def parameters_for(scene: AnyScene, names: Sequence[str]) -> tuple[Parameter, ..
     if not names or len(set(names)) < len(names):
         raise FitError("name at least one parameter, and each once")
     if isinstance(scene, Scene):
-        return tuple(scene_parameter(scene, name) for name in names)
+        return tuple(Parameter.of(scene, name) for name in names)
     return tuple(_eccentric_parameter(scene, name) for name in names)
 
 

@@ -6,7 +6,7 @@ import json as json_format
 from collections.abc import Sequence
 from pathlib import Path
 
-from ringbalance.identification.criticism.review import review
+from ringbalance.identification.criticism.review import Review
 from ringbalance.identification.data.reading import read_observations
 from ringbalance.identification.data.template import template as template_of
 from ringbalance.identification.documents import fit_document
@@ -80,7 +80,7 @@ def fit(
     except FitError as error:
         fault = Fault(file=given.file, table="", key="", value="", problem=str(error), allowed="")
         raise SceneError([fault]) from error
-    told, following = review(result), next_measurement(result, chosen)
+    told, following = Review.of(result), next_measurement(result, chosen)
     if json:
         document = fit_document(result, data=observations, told=told, following=following)
         print(json_format.dumps(document, allow_nan=False))

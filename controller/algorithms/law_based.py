@@ -9,13 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.algorithms.algorithm import (
-    Command,
-    Measurement,
-    ValveCommand,
-    usable,
-    valve_commands,
-)
+from ringbalance.controller.algorithms.algorithm import Command, Measurement, ValveCommand, valve_commands
 from ringbalance.controller.algorithms.law_based_times import fill_for_moment, pair_changes
 from ringbalance.controller.liquid_ring.opening import gas_time
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing, PairState
@@ -141,7 +135,7 @@ class LawBased:
         return _LawBasedState(disc=self.initial, influence=estimate)
 
     def step(self, state: _LawBasedState, measurement: Measurement | None) -> tuple[_LawBasedState, Command]:
-        if measurement is None or not usable(measurement, needs_phase=True):
+        if measurement is None or not measurement.usable(needs_phase=True):
             return state, Command(reason="no usable sample")
         seen = self._seen(state, measurement)
         if measurement.amplitude <= self.limit:

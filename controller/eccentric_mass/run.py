@@ -8,18 +8,14 @@ from dataclasses import replace
 import numpy as np
 
 from ringbalance.controller.eccentric_mass.plant.open_loop import Progress
-from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.plant.substep_limit import check_substeps
 from ringbalance.controller.eccentric_mass.remedies import expected_deviation, found_beforehand, remedies_of
 from ringbalance.controller.eccentric_mass.run_loop import Record, recorded
 from ringbalance.controller.eccentric_mass.run_record import EccentricEstimates, EccentricRun, StageSpan
 from ringbalance.controller.eccentric_mass.run_status import RunFacts
 from ringbalance.controller.eccentric_mass.strategy.plan import RELEASED, STAGE_NAMES, Cause, Findings, Stage
-from ringbalance.controller.eccentric_mass.strategy.settings import (
-    StrategySettings,
-    believed_whirl,
-    strategy_settings,
-)
+from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings, believed_whirl
 from ringbalance.controller.eccentric_mass.strategy.targets import Targets, target_angles
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.eccentric_models import EccentricScene
@@ -43,7 +39,7 @@ def simulate_eccentric(
     """
     check_substeps(scene)
     record, findings, innovation = recorded(
-        scene, seed, progress or _silent, settings or strategy_settings(scene)
+        scene, seed, progress or _silent, settings or StrategySettings.of(scene)
     )
     cause = Cause(int(record.cause[-1]))
     times, speeds = scene.rotor.profile
@@ -106,7 +102,7 @@ def _facts(
     amplitude: FloatArray,
 ) -> RunFacts:
     time: FloatArray = np.arange(len(speed), dtype=np.float64) * scene.sensor.step
-    most = plant_parameters(scene).maximum_voltage
+    most = PlantParameters.of(scene).maximum_voltage
     at_limit = np.any(np.abs(record.voltage) >= most, axis=1)
     estimating = np.flatnonzero(record.stage == int(Stage.IMBALANCE))
     fastest = float(np.max(np.abs(speed[estimating]))) if estimating.size else 0.0
@@ -164,14 +160,14 @@ def _targets(scene: EccentricScene, record: Record) -> Targets | None:
         return None
     x, y = record.imbalance[-1]
     gap = scene.masses.arc_length / scene.masses.guide_radius
-    moment = plant_parameters(scene).moment
+    moment = PlantParameters.of(scene).moment
     return target_angles(float(np.hypot(x, y)), float(np.arctan2(y, x)), moment, gap)
 
 
 def _unbalanced(scene: EccentricScene, speed: float) -> float:
     if speed == 0:
         return 0.0
-    return abs(plant_parameters(scene).steady_whirl(speed, scene.masses.initial_angle))
+    return abs(PlantParameters.of(scene).steady_whirl(speed, scene.masses.initial_angle))
 
 
 def _settling_time(*, time: FloatArray, amplitude: FloatArray, limit: float) -> float | None:

@@ -11,7 +11,7 @@ from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.controller.eccentric_mass.plant.friction import STUCK
 from ringbalance.controller.eccentric_mass.plant.integrate import plant_step
 from ringbalance.controller.eccentric_mass.plant.open_loop import Progress, run_plant, stretches
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.plant.plant import electrical_energy, rest_state, stuck_flags
 from ringbalance.controller.eccentric_mass.plant.speed import speed_at, turned
 from ringbalance.controller.eccentric_mass.strategy.plan import RELEASED, Cause, Findings
@@ -101,7 +101,7 @@ def _locked(scene: EccentricScene, record: Record, progress: Progress) -> Record
 def _driven(
     scene: EccentricScene, settings: StrategySettings, numbers: FloatArray, progress: Progress
 ) -> tuple[Record, Findings, float | None]:
-    parameters, record = plant_parameters(scene), _empty_record(len(numbers))
+    parameters, record = PlantParameters.of(scene), _empty_record(len(numbers))
     state, stuck = rest_state(scene.masses.initial_angle), stuck_flags(STUCK)
     profile, sensor = _Profile(*scene.rotor.profile), scene.sensor
     noise = _SensorNoise(

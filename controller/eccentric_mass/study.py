@@ -15,12 +15,12 @@ import numpy as np
 
 from ringbalance.controller.eccentric_mass.document import eccentric_document
 from ringbalance.controller.eccentric_mass.plant.open_loop import Progress
-from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.sampled_loops import GAIN_MARGIN, RecommendedGains
 from ringbalance.controller.eccentric_mass.strategy.plan import STAGE_NAMES, Stage
-from ringbalance.controller.eccentric_mass.strategy.settings import strategy_settings
+from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.strategy.targets import target_angles
 from ringbalance.controller.tuning.eccentric import EccentricTuning, eccentric_tuning_document, tune_eccentric
 from ringbalance.scene.eccentric_models import EccentricScene
@@ -136,7 +136,7 @@ def eccentric_study(
 
 
 def _of_run(scene: EccentricScene, run: EccentricRun) -> Sequence[Requirement]:
-    plant = plant_parameters(scene)
+    plant = PlantParameters.of(scene)
     gap = scene.masses.arc_length / scene.masses.guide_radius
     # Of an imbalance beyond all reach, what the masses side by side leave is what they lack.
     beyond = 4 * plant.moment
@@ -240,7 +240,7 @@ def _moved_runs(
     """
     if not scene.uncertainty:
         return {}
-    settings = strategy_settings(scene)
+    settings = StrategySettings.of(scene)
 
     def came_to(plant: EccentricScene, number: int) -> Judged:
         return judge(plant, simulate_eccentric(plant, seed=number, settings=settings))
@@ -258,7 +258,7 @@ def _drawn_runs(
     """What runs come to with all stated inputs, and the noise, drawn at once; empty: none is stated."""
     if not scene.uncertainty:
         return []
-    settings = strategy_settings(scene)
+    settings = StrategySettings.of(scene)
     plants = (
         (
             eccentric_drawn(scene, np.random.default_rng(np.random.SeedSequence(number, spawn_key=(1,)))),

@@ -13,7 +13,7 @@ from ringbalance.controller.algorithms.by_name import target_vector_of
 from ringbalance.controller.ensemble.compiled_noise import noise_key
 from ringbalance.controller.ensemble.compiled_records import GAS_LINE, RUN
 from ringbalance.controller.ensemble.compiled_sample import run_members
-from ringbalance.controller.ensemble.moment import moment_table
+from ringbalance.controller.ensemble.moment import MomentTable
 from ringbalance.controller.ensemble.samples import LARGEST_RATIO, Members
 from ringbalance.controller.ensemble.transfer import PairTransfer
 from ringbalance.controller.judgement import noise_floor
@@ -115,7 +115,7 @@ def ensemble_plan(*, scene: Scene, model: BalancerModel, transfer: PairTransfer)
     """Prepare the runs of an ensemble."""
     shared, chambers = transfer.shared.copy(), scene.disc.chambers
     axes = chamber_directions(chambers)[: chambers // 2]
-    moment = moment_table(model=model, total=2 * scene.disc.initial_fill)
+    moment = MomentTable.of(model=model, total=2 * scene.disc.initial_fill)
     parts = [part for z in (np.real, np.imag) for part in (z(moment.value), z(moment.slope))]
     shared["moment"], shared["moment_step"] = np.stack(parts, axis=1), moment.step
     shared["asymmetric"] = bool(np.any(moment.value.imag))

@@ -18,7 +18,7 @@ from ringbalance.controller.ensemble.compiled_records import DRY, OFF, ON, PATH_
 from ringbalance.controller.formulas.paths import linear_course, piece_part, piece_rise
 from ringbalance.controller.liquid_ring.closed_form import LinearSquaredVelocity
 from ringbalance.controller.liquid_ring.motion import Dynamics
-from ringbalance.controller.liquid_ring.pair_path import UntabulatedError, flow_paths
+from ringbalance.controller.liquid_ring.pair_path import FlowPaths, UntabulatedError
 from ringbalance.controller.liquid_ring.records import PLANT
 from ringbalance.controller.liquid_ring.transfer import Drive, Event
 from ringbalance.reduced_model.law.model import BalancerModel
@@ -52,39 +52,39 @@ class PairTransfer:
         x, t = np.broadcast_arrays(np.asarray(fill, dtype=np.float64), np.asarray(time, dtype=np.float64))
         return _fills_after(self.shared[0], x.flatten(), t.flatten()).reshape(x.shape)
 
+    @classmethod
+    def of(
+        cls, *, model: BalancerModel, total: float, gas_pressure: float, dynamics: Dynamics | None = None
+    ) -> PairTransfer:
+        """Closed form of a pair when the law has one, else the paths of every flow, exact to 1e-11.
 
-def pair_transfer(
-    *, model: BalancerModel, total: float, gas_pressure: float, dynamics: Dynamics | None = None
-) -> PairTransfer:
-    """Closed form of a pair when the law has one, else the paths of every flow, exact to 1e-11.
-
-    `total` is the sum of the two fill ratios, the gas pressure is gauge. With `dynamics` every pair moves by
-    them, each step to `RELATIVE_ERROR`, and nothing is tabulated.
-    Raises: ValueError: a law whose regimes change more often than can be tabled.
-    """
-    drive = Drive(
-        law=model.flow,
-        fill=total / 2,
-        total=total,
-        exchange_rate=model.tube_area / model.chamber_volume,
-        gas_pressure=gas_pressure,
-        primed=True,
-    )
-    shared = np.zeros(1, dtype=SHARED)
-    for name in ("gas_pressure", "exchange_rate", "total", "lowest", "highest"):
-        shared[name] = getattr(drive, name)
-    shared["lowest_empties"] = drive.boundary_event(drive.lowest) is Event.EMPTY
-    shared["highest_empties"] = drive.boundary_event(drive.highest) is Event.EMPTY
-    if dynamics is not None:
-        shared["moving"] = True
-        return PairTransfer(shared=shared, plant=dynamics.plant(total=total, relative_error=RELATIVE_ERROR))
-    if isinstance(model.flow, LinearSquaredVelocity):
-        shared["linear"] = True
-        shared["squared_per_pressure"] = model.flow.velocity_squared_per_pressure
-        shared["pressure_per_fill"] = model.flow.pressure_per_fill_difference
-    else:
-        _fill_tables(drive, shared[0])
-    return PairTransfer(shared=shared, plant=np.zeros(1, dtype=PLANT))
+        `total` is the sum of the two fill ratios, the gas pressure is gauge. With `dynamics` every pair moves
+        by them, each step to `RELATIVE_ERROR`, and nothing is tabulated.
+        Raises: ValueError: a law whose regimes change more often than can be tabled.
+        """
+        drive = Drive(
+            law=model.flow,
+            fill=total / 2,
+            total=total,
+            exchange_rate=model.tube_area / model.chamber_volume,
+            gas_pressure=gas_pressure,
+            primed=True,
+        )
+        shared = np.zeros(1, dtype=SHARED)
+        for name in ("gas_pressure", "exchange_rate", "total", "lowest", "highest"):
+            shared[name] = getattr(drive, name)
+        shared["lowest_empties"] = drive.boundary_event(drive.lowest) is Event.EMPTY
+        shared["highest_empties"] = drive.boundary_event(drive.highest) is Event.EMPTY
+        if dynamics is not None:
+            shared["moving"] = True
+            return cls(shared=shared, plant=dynamics.plant(total=total, relative_error=RELATIVE_ERROR))
+        if isinstance(model.flow, LinearSquaredVelocity):
+            shared["linear"] = True
+            shared["squared_per_pressure"] = model.flow.velocity_squared_per_pressure
+            shared["pressure_per_fill"] = model.flow.pressure_per_fill_difference
+        else:
+            _fill_tables(drive, shared[0])
+        return cls(shared=shared, plant=np.zeros(1, dtype=PLANT))
 
 
 def _fill_tables(drive: Drive, shared: np.void) -> None:
@@ -95,7 +95,7 @@ def _fill_tables(drive: Drive, shared: np.void) -> None:
         (DRY, drive.gas_pressure, False),
         (OFF, 0.0, True),
     ):
-        paths = flow_paths(replace(drive, gas_pressure=pressure), primed=primed, most_changes=MOST_CHANGES)
+        paths = FlowPaths.of(replace(drive, gas_pressure=pressure), primed=primed, most_changes=MOST_CHANGES)
         nodes, rows = paths.nodes.shape[1], slice(interval, interval + paths.sense.size)
         if node + nodes > PATH_NODES:
             raise UntabulatedError

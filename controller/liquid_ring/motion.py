@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from ringbalance.controller.liquid_ring.records import PIECES, PLANT
 from ringbalance.controller.liquid_ring.transfer import Event
-from ringbalance.physics.gas.supply import (
+from ringbalance.physics.gas import (
     HEAT_CAPACITY_RATIO,
     REFERENCE_PRESSURE,
     REFERENCE_TEMPERATURE,
@@ -36,6 +36,19 @@ class Lift:
     """c of D_m - D = (D_m - D_p)(c o + (1 - c) o^2) with o from 0 at the crest to 1 at the port."""
     entrance: float
     """Fraction of the loss up to the crest's end that is lost at the entrance."""
+
+    @classmethod
+    def of(cls, scene: Scene, *, law: FlowLaw) -> Lift | None:
+        """What liquid meets on its way up to the crest; None without one, or under a law that has none."""
+        tube = scene.tube
+        if tube.hump_radius is None or not isinstance(law, CalibratedLaw) or law.path.crest is None:
+            return None
+        half = law.max_fill_ratio / 2
+        flow = law.evaluate(fill_ratio=half, gas_pressure=scene.gas.pressure, primed=True)
+        straight = (
+            0.0 if tube.hump_shape == "arc" else 2 * tube.hump_radius / (tube.port_radius + tube.hump_radius)
+        )
+        return cls(straight=straight, entrance=entrance_fraction(scene, float(flow.velocity) or 1.0))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -61,25 +74,12 @@ class Column:
     gas_factor: float = 1.0
     """Gas pressure on the liquid over the one at the place of measurement."""
 
-
-def column_of(*, law: FlowLaw, tube: Tube, gas_off: float = 0.0) -> Column | None:
-    """The column that a flow law describes; None for a law that gives velocities and no forces."""
-    if isinstance(law, CalibratedLaw):
-        return _calibrated(law, tube, gas_off)
-    return _paper(law, tube, gas_off) if isinstance(law, PaperLaw) else None
-
-
-def lift_of(scene: Scene, *, law: FlowLaw) -> Lift | None:
-    """What liquid meets on its way up to the crest; None without a crest, or under a law that has none."""
-    tube = scene.tube
-    if tube.hump_radius is None or not isinstance(law, CalibratedLaw) or law.path.crest is None:
-        return None
-    half = law.max_fill_ratio / 2
-    flow = law.evaluate(fill_ratio=half, gas_pressure=scene.gas.pressure, primed=True)
-    straight = (
-        0.0 if tube.hump_shape == "arc" else 2 * tube.hump_radius / (tube.port_radius + tube.hump_radius)
-    )
-    return Lift(straight=straight, entrance=entrance_fraction(scene, float(flow.velocity) or 1.0))
+    @classmethod
+    def of(cls, *, law: FlowLaw, tube: Tube, gas_off: float = 0.0) -> Column | None:
+        """The column that a flow law describes; None for a law that gives velocities and no forces."""
+        if isinstance(law, CalibratedLaw):
+            return _calibrated(law, tube, gas_off)
+        return _paper(law, tube, gas_off) if isinstance(law, PaperLaw) else None
 
 
 def _calibrated(law: CalibratedLaw, tube: Tube, gas_off: float) -> Column:

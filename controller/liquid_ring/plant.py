@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -54,6 +54,12 @@ class DiscState:
     def rests(self) -> bool:
         """Whether no liquid can move until a valve is commanded to open."""
         return not any(pair.primed for pair in self.pairs) and all(p.motion.rests for p in self.pairs)
+
+    @classmethod
+    def initial(cls, *, disc: Disc) -> DiscState:
+        """All chambers at the scene's initial fill, no tube primed."""
+        pair = PairState(fill=disc.initial_fill, total=2 * disc.initial_fill)
+        return cls(pairs=(pair,) * (disc.chambers // 2))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -286,17 +292,6 @@ class _Path:
     fill: FloatArray
     operation: Operation | None
     drift: float
-
-
-def initial_state(*, disc: Disc) -> DiscState:
-    """All chambers at the scene's initial fill, no tube primed."""
-    pair = PairState(fill=disc.initial_fill, total=2 * disc.initial_fill)
-    return DiscState(pairs=(pair,) * (disc.chambers // 2))
-
-
-def longest(operations: Sequence[Operation]) -> Operation:
-    """The operation of a command that was given the most gas."""
-    return max(operations, key=lambda operation: operation.duration)
 
 
 def _run_dry(transfer: Transfer, before: float, duration: float) -> float:

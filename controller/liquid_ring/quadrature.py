@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.formulas.paths import piece_part, piece_rise
-from ringbalance.controller.liquid_ring.pair_path import FlowPaths, UntabulatedError, flow_paths
+from ringbalance.controller.liquid_ring.pair_path import FlowPaths, UntabulatedError
 from ringbalance.controller.liquid_ring.transfer import Drive, Event, Transfer, checked_instants
 from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
 from ringbalance.scene.arrays import FloatArray
@@ -105,7 +105,7 @@ def _paths(
         gas_pressure=gas_pressure,
         primed=primed,
     )
-    return flow_paths(drive, primed=primed)
+    return FlowPaths.of(drive, primed=primed)
 
 
 def _way(paths: FlowPaths, fill: float, instants: FloatArray, *, primed: bool) -> _Way:

@@ -16,9 +16,9 @@ from rich.text import Text
 
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
-from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, advised, recommended_gains
+from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, advised
 from ringbalance.controller.eccentric_mass.strategy.plan import STAGE_NAMES, Stage
-from ringbalance.controller.eccentric_mass.strategy.settings import strategy_settings
+from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
 from ringbalance.controller.tuning.settling import QUANTILES, Progress, SettlingTimes, summary
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.uncertain import eccentric_drawn
@@ -75,7 +75,7 @@ def tune_eccentric(
 
     Args: `runs`: at the most; 0 judges the loops alone.
     """
-    gains = recommended_gains(scene)
+    gains = RecommendedGains.of(scene)
     ready, changes = advised(scene, gains)
     settling = None
     if runs and scene.supervisor.strategy != "locked":
@@ -109,7 +109,7 @@ def eccentric_settling(scene: EccentricScene, *, runs: int, told: Progress) -> E
 def _one_run(scene: EccentricScene, number: int, *, spans: tuple[float, float]) -> EccentricRun:
     seed = scene.run.seed + number
     random = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(0,)))
-    settings, plant = strategy_settings(scene), eccentric_drawn(scene, random)
+    settings, plant = StrategySettings.of(scene), eccentric_drawn(scene, random)
     for span in dict.fromkeys(spans):
         limited = replace(plant, run=replace(plant.run, time_limit=span))
         run = simulate_eccentric(limited, seed=seed, settings=settings)

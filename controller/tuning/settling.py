@@ -10,9 +10,9 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.algorithms.by_name import law_based_of
-from ringbalance.controller.ensemble.monte_carlo import Probability, binomial_share, simulate_ensemble
-from ringbalance.controller.ensemble.samples import Members, MemberUncertainty, drawn_members
-from ringbalance.controller.liquid_ring.plant import initial_state
+from ringbalance.controller.ensemble.monte_carlo import Probability, simulate_ensemble
+from ringbalance.controller.ensemble.samples import Members, MemberUncertainty
+from ringbalance.controller.liquid_ring.plant import DiscState
 from ringbalance.controller.liquid_ring.reach import unreachable_vibration
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Outcome, Simulation
@@ -133,7 +133,7 @@ def _runs(
 
 def summary(times: Sequence[float]) -> SettlingTimes:
     """Of runs one by one, each with its settling time, s, or infinity; quantiles are of all of them."""
-    settled = binomial_share(count=sum(map(math.isfinite, times)), of=len(times))
+    settled = Probability.counted(count=sum(map(math.isfinite, times)), of=len(times))
     quantiles = {name: _quantile(np.array(times), q) for name, q in QUANTILES.items()}
     return SettlingTimes(runs=len(times), settled=settled, quantiles=quantiles)
 
@@ -162,8 +162,8 @@ def _beyond_capacity(
     scene: Scene, model: BalancerModel, widths: MemberUncertainty, *, runs: int
 ) -> tuple[float, float]:
     """Of the drawn runs, the fraction whose unbalance is beyond the liquid, and beyond it under this gas."""
-    ring, state = law_based_of(scene, model).ring, initial_state(disc=scene.disc)
-    drawn = drawn_members(scene, uncertainty_95=widths, seed=scene.run.seed, block=0)
+    ring, state = law_based_of(scene, model).ring, DiscState.initial(disc=scene.disc)
+    drawn = Members.drawn(scene, uncertainty_95=widths, seed=scene.run.seed, block=0)
     driven = with_driving_gas(scene, model)
     residual = np.interp(drawn.velocity_factor[:runs], *residual_by_velocity(driven, law=model.flow))
 
@@ -196,7 +196,7 @@ def _one_run(
 ) -> Simulation:
     """One drawn run; velocity, moment and influence coefficient act through their product."""
     told(f"run {number + 1}")
-    drawn = drawn_members(scene, uncertainty_95=widths, seed=scene.run.seed, block=0)
+    drawn = Members.drawn(scene, uncertainty_95=widths, seed=scene.run.seed, block=0)
     rotor = _rotor(scene, drawn, number)
     faster = rotor.influence_coefficient * float(drawn.velocity_factor[number])
     run = replace(scene.run, seed=scene.run.seed + number)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ringbalance.controller.algorithms.by_name import controller_of, law_based_of
 from ringbalance.controller.checks import check_settings
-from ringbalance.controller.liquid_ring.plant import initial_state
+from ringbalance.controller.liquid_ring.plant import DiscState
 from ringbalance.controller.liquid_ring.reach import unreachable_vibration
 from ringbalance.controller.terms import run_models
 from ringbalance.controller.tuning.dead_time import dead_times, dead_zone
@@ -167,7 +167,10 @@ def _judged(
 
 def _beyond_capacity(scene: Scene, model: BalancerModel) -> float:
     """With gas that drives the liquid: what only a higher pressure can do is not beyond the disc."""
-    plant, state = law_based_of(with_driving_gas(scene, model), model).ring, initial_state(disc=scene.disc)
+    plant, state = (
+        law_based_of(with_driving_gas(scene, model), model).ring,
+        DiscState.initial(disc=scene.disc),
+    )
     return unreachable_vibration(plant=plant, state=state, rotor=scene.rotor)
 
 

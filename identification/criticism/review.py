@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.identification.criticism.law_comparison import LawComparison, compare_laws
+from ringbalance.identification.criticism.law_comparison import LawComparison
 from ringbalance.identification.criticism.linear_fit import LinearFit
 from ringbalance.identification.criticism.patterns import Criticism, criticise
 from ringbalance.identification.data.kinds import KINDS
@@ -67,14 +67,14 @@ class Review:
         """All that is to be said, the verdict on the fit first."""
         return (self.criticism.text, *(each.text for each in self.laws))
 
-
-def review(result: FitResult) -> Review:
-    """Test the residuals of a fit and compare its law with others."""
-    found = _at_solution(result)
-    return Review(
-        criticism=criticise(found.fit, found.covariates),
-        laws=tuple(_comparisons(result, found)),
-    )
+    @classmethod
+    def of(cls, result: FitResult) -> Review:
+        """Test the residuals of a fit and compare its law with others."""
+        found = _at_solution(result)
+        return cls(
+            criticism=criticise(found.fit, found.covariates),
+            laws=tuple(_comparisons(result, found)),
+        )
 
 
 def _comparisons(result: FitResult, found: _AtSolution) -> Iterator[LawComparison]:
@@ -83,7 +83,7 @@ def _comparisons(result: FitResult, found: _AtSolution) -> Iterator[LawCompariso
     predictions = _by_other_tubes if isinstance(scene, Scene) else _by_other_machines
     for name, predicted in predictions(problem, scene):
         residuals = found.turned(best.residuals.at(best.t, predicted=predicted))
-        yield compare_laws(found.fit, other=name, residuals=residuals)
+        yield LawComparison.of(found.fit, other=name, residuals=residuals)
 
 
 def _by_other_machines(problem: Problem, scene: EccentricScene) -> Iterator[tuple[str, FloatArray]]:

@@ -89,31 +89,31 @@ class Measurements:
             columns={name: column[chosen] for name, column in self.columns.items()},
         )
 
+    @classmethod
+    def parsed(cls, text: str, *, file: str) -> Measurements:
+        """The data set of a text. Args: `file`: for messages. Raises: MeasurementsError: all errors."""
+        table, faults = parse_table(text, file=file)
+        if table is None:
+            raise _error(faults)
+        wrong = [*faults, *_source_faults(table), *table.name_faults(), *_unit_faults(table)]
+        heads_are_right = len(wrong) == len(faults)
+        columns = dict(_columns(table, wrong)) if heads_are_right else {}
+        if wrong:
+            raise _error(wrong)
+        return cls(
+            source=Source(**table.header),  # type: ignore[arg-type]
+            series=table.series,
+            columns=columns,
+        )
 
-def read_measurements(path: Path) -> Measurements:
-    """The data set of a file. Raises: MeasurementsError: no such file, or not a data set."""
-    content, unreadable = read_content(path)
-    text, faults = decoded(content, file=file_name(path))
-    if unreadable or faults:
-        raise _error(unreadable or faults)
-    return parse_measurements(text, file=file_name(path))
-
-
-def parse_measurements(text: str, *, file: str) -> Measurements:
-    """The data set of a text. Args: `file`: its name in messages. Raises: MeasurementsError: all errors."""
-    table, faults = parse_table(text, file=file)
-    if table is None:
-        raise _error(faults)
-    wrong = [*faults, *_source_faults(table), *table.name_faults(), *_unit_faults(table)]
-    heads_are_right = len(wrong) == len(faults)
-    columns = dict(_columns(table, wrong)) if heads_are_right else {}
-    if wrong:
-        raise _error(wrong)
-    return Measurements(
-        source=Source(**table.header),  # type: ignore[arg-type]
-        series=table.series,
-        columns=columns,
-    )
+    @classmethod
+    def read(cls, path: Path) -> Measurements:
+        """The data set of a file. Raises: MeasurementsError: no such file, or not a data set."""
+        content, unreadable = read_content(path)
+        text, faults = decoded(content, file=file_name(path))
+        if unreadable or faults:
+            raise _error(unreadable or faults)
+        return Measurements.parsed(text, file=file_name(path))
 
 
 def _source_faults(table: Table) -> Iterator[Fault]:

@@ -55,13 +55,13 @@ class Models:
     other: Callable[[CalibratedLaw], CalibratedLaw] | None = None
     """Makes another law of the scene's, to be compared with it."""
 
-
-def models_of(scene: Scene) -> Models:
-    """The models that `calibrate` takes."""
-    tube = tube_models(scene)
-    gravity = mean_gravity(scene) > scene.tolerance
-    law = nominal_law(replace(scene, tube=replace(scene.tube, models=tube)), gravity=gravity)
-    return Models(tube=tube, gravity=gravity, velocity=_primed_velocity(law, scene))
+    @classmethod
+    def of(cls, scene: Scene) -> Models:
+        """The models that `calibrate` takes."""
+        tube = tube_models(scene)
+        gravity = mean_gravity(scene) > scene.tolerance
+        law = nominal_law(replace(scene, tube=replace(scene.tube, models=tube)), gravity=gravity)
+        return cls(tube=tube, gravity=gravity, velocity=_primed_velocity(law, scene))
 
 
 def _primed_velocity(law: CalibratedLaw, scene: Scene) -> float:

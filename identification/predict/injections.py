@@ -14,13 +14,7 @@ import numpy as np
 from ringbalance.controller.rotor import chamber_directions, chamber_letters
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.predict.device import Device, Models, device_of
-from ringbalance.identification.predict.predicted import (
-    PredictedKind,
-    always,
-    parts,
-    spread_out,
-    vector_covariance,
-)
+from ringbalance.identification.predict.predicted import PredictedKind, always, parts, spread_out
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.models import Scene
 
@@ -87,7 +81,7 @@ def _covariance(observations: Observations) -> FloatArray:
     measured once: its error enters both changes, with opposite signs.
     """
     before, after = (
-        vector_covariance(observations, when=when, given=_noise_given(observations))
+        observations.vector_covariance(when=when, given=_noise_given(observations))
         for when in ("_before", "_after")
     )
     full = spread_out(before + after)

@@ -13,19 +13,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.predict.device import Device, Models, device_of
 from ringbalance.identification.predict.injections import INJECTION
 from ringbalance.identification.predict.positionings import POSITIONING
-from ringbalance.identification.predict.predicted import (
-    PredictedKind,
-    always,
-    numbers,
-    parts,
-    spread_out,
-    vector_covariance,
-)
+from ringbalance.identification.predict.predicted import PredictedKind, always, numbers, parts, spread_out
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.tube.state import tube_state
 from ringbalance.physics.tube.uncertainty import with_errors
@@ -52,7 +45,7 @@ def _vibrations(predict: Callable[[Any, Observations], FloatArray], **declared: 
         predict=_by_scene_alone(predict),
         measured=lambda observations: parts(observations.vectors()),
         covariance=lambda observations: spread_out(
-            vector_covariance(observations, given="amplitude" in observations.uncertainty)
+            observations.vector_covariance(given="amplitude" in observations.uncertainty)
         ),
         noise_given=lambda observations: "amplitude" in observations.uncertainty,
         column=lambda _: "amplitude",
@@ -171,7 +164,7 @@ def _steady_whirls(scene: EccentricScene, observations: Observations) -> FloatAr
     At constant speed, as in a run-up that is slow against the decay of the rotor's motion.
     Returns: in the rotor's frame, real and then imaginary parts, m, shape (2 n,).
     """
-    plant, angles = plant_parameters(scene), scene.masses.initial_angle
+    plant, angles = PlantParameters.of(scene), scene.masses.initial_angle
     speeds = observations.columns["speed"].tolist()
     return parts(np.array([plant.steady_whirl(speed, angles) for speed in speeds], dtype=np.complex128))
 

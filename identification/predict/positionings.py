@@ -13,7 +13,7 @@ import numpy as np
 
 from ringbalance.controller.eccentric_mass.plant.friction import LOCKED, STUCK
 from ringbalance.controller.eccentric_mass.plant.integrate import plant_step, substeps
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.plant.plant import rest_state
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.predict.predicted import numbers
@@ -31,7 +31,7 @@ def _predict(scene: EccentricScene, observations: Observations, _: object) -> Fl
 
     Rows of one series, mass, voltage and speed are one motion.
     """
-    plant = plant_parameters(scene)
+    plant = PlantParameters.of(scene)
     found = np.empty(len(observations))
     for motion, rows in _motions(observations):
         found[rows] = _moved(plant, scene.masses.initial_angle, motion, observations.columns["time"][rows])
@@ -51,7 +51,7 @@ def _informs(observations: Observations) -> tuple[str, ...]:
 
 def _too_long(scene: EccentricScene, observations: Observations) -> str:
     """Why these motions would take too long to integrate, as a fit does some hundred times; else empty."""
-    plant, times = plant_parameters(scene), observations.columns["time"]
+    plant, times = PlantParameters.of(scene), observations.columns["time"]
     motions = _motions(observations)
     steps = sum(substeps(plant, motion.speed, 0.0, times[rows[-1]]) for motion, rows in motions)
     if steps <= MOST_STEPS:

@@ -70,44 +70,44 @@ class Body:
         labels = [f"facet ({n}) at {_place(m)}" for n, m in zip(names, middles, strict=True)]
         return _shown(labels + [""] * (len(facets) - len(few)))
 
+    @classmethod
+    def of(cls, contents: Contents, *, scale: float) -> Body:
+        """One body of what a file holds.
+
+        Args: `scale`: metres in the file's unit.
+        Raises: MeshFileError: its cells or nodes are such that nothing further can be looked at.
+        """
+        cells = [block for block in contents.blocks if dimension(block.kind) == 3]
+        found = [*_wrong_kinds(contents, cells), *_wrong_nodes(contents)]
+        if found:
+            raise MeshFileError(found)
+        order = np.argsort(contents.node_numbers, kind="stable")
+        numbered = contents.node_numbers[order]
+        lost = [each for block in contents.blocks if (each := _lost(block, numbered)) is not None]
+        if lost:
+            raise MeshFileError(lost)
+
+        def placed(block: Elements) -> Elements:
+            return replace(block, nodes=order[np.searchsorted(numbered, block.nodes)])
+
+        facets = (placed(b) for b in contents.blocks if b.names and dimension(b.kind) == 2)
+        lower = [b for b in contents.blocks if dimension(b.kind) < 2]
+        return cls(
+            kind=next(kind for kind in CELL_KINDS if kind == cells[0].kind),
+            node_numbers=contents.node_numbers,
+            points=contents.coordinates * scale,
+            cell_numbers=np.concatenate([block.numbers for block in cells]),
+            cells=np.concatenate([placed(block).nodes for block in cells]),
+            cell_names=tuple(_cell_names(cells)),
+            named=tuple(facets),
+            lesser=tuple(dict.fromkeys(name for block in lower for name in block.names)),
+            other_names=contents.other_names,
+        )
+
 
 def _place(point: FloatArray) -> str:
     """A place in mm, in the axes of the file."""
     return "(" + ", ".join(f"{1e3 * value:.4g}" for value in point) + ") mm"
-
-
-def assembled(contents: Contents, *, scale: float) -> Body:
-    """One body of what a file holds.
-
-    Args: `scale`: metres in the file's unit.
-    Raises: MeshFileError: its cells or nodes are such that nothing further can be looked at.
-    """
-    cells = [block for block in contents.blocks if dimension(block.kind) == 3]
-    found = [*_wrong_kinds(contents, cells), *_wrong_nodes(contents)]
-    if found:
-        raise MeshFileError(found)
-    order = np.argsort(contents.node_numbers, kind="stable")
-    numbered = contents.node_numbers[order]
-    lost = [each for block in contents.blocks if (each := _lost(block, numbered)) is not None]
-    if lost:
-        raise MeshFileError(lost)
-
-    def placed(block: Elements) -> Elements:
-        return replace(block, nodes=order[np.searchsorted(numbered, block.nodes)])
-
-    facets = (placed(b) for b in contents.blocks if b.names and dimension(b.kind) == 2)
-    lower = [b for b in contents.blocks if dimension(b.kind) < 2]
-    return Body(
-        kind=next(kind for kind in CELL_KINDS if kind == cells[0].kind),
-        node_numbers=contents.node_numbers,
-        points=contents.coordinates * scale,
-        cell_numbers=np.concatenate([block.numbers for block in cells]),
-        cells=np.concatenate([placed(block).nodes for block in cells]),
-        cell_names=tuple(_cell_names(cells)),
-        named=tuple(facets),
-        lesser=tuple(dict.fromkeys(name for block in lower for name in block.names)),
-        other_names=contents.other_names,
-    )
 
 
 def _wrong_kinds(contents: Contents, cells: Sequence[Elements]) -> Iterator[Finding]:

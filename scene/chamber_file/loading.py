@@ -15,7 +15,7 @@ import numpy as np
 
 from ringbalance.scene.arrays import IntArray
 from ringbalance.scene.chamber_file.abaqus_file import read_abaqus
-from ringbalance.scene.chamber_file.assembly import Body, assembled
+from ringbalance.scene.chamber_file.assembly import Body
 from ringbalance.scene.chamber_file.contents import Contents, MeshFileError, unreadable
 from ringbalance.scene.chamber_file.elements import dimension
 from ringbalance.scene.chamber_file.fitting import PORT_RADIUS, unfitting
@@ -105,7 +105,7 @@ def _chamber(reading: Reading) -> tuple[ChamberGeometry, Placed]:
     content = _content_of(path)
     unit = STEP_UNIT if _is_step(path) else reading.values["disc.mesh_unit"]
     contents = _contents_of(path, content, tolerance=reading.values["accuracy.tolerance"])
-    body = assembled(contents, scale=float(DIMENSIONS["length"].units[unit].factor))
+    body = Body.of(contents, scale=float(DIMENSIONS["length"].units[unit].factor))
     body, misshapen = oriented(body)
     facets = Facets.of(body)
     boundaries, misnamed = boundaries_of(body, facets)

@@ -30,6 +30,11 @@ class Table:
     record: type | None = None
     """What is made of it; None when the scene has its values elsewhere."""
 
+    @classmethod
+    def of(cls, record: type, text: str) -> Table:
+        """A table that becomes a record. Args: `text`: what it describes."""
+        return cls(text=text, keys=keys_of(record), record=record)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Schema:
@@ -58,10 +63,33 @@ class Schema:
             keys = takes.keys if isinstance(takes, Entries) else {}
         return keys
 
+    @classmethod
+    def of(
+        cls,
+        tables: Mapping[str, Table],
+        *,
+        balancer: Presence,
+        scene: Callable[..., Any],
+        uncertainty: Table | None = None,
+    ) -> Schema:
+        """The schema of a kind of balancer, with what every scene file has.
 
-def table_of(record: type, text: str) -> Table:
-    """A table that becomes a record. Args: `text`: what it describes."""
-    return Table(text=text, keys=keys_of(record), record=record)
+        Args: `balancer`: how that key may be absent. `uncertainty`: that table, by default with a table of
+        half-widths for each table, where tables share names of keys.
+        """
+        whole = {**tables, "uncertainty": uncertainty or _uncertainty_by_table(tables), **_RUN}
+        return cls(
+            top=MappingProxyType(
+                {
+                    "name": Key(takes=text(), presence=derived("the file's name", "title of the scene")),
+                    "balancer": Key(takes=choice(Balancer), presence=balancer),
+                }
+            ),
+            tables=MappingProxyType(
+                {n: replace(each, keys={**each.keys, ORIGIN: _origins(each)}) for n, each in whole.items()}
+            ),
+            scene=scene,
+        )
 
 
 def _disc() -> Table:
@@ -138,55 +166,28 @@ _TOLERANCE = Key(
     presence=standard("1 %", "relative bound on discretisation and left-out terms, against the top model"),
 )
 _RUN = {
-    "run": table_of(loop_models.RunSettings, "a simulation's seed and end"),
+    "run": Table.of(loop_models.RunSettings, "a simulation's seed and end"),
     "accuracy": Table(text="what is asked of the result", keys={"tolerance": _TOLERANCE}),
-    "measured": table_of(
+    "measured": Table.of(
         Measured, "the measurements that `ringbalance fit` has fitted the scene to; `fit --save` writes it"
     ),
 }
 
 
-def schema_of(
-    tables: Mapping[str, Table],
-    *,
-    balancer: Presence,
-    scene: Callable[..., Any],
-    uncertainty: Table | None = None,
-) -> Schema:
-    """The schema of a kind of balancer, with what every scene file has.
-
-    Args: `balancer`: how that key may be absent. `uncertainty`: that table, by default with a table of
-    half-widths for each table, where tables share names of keys.
-    """
-    whole = {**tables, "uncertainty": uncertainty or _uncertainty_by_table(tables), **_RUN}
-    return Schema(
-        top=MappingProxyType(
-            {
-                "name": Key(takes=text(), presence=derived("the file's name", "title of the scene")),
-                "balancer": Key(takes=choice(Balancer), presence=balancer),
-            }
-        ),
-        tables=MappingProxyType(
-            {n: replace(each, keys={**each.keys, ORIGIN: _origins(each)}) for n, each in whole.items()}
-        ),
-        scene=scene,
-    )
-
-
 _LIQUID_RING = {
     "disc": _disc(),
-    "liquid": table_of(models.Liquid, "the balancing liquid"),
-    "tube": table_of(models.Tube, "the tube that connects two opposite chambers"),
-    "gas": table_of(models.Gas, "the gas that drives the liquid"),
-    "environment": table_of(loop_models.Environment, "gravity and how the shaft lies in it"),
+    "liquid": Table.of(models.Liquid, "the balancing liquid"),
+    "tube": Table.of(models.Tube, "the tube that connects two opposite chambers"),
+    "gas": Table.of(models.Gas, "the gas that drives the liquid"),
+    "environment": Table.of(loop_models.Environment, "gravity and how the shaft lies in it"),
     "rotor": _rotor(),
-    "sensor": table_of(loop_models.Sensor, "the vibration sensor; exact when left out"),
-    "controller": table_of(loop_models.ControllerSettings, "the control algorithm"),
-    "requirement": table_of(
+    "sensor": Table.of(loop_models.Sensor, "the vibration sensor; exact when left out"),
+    "controller": Table.of(loop_models.ControllerSettings, "the control algorithm"),
+    "requirement": Table.of(
         loop_models.Requirement, "what is required of the balancer; reports compare it with what is reached"
     ),
 }
-LIQUID_RING = schema_of(
+LIQUID_RING = Schema.of(
     _LIQUID_RING,
     balancer=standard("liquid_ring", "kind of balancer"),
     uncertainty=_uncertainty(_LIQUID_RING),

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing, initial_state
+from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.reach import (
     largest_pair_moment,
@@ -110,7 +110,7 @@ def left_over(plant: LiquidRing, state: DiscState, rotor: Rotor, *, wanted: comp
 
 @pytest.mark.parametrize("n", [4, 6, 8])
 def test_the_reach_is_the_polygon_of_full_pairs(scene: Scene, model: BalancerModel, n: int) -> None:
-    state = initial_state(disc=replace(scene.disc, chambers=n))
+    state = DiscState.initial(disc=replace(scene.disc, chambers=n))
     plant = plant_of(model, n)
     pair = largest_pair_moment(plant=plant, state=state)
     assert pair == pytest.approx(PER_DIFFERENCE * 0.5, rel=1e-12)
@@ -123,14 +123,14 @@ def test_the_reach_is_the_polygon_of_full_pairs(scene: Scene, model: BalancerMod
 
 
 def test_four_chambers_reach_a_square(scene: Scene, model: BalancerModel) -> None:
-    state, plant = initial_state(disc=scene.disc), plant_of(model, 4)
+    state, plant = DiscState.initial(disc=scene.disc), plant_of(model, 4)
     pair = PER_DIFFERENCE * 0.5
     assert left_over(plant, state, scene.rotor, wanted=pair * (1.3 + 0.9j)) == pytest.approx(0.3 * pair)
     assert left_over(plant, state, scene.rotor, wanted=pair * (1.3 + 1.4j)) == pytest.approx(0.5 * pair)
 
 
 def test_two_chambers_reach_a_line(scene: Scene, model: BalancerModel) -> None:
-    state = initial_state(disc=replace(scene.disc, chambers=2))
+    state = DiscState.initial(disc=replace(scene.disc, chambers=2))
     plant, pair = plant_of(model, 2), PER_DIFFERENCE * 0.5
     assert left_over(plant, state, scene.rotor, wanted=0.7 * pair) == pytest.approx(0.0, abs=1e-18)
     assert left_over(plant, state, scene.rotor, wanted=(0.7 + 0.2j) * pair) == pytest.approx(0.2 * pair)

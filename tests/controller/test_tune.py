@@ -14,7 +14,7 @@ import pytest
 import ringbalance as rb
 from ringbalance.cli import main
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
-from ringbalance.controller.eccentric_mass.strategy.settings import strategy_settings
+from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.tuning.cli import _show
 from ringbalance.controller.tuning.eccentric import FIRST_RUNS, eccentric_settling, tune_eccentric
@@ -277,7 +277,9 @@ def test_settling_times_of_eccentric_masses_are_those_of_whole_runs() -> None:
     for number in range(6):
         seed = scene.run.seed + number
         random = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(0,)))
-        run = simulate_eccentric(eccentric_drawn(scene, random), seed=seed, settings=strategy_settings(scene))
+        run = simulate_eccentric(
+            eccentric_drawn(scene, random), seed=seed, settings=StrategySettings.of(scene)
+        )
         times.append(math.inf if run.settling_time is None else run.settling_time)
     assert found.times.quantiles["p50"] == sorted(times)[2]
     assert found.times.quantiles["p95"] == sorted(times)[5]

@@ -11,12 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.identification.criticism.law_comparison import (
-    NEEDED,
-    LawComparison,
-    compare_laws,
-    summaries,
-)
+from ringbalance.identification.criticism.law_comparison import NEEDED, LawComparison, summaries
 from ringbalance.identification.criticism.linear_fit import LinearFit
 from ringbalance.identification.criticism.patterns import LEVEL, Criticism, criticise, runs_probability
 from ringbalance.scene.arrays import FloatArray
@@ -168,7 +163,7 @@ def _comparison(true: FloatArray, noise: float) -> Any:
         data=np.ones(24, dtype=np.bool_),
         known_noise=np.ones(24, dtype=np.bool_),
     )
-    return compare_laws(fit, other="laminar flow", residuals=(measured - factor * other) / noise)
+    return LawComparison.of(fit, other="laminar flow", residuals=(measured - factor * other) / noise)
 
 
 def test_laws_are_told_apart_where_data_allow() -> None:

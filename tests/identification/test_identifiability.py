@@ -13,7 +13,7 @@ from synthetic_rigs import READINGS, observations
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.identifiability import DEPENDENT, Verdict, power_text
-from ringbalance.identification.predict.device import models_of
+from ringbalance.identification.predict.device import Models
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.scene.arrays import FloatArray
@@ -37,7 +37,7 @@ def noisy(
 ) -> Observations:
     """What a scene measures, to a thousandth."""
     plan = observations(kind, columns, chambers)
-    found = PREDICTED[kind].predict(scene, plan, models_of(scene))
+    found = PREDICTED[kind].predict(scene, plan, Models.of(scene))
     random = np.random.default_rng(1)
     seen = found + 1e-3 * np.sqrt(np.mean(found**2)) * random.standard_normal(found.size)
     if kind == "trial_weight":
@@ -118,7 +118,7 @@ def injections(
     }
     chambers = [("ABCD" * rows)[i] for i in range(rows)]
     plan = observations("injection", columns, chambers)
-    found = PREDICTED["injection"].predict(scene, plan, models_of(scene))
+    found = PREDICTED["injection"].predict(scene, plan, Models.of(scene))
     error = noise * (random.standard_normal((2, rows)) + 1j * random.standard_normal((2, rows)))
     after, before = 1e-6 + found[:rows] + 1j * found[rows:] + error[0], 1e-6 + error[1]
     readings: tuple[FloatArray, ...] = (np.abs(before), np.angle(before), np.abs(after), np.angle(after))

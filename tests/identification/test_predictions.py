@@ -10,12 +10,12 @@ import numpy.typing as npt
 import pytest
 from synthetic_rigs import READINGS, observations
 
-from ringbalance.controller.liquid_ring.plant import LiquidRing, initial_state
+from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.rotor import disc_unbalance
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.predict.device import Models, device_of, models_of
+from ringbalance.identification.predict.device import Models, device_of
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.physics.tube.loss import tube_loss
@@ -28,12 +28,12 @@ from ringbalance.scene.uncertain import with_value
 
 
 def predicted(scene: Scene, data: Observations) -> FloatArray:
-    return PREDICTED[data.kind].predict(scene, data, models_of(scene))
+    return PREDICTED[data.kind].predict(scene, data, Models.of(scene))
 
 
 def test_the_quick_law_is_the_calibrated_one(paper_scene: Scene) -> None:
     slow = calibrated_model(paper_scene)
-    quick = device_of(paper_scene, models_of(paper_scene)).law
+    quick = device_of(paper_scene, Models.of(paper_scene)).law
     fills = np.linspace(0.02, 0.48, 60)
     for gas in (0.0, 0.6e6, 1.2e6):
         one, other = (
@@ -62,7 +62,7 @@ def test_injections_are_those_of_the_closed_loop(paper_scene: Scene) -> None:
         integrator=quadrature,
         dynamics=dynamics_of(scene=scene, model=model, modelled=[INERTIA, HELD]),
     )
-    state, before, expected = initial_state(disc=scene.disc), 0j, []
+    state, before, expected = DiscState.initial(disc=scene.disc), 0j, []
     k = scene.rotor.influence
     for chamber, time in ((0, 0.2), (2, 0.1), (3, 0.15)):
         state = plant.advance(state, gas_times={chamber: time}, duration=3.0, points=1).state
@@ -80,7 +80,7 @@ def test_injections_do_not_step_as_the_crest_moves(bends: int) -> None:
     """
     scene = liquid_ring_scene(load_scene(bundled_scene("six_chamber")))
     scene = replace(scene, tube=replace(scene.tube, bends=scene.tube.bends[:1] * bends))
-    assert _misses_a_line(scene, models_of(scene)) < 2e-3
+    assert _misses_a_line(scene, Models.of(scene)) < 2e-3
 
 
 def _misses_a_line(scene: Scene, models: Models) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from ringbalance.identification.data.measurements import MeasurementsError, parse_measurements
+from ringbalance.identification.data.measurements import Measurements, MeasurementsError
 from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.scene.models import Scene
@@ -150,7 +150,7 @@ _HEAD = '# kind = "friction"\n# source = "me"\n# uncertainty = 0.02\n'
 
 def test_units_of_a_file_become_si() -> None:
     head = _HEAD.replace("friction", "vessel")
-    data = parse_measurements(head + "time [ms],pressure [bar],series\n250,2,a\n500,3,b\n", file="x.csv")
+    data = Measurements.parsed(head + "time [ms],pressure [bar],series\n250,2,a\n500,3,b\n", file="x.csv")
     assert data.columns["time"] == pytest.approx([0.25, 0.5])
     assert data.columns["pressure"] == pytest.approx([2e5, 3e5])
     assert list(data.series) == ["a", "b"]
@@ -160,12 +160,12 @@ def test_units_of_a_file_become_si() -> None:
 def test_all_errors_of_a_file_are_reported_together_with_row_and_column() -> None:
     text = '# kind = 3\n# sorce = "me"\n# uncertainty = 2\nreynolds,friction factor,x [furlong]\n1,2,3\n'
     with pytest.raises(MeasurementsError) as error:
-        parse_measurements(text, file="bad.csv")
+        Measurements.parsed(text, file="bad.csv")
     lines = str(error.value).splitlines()
     assert all(line.startswith("bad.csv: ") for line in lines)
     assert len(lines) == 6
     with pytest.raises(MeasurementsError) as error:
-        parse_measurements(_HEAD + "reynolds,friction_factor\n100,nan\n\n200\n300,x\n", file="bad.csv")
+        Measurements.parsed(_HEAD + "reynolds,friction_factor\n100,nan\n\n200\n300,x\n", file="bad.csv")
     assert [line.split(": ")[1] for line in str(error.value).splitlines()] == [
         'line 5, column "friction_factor" = "nan"',
         "line 7",
@@ -190,14 +190,14 @@ def test_all_errors_of_a_file_are_reported_together_with_row_and_column() -> Non
 )
 def test_what_cannot_be_predicted_is_refused_by_name(text: str, named: str) -> None:
     with pytest.raises(MeasurementsError, match=named):
-        compare(parse_measurements(text, file="x.csv"))
+        compare(Measurements.parsed(text, file="x.csv"))
 
 
 def test_a_comparison_is_confirmed_by_its_own_predictions_and_refuted_by_others() -> None:
     data = measurements("stanton_pannell_1914")
     found = compare(data)
     rows = "".join(f"{r},{f}\n" for r, f in zip(data.columns["reynolds"], found.predicted, strict=True))
-    own = compare(parse_measurements(_HEAD + "reynolds,friction_factor\n" + rows, file="own.csv"))
+    own = compare(Measurements.parsed(_HEAD + "reynolds,friction_factor\n" + rows, file="own.csv"))
     assert own.statistics.bias == pytest.approx(0, abs=1e-12)
     assert (found.verdict, own.verdict) == ("confirmed", "confirmed")
     assert compare(data, mutation="ten_per_cent_high").verdict == "refuted"
@@ -245,7 +245,7 @@ def test_adiabatic_venting_of_a_choked_vessel_is_the_closed_form() -> None:
         "conductance [l/(s*bar)]"
     )
     text = _HEAD.replace("friction", "vessel") + f"{columns}\n1,4,10,1,293.15,1,1\n"
-    found = compare(parse_measurements(text, file="x.csv"))
+    found = compare(Measurements.parsed(text, file="x.csv"))
     adiabatic = 5 * (2.5 ** (1 / 7) - 1)
     assert found.predicted[0] == pytest.approx((adiabatic + math.log(2.5)) / 2, rel=1e-5)
     assert found.stated[0] ** 2 - (0.1 * found.predicted[0]) ** 2 == pytest.approx(
@@ -264,4 +264,4 @@ def test_the_page_on_measurements_lists_the_kinds_and_its_example_can_be_read() 
     page = measurement_tables.PAGE.read_text(encoding="utf-8")
     assert measurement_tables.fresh(page, "kinds", measurement_tables.kind_table()) == page
     example = page.split("```")[1]
-    assert len(compare(parse_measurements(example, file="example")).measured) == 3
+    assert len(compare(Measurements.parsed(example, file="example")).measured) == 3

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.liquid_ring.closed_form import closed_form
-from ringbalance.controller.liquid_ring.plant import LiquidRing, initial_state
+from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.chamber.range import chamber_status
@@ -147,7 +147,7 @@ def moved_mass(scene: Scene, *, law: CompleteLaw, course: Course, gas_time: floa
         integrator=course.integrator,
         dynamics=dynamics_of(scene=scene, model=model, modelled=course.modelled),
     )
-    start = initial_state(disc=scene.disc)
+    start = DiscState.initial(disc=scene.disc)
     valve = plant.advance(start, gas_times={0: gas_time}, duration=gas_time, points=1)
     end = plant.advance(valve.state, gas_times={}, duration=scene.controller.period, points=1)
     return (start.fills()[0] - end.state.fills()[0]) * model.density * model.chamber_volume

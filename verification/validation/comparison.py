@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.identification.data.measurements import Measurements, MeasurementsError, read_measurements
+from ringbalance.identification.data.measurements import Measurements, MeasurementsError
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, StringArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, as_found, figure
@@ -211,7 +211,7 @@ def data_document(path: Path) -> dict[str, Any]:
 
     Raises: MeasurementsError: not such a file, or too few points; with the file's name in every line.
     """
-    data = read_measurements(path)
+    data = Measurements.read(path)
     try:
         kind, comparison = kind_of(data), compare(data)
         if len(data) < _FEWEST:

@@ -72,34 +72,35 @@ class PlantParameters(NamedTuple):
         moment = self.unbalance * cmath.exp(1j * self.phase) + self.moment * masses
         return self.influence(speed) * moment
 
+    @classmethod
+    def of(cls, scene: EccentricScene) -> PlantParameters:
+        """Gather the plant's constants.
 
-def plant_parameters(scene: EccentricScene) -> PlantParameters:
-    """Gather the plant's constants.
-
-    J_add = (J_1 + J_2 (N_1/N_2)^2) (N_3/N_1)^2, C_add = K_i K_m / R_m (N_3/N_1)^2, B_add = K_i / R_m N_3/N_1.
-    Source: Appendix A of the paper on eccentric masses, rederived; its Eq. (A9) with all signs.
-    """
-    masses, rotor, imbalance, motor = scene.masses, scene.rotor, scene.imbalance, scene.motor
-    ratio = motor.teeth[2] / motor.teeth[0]
-    moment = masses.mass * masses.guide_radius
-    return PlantParameters(
-        mass=rotor.mass + 2 * masses.mass,
-        damping=rotor.damping,
-        stiffness=rotor.stiffness,
-        unbalance=imbalance.mass * imbalance.radius,
-        phase=imbalance.phase,
-        moment=moment,
-        inertia=moment * masses.guide_radius,
-        drive_inertia=_reflected_inertia(motor),
-        drive_damping=motor.torque_constant * motor.back_emf_constant / motor.resistance * ratio**2,
-        drive_gain=motor.torque_constant / motor.resistance * ratio,
-        friction_arm_1=masses.friction_arm[0],
-        friction_arm_2=masses.friction_arm[1],
-        gear_ratio=ratio,
-        back_emf_constant=motor.back_emf_constant,
-        resistance=motor.resistance,
-        maximum_voltage=math.inf if motor.maximum_voltage is None else motor.maximum_voltage,
-    )
+        J_add = (J_1 + J_2 (N_1/N_2)^2) (N_3/N_1)^2, C_add = K_i K_m / R_m (N_3/N_1)^2,
+        B_add = K_i / R_m N_3/N_1.
+        Source: Appendix A of the paper on eccentric masses, rederived; its Eq. (A9) with all signs.
+        """
+        masses, rotor, imbalance, motor = scene.masses, scene.rotor, scene.imbalance, scene.motor
+        ratio = motor.teeth[2] / motor.teeth[0]
+        moment = masses.mass * masses.guide_radius
+        return cls(
+            mass=rotor.mass + 2 * masses.mass,
+            damping=rotor.damping,
+            stiffness=rotor.stiffness,
+            unbalance=imbalance.mass * imbalance.radius,
+            phase=imbalance.phase,
+            moment=moment,
+            inertia=moment * masses.guide_radius,
+            drive_inertia=_reflected_inertia(motor),
+            drive_damping=motor.torque_constant * motor.back_emf_constant / motor.resistance * ratio**2,
+            drive_gain=motor.torque_constant / motor.resistance * ratio,
+            friction_arm_1=masses.friction_arm[0],
+            friction_arm_2=masses.friction_arm[1],
+            gear_ratio=ratio,
+            back_emf_constant=motor.back_emf_constant,
+            resistance=motor.resistance,
+            maximum_voltage=math.inf if motor.maximum_voltage is None else motor.maximum_voltage,
+        )
 
 
 def _reflected_inertia(motor: Motor) -> float:

@@ -11,7 +11,7 @@ from ringbalance.controller.eccentric_mass.estimation.friction_filter import (
     TrackModel,
 )
 from ringbalance.controller.eccentric_mass.estimation.imbalance_model import ProcessNoise, WhirlModel
-from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.strategy.plan import Gates
 from ringbalance.scene.eccentric_control_models import Supervisor
 from ringbalance.scene.eccentric_models import EccentricScene
@@ -56,6 +56,26 @@ class DriveLaw(NamedTuple):
     """Rate below which a mass counts as resting, rad/s."""
     near: float
     """Distance from its place within which a resting mass is left to friction, rad."""
+
+    @classmethod
+    def of(cls, scene: EccentricScene) -> DriveLaw:
+        """What the law of the voltages knows."""
+        plant, track = PlantParameters.of(scene), track_model(scene)
+        position_gain, rate_gain = lqr_gain(
+            track, state_weight=scene.lqr.state_weight, input_weight=scene.lqr.input_weight
+        )
+        return cls(
+            whirl=believed_whirl(scene),
+            track=track,
+            mass_inertia=plant.inertia,
+            torque_per_volt=plant.drive_gain,
+            maximum_voltage=plant.maximum_voltage,
+            position_gain=position_gain,
+            rate_gain=rate_gain,
+            breaks_away=scene.lqr.friction_compensation == "break_away",
+            slow=max(3 * scene.sensor.encoder_rate_noise, _SLOWEST_RATE),
+            near=_near(scene),
+        )
 
 
 class _ImbalanceSettings(NamedTuple):
@@ -114,6 +134,21 @@ class StrategySettings(NamedTuple):
     imbalance: _ImbalanceSettings
     friction: _FrictionSettings
 
+    @classmethod
+    def of(cls, scene: EccentricScene) -> StrategySettings:
+        """Gather what the strategy needs."""
+        step = scene.sensor.step
+        return cls(
+            step=step,
+            laboratory=scene.sensor.frame == "laboratory",
+            smoothing=-math.expm1(-step / _SMOOTHING_TIME),
+            voltage_every=max(round(scene.lqr.step / step), 1),
+            law=DriveLaw.of(scene),
+            gates=_gates(scene),
+            imbalance=_imbalance(scene),
+            friction=_friction(scene),
+        )
+
 
 def believed_whirl(scene: EccentricScene) -> WhirlModel:
     """The rotor as configured in filter and controller; its mass includes the eccentric masses."""
@@ -123,23 +158,8 @@ def believed_whirl(scene: EccentricScene) -> WhirlModel:
 
 def track_model(scene: EccentricScene) -> TrackModel:
     """One eccentric mass with its drive."""
-    plant = plant_parameters(scene)
+    plant = PlantParameters.of(scene)
     return TrackModel(plant.inertia + plant.drive_inertia, plant.drive_damping, plant.moment)
-
-
-def strategy_settings(scene: EccentricScene) -> StrategySettings:
-    """Gather what the strategy needs."""
-    step = scene.sensor.step
-    return StrategySettings(
-        step=step,
-        laboratory=scene.sensor.frame == "laboratory",
-        smoothing=-math.expm1(-step / _SMOOTHING_TIME),
-        voltage_every=max(round(scene.lqr.step / step), 1),
-        law=drive_law(scene),
-        gates=_gates(scene),
-        imbalance=_imbalance(scene),
-        friction=_friction(scene),
-    )
 
 
 def _imbalance(scene: EccentricScene) -> _ImbalanceSettings:
@@ -192,26 +212,6 @@ def lqr_gain(track: TrackModel, *, state_weight: float, input_weight: float) -> 
     return position, more / (math.sqrt(track.damping**2 + more) + track.damping)
 
 
-def drive_law(scene: EccentricScene) -> DriveLaw:
-    """What the law of the voltages knows."""
-    plant, track = plant_parameters(scene), track_model(scene)
-    position_gain, rate_gain = lqr_gain(
-        track, state_weight=scene.lqr.state_weight, input_weight=scene.lqr.input_weight
-    )
-    return DriveLaw(
-        whirl=believed_whirl(scene),
-        track=track,
-        mass_inertia=plant.inertia,
-        torque_per_volt=plant.drive_gain,
-        maximum_voltage=plant.maximum_voltage,
-        position_gain=position_gain,
-        rate_gain=rate_gain,
-        breaks_away=scene.lqr.friction_compensation == "break_away",
-        slow=max(3 * scene.sensor.encoder_rate_noise, _SLOWEST_RATE),
-        near=_near(scene),
-    )
-
-
 def _near(scene: EccentricScene) -> float:
     """A quarter of the finest move asked for, but not finer than the smoothed encoder can tell."""
     finest = min(scene.fine_tuning.stop, scene.supervisor.arrival_angle)
@@ -228,7 +228,7 @@ def _least_estimate(scene: EccentricScene) -> float:
 
 def _gates(scene: EccentricScene) -> Gates:
     told, tuning = scene.supervisor, scene.fine_tuning
-    plant, law = plant_parameters(scene), drive_law(scene)
+    plant, law = PlantParameters.of(scene), DriveLaw.of(scene)
     averaged = max(tuning.average / scene.sensor.step, 1.0)
     return Gates(
         **{name: getattr(told, name) for name in _SUPERVISOR_KEYS},

@@ -14,10 +14,7 @@ from scipy.integrate import solve_ivp
 from ringbalance.controller.eccentric_mass.plant import integrate
 from ringbalance.controller.eccentric_mass.plant.friction import LOCKED, SLIDING, STUCK
 from ringbalance.controller.eccentric_mass.plant.open_loop import run_plant, run_steps
-from ringbalance.controller.eccentric_mass.plant.parameters import (
-    PlantParameters,
-    plant_parameters,
-)
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.plant.plant import (
     drive_of,
     electrical_energy,
@@ -40,7 +37,7 @@ def scene() -> EccentricScene:
 
 @pytest.fixture(scope="module")
 def parameters(scene: EccentricScene) -> PlantParameters:
-    return plant_parameters(scene)
+    return PlantParameters.of(scene)
 
 
 def without_friction(parameters: PlantParameters) -> PlantParameters:

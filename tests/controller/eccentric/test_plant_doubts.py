@@ -11,7 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from ringbalance.controller.eccentric_mass.plant.open_loop import PlantRun, run_plant
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray
 from ringbalance.scene.eccentric_models import SpeedPoint
@@ -28,7 +28,7 @@ def scene() -> EccentricScene:
 
 @pytest.fixture(scope="module")
 def p(scene: EccentricScene) -> PlantParameters:
-    return plant_parameters(scene)
+    return PlantParameters.of(scene)
 
 
 def test_k32_as_printed_misses_a_torque_as_large_as_friction(p: PlantParameters) -> None:

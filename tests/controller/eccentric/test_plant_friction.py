@@ -26,7 +26,7 @@ from ringbalance.controller.eccentric_mass.plant.friction import (
 )
 from ringbalance.controller.eccentric_mass.plant.integrate import held_step, plant_step
 from ringbalance.controller.eccentric_mass.plant.open_loop import run_steps
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.plant.plant import (
     Drive,
     drive_of,
@@ -43,7 +43,7 @@ OFF = np.zeros(2)
 
 @pytest.fixture(scope="module")
 def parameters() -> PlantParameters:
-    return plant_parameters(eccentric_scene(load_scene(bundled_scene("eccentric_mass_paper"))))
+    return PlantParameters.of(eccentric_scene(load_scene(bundled_scene("eccentric_mass_paper"))))
 
 
 @pytest.fixture(scope="module")

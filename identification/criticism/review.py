@@ -13,7 +13,7 @@ import numpy as np
 
 from ringbalance.identification.criticism.law_comparison import LawComparison
 from ringbalance.identification.criticism.linear_fit import LinearFit
-from ringbalance.identification.criticism.patterns import Criticism, criticise
+from ringbalance.identification.criticism.patterns import Criticism
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.likelihood import Block, Problem
@@ -72,7 +72,7 @@ class Review:
         """Test the residuals of a fit and compare its law with others."""
         found = _at_solution(result)
         return cls(
-            criticism=criticise(found.fit, found.covariates),
+            criticism=Criticism.of(found.fit, found.covariates),
             laws=tuple(_comparisons(result, found)),
         )
 

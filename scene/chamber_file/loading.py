@@ -26,7 +26,7 @@ from ringbalance.scene.chamber_file.placing import Placed, placed, port_radius
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.chamber_file.shape import oriented
 from ringbalance.scene.chamber_file.step_file import STEP_ENDINGS, STEP_UNIT, meshed_step
-from ringbalance.scene.chamber_file.topology import Facets, topology_findings
+from ringbalance.scene.chamber_file.topology import Facets
 from ringbalance.scene.chamber_file.vtu_file import read_vtu
 from ringbalance.scene.faults import Fault
 from ringbalance.scene.keys.declaration import keys_of
@@ -112,7 +112,7 @@ def _chamber(reading: Reading) -> tuple[ChamberGeometry, Placed]:
     axis, middle = reading.values["disc.mesh_axis"], reading.values.get("disc.mesh_middle")
     found, misplaced = placed(body, boundaries, facets.nodes[facets.outer], axis=axis, middle=middle)
     everything = [
-        *topology_findings(body, facets, drawing_nodes=_drawing_nodes(contents)),
+        *facets.findings(body, drawing_nodes=_drawing_nodes(contents)),
         *misshapen,
         *misnamed,
         *misplaced,

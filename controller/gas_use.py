@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 from ringbalance.controller.liquid_ring.opening import NEAR_RESIDUAL
 from ringbalance.controller.liquid_ring.plant import Operation
-from ringbalance.physics.gas.column import compression_work, normal_volume, nozzle_flow
-from ringbalance.physics.gas.supply import gas_line
+from ringbalance.physics.gas import compression_work, gas_line, normal_volume, nozzle_flow
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.scene.models import Scene

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 from ringbalance.controller.liquid_ring.motion import Column, Dynamics, Lift
-from ringbalance.physics.gas.supply import VENTED, gas_line
+from ringbalance.physics.gas import VENTED, gas_line
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.selection.estimates import FILLING, HELD, INERTIA, LAG, term_estimates

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, liquid_area
-from ringbalance.physics.gas.column import pressure_factor
+from ringbalance.physics.gas import pressure_factor
 from ringbalance.physics.tube.draw_down import draw_down_depth
 from ringbalance.physics.tube.uncertainty import TUBE_INPUTS
 from ringbalance.reduced_model.chamber.inputs import measured_closed_forms

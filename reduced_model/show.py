@@ -14,9 +14,9 @@ from rich.text import Text
 
 from ringbalance.reduced_model.budget import UNSTATED, believed, measured, rounded
 from ringbalance.reduced_model.calibration import Calibration
-from ringbalance.reduced_model.chamber.row_status import REMEDIES
 from ringbalance.reduced_model.documents import (
     PRESSURE_FACTORS,
+    REMEDIES,
     chamber_status,
     paper_columns,
     velocity_status,

@@ -19,11 +19,11 @@ import numpy as np
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.line_runs import line_runs, line_runs_document
 from ringbalance.controller.loop import simulate
+from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
 from ringbalance.reduced_model.law.paper_law import paper_model
-from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.reports.pictures.imported_field import shown_field
 from ringbalance.reports.provenance import provenance, versions
 from ringbalance.reports.saved import keep_cases, kept_cases, looks_at_no_scene

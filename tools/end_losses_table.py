@@ -19,7 +19,7 @@ from flow_at_points import probe
 from rich.console import Console
 from rich.progress import Progress
 
-from ringbalance.physics.convergence.grid import gci
+from ringbalance.physics.convergence import gci
 from ringbalance.scene.platform.files import write_whole
 from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification.navier_stokes.continuation import StepRule, follow

@@ -23,7 +23,7 @@ from flow_at_points import transfer
 from rich.console import Console
 from rich.progress import MofNCompleteColumn, Progress, TimeElapsedColumn
 
-from ringbalance.physics.convergence.grid import gci
+from ringbalance.physics.convergence import gci
 from ringbalance.physics.tube.rotation_table import (
     KL_LIMIT,
     KL_SCALE,

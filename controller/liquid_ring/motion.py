@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from ringbalance.controller.liquid_ring.records import PIECES, PLANT
 from ringbalance.controller.liquid_ring.transfer import Event
-from ringbalance.physics.gas.supply import (
+from ringbalance.physics.gas import (
     HEAT_CAPACITY_RATIO,
     REFERENCE_PRESSURE,
     REFERENCE_TEMPERATURE,

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.physics.tube.state import TubeState, tube_state
-from ringbalance.reduced_model.paper.formulas import PAPER_DRAG_COEFFICIENT
+from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT
 from ringbalance.reduced_model.tube.heads import crest_head
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene

@@ -65,10 +65,8 @@ def test_proportional_control_along_one_axis_by_hand(scene: Scene, model: Balanc
         expected.append((time, gas, x, after))
         x, time = after, time + gas + 0.5
         amplitude = 10e-6 - 0.0108 * 72e-3 * 1000 * volume * (0.25 - x)
-    found = [
-        (i.time, i.operation.duration, i.operation.fill_before, i.operation.fill_after)
-        for i in run.injections
-    ]
+    gone = [(i.time, i.operation) for i in run.injections]
+    found = [(time, one.duration, one.fill_before, one.fill_after) for time, one in gone]
     assert {i.chamber for i in run.injections} == {"A"}
     assert np.array(found) == pytest.approx(np.array(expected), rel=1e-9)
     assert run.settled

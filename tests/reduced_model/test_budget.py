@@ -14,7 +14,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 from scipy.stats import binom
 
-from ringbalance.physics.gas.column import pressure_factor
+from ringbalance.physics.gas import pressure_factor
 from ringbalance.reduced_model.budget import UNITS, Budget, believed, budgets, measured, rounded
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.device import device_of

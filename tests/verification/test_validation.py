@@ -18,11 +18,16 @@ from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import NORMAL_95
 from ringbalance.verification.catalogue import case_code, load_case
+from ringbalance.verification.navier_stokes.rotating_section import (
+    DuctMesh,
+    friction_ratio,
+    solve_section_without_inertia,
+)
 from ringbalance.verification.validation import tube_at_rest
 from ringbalance.verification.validation.comparison import KINDS, compare
 from ringbalance.verification.validation.kinds import measurements
 from ringbalance.verification.validation.model_bias import ModelStatistics, model_statistics
-from ringbalance.verification.validation.tube_friction import friction_points
+from ringbalance.verification.validation.tube_friction import friction_points, laminar_ratio
 from ringbalance.verification.validation.wave_frequency import tank_frequency
 
 _DATA = files("ringbalance.verification.validation") / "data"
@@ -103,6 +108,14 @@ def test_points_come_in_ascending_order_with_their_walls() -> None:
     plain = replace(points, relative_roughness=np.zeros_like(points.reynolds)).predicted()
     assert np.array_equal(rough[smooth], plain[smooth])
     assert np.all(rough[~smooth] > plain[~smooth])
+
+
+def test_laminar_friction_of_ducts_against_finite_elements() -> None:
+    for aspect in (1.0, 2.9, 8.0):
+        system = DuctMesh(aspect_ratio=aspect).system()
+        found = friction_ratio(solve_section_without_inertia(system=system, rotation_reynolds=0.0))
+        assert float(laminar_ratio(np.array([aspect]))[0]) == pytest.approx(found, rel=1e-4)
+    assert laminar_ratio(np.array([0.0, 1e4])) == pytest.approx([1.0, 1.5], rel=1e-3)
 
 
 def test_the_budget_of_k_holds_bias_and_scatter_of_turbulent_friction(paper_scene: Scene) -> None:

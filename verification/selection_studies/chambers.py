@@ -13,10 +13,9 @@ from ringbalance.mesh.chamber import default_cells
 from ringbalance.mesh.cut.tilted import tilted_liquid
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics import deferred
-from ringbalance.reduced_model.chamber.imported_check import imported_elements
+from ringbalance.reduced_model.chamber.element_check import imported_elements, scene_ring
 from ringbalance.reduced_model.chamber.imported_walls import drawing_shares
 from ringbalance.reduced_model.chamber.range import chamber_fills, chamber_status
-from ringbalance.reduced_model.chamber.scene_ring import scene_ring
 from ringbalance.reduced_model.chamber.terms import (
     MEAN,
     PLATES,

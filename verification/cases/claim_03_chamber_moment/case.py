@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.reduced_model.paper.formulas import (
+from ringbalance.reduced_model.paper import (
     max_liquid_volume_paper,
     moment_paper,
     surface_radius_paper,

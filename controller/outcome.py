@@ -16,9 +16,7 @@ from ringbalance.controller.liquid_ring.reach import (
     LEAST_PRESSURE,
     NEARLY_EMPTY,
     RUNS_BACK,
-    largest_pair_moment,
     starting_pressure,
-    unreachable_vibration,
 )
 from ringbalance.controller.liquid_ring.transfer import Event
 from ringbalance.controller.simulation import Injection, Outcome, Sample, Verdict
@@ -69,7 +67,7 @@ class Facts:
     @property
     def unreachable_amplitude(self) -> float:
         """Vibration that remains with the liquid at its best, m."""
-        return unreachable_vibration(plant=self.plant, state=self.state, rotor=self.scene.rotor)
+        return self.plant.unreachable_vibration(state=self.state, rotor=self.scene.rotor)
 
     @property
     def settling_time(self) -> float | None:
@@ -263,7 +261,7 @@ def _stalled(facts: Facts) -> str:
 
 def _capacity(facts: Facts) -> str:
     needed = abs(facts.scene.rotor.initial_unbalance) / GRAM_MILLIMETRE
-    pair = abs(largest_pair_moment(plant=facts.plant, state=facts.state)) / GRAM_MILLIMETRE
+    pair = abs(facts.plant.largest_pair_moment(state=facts.state)) / GRAM_MILLIMETRE
     return (
         f"{_not_settled(facts)}; capacity exceeded: the unbalance is {needed:.4g} g mm, one pair of chambers "
         f"can form {pair:.4g} g mm along its axis, so at best {_um(facts.unreachable_amplitude)} remain: "

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.parameters import FitError, Parameter, unknown_name
+from ringbalance.identification.parameters import FitError, Parameter
 from ringbalance.identification.predict.device import Models
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
@@ -151,7 +151,7 @@ def _eccentric_parameter(scene: EccentricScene, name: str) -> Parameter:
     Raises: FitError: no such quantity, or a value that is zero.
     """
     if name not in fitted_names(scene):
-        raise unknown_name(name, fitted_names(scene))
+        raise FitError.unknown(name, fitted_names(scene))
     start, is_angle = eccentric_value(scene, name), name == "imbalance.phase"
     if start <= 0 and not is_angle:
         raise FitError(f"{name} is zero: give a value above zero to fit it")

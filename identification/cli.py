@@ -16,7 +16,7 @@ from ringbalance.identification.next_measurement import next_measurement
 from ringbalance.identification.parameters import FitError
 from ringbalance.identification.saving import save_result
 from ringbalance.identification.show import fit_view
-from ringbalance.scene.faults import Fault, SceneError, did_you_mean, option_error
+from ringbalance.scene.faults import Fault, SceneError, did_you_mean
 from ringbalance.scene.loader import read_scene
 from ringbalance.scene.platform.files import check_file
 from ringbalance.scene.platform.terminal import activity, messages_console, results_console
@@ -97,7 +97,7 @@ def fit(
 def _fitted_name(name: str | None, fitted: Sequence[str]) -> str | None:
     if name is not None and name not in fitted:
         problem = f"this parameter is not fitted{did_you_mean(name, fitted)}"
-        raise option_error(option="--next", value=name, problem=problem, allowed=", ".join(fitted))
+        raise SceneError.of_option(option="--next", value=name, problem=problem, allowed=", ".join(fitted))
     return name
 
 
@@ -106,7 +106,9 @@ def _keep_inputs(save: Path, inputs: Sequence[Path]) -> None:
     for each in inputs:
         if save.exists() and each.exists() and save.samefile(each):
             problem = "the fitted scene would replace a file that is read here"
-            raise option_error(option="--save", value=str(save), problem=problem, allowed="another file")
+            raise SceneError.of_option(
+                option="--save", value=str(save), problem=problem, allowed="another file"
+            )
 
 
 def _usage(file: str, problem: str) -> SceneError:
@@ -119,5 +121,5 @@ def _names(text: str) -> list[str]:
     if not all(names) or len(set(names)) < len(names):
         problem = "it is not a list of different names with commas between"
         allowed = 'such as "bore,extra_loss"'
-        raise option_error(option="--parameters", value=text, problem=problem, allowed=allowed)
+        raise SceneError.of_option(option="--parameters", value=text, problem=problem, allowed=allowed)
     return names

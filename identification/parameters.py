@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from ringbalance.identification.predict.device import Models, device_of
+from ringbalance.identification.predict.device import Device, Models
 from ringbalance.scene.faults import did_you_mean
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import (
@@ -29,6 +29,12 @@ from ringbalance.scene.uncertain import (
 
 class FitError(ValueError):
     """A fit that cannot be made; the text says why, and what to change."""
+
+    @classmethod
+    def unknown(cls, name: str, allowed: Sequence[str]) -> FitError:
+        """The error for a name that cannot be fitted."""
+        hint = did_you_mean(name, allowed)
+        return cls(f'"{name}" cannot be fitted{hint}; allowed: {", ".join(allowed)}')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,7 +81,7 @@ class Parameter:
         if name in START:
             return _of_start(scene, name)
         if name not in UNCERTAIN_QUANTITIES:
-            raise unknown_name(name, sorted((*UNCERTAIN_QUANTITIES, *START)))
+            raise FitError.unknown(name, sorted((*UNCERTAIN_QUANTITIES, *START)))
         if scene.disc.geometry is not None and name in SHAPE:
             raise FitError(f"{name} follows from the mesh of the chamber; fit lambda_factor in its place")
         value = nominal_value(scene=scene, quantity=name)
@@ -121,12 +127,6 @@ START: Final = ("initial_amplitude", "initial_phase")
 _LOSS_STEP: Final = 0.01
 
 
-def unknown_name(name: str, allowed: Sequence[str]) -> FitError:
-    """The error for a name that cannot be fitted."""
-    hint = did_you_mean(name, allowed)
-    return FitError(f'"{name}" cannot be fitted{hint}; allowed: {", ".join(allowed)}')
-
-
 def _of_start(scene: Scene, name: str) -> Parameter:
     """Amplitude or phase of the vibration without trial weight, of which nothing is known beforehand."""
     start = float(getattr(scene.rotor, name))
@@ -170,7 +170,7 @@ def _loss_scale(scene: Scene, name: str) -> tuple[float, float]:
 def _driving_head(scene: Scene) -> float:
     """H at equal fills, m^2/s^2."""
     fill = scene.disc.initial_fill
-    ends = device_of(scene, Models.of(scene)).law.ends(
+    ends = Device.of(scene, Models.of(scene)).law.ends(
         fill_ratio=fill, opposite_fill_ratio=fill, gas_pressure=scene.gas.pressure
     )
     return float(ends.driving_pressure()) / scene.liquid.density

@@ -89,7 +89,7 @@ def known_liquids() -> tuple[KnownLiquid, ...]:
     return tuple(liquid for liquid, _ in _library().values())
 
 
-def find_liquid(*, name: str) -> KnownLiquid | None:
+def _find_liquid(*, name: str) -> KnownLiquid | None:
     """The liquid of any of its names, such as "Silicone oil 100 cSt"; None when no liquid has it."""
     plain = _plain(name)
     return next((liquid for liquid in known_liquids() if plain in map(_plain, _names(liquid))), None)
@@ -113,9 +113,9 @@ def liquid_at(*, name: str, temperature: float) -> Liquid:
     Args: `name`: any of the liquid's names. `temperature`: K.
     Returns: The liquid with its uncertainties.
     Raises: FieldError: an unknown name, or a temperature outside the data.
-    Source: the rows of `data/fluid_properties.csv`, each with its own; water, `water_properties`.
+    Source: the rows of `data/fluid_properties.csv`, each with its own; water, `_water_properties`.
     """
-    liquid = find_liquid(name=name)
+    liquid = _find_liquid(name=name)
     if liquid is None:
         raise _unknown_liquid(name=name)
     if not liquid.holds(temperature):
@@ -139,7 +139,7 @@ def _properties(liquid: KnownLiquid, temperature: float) -> tuple[float, float, 
     low, high = liquid.temperatures[0], liquid.temperatures[-1]
     inside = min(max(temperature, low), high)
     if liquid.name == _WATER:
-        return water_properties(temperature=inside)
+        return _water_properties(temperature=inside)
     return _interpolated(_library()[liquid.name][1], inside)
 
 
@@ -205,18 +205,15 @@ def _row(line: Mapping[str, str]) -> _Row:
     )
 
 
-def water_properties(*, temperature: float) -> tuple[float, float, float]:
+def _water_properties(*, temperature: float) -> tuple[float, float, float]:
     """Properties of water at atmospheric pressure.
 
     Args: `temperature`: K.
     Returns: Density, kg/m^3; kinematic viscosity, m^2/s; vapour pressure, Pa absolute.
-    Raises: ValueError: a temperature at which water is not liquid.
     Range: `COLDEST` to `HOTTEST`, 101 325 Pa; at 10 MPa the density is 0.5 % higher, which is left out.
     Source: density and vapour pressure, Wagner and Pruss, J. Phys. Chem. Ref. Data 31 (2002) 387 (IAPWS-95);
         viscosity, Huber et al., J. Phys. Chem. Ref. Data 38 (2009) 101 (IAPWS 2008); package `chemicals`.
     """
-    if not COLDEST <= temperature <= HOTTEST:
-        raise ValueError(f"temperature must lie within {COLDEST} K and {HOTTEST} K")
     density = float(iapws95_rho(temperature, _ATMOSPHERIC_PRESSURE))  # type: ignore[no-untyped-call]
     viscosity = float(mu_IAPWS(temperature, density))
     vapour_pressure = float(iapws95_Psat(temperature))  # type: ignore[no-untyped-call]
@@ -227,7 +224,7 @@ def with_liquid(reading: Reading) -> tuple[Reading, tuple[Fault, ...]]:
     """The liquid's values, as far as they can be known, what is given outright first; and what is wrong."""
     if "liquid" in reading.broken or not reading.given("liquid"):
         return reading, ()
-    liquid = find_liquid(name=reading.values["liquid.name"]) if reading.known("liquid.name") else None
+    liquid = _find_liquid(name=reading.values["liquid.name"]) if reading.known("liquid.name") else None
     faults = _faults(reading, liquid)
     looked_up = None if faults or liquid is None else _looked_up(reading, liquid)
     return reading.adding(_liquid_values(reading, looked_up)), faults

@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.checks import check_fit
-from ringbalance.controller.ensemble.run import EnsemblePlan, MemberRuns, ensemble_plan
+from ringbalance.controller.ensemble.run import EnsemblePlan, MemberRuns
 from ringbalance.controller.ensemble.samples import BLOCK, Members, MemberUncertainty
 from ringbalance.controller.ensemble.transfer import PairTransfer
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
@@ -140,7 +140,7 @@ def simulate_ensemble(
     model = flow_law if isinstance(flow_law, BalancerModel) else balancer_model(flow_law)
     followed = ensemble_transfer(scene, model) if transfer is None else transfer
     widths = MemberUncertainty.of(scene, model) if uncertainty_95 is None else uncertainty_95
-    plan = ensemble_plan(scene=scene, model=model, transfer=followed)
+    plan = EnsemblePlan.of(scene=scene, model=model, transfer=followed)
     tally = _Tally(time_limit=scene.run.time_limit, quantiles=quantiles)
 
     def run(block: int) -> MemberRuns:
@@ -170,7 +170,7 @@ def simulate_members(
     if given.proportional.size > BLOCK:
         raise ValueError(f"at most {BLOCK} members at once")
     followed = ensemble_transfer(scene, model) if transfer is None else transfer
-    return ensemble_plan(scene=scene, model=model, transfer=followed).run(given, seed=seed)
+    return EnsemblePlan.of(scene=scene, model=model, transfer=followed).run(given, seed=seed)
 
 
 def ensemble_transfer(scene: Scene, model: BalancerModel) -> PairTransfer:

@@ -13,7 +13,6 @@ from ringbalance.controller.algorithms.by_name import law_based_of
 from ringbalance.controller.ensemble.monte_carlo import Probability, simulate_ensemble
 from ringbalance.controller.ensemble.samples import Members, MemberUncertainty
 from ringbalance.controller.liquid_ring.plant import DiscState
-from ringbalance.controller.liquid_ring.reach import unreachable_vibration
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Outcome, Simulation
 from ringbalance.controller.terms import run_models, terms_modelled
@@ -169,10 +168,8 @@ def _beyond_capacity(
 
     def fraction(least: FloatArray) -> float:
         left = (
-            unreachable_vibration(
-                plant=replace(ring, residual_fill=float(fill)),
-                state=state,
-                rotor=_rotor(scene, drawn, number),
+            replace(ring, residual_fill=float(fill)).unreachable_vibration(
+                state=state, rotor=_rotor(scene, drawn, number)
             )
             for number, fill in enumerate(least)
         )

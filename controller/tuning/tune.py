@@ -11,7 +11,6 @@ import numpy as np
 from ringbalance.controller.algorithms.by_name import controller_of, law_based_of
 from ringbalance.controller.checks import check_settings
 from ringbalance.controller.liquid_ring.plant import DiscState
-from ringbalance.controller.liquid_ring.reach import unreachable_vibration
 from ringbalance.controller.terms import run_models
 from ringbalance.controller.tuning.dead_time import dead_times, dead_zone
 from ringbalance.controller.tuning.loop_factor import (
@@ -171,7 +170,7 @@ def _beyond_capacity(scene: Scene, model: BalancerModel) -> float:
         law_based_of(with_driving_gas(scene, model), model).ring,
         DiscState.initial(disc=scene.disc),
     )
-    return unreachable_vibration(plant=plant, state=state, rotor=scene.rotor)
+    return plant.unreachable_vibration(state=state, rotor=scene.rotor)
 
 
 def _line_reaches(lines: tuple[LineAnswer, ...], *, settles: bool) -> bool | None:

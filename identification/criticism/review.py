@@ -13,11 +13,11 @@ import numpy as np
 
 from ringbalance.identification.criticism.law_comparison import LawComparison
 from ringbalance.identification.criticism.linear_fit import LinearFit
-from ringbalance.identification.criticism.patterns import Criticism, criticise
+from ringbalance.identification.criticism.patterns import Criticism
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.likelihood import Block, Problem
-from ringbalance.identification.predict.device import device_of
+from ringbalance.identification.predict.device import Device
 from ringbalance.identification.result import FitResult
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.tables.fit import table_from_samples
@@ -72,7 +72,7 @@ class Review:
         """Test the residuals of a fit and compare its law with others."""
         found = _at_solution(result)
         return cls(
-            criticism=criticise(found.fit, found.covariates),
+            criticism=Criticism.of(found.fit, found.covariates),
             laws=tuple(_comparisons(result, found)),
         )
 
@@ -103,7 +103,7 @@ def _by_other_tubes(problem: Problem, scene: Scene) -> Iterator[tuple[str, Float
     blocks = [b for b in problem.blocks if b.observations.kind in _BY_LAW]
     if not blocks:
         return
-    law, velocity = device_of(scene, problem.models).law, _typical_velocity(scene, problem, blocks)
+    law, velocity = Device.of(scene, problem.models).law, _typical_velocity(scene, problem, blocks)
     for name in _laws_to_compare(law):
         models = replace(problem.models, other=partial(_other_law, name=name, velocity=velocity))
         other = replace(problem, models=models)
@@ -129,7 +129,7 @@ def _typical_velocity(scene: Scene, problem: Problem, blocks: list[Block]) -> fl
     """At equal fills under the middle of the data's gas pressures, m/s; 1 where nothing flows there."""
     pressures = [b.observations.columns["pressure"] for b in blocks if "pressure" in b.observations.columns]
     pressure = float(np.median(np.concatenate(pressures))) if pressures else scene.gas.pressure
-    law, x = device_of(scene, problem.models).law, scene.disc.initial_fill
+    law, x = Device.of(scene, problem.models).law, scene.disc.initial_fill
     flow = law.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=pressure, primed=True)
     return abs(float(flow.velocity)) or 1.0
 

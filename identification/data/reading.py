@@ -17,7 +17,6 @@ from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.data.stated import stated_uncertainty
 from ringbalance.identification.data.tables import (
     Table,
-    check_unit,
     data_fault,
     decoded,
     file_name,
@@ -31,7 +30,7 @@ from ringbalance.scene.faults import Fault, SceneError, did_you_mean, toml_text
 from ringbalance.scene.keys.fields import LETTERS
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
-from ringbalance.scene.units import FieldError
+from ringbalance.scene.units import FieldError, parse_quantity
 
 AMPLITUDE: Final = "amplitude"
 _NEEDED: Final = ("kind", "source")
@@ -181,7 +180,7 @@ def _one_head(
         return
     try:
         if column.dimension is not None:
-            check_unit(unit, column.dimension)
+            parse_quantity(f"1 {unit}", column.dimension)
         elif unit and unit != "%":
             raise FieldError("this column has no unit", f"{name}, or {name} [%]")
     except FieldError as error:

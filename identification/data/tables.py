@@ -288,7 +288,7 @@ def split_head(head: str) -> tuple[str, str] | None:
     return match[1].strip(), "" if unit == _NO_UNIT else unit
 
 
-def check_unit(unit: str, dimension: str) -> None:
+def _check_unit(unit: str, dimension: str) -> None:
     """Raises: FieldError: no unit of that dimension; the error has those that are."""
     parse_quantity(f"1 {unit}", dimension)
 
@@ -297,7 +297,7 @@ def dimension_of(unit: str) -> str | None:
     """The first dimension that has a unit; None where none has it."""
     for dimension in DIMENSIONS:
         try:
-            check_unit(unit, dimension)
+            _check_unit(unit, dimension)
         except FieldError:
             continue
         return dimension

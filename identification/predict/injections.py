@@ -13,7 +13,7 @@ import numpy as np
 
 from ringbalance.controller.rotor import chamber_directions, chamber_letters
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.predict.device import Device, Models, device_of
+from ringbalance.identification.predict.device import Device, Models
 from ringbalance.identification.predict.predicted import PredictedKind, always, parts, spread_out
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.models import Scene
@@ -26,7 +26,7 @@ def _measured(observations: Observations) -> FloatArray:
 
 def _predict(scene: Scene, observations: Observations, models: Models) -> FloatArray:
     """The same by the scene's law. Raises: ValueError: as `_chamber_numbers`."""
-    device = device_of(scene, models)
+    device = Device.of(scene, models)
     before, after = device.once(observations, _fills)
     total = 2 * scene.disc.initial_fill
     pair = _chamber_numbers(scene, observations) % (scene.disc.chambers // 2)

@@ -15,10 +15,10 @@ import numpy as np
 
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.predict.device import Device, Models, device_of
+from ringbalance.identification.predict.device import Device, Models
 from ringbalance.identification.predict.injections import INJECTION
 from ringbalance.identification.predict.positionings import POSITIONING
-from ringbalance.identification.predict.predicted import PredictedKind, always, numbers, parts, spread_out
+from ringbalance.identification.predict.predicted import PredictedKind, always, parts, spread_out
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.tube.state import tube_state
 from ringbalance.physics.tube.uncertainty import with_errors
@@ -94,7 +94,7 @@ def _transferred_column(observations: Observations) -> str:
 
 def _transferred(scene: Scene, observations: Observations, models: Models) -> FloatArray:
     """V (x_before - x_after), m^3, times rho for a mass, kg, once the liquid rests again."""
-    device = device_of(scene, models)
+    device = Device.of(scene, models)
     volume = device.law.chamber_volume * device.once(observations, _moved)
     return np.asarray(
         scene.liquid.density * volume if _transferred_column(observations) == "mass" else volume
@@ -119,7 +119,7 @@ def _flow_rates(scene: Scene, observations: Observations, models: Models) -> Flo
     Returns: Q, m^3/s, shape (n,), by Newton's method in ln u.
     Source: definition of k, Eq. 14 of the liquid-ring paper, between two reservoirs at rest.
     """
-    return device_of(scene, models).once(observations, _flow_rate)
+    return Device.of(scene, models).once(observations, _flow_rate)
 
 
 def _flow_rate(device: Device, observations: Observations) -> FloatArray:
@@ -176,15 +176,19 @@ PREDICTED: Final[Mapping[str, PredictedKind]] = MappingProxyType(
             informs=always("influence_coefficient", "lag_angle"),
             free=_effect_of_starts,
         ),
-        "trial_amplitude": numbers(
+        "trial_amplitude": PredictedKind.numbers(
             lambda _: "amplitude",
             predict=_by_scene_alone(_trial_amplitudes),
             informs=always("influence_coefficient", "initial_amplitude", "initial_phase"),
         ),
         "injection": INJECTION,
-        "transfer": numbers(_transferred_column, predict=_transferred, informs=always("bore", "extra_loss")),
-        "flow": numbers(lambda _: "flow_rate", predict=_flow_rates, informs=always("bore", "extra_loss")),
-        "pressure": numbers(
+        "transfer": PredictedKind.numbers(
+            _transferred_column, predict=_transferred, informs=always("bore", "extra_loss")
+        ),
+        "flow": PredictedKind.numbers(
+            lambda _: "flow_rate", predict=_flow_rates, informs=always("bore", "extra_loss")
+        ),
+        "pressure": PredictedKind.numbers(
             lambda _: "pressure", predict=_by_scene_alone(_pressures), informs=always("density")
         ),
         "run_up": _vibrations(

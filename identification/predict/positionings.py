@@ -16,7 +16,7 @@ from ringbalance.controller.eccentric_mass.plant.integrate import plant_step, su
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.plant.plant import rest_state
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.predict.predicted import numbers
+from ringbalance.identification.predict.predicted import PredictedKind
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.eccentric_models import EccentricScene
 
@@ -99,4 +99,6 @@ def _moved(
     return found
 
 
-POSITIONING: Final = numbers(lambda _: "angle", predict=_predict, informs=_informs, too_long=_too_long)
+POSITIONING: Final = PredictedKind.numbers(
+    lambda _: "angle", predict=_predict, informs=_informs, too_long=_too_long
+)

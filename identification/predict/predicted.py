@@ -37,6 +37,17 @@ class PredictedKind:
     too_long: Callable[[Any, Observations], str] = _never
     """Scene and observations to why predictions would take too long; empty where they do not."""
 
+    @classmethod
+    def numbers(cls, column: Callable[[Observations], str], **declared: Any) -> PredictedKind:
+        """One measured number a row, its errors independent from row to row."""
+        return cls(
+            measured=lambda observations: observations.columns[column(observations)],
+            covariance=lambda observations: _scalar_covariance(observations, column(observations)),
+            noise_given=lambda observations: column(observations) in observations.uncertainty,
+            column=column,
+            **declared,
+        )
+
 
 def always(*names: str) -> Callable[[Observations], tuple[str, ...]]:
     """The same parameters for all data of a kind."""
@@ -47,17 +58,6 @@ def _scalar_covariance(observations: Observations, column: str) -> FloatArray:
     """Of errors that are independent from row to row, shape (n, n); unit where their noise is not given."""
     given = observations.uncertainty.get(column)
     return np.diag(np.ones(len(observations)) if given is None else (given / NORMAL_95) ** 2)
-
-
-def numbers(column: Callable[[Observations], str], **declared: Any) -> PredictedKind:
-    """One measured number a row, its errors independent from row to row."""
-    return PredictedKind(
-        measured=lambda observations: observations.columns[column(observations)],
-        covariance=lambda observations: _scalar_covariance(observations, column(observations)),
-        noise_given=lambda observations: column(observations) in observations.uncertainty,
-        column=column,
-        **declared,
-    )
 
 
 def parts(vector: ComplexArray) -> FloatArray:

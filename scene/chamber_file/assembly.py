@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
-from ringbalance.scene.chamber_file.contents import Contents, Elements, MeshFileError, unreadable
+from ringbalance.scene.chamber_file.contents import Contents, Elements, MeshFileError
 from ringbalance.scene.chamber_file.elements import CELL_KINDS, CORNERS, MOST_NODES, dimension
 from ringbalance.scene.chamber_file.record import CellKind
 from ringbalance.scene.rules.check import Finding
@@ -154,7 +154,7 @@ def _wrong_nodes(contents: Contents) -> Iterator[Finding]:
 def _lost(block: Elements, numbered: IntArray) -> Finding | None:
     """An error for elements whose nodes the file does not have."""
     if not len(numbered):
-        raise unreadable("it has elements, but no nodes")
+        raise MeshFileError.of("it has elements, but no nodes")
     at = np.minimum(np.searchsorted(numbered, block.nodes), len(numbered) - 1)
     missing = numbered[at] != block.nodes
     rows = np.flatnonzero(missing.any(axis=1))

@@ -19,10 +19,10 @@ class MeshFileError(Exception):
         self.findings = tuple(findings)
         super().__init__("; ".join(each.problem for each in self.findings))
 
-
-def unreadable(problem: str, allowed: str = "") -> MeshFileError:
-    """The error of a file in which nothing further can be looked at."""
-    return MeshFileError([Finding(problem=problem, allowed=allowed)])
+    @classmethod
+    def of(cls, problem: str, allowed: str = "") -> MeshFileError:
+        """The error of a file in which nothing further can be looked at."""
+        return cls([Finding(problem=problem, allowed=allowed)])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,7 +60,9 @@ def numbers_in(body: bytes, what: str) -> FloatArray:
         try:
             return np.fromstring(body, dtype=np.float64, sep=" ")
         except (DeprecationWarning, ValueError) as error:
-            raise unreadable(f"{what} holds something other than numbers: the file is damaged") from error
+            raise MeshFileError.of(
+                f"{what} holds something other than numbers: the file is damaged"
+            ) from error
 
 
 def whole(values: FloatArray, what: str) -> IntArray:
@@ -69,5 +71,5 @@ def whole(values: FloatArray, what: str) -> IntArray:
         found = values.astype(np.int64)
         exact = (found == values) & (np.abs(values) < 2**53)
     if not exact.all():
-        raise unreadable(f"{what} has a fraction where a whole number belongs: the file is damaged")
+        raise MeshFileError.of(f"{what} has a fraction where a whole number belongs: the file is damaged")
     return found

@@ -16,7 +16,7 @@ import numpy as np
 from ringbalance.scene.arrays import IntArray
 from ringbalance.scene.chamber_file.abaqus_file import read_abaqus
 from ringbalance.scene.chamber_file.assembly import Body
-from ringbalance.scene.chamber_file.contents import Contents, MeshFileError, unreadable
+from ringbalance.scene.chamber_file.contents import Contents, MeshFileError
 from ringbalance.scene.chamber_file.elements import dimension
 from ringbalance.scene.chamber_file.fitting import PORT_RADIUS, unfitting
 from ringbalance.scene.chamber_file.gmsh_file import read_gmsh
@@ -26,7 +26,7 @@ from ringbalance.scene.chamber_file.placing import Placed, placed, port_radius
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.chamber_file.shape import oriented
 from ringbalance.scene.chamber_file.step_file import STEP_ENDINGS, STEP_UNIT, meshed_step
-from ringbalance.scene.chamber_file.topology import Facets, topology_findings
+from ringbalance.scene.chamber_file.topology import Facets
 from ringbalance.scene.chamber_file.vtu_file import read_vtu
 from ringbalance.scene.faults import Fault
 from ringbalance.scene.keys.declaration import keys_of
@@ -112,7 +112,7 @@ def _chamber(reading: Reading) -> tuple[ChamberGeometry, Placed]:
     axis, middle = reading.values["disc.mesh_axis"], reading.values.get("disc.mesh_middle")
     found, misplaced = placed(body, boundaries, facets.nodes[facets.outer], axis=axis, middle=middle)
     everything = [
-        *topology_findings(body, facets, drawing_nodes=_drawing_nodes(contents)),
+        *facets.findings(body, drawing_nodes=_drawing_nodes(contents)),
         *misshapen,
         *misnamed,
         *misplaced,
@@ -158,24 +158,28 @@ def _is_step(path: Path) -> bool:
 def _content_of(path: Path) -> bytes:
     """The bytes of a mesh file. Raises: MeshFileError: it cannot be read, or is larger than any mesh."""
     if path.suffix.lower() not in (*_READERS, *STEP_ENDINGS):
-        raise unreadable(f"a name that ends with {path.suffix[:20] or 'no .ending'} is not read", FORMATS)
+        raise MeshFileError.of(
+            f"a name that ends with {path.suffix[:20] or 'no .ending'} is not read", FORMATS
+        )
     try:
         # Without blocking: a pipe that nobody writes to must not hold the program.
         handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
         with os.fdopen(handle, "rb") as stream:
             kind = os.fstat(stream.fileno())
             if not stat.S_ISREG(kind.st_mode):
-                raise unreadable("this is a folder or a device, not a file", FORMATS)
+                raise MeshFileError.of("this is a folder or a device, not a file", FORMATS)
             content = stream.read(_LARGEST_FILE + 1)
     except FileNotFoundError as error:
-        raise unreadable(f"there is no file {path}", "a path from the folder of the scene file") from error
+        raise MeshFileError.of(
+            f"there is no file {path}", "a path from the folder of the scene file"
+        ) from error
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise unreadable(f"the file cannot be read: {reason}") from error
+        raise MeshFileError.of(f"the file cannot be read: {reason}") from error
     if len(content) > _LARGEST_FILE:
-        raise unreadable("the file is too large to be checked", f"up to {_LARGEST_FILE // 2**20} MiB")
+        raise MeshFileError.of("the file is too large to be checked", f"up to {_LARGEST_FILE // 2**20} MiB")
     if not content.strip():
-        raise unreadable("the file is empty", FORMATS)
+        raise MeshFileError.of("the file is empty", FORMATS)
     return content
 
 

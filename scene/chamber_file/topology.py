@@ -55,20 +55,22 @@ class Facets:
             shared=counts > 2,
         )
 
+    def findings(self, body: Body, *, drawing_nodes: IntArray) -> Iterator[Finding]:
+        """What is wrong with how cells hang together.
 
-def topology_findings(body: Body, facets: Facets, *, drawing_nodes: IntArray) -> Iterator[Finding]:
-    """What is wrong with how cells hang together. Args: `drawing_nodes`: numbers of nodes of the drawing."""
-    yield from _repeated(body)
-    crowded = [*_same_cells(body), *_crowded_facets(body, facets)]
-    yield from crowded
-    doubled = [*_doubled_nodes(body, facets)]
-    hanging = [] if doubled else [*_hanging_nodes(body, facets)]
-    yield from (*doubled, *hanging)
-    parts = [*_several_volumes(body, facets)]
-    yield from parts
-    if not (crowded or doubled or hanging or parts):
-        yield from _pinched(body, facets)
-    yield from _unused(body, drawing_nodes)
+        Args: `drawing_nodes`: numbers of nodes of the drawing.
+        """
+        yield from _repeated(body)
+        crowded = [*_same_cells(body), *_crowded_facets(body, self)]
+        yield from crowded
+        doubled = [*_doubled_nodes(body, self)]
+        hanging = [] if doubled else [*_hanging_nodes(body, self)]
+        yield from (*doubled, *hanging)
+        parts = [*_several_volumes(body, self)]
+        yield from parts
+        if not (crowded or doubled or hanging or parts):
+            yield from _pinched(body, self)
+        yield from _unused(body, drawing_nodes)
 
 
 def _repeated(body: Body) -> Iterator[Finding]:

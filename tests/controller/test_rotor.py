@@ -11,11 +11,7 @@ import pytest
 
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.liquid_ring.quadrature import quadrature
-from ringbalance.controller.liquid_ring.reach import (
-    largest_pair_moment,
-    starting_pressure,
-    unreachable_vibration,
-)
+from ringbalance.controller.liquid_ring.reach import starting_pressure
 from ringbalance.controller.rotor import chamber_directions, chamber_letters, disc_unbalance, wrapped
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.loop_models import Rotor
@@ -105,14 +101,14 @@ def left_over(plant: LiquidRing, state: DiscState, rotor: Rotor, *, wanted: comp
         initial_amplitude=abs(wanted),
         initial_phase=cmath.phase(-wanted),
     )
-    return unreachable_vibration(plant=plant, state=state, rotor=against)
+    return plant.unreachable_vibration(state=state, rotor=against)
 
 
 @pytest.mark.parametrize("n", [4, 6, 8])
 def test_the_reach_is_the_polygon_of_full_pairs(scene: Scene, model: BalancerModel, n: int) -> None:
     state = DiscState.initial(disc=replace(scene.disc, chambers=n))
     plant = plant_of(model, n)
-    pair = largest_pair_moment(plant=plant, state=state)
+    pair = plant.largest_pair_moment(state=state)
     assert pair == pytest.approx(PER_DIFFERENCE * 0.5, rel=1e-12)
     # All pairs full towards one corner: the side of the polygon is 2 M, its corners at M/sin(pi/n).
     corner = pair / math.sin(math.pi / n) * cmath.exp(1j * (math.pi / n if n % 4 == 0 else 0.0))

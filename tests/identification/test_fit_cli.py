@@ -123,7 +123,7 @@ def test_another_law_that_the_data_prefer_is_a_failure(run: Run, monkeypatch: py
     words = (PAPER, EXAMPLES["trial_weight"])
     for laws, expected in (((), 0), ((better,), 1)):
         found = Review(criticism=Criticism(findings=()), laws=laws)
-        monkeypatch.setattr("ringbalance.identification.cli.review", lambda _, found=found: found)
+        monkeypatch.setattr(Review, "of", lambda _, found=found: found)
         code, out, _ = run(*words)
         assert code == expected
         assert ("prefer another law" in " ".join(out.split())) == bool(laws)

@@ -15,7 +15,7 @@ from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.rotor import disc_unbalance
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.predict.device import Models, device_of
+from ringbalance.identification.predict.device import Device, Models
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.physics.tube.loss import tube_loss
@@ -33,7 +33,7 @@ def predicted(scene: Scene, data: Observations) -> FloatArray:
 
 def test_the_quick_law_is_the_calibrated_one(paper_scene: Scene) -> None:
     slow = calibrated_model(paper_scene)
-    quick = device_of(paper_scene, Models.of(paper_scene)).law
+    quick = Device.of(paper_scene, Models.of(paper_scene)).law
     fills = np.linspace(0.02, 0.48, 60)
     for gas in (0.0, 0.6e6, 1.2e6):
         one, other = (

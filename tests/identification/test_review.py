@@ -13,7 +13,7 @@ from ringbalance.identification.criticism.review import LAMINAR, UNBROKEN, Revie
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.next_measurement import next_measurement, offered_rows, words_of
-from ringbalance.identification.predict.device import Models, device_of
+from ringbalance.identification.predict.device import Device, Models
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.identification.saving import save_result
@@ -91,7 +91,7 @@ def test_a_disc_with_another_law_is_found_out(
     """Data of a disc whose loss follows the velocity: the fit fails, and that law is the better one."""
     models = Models.of(paper_scene)
     velocity = float(
-        device_of(paper_scene, models).law.evaluate(fill_ratio=0.25, gas_pressure=0.7e6).velocity
+        Device.of(paper_scene, models).law.evaluate(fill_ratio=0.25, gas_pressure=0.7e6).velocity
     )
     other = replace(models, other=lambda law: power_of(law, velocity, exponent))
     data = transfers(true, other, seed=1, known=False)

@@ -35,7 +35,7 @@ from ringbalance.controller.eccentric_mass.strategy.lqr_law import (
     share_of_friction,
     voltage_for,
 )
-from ringbalance.controller.eccentric_mass.strategy.plan import Facts, Plan, first_plan
+from ringbalance.controller.eccentric_mass.strategy.plan import Facts, Plan
 from ringbalance.controller.eccentric_mass.strategy.records import (
     Beliefs,
     EccentricMeasurement,
@@ -52,6 +52,7 @@ from ringbalance.controller.eccentric_mass.strategy.supervisor import (
     FRICTION,
     IMBALANCE,
     REST,
+    first_plan,
     supervise,
 )
 from ringbalance.scene.arrays import FloatArray

@@ -18,7 +18,7 @@ from ringbalance.verification.navier_stokes.meshes import (
 )
 from ringbalance.verification.navier_stokes.newton import FlowSolution, solve_flow
 from ringbalance.verification.navier_stokes.space import taylor_hood
-from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem, flow_system
+from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem
 
 Field = Callable[[FloatArray], FloatArray]
 
@@ -122,7 +122,7 @@ def kovasznay_flow(
         Dirichlet(boundary="boundary", component=0, value=lambda x: velocity(x)[0]),
         Dirichlet(boundary="boundary", component=1, value=lambda x: velocity(x)[1]),
     ]
-    system = flow_system(space=taylor_hood(mesh=mesh), conditions=conditions, enclosed=True)
+    system = FlowSystem.of(space=taylor_hood(mesh=mesh), conditions=conditions, enclosed=True)
     return system, solve_flow(system=system, coefficients=Coefficients(viscosity=1 / reynolds))
 
 
@@ -184,7 +184,7 @@ def taylor_couette(
     walls = (("inner", inner_speed), ("outer", outer_speed))
     conditions = [Dirichlet(boundary=b, component=c, value=_spinning(w, c)) for b, w in walls for c in (0, 1)]
     space = taylor_hood(mesh=patch_mesh(patches=[ring], shape="triangle"))
-    system = flow_system(space=space, conditions=conditions, enclosed=True, stress_form=True)
+    system = FlowSystem.of(space=space, conditions=conditions, enclosed=True, stress_form=True)
     solution = solve_flow(system=system, coefficients=Coefficients(viscosity=viscosity))
     gap = outer_radius**2 - inner_radius**2
     solid = (outer_speed * outer_radius**2 - inner_speed * inner_radius**2) / gap
@@ -213,7 +213,7 @@ def cavity_flow(*, cells: int, reynolds: float, wall_ratio: float = 4.0) -> tupl
     mesh = patch_mesh(patches=[tensor_patch(x=line, y=line, sides=sides)], shape="quad")
     conditions = [Dirichlet(boundary="lid", component=0, value=1.0), Dirichlet(boundary="lid", component=1)]
     conditions += [Dirichlet(boundary="wall", component=c) for c in (0, 1)]
-    system = flow_system(space=taylor_hood(mesh=mesh), conditions=conditions, enclosed=True)
+    system = FlowSystem.of(space=taylor_hood(mesh=mesh), conditions=conditions, enclosed=True)
     solution = None
     for step in [r for r in (100.0, 400.0, 1000.0, 2000.0) if r < reynolds] + [reynolds]:
         solution = solve_flow(system=system, coefficients=Coefficients(viscosity=1 / step), start=solution)
@@ -265,7 +265,7 @@ def cylinder_flow(*, mesh: Any) -> tuple[FlowSystem, FlowSolution]:
     )
     still = [Dirichlet(boundary=b, component=c) for b in ("wall", "cylinder") for c in (0, 1)]
     conditions = [inflow, Dirichlet(boundary="inflow", component=1), *still]
-    system = flow_system(space=taylor_hood(mesh=mesh), conditions=conditions)
+    system = FlowSystem.of(space=taylor_hood(mesh=mesh), conditions=conditions)
     return system, solve_flow(system=system, coefficients=Coefficients(viscosity=1e-3))
 
 

@@ -26,7 +26,7 @@ from ringbalance.physics.results import StatusCode
 from ringbalance.verification.navier_stokes.meshes import patch_mesh, tensor_patch
 from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, solve_flow
 from ringbalance.verification.navier_stokes.space import taylor_hood
-from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem, flow_system
+from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem
 
 DATA = Path(__file__).parent / "data"
 
@@ -183,7 +183,7 @@ def test_three_components_with_coriolis_converge_at_third_order() -> None:
     for cells in (4, 8):
         conditions = [Dirichlet(boundary="wall", component=c, value=partial(_component, c)) for c in range(3)]
         space = taylor_hood(mesh=_square(cells), components=3)
-        system = flow_system(
+        system = FlowSystem.of(
             space=space,
             conditions=conditions,
             enclosed=True,
@@ -202,7 +202,7 @@ def test_three_components_with_coriolis_converge_at_third_order() -> None:
 def _random_system() -> tuple[FlowSystem, np.ndarray]:
     conditions = [Dirichlet(boundary="wall", component=c) for c in range(3)]
     space = taylor_hood(mesh=_square(2), components=3)
-    system = flow_system(space=space, conditions=conditions, enclosed=True, coriolis=CORIOLIS)
+    system = FlowSystem.of(space=space, conditions=conditions, enclosed=True, coriolis=CORIOLIS)
     return system, np.random.default_rng(0).normal(size=space.unknowns)
 
 
@@ -243,7 +243,7 @@ def test_a_flow_inside_the_space_is_exact_in_three_dimensions(kind: Any) -> None
         Dirichlet(boundary="wall", component=c, value=partial(_square_of_next, c)) for c in range(3)
     ]
     space = taylor_hood(mesh=mesh)
-    system = flow_system(space=space, conditions=conditions, enclosed=True, body_force=_solid_force)
+    system = FlowSystem.of(space=space, conditions=conditions, enclosed=True, body_force=_solid_force)
     solution = solve_flow(system=system, coefficients=Coefficients(viscosity=0.5))
     assert solution.status.ok
     at = space.node_coordinates()
@@ -256,7 +256,7 @@ def test_a_flow_inside_the_space_is_exact_in_three_dimensions(kind: Any) -> None
 def test_a_failed_solve_says_what_to_do() -> None:
     conditions = [Dirichlet(boundary="wall", component=0, value=lambda x: np.where(x[1] == 1, 1.0, 0.0))]
     conditions += [Dirichlet(boundary="wall", component=1)]
-    system = flow_system(space=taylor_hood(mesh=_square(4)), conditions=conditions, enclosed=True)
+    system = FlowSystem.of(space=taylor_hood(mesh=_square(4)), conditions=conditions, enclosed=True)
     solution = solve_flow(
         system=system, coefficients=Coefficients(viscosity=1e-5), settings=NewtonSettings(max_iterations=4)
     )
@@ -270,9 +270,9 @@ def test_bad_arguments_are_refused() -> None:
     with pytest.raises(ValueError, match="viscosity"):
         solve_flow(system=system, coefficients=Coefficients(viscosity=0.0))
     with pytest.raises(ValueError, match="no boundary 'lid'"):
-        flow_system(space=system.space, conditions=[Dirichlet(boundary="lid", component=0)])
+        FlowSystem.of(space=system.space, conditions=[Dirichlet(boundary="lid", component=0)])
     with pytest.raises(ValueError, match="coriolis"):
-        flow_system(space=system.space, conditions=[], coriolis=np.eye(2))
+        FlowSystem.of(space=system.space, conditions=[], coriolis=np.eye(2))
     other = kovasznay_flow(cells=2)[1]
     with pytest.raises(ValueError, match="start"):
         solve_flow(system=system, coefficients=Coefficients(), start=other)

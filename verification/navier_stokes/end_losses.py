@@ -26,7 +26,7 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.navier_stokes.meshes import patch_mesh, tensor_patch, with_midpoints
 from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, solve_flow
 from ringbalance.verification.navier_stokes.space import taylor_hood
-from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem, flow_system
+from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem
 
 End = Literal["entrance", "exit"]
 
@@ -79,7 +79,7 @@ class EndMesh:
         if end == "exit":
             # The jet draws liquid in through the side; left free along it, that goes unstable near Re 1950.
             conditions.append(Dirichlet(boundary="side", component=0))
-        return flow_system(space=space, conditions=conditions)
+        return FlowSystem.of(space=space, conditions=conditions)
 
 
 def _graded_line(*, length: float, longest: float, cells: EndMesh) -> FloatArray:

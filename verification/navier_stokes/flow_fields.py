@@ -25,7 +25,7 @@ from ringbalance.verification.navier_stokes.rotating_section import (
     friction_ratio,
 )
 from ringbalance.verification.navier_stokes.space import FlowSpace, taylor_hood
-from ringbalance.verification.navier_stokes.system import Dirichlet, FlowSystem, flow_system
+from ringbalance.verification.navier_stokes.system import Dirichlet, FlowSystem
 
 LARGEST_KL: Final = 1e6
 """R Re up to which the section is drawn; near it further steady flows appear."""
@@ -221,7 +221,7 @@ def _entrance_system(cells: EndMesh) -> FlowSystem:
     conditions = [Dirichlet(boundary=b, component=c, value=_sink(c)) for b in ("far", "side") for c in (0, 1)]
     conditions += [Dirichlet(boundary="wall", component=c) for c in (0, 1)]
     conditions += [Dirichlet(boundary="deep", component=1), Dirichlet(boundary="axis", component=1)]
-    return flow_system(space=space, conditions=conditions)
+    return FlowSystem.of(space=space, conditions=conditions)
 
 
 def _reservoir_pressure(space: FlowSpace, pressure: FloatArray) -> float:

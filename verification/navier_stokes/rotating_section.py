@@ -34,7 +34,7 @@ from ringbalance.verification.navier_stokes.meshes import (
 )
 from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, solve_flow
 from ringbalance.verification.navier_stokes.space import taylor_hood
-from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem, flow_system
+from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem
 
 POISEUILLE_GRADIENT = 32.0
 """G of a tube at rest: -dp/dx d^2/(mu U)."""
@@ -55,7 +55,7 @@ class _HalfSection(ABC):
         space = taylor_hood(mesh=self.mesh(), components=3)
         conditions = [Dirichlet(boundary="symmetry", component=1)]
         conditions += [Dirichlet(boundary="wall", component=c) for c in range(3)]
-        return flow_system(
+        return FlowSystem.of(
             space=space, conditions=conditions, enclosed=True, flow_component=2, coriolis=CORIOLIS
         )
 

@@ -33,7 +33,7 @@ from ringbalance.verification.navier_stokes.continuation import StepRule, follow
 from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, solve_flow
 from ringbalance.verification.navier_stokes.rotating_section import SectionMesh, developed_section
 from ringbalance.verification.navier_stokes.space import FlowSpace, taylor_hood
-from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem, flow_system
+from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem
 
 Progress = Callable[[str], None]
 _NEWTON = NewtonSettings(tolerance=1e-7, max_iterations=10)
@@ -114,7 +114,7 @@ def _system(tube: SweptTube, section: FlowSystem, developed: FlowSolution, reyno
     conditions = [Dirichlet(boundary="symmetry", component=2)]
     conditions += [Dirichlet(boundary=name, component=c) for name in ("inlet", "wall") for c in range(3)]
     space = taylor_hood(mesh=tube.mesh)
-    system = flow_system(space=space, conditions=conditions, coriolis=CORIOLIS, slab=tube.slab)
+    system = FlowSystem.of(space=space, conditions=conditions, coriolis=CORIOLIS, slab=tube.slab)
     velocity = _swept_velocity(tube, developed, reynolds)
     velocity[:, space.boundary_nodes("wall")] = 0.0
     fixed = np.concatenate([velocity.ravel(), np.zeros(space.pressure_nodes)])

@@ -30,33 +30,33 @@ class Running:
     reynolds: float
     flow_state: str
 
+    @classmethod
+    def under(cls, scene: Scene, *, head: float) -> Running:
+        """The velocity with (k(u) + 1) u^2/2 = head, by interpolation in logarithms; the head grows with u.
+
+        Args: `head`: H_A - H_C, m^2/s^2, positive.
+        Raises: ValueError: a head beyond the velocities at hand.
+        """
+        curve = tube_curve(scene)
+        heads = (curve.k.value + 1) * curve.velocity**2 / 2
+        if not heads[0] <= head <= heads[-1]:
+            raise ValueError(f"a head of {head:g} m^2/s^2 is outside the velocities of {_VELOCITIES[:2]} m/s")
+        log_u = np.log(curve.velocity)
+        at = float(np.interp(np.log(head), np.log(heads), log_u))
+        velocity = float(np.exp(at))
+        return cls(
+            velocity=velocity,
+            k=2 * head / velocity**2 - 1,
+            half_width=float(np.interp(at, log_u, curve.k.uncertainty)),
+            reynolds=float(np.exp(np.interp(at, log_u, np.log(curve.reynolds)))),
+            flow_state=str(curve.flow_state[int(np.argmin(np.abs(log_u - at)))]),
+        )
+
 
 @lru_cache(maxsize=256)
 def tube_curve(scene: Scene) -> TubeLoss:
     """k(u) of a scene's tube over all velocities that any scene may reach."""
     return tube_loss(scene, np.geomspace(*_VELOCITIES))
-
-
-def running_tube(scene: Scene, *, head: float) -> Running:
-    """The velocity with (k(u) + 1) u^2/2 = head, by interpolation in logarithms; the head grows with u.
-
-    Args: `head`: H_A - H_C, m^2/s^2, positive.
-    Raises: ValueError: a head beyond the velocities at hand.
-    """
-    curve = tube_curve(scene)
-    heads = (curve.k.value + 1) * curve.velocity**2 / 2
-    if not heads[0] <= head <= heads[-1]:
-        raise ValueError(f"a head of {head:g} m^2/s^2 is outside the velocities of {_VELOCITIES[:2]} m/s")
-    log_u = np.log(curve.velocity)
-    at = float(np.interp(np.log(head), np.log(heads), log_u))
-    velocity = float(np.exp(at))
-    return Running(
-        velocity=velocity,
-        k=2 * head / velocity**2 - 1,
-        half_width=float(np.interp(at, log_u, curve.k.uncertainty)),
-        reynolds=float(np.exp(np.interp(at, log_u, np.log(curve.reynolds)))),
-        flow_state=str(curve.flow_state[int(np.argmin(np.abs(log_u - at)))]),
-    )
 
 
 def driving_head(scene: Scene, *, share: float) -> float:

@@ -19,13 +19,7 @@ from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, Series, Table, figure
 from ringbalance.verification.loops import flow_law_of
 from ringbalance.verification.reference.fig_7 import readings
-from ringbalance.verification.reference.tube_running import (
-    Running,
-    driving_head,
-    running_tube,
-    tube_curve,
-    with_bore,
-)
+from ringbalance.verification.reference.tube_running import Running, driving_head, tube_curve, with_bore
 
 _ABOUT: Final = 0.1
 _BORES: Final = (0.5, 0.75, 1.0, 1.5, 2.0)
@@ -47,14 +41,14 @@ reference = {
 
 
 def values(scene: Scene) -> dict[str, float]:
-    own = running_tube(scene, head=driving_head(scene, share=0.5))
+    own = Running.under(scene, head=driving_head(scene, share=0.5))
     return {"k_scene": own.k, "fill_spread": _range(_over_fills(scene)).value}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    own = running_tube(scene, head=driving_head(scene, share=0.5))
+    own = Running.under(scene, head=driving_head(scene, share=0.5))
     printed, bare = readings()
-    narrow = running_tube(bare, head=driving_head(bare, share=0.5))
+    narrow = Running.under(bare, head=driving_head(bare, share=0.5))
     fills = _over_fills(scene)
     bores = [_with_bore(scene, factor) for factor in _BORES]
     differences = _differences(printed, bare)
@@ -89,7 +83,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 
 
 def _over_fills(scene: Scene) -> list[Running]:
-    return [running_tube(scene, head=driving_head(scene, share=s)) for s in np.linspace(0, 1, 11)]
+    return [Running.under(scene, head=driving_head(scene, share=s)) for s in np.linspace(0, 1, 11)]
 
 
 def _liquids() -> tuple[Liquid, ...]:
@@ -105,11 +99,11 @@ def _liquids() -> tuple[Liquid, ...]:
 
 def _with_liquid(scene: Scene, liquid: Liquid) -> Running:
     changed = dataclasses.replace(scene, liquid=liquid)
-    return running_tube(changed, head=scene.gas.pressure / liquid.density)
+    return Running.under(changed, head=scene.gas.pressure / liquid.density)
 
 
 def _with_bore(scene: Scene, factor: float) -> Running:
-    return running_tube(with_bore(scene, factor), head=scene.gas.pressure / scene.liquid.density)
+    return Running.under(with_bore(scene, factor), head=scene.gas.pressure / scene.liquid.density)
 
 
 def _range(runs: Sequence[Running]) -> Found:

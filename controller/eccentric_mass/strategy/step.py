@@ -18,6 +18,7 @@ from ringbalance.controller.eccentric_mass.estimation.friction_filter import (
     friction_step,
 )
 from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import (
+    ImbalanceEstimate,
     MassInput,
     correct,
     encoder_covariance,
@@ -26,9 +27,11 @@ from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import (
     predict,
     start_estimate,
     turned_back,
-    with_fresh_whirl,
 )
-from ringbalance.controller.eccentric_mass.estimation.imbalance_model import FilterMatrices, filter_matrices
+from ringbalance.controller.eccentric_mass.estimation.imbalance_model import (
+    FilterMatrices,
+    filter_matrices,
+)
 from ringbalance.controller.eccentric_mass.strategy.lqr_law import (
     known_torques,
     motor_torques,
@@ -171,7 +174,7 @@ def _with_sample(
     before, drift = old.place, old.pace
     if not old.running:
         start = start_estimate(told.start_position, told.start_velocity, told.start_imbalance)
-        estimate, before, drift = with_fresh_whirl(estimate, start), place, pace
+        estimate, before, drift = _with_fresh_whirl(estimate, start), place, pace
     masses = _mass_input(settings, motion, 0.5 * (before + place), 0.5 * (drift + pace))
     mass, shifted = settings.law.whirl.mass, sample.copy()
     shifted[2] += pace.real / mass
@@ -277,3 +280,14 @@ def _facts(
         deviation,
         load,
     )
+
+
+@compiled
+def _with_fresh_whirl(estimate: ImbalanceEstimate, start: ImbalanceEstimate) -> ImbalanceEstimate:
+    """Forget the whirl and keep the imbalance, after a time in which the filter's model did not hold."""
+    state, covariance = start.state.copy(), start.covariance.copy()
+    for i in range(4, 6):
+        state[i] = estimate.state[i]
+        for k in range(4, 6):
+            covariance[i, k] = estimate.covariance[i, k]
+    return ImbalanceEstimate(state, covariance)

@@ -36,7 +36,6 @@ from ringbalance.controller.eccentric_mass.strategy.lqr_law import (
     known_torques,
     motor_torques,
     share_of_friction,
-    voltage_for,
 )
 from ringbalance.controller.eccentric_mass.strategy.plan import Facts, Plan
 from ringbalance.controller.eccentric_mass.strategy.records import (
@@ -102,7 +101,7 @@ def strategy_step(
     plan = supervise(settings.gates, old, facts)
     asked = motor_torques(settings, plan, beliefs, motion, smoothed)
     if count % settings.voltage_every == 0:
-        voltage = (voltage_for(settings.law, asked[0]), voltage_for(settings.law, asked[1]))
+        voltage = (_voltage_for(settings.law, asked[0]), _voltage_for(settings.law, asked[1]))
     if plan.stage == FRICTION:
         torque = known_torques(settings.law, torque, motion, beliefs.imbalance, voltage)
     return StrategyState(count + 1, plan, smoothed, whirl, beliefs, torque, rate, voltage), voltage
@@ -116,6 +115,12 @@ def _usable(measurement: EccentricMeasurement) -> bool:
     for i in range(2):
         total += measurement.angle[i] + measurement.rate[i]
     return math.isfinite(total)
+
+
+@compiled
+def _voltage_for(law: DriveLaw, torque: float) -> float:
+    """Voltage that gives a torque, as far as the supply allows. Returns: V."""
+    return min(max(torque / law.torque_per_volt, -law.maximum_voltage), law.maximum_voltage)
 
 
 @compiled

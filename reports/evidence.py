@@ -28,7 +28,7 @@ from ringbalance.reports.pictures.imported_field import shown_field
 from ringbalance.reports.provenance import provenance, versions
 from ringbalance.reports.saved import keep_cases, kept_cases, looks_at_no_scene
 from ringbalance.reports.section import Level, Record, Work
-from ringbalance.reports.sections import collected
+from ringbalance.reports.sections import begun, collected, finished
 from ringbalance.scene import AnyScene, Scene, scene_table
 from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification import paper_numbers
@@ -65,6 +65,7 @@ def collect_evidence(
     """
     tell = progress or (lambda _: None)
     with cases_of_report(scene=scene, level=level, without=_ELSEWHERE[level], pool=pool) as judged_cases:
+        apart = begun(scene, level, pool)
         tell("pressure field")
         pressure = _pressure(scene)
         tell("calibration")
@@ -73,13 +74,13 @@ def collect_evidence(
         runs = _closed_loop(scene, calibration)
         tell("sections")
         work = Work(scene=scene, calibration=calibration, level=level)
-        sections = collected(work, last=False)
+        sections = collected(work, without=apart)
         tell("verification")
         found, kept = judged_cases(tell)
     cases = merge_saved(found, saved)
     if judged is not None:
         judged(cases)
-    sections |= collected(work, last=True)
+    sections |= finished(apart, pool, scene, level)
     # What a section measured by the clock does not reproduce.
     clocked = {name: record.pop("times") for name, record in sections.items() if "times" in record}
     return {

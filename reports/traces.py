@@ -26,7 +26,7 @@ def traced(text: str, path: str) -> str:
 
 def untraced(text: str) -> str:
     """The text alone, for a terminal."""
-    return _TRACED.sub(r"\2", text)
+    return _TRACED.sub(r"\2", text) if _OPEN in text else text
 
 
 def marked_up(value: object) -> object:

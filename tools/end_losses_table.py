@@ -28,7 +28,8 @@ from ringbalance.verification.navier_stokes.end_losses import (
     EndMesh,
     solve_end,
 )
-from ringbalance.verification.navier_stokes.newton import FlowSolution, FlowSystem, NewtonSettings
+from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings
+from ringbalance.verification.navier_stokes.system import FlowSystem
 
 ENDS: tuple[End, End] = ("entrance", "exit")
 REYNOLDS_SCALE, REYNOLDS_LIMIT = 5.0, 2000.0

@@ -273,4 +273,4 @@ def _series(names: list[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
-SECTION: Final = Section(name="fifty", title="Is k = 50 right?", collect=_collect, show=_view)
+SECTION: Final = Section(name="fifty", title="Is k = 50 right?", collect=_collect, apart=True, show=_view)

@@ -85,5 +85,5 @@ def _statuses(found: Record) -> list[str]:
 
 
 SECTION: Final = Section(
-    name="driven", title="The second balancer", collect=_collect, last=True, show=_view, always=True
+    name="driven", title="The second balancer", collect=_collect, show=_view, always=True
 )

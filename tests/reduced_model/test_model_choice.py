@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 
 from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.verification.selection_studies.choice import MARGIN, choose
-from ringbalance.verification.selection_studies.cost import CostModel
 from ringbalance.verification.selection_studies.hierarchy import (
     Fidelity,
     ModelHierarchy,
     Values,
     relative_error,
 )
+from ringbalance.verification.selection_studies.measure import CostModel
 
 COSTS = CostModel(seconds={"step": 1.0}, fitted_on="test")
 

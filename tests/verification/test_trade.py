@@ -25,10 +25,16 @@ from ringbalance.verification.selection_studies import study as trade_module
 from ringbalance.verification.selection_studies.chambers import forget_solves
 from ringbalance.verification.selection_studies.choice import choose
 from ringbalance.verification.selection_studies.choices import judge, random_scene
-from ringbalance.verification.selection_studies.cost import CostModel, committed_costs
 from ringbalance.verification.selection_studies.hierarchy import ModelHierarchy, Values
 from ringbalance.verification.selection_studies.laws import CLOSED, REGIMES, LawBook, LawModels, k_hierarchy
-from ringbalance.verification.selection_studies.measure import Clock, knee, measure, pareto_front
+from ringbalance.verification.selection_studies.measure import (
+    Clock,
+    CostModel,
+    committed_costs,
+    knee,
+    measure,
+    pareto_front,
+)
 from ringbalance.verification.selection_studies.operation import (
     courses,
     moved_mass,

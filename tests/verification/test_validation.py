@@ -24,10 +24,10 @@ from ringbalance.verification.navier_stokes.rotating_section import (
     solve_section_without_inertia,
 )
 from ringbalance.verification.validation import tube_at_rest
-from ringbalance.verification.validation.comparison import KINDS, compare
+from ringbalance.verification.validation.comparison import KINDS, compare, friction
 from ringbalance.verification.validation.kinds import measurements
 from ringbalance.verification.validation.model_bias import ModelStatistics, model_statistics
-from ringbalance.verification.validation.tube_friction import friction_points, laminar_ratio
+from ringbalance.verification.validation.tube_friction import laminar_ratio
 from ringbalance.verification.validation.wave_frequency import tank_frequency
 
 _DATA = files("ringbalance.verification.validation") / "data"
@@ -100,14 +100,16 @@ def test_the_interval_of_the_bias_covers_when_rigs_differ() -> None:
 
 
 def test_points_come_in_ascending_order_with_their_walls() -> None:
-    points = friction_points("nikuradse_1933", "mckeon_2004")
-    assert np.all(np.diff(points.reynolds) >= 0)
-    smooth = points.relative_roughness == 0
-    assert smooth.sum() == len(measurements("mckeon_2004"))
-    rough = points.predicted()
-    plain = replace(points, relative_roughness=np.zeros_like(points.reynolds)).predicted()
-    assert np.array_equal(rough[smooth], plain[smooth])
-    assert np.all(rough[~smooth] > plain[~smooth])
+    rough = measurements("nikuradse_1933")
+    smooth = replace(rough, columns={**rough.columns, "relative_roughness": np.zeros(len(rough))})
+    points, plain = friction(rough), friction(smooth)
+    assert np.all(np.diff(points.columns["reynolds"]) >= 0)
+    assert np.all(points.predicted > plain.predicted)
+    both = friction(rough, measurements("mckeon_2004"))
+    assert np.all(np.diff(both.columns["reynolds"]) >= 0)
+    of_rough = np.isin(both.series, rough.series)
+    assert np.array_equal(both.predicted[of_rough], points.predicted)
+    assert set(both.columns) == {"friction_factor", "reynolds"}
 
 
 def test_laminar_friction_of_ducts_against_finite_elements() -> None:
@@ -130,13 +132,13 @@ def test_the_budget_of_k_holds_bias_and_scatter_of_turbulent_friction(paper_scen
 def test_measured_friction_drifts_from_the_correlation_as_its_error_is_taken_to() -> None:
     """`with_errors` has a slope of U/1.96 per e-fold of Re: that of series of smooth tubes, turbulent and
     over at least a factor of two, is within a factor of two of it (root mean square)."""
-    points = friction_points("mckeon_2004", "stanton_pannell_1914", "senecal_1951")
-    points = points.where((points.reynolds > 6000) & (points.reynolds < 1e5))
-    apart = points.friction / points.predicted() - 1
-    stated = points.stated() / points.predicted() / NORMAL_95
+    points = friction(*map(measurements, ("mckeon_2004", "stanton_pannell_1914", "senecal_1951")))
+    points = points.where((points.columns["reynolds"] > 6000) & (points.columns["reynolds"] < 1e5))
+    apart = points.measured / points.predicted - 1
+    stated = points.stated / points.predicted / NORMAL_95
     slopes = []
     for series in np.unique(points.series):
-        log_re = np.log(points.reynolds[mine := points.series == series])
+        log_re = np.log(points.columns["reynolds"][mine := points.series == series])
         if np.count_nonzero(mine) >= 6 and np.ptp(log_re) > math.log(2):
             slopes.append(np.polyfit(log_re, apart[mine], 1)[0] / np.mean(stated[mine]))
     assert len(slopes) >= 6

@@ -32,16 +32,9 @@ from ringbalance.verification.navier_stokes.meshes import (
     tensor_patch,
     with_midpoints,
 )
-from ringbalance.verification.navier_stokes.newton import (
-    Coefficients,
-    Dirichlet,
-    FlowSolution,
-    FlowSystem,
-    NewtonSettings,
-    flow_system,
-    solve_flow,
-)
+from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, solve_flow
 from ringbalance.verification.navier_stokes.space import taylor_hood
+from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem, flow_system
 
 POISEUILLE_GRADIENT = 32.0
 """G of a tube at rest: -dp/dx d^2/(mu U)."""

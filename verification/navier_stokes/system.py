@@ -19,9 +19,7 @@ from scipy import sparse
 
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.verification.navier_stokes.linear import layers_of
-from ringbalance.verification.navier_stokes.space import (
-    FlowSpace,
-)
+from ringbalance.verification.navier_stokes.space import FlowSpace
 
 
 @dataclass(frozen=True, kw_only=True)

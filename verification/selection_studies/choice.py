@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from ringbalance.reduced_model.contribution import NEGLIGIBLE, Contribution
-from ringbalance.verification.selection_studies.cost import CostModel, committed_costs
 from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy, Values
+from ringbalance.verification.selection_studies.measure import CostModel, committed_costs
 
 TOLERANCES: Final = (0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 """At which choices are shown and judged; none is made outside of their range."""

@@ -14,8 +14,8 @@ from ringbalance.mesh.geometry import surface_radius
 from ringbalance.scene.models import Bend, Disc, Scene
 from ringbalance.verification.evidence import Evidence, Level, Table, as_found
 from ringbalance.verification.selection_studies.choice import TOLERANCES, choose
-from ringbalance.verification.selection_studies.cost import committed_costs
 from ringbalance.verification.selection_studies.hierarchy import Values
+from ringbalance.verification.selection_studies.measure import committed_costs
 from ringbalance.verification.selection_studies.study import hierarchies_of
 
 _FEW: Final = 12

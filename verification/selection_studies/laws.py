@@ -177,11 +177,9 @@ class LawBook:
     ) -> Fidelity:
         """Models of what a law decides on; `course`: of what it decides over time."""
         way = course or Course()
-        short = [
-            models.loss,
-            models.level,
-            *(["hump" if models.regimes == REGIMES else "no hump"] * self._crest),
-        ]
+        short = [models.loss, models.level]
+        if self._crest:
+            short.append("hump" if models.regimes == REGIMES else "no hump")
         parts = {
             "level of a chamber": models.level,
             "loss of the tube": models.loss,

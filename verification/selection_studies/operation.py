@@ -83,7 +83,7 @@ def _law(book: LawBook, law: LawModels, course: Course) -> CompleteLaw:
     return paper_law(book.scene) if course.name == _CLOSED_FORM else book.law(law)
 
 
-def gas_times(scene: Scene) -> tuple[float, float]:
+def _gas_times(scene: Scene) -> tuple[float, float]:
     """Valve-open times of an injection at which it is judged: the shortest that matters and the first, s."""
     low, high = sorted((injection_time(scene), first_gas_time(scene)))
     return low, high
@@ -91,7 +91,7 @@ def gas_times(scene: Scene) -> tuple[float, float]:
 
 def _operation_contributions(scene: Scene) -> Mapping[str, Contribution]:
     """What the ways through time leave out, and what their laws do, relative to the mass moved."""
-    change = _velocity_change(scene, max(gas_times(scene)))
+    change = _velocity_change(scene, max(_gas_times(scene)))
     segments = {
         name: Contribution(
             term=name,
@@ -116,7 +116,7 @@ def _velocity_change(scene: Scene, duration: float) -> float:
 
 def mass_hierarchy(book: LawBook) -> ModelHierarchy:
     """Models of the mass that one injection moves, from equal fills and an empty tube, after its wait."""
-    times = gas_times(book.scene)
+    times = _gas_times(book.scene)
 
     def solve(point: int, *, law: LawModels, course: Course) -> FloatArray:
         made = _law(book, law, course)

@@ -16,7 +16,6 @@ from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.selection_studies.chambers import chamber_hierarchies
 from ringbalance.verification.selection_studies.choice import TOLERANCES, Choice, choose
-from ringbalance.verification.selection_studies.cost import CostModel, committed_costs, fitted_costs
 from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy, Values, Work
 from ringbalance.verification.selection_studies.laws import (
     QUADRATURE,
@@ -24,7 +23,15 @@ from ringbalance.verification.selection_studies.laws import (
     k_hierarchy,
     velocity_hierarchy,
 )
-from ringbalance.verification.selection_studies.measure import Clock, Measured, Trade, measure
+from ringbalance.verification.selection_studies.measure import (
+    Clock,
+    CostModel,
+    Measured,
+    Trade,
+    committed_costs,
+    fitted_costs,
+    measure,
+)
 from ringbalance.verification.selection_studies.operation import EXPLICIT, mass_hierarchy, settling_hierarchy
 from ringbalance.verification.selection_studies.scene_numbers import scene_numbers
 

@@ -23,12 +23,7 @@ from ringbalance.verification.paper_numbers import (
     rounded_radius,
     with_plate,
 )
-from ringbalance.verification.rings import (
-    chamber_moment,
-    found_of,
-    mesh_table,
-    ring_of,
-)
+from ringbalance.verification.rings import chamber_moment, found_of, mesh_table, ring_of
 
 _FILLS: Final = (0.1, 0.2, 0.3, 0.4, 0.5)
 _WHOLE_ANGLE: Final = float(np.sqrt(2))

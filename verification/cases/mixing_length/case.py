@@ -16,7 +16,8 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Level, Series, as_found, figure
 from ringbalance.verification.reference.mixing_length import MixingLength, mixing_length, mixing_length_flow
-from ringbalance.verification.validation.tube_friction import friction_points
+from ringbalance.verification.validation.comparison import friction
+from ringbalance.verification.validation.kinds import measurements
 
 Friction = Callable[[FloatArray, FloatArray], FloatArray]
 
@@ -52,15 +53,16 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         )
         return np.array([flow.friction_factor for flow in flows])
 
-    sand = friction_points("nikuradse_1933").where(slice(None, None, _SAND[level]))
-    every = friction_points("mckeon_2004")
-    smooth = every.where(every.reynolds >= _HIGH).where(slice(None, None, -_SMOOTH[level]))
+    sand = friction(measurements("nikuradse_1933")).where(slice(None, None, _SAND[level]))
+    reynolds, rough = (sand.columns[name] for name in ("reynolds", "relative_roughness"))
+    every = friction(measurements("mckeon_2004"))
+    smooth = every.where(every.columns["reynolds"] >= _HIGH).where(slice(None, None, -_SMOOTH[level]))
     even = np.array(_LOW + _EVEN[level])
     apart = by_length(even, np.zeros_like(even)) / friction_factor(reynolds=even, relative_roughness=0.0) - 1
-    measured = by_length(smooth.reynolds, smooth.relative_roughness) / smooth.friction - 1
-    wall = by_length(sand.reynolds, sand.relative_roughness) / sand.friction - 1
-    formula = sand.predicted() / sand.friction - 1
-    grain = sand.reynolds * np.sqrt(sand.friction / 8) * sand.relative_roughness
+    measured = by_length(smooth.columns["reynolds"], np.zeros(smooth.measured.size)) / smooth.measured - 1
+    wall = by_length(reynolds, rough) / sand.measured - 1
+    formula = sand.predicted / sand.measured - 1
+    grain = reynolds * np.sqrt(sand.measured / 8) * rough
     between = (grain > _BETWEEN[0]) & (grain < _BETWEEN[1])
     return Evidence(
         found=as_found(
@@ -73,7 +75,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "measured": float(np.max(np.abs(measured))),
             "formula_between": float(np.mean(formula[between])),
             "formula_worst": float(np.max(formula[between])),
-            "bar": float(np.max((sand.stated() / sand.friction)[between])),
+            "bar": float(np.max((sand.stated / sand.measured)[between])),
             "rough": float(np.max(np.abs(wall[grain > _FULLY_ROUGH]))),
             "formula_rough": float(np.max(np.abs(formula[grain > _FULLY_ROUGH]))),
         },
@@ -98,15 +100,15 @@ def _quadrature_gap(closure: MixingLength) -> float:
 
 def _figure(by_length: Friction) -> Series:
     """One sand over Re, where formula and measurements part."""
-    sand = friction_points("nikuradse_1933")
-    shown = sand.where(np.isclose(sand.relative_roughness, 0.5 / _SHOWN)).where(slice(None, None, 8))
-    reynolds, roughness = shown.reynolds, shown.relative_roughness
-    formula = shown.predicted()
+    sand = friction(measurements("nikuradse_1933"))
+    wall = np.isclose(sand.columns["relative_roughness"], 0.5 / _SHOWN)
+    shown = sand.where(wall).where(slice(None, None, 8))
+    reynolds, roughness = (shown.columns[name] for name in ("reynolds", "relative_roughness"))
     return figure(
         f"friction factor on sand of R/ks = {_SHOWN:.0f}",
         ("Reynolds number", "1", reynolds),
-        Curve("formula", "1", formula, uncertainty=shown.stated()),
+        Curve("formula", "1", shown.predicted, uncertainty=shown.stated),
         Curve("mixing length", "1", by_length(reynolds, roughness), style="paper"),
-        Curve("Nikuradse (1933)", "1", shown.friction, style="reference"),
+        Curve("Nikuradse (1933)", "1", shown.measured, style="reference"),
         log=True,
     )

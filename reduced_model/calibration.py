@@ -20,7 +20,7 @@ from ringbalance.reduced_model.gas_line import LineAnswer, line_answers
 from ringbalance.reduced_model.law.building import calibrated_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.loading import load_law
-from ringbalance.reduced_model.law.model import BalancerModel, balancer_model
+from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_law, paper_model
 from ringbalance.reduced_model.operating.point import OperatingPoint
 from ringbalance.reduced_model.operating.residual import ResidualLiquid
@@ -78,7 +78,7 @@ class Calibration:
     @property
     def model(self) -> BalancerModel:
         """The balancer as the closed loop takes it."""
-        return balancer_model(self.flow_law)
+        return BalancerModel.of(self.flow_law)
 
     def lambda_over_fill(self, *, fill_ratio: FloatArray) -> FloatArray:
         """lambda(x) per transferred mass, [U(x) - U(x_max - x)]/(rho V (x - x_max/2)).
@@ -128,7 +128,7 @@ def calibrate(scene: AnyScene) -> Calibration:
         operating_point=point,
         residual=ResidualLiquid.of(scene, law=law),
         tube_liquid=TubeLiquid.of(scene, law=law),
-        gas_line=line_answers(scene, balancer_model(law)),
+        gas_line=line_answers(scene, BalancerModel.of(law)),
         instability=AsynchronousInstability.of(scene),
         models_used=models_used(scene),
         identifiability=IDENTIFIABILITY,
@@ -150,7 +150,7 @@ def calibrated_model(scene: Scene) -> BalancerModel:
 
     Raises: SceneError, ValueError: as `calibrate`.
     """
-    return balancer_model(chamber_and_law(with_tube_models(scene))[1])
+    return BalancerModel.of(chamber_and_law(with_tube_models(scene))[1])
 
 
 def law_by_name(scene: Scene, law: str) -> BalancerModel:
@@ -160,7 +160,7 @@ def law_by_name(scene: Scene, law: str) -> BalancerModel:
     """
     if law == "calibrated":
         return calibrated_model(scene)
-    return paper_model(scene) if law == "paper" else balancer_model(load_law(Path(law)))
+    return paper_model(scene) if law == "paper" else BalancerModel.of(load_law(Path(law)))
 
 
 def chamber_and_law(scene: Scene) -> tuple[ChamberCalibration, CalibratedLaw]:

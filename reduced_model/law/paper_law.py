@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.law.flow_law import Conditions, Flow, Regime
-from ringbalance.reduced_model.law.model import BalancerModel, balancer_model
+from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.storage import save_record
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
@@ -163,4 +163,4 @@ def paper_model(scene: Scene) -> BalancerModel:
 
     Source: sections 3 and 5 of the liquid-ring paper.
     """
-    return balancer_model(paper_law(scene))
+    return BalancerModel.of(paper_law(scene))

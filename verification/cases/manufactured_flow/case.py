@@ -21,7 +21,7 @@ from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level
 from ringbalance.verification.navier_stokes.newton import FlowSolution, solve_flow
 from ringbalance.verification.navier_stokes.rotating_section import CORIOLIS, SectionMesh
-from ringbalance.verification.navier_stokes.space import FlowSpace, taylor_hood
+from ringbalance.verification.navier_stokes.space import FlowSpace
 from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem
 from ringbalance.verification.orders import OrderStudy, order_figure, orders_found
 
@@ -129,7 +129,7 @@ def _spoiled(defect: str | None) -> Coefficients:
 def _solve(around: int, coefficients: Coefficients) -> tuple[FlowSpace, FlowSolution]:
     across = max(1, round(_ACROSS * around))
     cells = SectionMesh(around=around, across=across, wall_ratio=_WALL_RATIO)
-    space = taylor_hood(mesh=cells.mesh(), components=3)
+    space = FlowSpace.taylor_hood(mesh=cells.mesh(), components=3)
     conditions = [
         Dirichlet(boundary=name, component=c, value=partial(_component, c))
         for name in ("symmetry", "wall")
